@@ -17,7 +17,6 @@ from warpspace.app.browser.html import (
     number,
     rows,
     signed,
-    slider,
     switch,
     tag,
     text_box,
@@ -27,8 +26,9 @@ from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, PRESENT, SHOWN, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
-from warpspace.app.state.tree import leaves, put, spell, value
+from warpspace.app.state.tree import leaves, put, spell
 from warpspace.app.tasks.conventions import with_travel
+from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.parts import Part
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
@@ -41,25 +41,6 @@ SWITCHES = (
     "look.worst", "look.arrows", "look.isolines", "shown.grid_lines", "shown.ghost", "shown.axes",
     "shown.traces", "look.bars", "shown.dark",
 )  # fmt: skip
-
-
-def setting(state: AppState, path: str, *, shown: str = "", bar: bool = False) -> Markup:
-    """Give the control of a leaf of the state: a switch, a list, or a box, with a slider or not."""
-    leaf, at, name = leaves(state)[path], value(state, path), f"state:set.{path}"
-    if leaf.kind == "switch":
-        return switch(name, leaf.label, on=bool(at), hint=leaf.hint)
-    if leaf.kind == "choice":
-        return field(leaf.label, choice(name, str(at), leaf.choices), name, leaf.unit, leaf.hint)
-    if leaf.kind != "number":
-        return field(leaf.label, text_box(name, spell(state, path)), name, leaf.unit, leaf.hint)
-    shown = shown or f"{at:.6g}"
-    control = text_box(name, shown, size="short", inputmode="decimal")
-    if bar and leaf.span is not None:
-        span, words = leaf.span, f"{shown} {leaf.unit}"
-        control = slider(name, at, span.low, span.high, span.step, label=leaf.label, twin=name,
-                         text=words) + control  # fmt: skip
-    label = path.rpartition(".")[2] if bar else leaf.label
-    return field(label, control, name, leaf.unit, leaf.hint)
 
 
 def _picks(do: str, words: Mapping[str, object], chosen: str, prefix: str = "") -> Markup:

@@ -34,7 +34,7 @@ from warpspace.app.state.leaf import Identity
 from warpspace.app.state.typed_numbers import read_costs, spell_typed
 from warpspace.app.tasks.analysis import AnalysisPart, Answer, Question
 from warpspace.app.tasks.charts import histogram_html
-from warpspace.app.tasks.forms import leaf_field
+from warpspace.app.tasks.forms import setting
 from warpspace.exceptions import WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -186,7 +186,7 @@ class TolerancesPart(AnalysisPart):
 
 
 def _controls(state: AppState, *names: str) -> Markup:
-    return join(leaf_field(state, f"specification.{name}") for name in names)
+    return join(setting(state, f"specification.{name}") for name in names)
 
 
 def _row(state: AppState, key: str, share: float, longest: float) -> Markup:

@@ -1,13 +1,13 @@
-"""Forms out of analyses: one control an option, with unit, range and help."""
+"""Controls with unit, range and help: of the options of an analysis, of leaves of the state."""
 
 from collections.abc import Mapping, Sequence
 
 from markupsafe import Markup
 
 from warpspace.analysis.options import Option
-from warpspace.app.browser.html import choice, field, join, switch, text_box
+from warpspace.app.browser.html import choice, field, join, slider, switch, text_box
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.tree import leaves, value
+from warpspace.app.state.tree import leaves, spell, value
 from warpspace.scene.model import Scene
 
 OWN = ""  # what stands for an option that is left to the analysis
@@ -45,13 +45,19 @@ def _control(name: str, one: Option, given: str | None, scene: Scene) -> Markup:
     return field(one.label, control, name, one.unit, hint)
 
 
-def leaf_field(state: AppState, path: str) -> Markup:
-    """Give the control of a number, text or choice of the state, which sets it by itself."""
-    leaf, held, name = leaves(state)[path], value(state, path), f"state:set.{path}"
-    if leaf.choices:
-        control = choice(name, str(held), leaf.choices)
+def setting(state: AppState, path: str, *, shown: str = "", bar: bool = False) -> Markup:
+    """Give the control of a leaf of the state: a switch, a list, or a box, with a slider or not."""
+    leaf, at, name = leaves(state)[path], value(state, path), f"state:set.{path}"
+    if leaf.kind == "switch":
+        return switch(name, leaf.label, on=bool(at), hint=leaf.hint)
+    label, control = leaf.label, text_box(name, spell(state, path))
+    if leaf.kind == "choice":
+        control = choice(name, str(at), leaf.choices)
     elif leaf.kind == "number":
-        control = text_box(name, f"{held:g}", size="short", inputmode="decimal")
-    else:
-        control = text_box(name, held)
-    return field(leaf.label, control, name, leaf.unit, leaf.hint)
+        shown = shown or f"{at:.6g}"
+        control = text_box(name, shown, size="short", inputmode="decimal")
+        if bar and leaf.span is not None:
+            span, label = leaf.span, path.rpartition(".")[2]
+            control = slider(name, at, span.low, span.high, span.step, label=leaf.label, twin=name,
+                             text=f"{shown} {leaf.unit}") + control  # fmt: skip
+    return field(label, control, name, leaf.unit, leaf.hint)

@@ -16,7 +16,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves, put, toggled
 from warpspace.app.tasks.charts import block_html
-from warpspace.app.tasks.controls import setting
+from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.parts import Section
 from warpspace.bodies.own_meshes import check_meshes
 from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines
