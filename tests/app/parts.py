@@ -14,6 +14,9 @@ LIVE = LiveModel()
 class Nobody(SimpleNamespace):
     """The context of a page that is not there."""
 
+    def __init__(self, **given: Any) -> None:
+        super().__init__(jobs=set(), **given)
+
     def __getattr__(self, name: str) -> Any:  # the state is that of its store, unless one is set
         if name == "state":
             return self.store.state
@@ -41,7 +44,7 @@ def part_of(kind: Any, name: str) -> Any:
     return kind(Nobody(
         act=lambda do: do(), renew=lambda _: None, post=posted.append, posted=posted, told=told,
         notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
-        page=SimpleNamespace(is_open=True), scenes={}, services=Services(),
+        scenes={}, services=Services(),
     ), entry)  # fmt: skip
 
 

@@ -5,7 +5,6 @@ import threading
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import pytest
 
@@ -20,8 +19,10 @@ from warpspace.app.server import session
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
+from warpspace.app.tasks import jobs
 from warpspace.app.tasks.errors import used_keys
 from warpspace.app.tasks.jobs import Jobs
+from warpspace.exceptions import WarpspaceError
 from warpspace.scene.library import load_scene
 
 FIRST = load_scene("dvf5000_first")
@@ -166,50 +167,59 @@ class Watcher:
     """Collects what jobs show and report."""
 
     def __init__(self):
-        self.bars, self.failures, self.failed = [], [], threading.Event()
-        context = Nobody(act=lambda do: do(), page=SimpleNamespace(is_open=True))
-        self.jobs = Jobs(context, "part", self._again, self._fail)
+        self.bars, self.failures, self.ended = [], [], threading.Event()
+        self.jobs = Jobs(Nobody(act=lambda do: do()), "part", self._again, self.failures.append)
 
     def _again(self):
         self.bars.append(str(self.jobs.html()))
-
-    def _fail(self, _, error):
-        self.failures.append(error)
-        self.failed.set()
+        if not self.jobs.busy:
+            self.ended.set()
 
 
-def test_one_job_at_a_time_and_progress_never_claims_to_be_done():
+def test_one_job_at_a_time_says_how_far_it_is(monkeypatch):
+    monkeypatch.setattr(jobs, "TICK_S", -1.0)
     watcher, go = Watcher(), threading.Event()
-    assert watcher.jobs.start("one", lambda _: go.wait(10) and None, 0.2)
-    assert not watcher.jobs.start("two", lambda _: None, 0.2)
-    time.sleep(0.6)
-    assert watcher.jobs.busy
+
+    def work(job):
+        for share in (0.25, 0.5):
+            job.tell(share)
+        go.wait(10)
+
+    assert watcher.jobs.start("one", work)
+    assert not watcher.jobs.start("two", work)
     go.set()
-    while watcher.bars[-1]:
-        time.sleep(0.01)
-    assert watcher.failures == []
-    percents = [int(re.search(r"one: (\d+) %", bar)[1]) for bar in watcher.bars[:-1]]
-    assert percents == sorted(percents)
-    assert max(percents) < 100
-    assert not watcher.jobs.busy
+    assert watcher.ended.wait(20)
+    assert not watcher.failures
+    said = [found[1] for bar in watcher.bars if (found := re.search("<span>(.*?)</span>", bar))]
+    assert {"one: 25 %", "one: 50 %"} <= set(said)
+    assert watcher.bars[-1] == ""
 
 
 def test_cancelling_frees_the_place_at_once_and_what_a_job_raises_is_handed_over():
-    watcher, go = Watcher(), threading.Event()
-    watcher.jobs.start("slow", lambda _: go.wait(10) and None, 1.0)
+    watcher, told, go = Watcher(), threading.Event(), threading.Event()
+
+    def slow(job):
+        go.wait(10)
+        with pytest.raises(CancelledError):
+            job.tell(0.5)
+        told.set()
+        raise RuntimeError("too late")
+
+    watcher.jobs.start("slow", slow)
     watcher.jobs.cancel()
-    assert watcher.failed.wait(20)
-    assert isinstance(watcher.failures[0], CancelledError)
     assert not watcher.jobs.busy
     go.set()
+    assert told.wait(20)
 
     def work(_):
-        raise RuntimeError("broken")
+        raise WarpspaceError("broken")
 
-    watcher = Watcher()
-    watcher.jobs.start("bad", work, 1.0)
-    assert watcher.failed.wait(20)
-    assert str(watcher.failures[0]) == "broken"
+    watcher.ended.clear()
+    watcher.jobs.start("bad", work)
+    assert watcher.ended.wait(20)
+    while not watcher.failures:
+        time.sleep(0.01)
+    assert [str(error) for error in watcher.failures] == ["broken"]
 
 
 def test_what_is_made_for_a_page_that_has_gone_is_given_up():

@@ -22,7 +22,7 @@ from warpspace.app.tasks.top import (
     TopPart,
     key_events,
 )
-from warpspace.exceptions import SceneError
+from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()
@@ -39,18 +39,24 @@ class Window:
         self.said, self.sent, self.saved, self.called = [], [], [], []
         self.store = StateStore(state)
         self.context = Nobody(
-            act=lambda do: do(), renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
+            act=self._act, renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
             notify=lambda *words: self.said.append(words), services=services or Services(),
             send=lambda *event: self.sent.append(event), reported=[],
             save_file=lambda *file: self.saved.append(file),
             scenes=SceneList({FIRST.title: FIRST, SECOND.title: SECOND}),
             page=SimpleNamespace(
-                is_open=True, tell=lambda **_: None, call=lambda *what: self.called.append(what)
+                report=None, tell=lambda **_: None, call=lambda *what: self.called.append(what)
             ),
             camera=SimpleNamespace(remember=lambda: None), fit_view=lambda: None,
             client=SimpleNamespace(flush=lambda: None), closed=lambda: None,
         )  # fmt: skip
         self.part = kind(self.context)
+
+    def _act(self, action):
+        try:
+            action()
+        except WarpspaceError as error:  # as the session says it
+            self.said.append(("", str(error)))
 
     def do(self, word, value=""):
         self.store.apply(lambda state: self.part.take(state, word, value))

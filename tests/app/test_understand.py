@@ -26,7 +26,7 @@ NUMBER = r"[+−]?\d+\.\d"
 def context():
     return SimpleNamespace(
         act=lambda do: do(), renew=lambda _: None, notify=lambda *_: None, shown=None,
-        page=SimpleNamespace(is_open=True), store=SimpleNamespace(state=STATE),
+        jobs=set(), store=SimpleNamespace(state=STATE),
     )  # fmt: skip
 
 

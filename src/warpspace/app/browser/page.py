@@ -77,7 +77,8 @@ class Page:
 
     def report(self, error: Exception) -> None:
         """Tell the user of this tab what went wrong."""
-        self.notify("That did not work", error_words(error), "problem")
+        title = "Not done" if isinstance(error, WarpspaceError) else "That did not work"
+        self.notify(title, error_words(error), "problem")
 
 
 @cache

@@ -42,6 +42,7 @@ from warpspace.app.viewport.box import BoxLayer
 from warpspace.app.viewport.camera import focus
 from warpspace.app.viewport.moving import MovingLayer
 from warpspace.app.viewport.shapes import SCENE_PER_MM
+from warpspace.exceptions import WarpspaceError
 
 logger = logging.getLogger(__name__)
 TAB = "tab"  # events of the page itself begin with it
@@ -136,6 +137,8 @@ class Session:
     def stop(self) -> None:
         """End the worker; nothing is sent any more."""
         self._stopped.set()
+        for job in tuple(self.context.jobs):
+            job.set()
         self.context.wake()
         self.context.store.unsubscribe(self.context.changed)
 
@@ -188,7 +191,8 @@ class Session:
         except Exception as error:
             if self._stopped.is_set() or not self.context.page.is_open:
                 return  # nobody is there to be told, and its widgets are gone
-            logger.exception("session %d", self._client.client_id)
+            if not isinstance(error, WarpspaceError):
+                logger.exception("session %d", self._client.client_id)
             self.context.page.report(error)
 
     def _build(self) -> None:

@@ -23,7 +23,6 @@ from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
-from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.cache import taken_turn
 from warpspace.app.evaluation.compare import with_applied, with_proposal
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -210,7 +209,7 @@ class AnalysisPart(Section):
             parts.append(tag("div", said, class_="ws-result" + (" stale" if faded else "")))
             parts += [tag("p", words, class_="ws-doubt") for words in found.doubts()]
             parts.append(self.actions(found, stale=stale))
-        bar = self._jobs.html()
+        bar = EMPTY if answer is not None and is_quick else self._jobs.html()
         wanted = answer is None or problem or (stale and not is_quick)
         if wanted and is_ready and not bar:
             words = f"{self.run_words} again" if answer else self.run_words
@@ -281,29 +280,21 @@ class AnalysisPart(Section):
         try:
             asked = self.ask(state, self.values(state), scenes)
         except WarpspaceError as error:
-            self._fail(self.title, error)
+            self._fail(error)
             return
 
         def answer(job: Job) -> Answer:
-            def watch(share: float) -> None:
-                job.share = share
-                if job.is_set():
-                    raise CancelledError(f"{self.title}: cancelled")
-
-            with taken_turn(lambda: watch(job.share)):
+            with taken_turn(lambda: job.tell(job.share)):
                 started = time.monotonic()
-                found = asked.run_all(scenes, watch)
+                found = asked.run_all(scenes, job.tell)
                 took_s = time.monotonic() - started
                 return Answer(
                     question, found, make_cards(state, scenes[0], found.changes()), took_s
                 )
 
-        took_s = self._answer.took_s if self._answer else 1.0
-        self._make(self.kind.doing, took_s, answer, self._take_answer)
+        self._make(self.kind.doing, answer, self._take_answer)
 
-    def _make(
-        self, words: str, usual_s: float, make: Callable[[Job], T], take: Callable[[T], None]
-    ) -> None:
+    def _make(self, words: str, make: Callable[[Job], T], take: Callable[[T], None]) -> None:
         """Make something beside the session, which then takes it."""
 
         def work(job: Job) -> None:
@@ -311,16 +302,13 @@ class AnalysisPart(Section):
             if not job.is_set():
                 self.context.act(partial(take, made))
 
-        quiet_s = QUICK_S if usual_s < QUICK_S else 0.0
-        self._jobs.start(words, work, max(usual_s, 1.0), quiet_s)
+        self._jobs.start(words, work)
 
     def _take_answer(self, answer: Answer) -> None:
         self._answer, self._problem = answer, None
         self._again()
 
-    def _fail(self, _name: str, error: Exception) -> None:
-        if isinstance(error, CancelledError):
-            return
+    def _fail(self, error: Exception) -> None:
         words = error_words(error)
         if isinstance(error, OptionError):
             labels = {one.name: one.label for one in self.kind.options()}

@@ -49,6 +49,7 @@ class Context:
         self.next_click: Callable[[Picked], None] | None = None
         self.renew: Callable[[Part], None] = lambda _: None  # write a part anew, at once
         self.closed: Callable[[], None] = lambda: None  # the page has closed its window by itself
+        self.jobs: set[threading.Event] = set()  # work that goes on; set when the page has gone
         self.reported: list[tuple[str, Result]] = []  # what is to stand in the report
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
         self.changed_at = time.monotonic()

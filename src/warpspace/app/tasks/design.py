@@ -268,7 +268,6 @@ def tolerance_shares(ensemble: "Ensemble", tolerances: ToleranceSet) -> dict[str
 # --- Concepts -------------------------------------------------------------------------------------
 
 PRESENT = "present"  # the machine that is steered, among those that are compared
-DRAWING_S = 8.0  # how long a sheet usually takes
 ADD = "Compare with …"
 
 
@@ -371,7 +370,7 @@ class ConceptsPart(AnalysisPart):
         asked: Any = found.found
         scenes, dark = tuple(self.scenes(state)), state.shown.dark
         self._make(
-            "Drawing the machines", DRAWING_S,
+            "Drawing the machines",
             lambda job: draw(scenes, asked.asked, dark, job),
             partial(self.context.save_file, "concepts.png"),
         )  # fmt: skip

@@ -11,7 +11,6 @@ from markupsafe import Markup
 from warpspace.analysis.description import Result
 from warpspace.app.browser.html import button, choice, field, join, tag, text_box
 from warpspace.app.browser.incoming import index_of
-from warpspace.app.browser.page import error_words
 from warpspace.app.documents import scene_file
 from warpspace.app.documents.files import (
     exported_words,
@@ -24,7 +23,6 @@ from warpspace.app.documents.files import (
     unpack,
     upload_text,
 )
-from warpspace.app.documents.services import CancelledError
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
@@ -33,10 +31,9 @@ from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.window import Window, actions
 from warpspace.app.viewport.camera import CameraMemory
-from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
 
-FIGURE_S, VIEW_S, EXPORT_S, REPORT_S = 5.0, 4.0, 1.0, 12.0  # what a file usually takes
 LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
@@ -55,14 +52,14 @@ class JobWindow(Window):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._jobs = Jobs(context, self.name, lambda: context.renew(self), self._failed)
+        again = partial(context.renew, self)
+        self._jobs = Jobs(context, self.name, again, context.page.report)
         self.said: dict[str, str] = dict.fromkeys(("figure", "author", "questions"), "")
 
     def make(
         self,
         name: str,
         ending: str,
-        usual_s: float,
         write: Callable[[LivePicture, Job], bytes],
         *,
         as_drawn: bool = False,
@@ -78,7 +75,7 @@ class JobWindow(Window):
             if not job.is_set():
                 self.context.save_file(f"{file_stem(picture)}{ending}", content)
 
-        if not self._jobs.start(name, work, usual_s):
+        if not self._jobs.start(name, work):
             self.context.notify(
                 "One file at a time", "Wait for the other one, or cancel it", "warning"
             )
@@ -90,12 +87,6 @@ class JobWindow(Window):
             self.said[word[4:]] = value[:LONGEST]
             self.context.act(partial(self.context.renew, self))
         return state
-
-    def _failed(self, name: str, error: Exception) -> None:
-        if isinstance(error, CancelledError):
-            self.context.notify(str(error))
-        else:
-            self.context.notify(f"{name}: not done", error_words(error), "problem")
 
 
 class FilesWindow(JobWindow):
@@ -148,14 +139,8 @@ class FilesWindow(JobWindow):
             "export": partial(self._export, value),
         }
         if word in doing:
-            self.context.act(partial(self._attempt, doing[word]))
+            self.context.act(doing[word])
         return super().take(state, word, value)
-
-    def _attempt(self, action: Callable[[], None]) -> None:
-        try:
-            action()
-        except WarpspaceError as error:
-            self._failed(self.title, error)
 
     # --- what is opened --------------------------------------------------------------------------
 
@@ -220,7 +205,7 @@ class FilesWindow(JobWindow):
         draw, kind = self.context.services.draw_figure, self.said["figure"]
         kind = kind if kind in dict(self.context.services.figures) else ""
         ending = f"_{kind or 'figure'}.png"
-        self.make("Figure", ending, FIGURE_S, lambda picture, job: draw(picture, kind, job))
+        self.make("Figure", ending, lambda picture, job: draw(picture, kind, job))
 
     def _view(self) -> None:
         client, camera = self.context.client, self.context.camera
@@ -233,7 +218,7 @@ class FilesWindow(JobWindow):
             )
             return self.context.services.draw_view(picture, pixels, camera.remember(), job)
 
-        self.make("Picture of the screen", "_view.png", VIEW_S, draw, as_drawn=True)
+        self.make("Picture of the screen", "_view.png", draw, as_drawn=True)
 
     def _page(self) -> None:
         from warpspace.app.documents.offline_page import build_offline_html
@@ -244,12 +229,12 @@ class FilesWindow(JobWindow):
         def write(picture: LivePicture, _: Job) -> bytes:
             return build_offline_html(picture, toml, camera).encode()
 
-        self.make("Page", ".html", EXPORT_S, write, as_drawn=True)
+        self.make("Page", ".html", write, as_drawn=True)
 
     def _export(self, ending: str) -> None:
         services = self.context.services
         if ending in dict(services.exports):
-            self.make(ending[1:].upper(), ending, EXPORT_S,
+            self.make(ending[1:].upper(), ending,
                       lambda picture, _: services.write_export(picture, ending))  # fmt: skip
 
 
@@ -330,4 +315,4 @@ class ReportWindow(JobWindow):
                 self.context.notify("Some figures are missing", "\n".join(missing), "warning")
             return content
 
-        self.make("Report", f"_report{ending}", REPORT_S, write)
+        self.make("Report", f"_report{ending}", write)

@@ -136,7 +136,6 @@ MOST_POINTS = 101
 RESOLUTION_UM = 0.005
 """What is left below that, or below the step of the numbers, is rounding, no error of a machine."""
 STEM, DATE = "compensation", (1980, 1, 1, 0, 0, 0)  # the same table gives the same bytes
-MAPS_S = 8.0  # how long they usually take
 MACHINE, BOTH, LEFT = "machine", "both", "left"
 BOXES = {MACHINE: "as it is", BOTH: "before and after", LEFT: "what is left"}
 
@@ -245,7 +244,7 @@ class CompensatePart(AnalysisPart):
             return
         save = partial(self.context.save_file, f"{STEM}.png")
         self._make(
-            "Drawing the maps", MAPS_S, lambda job: draw(found, dark, not saves, job),
+            "Drawing the maps", lambda job: draw(found, dark, not saves, job),
             save if saves else partial(self._take_picture, found),
         )  # fmt: skip
 

@@ -1,7 +1,6 @@
 """Long work of a part beside its session: one at a time, with progress, and cancellable."""
 
 import logging
-import math
 import threading
 import time
 from collections.abc import Callable
@@ -15,27 +14,25 @@ from warpspace.app.tasks.context import Context
 from warpspace.exceptions import WarpspaceError
 
 logger = logging.getLogger(__name__)
-TICK_S = 0.25
+TICK_S = 0.25  # how often progress is shown
 
 
 class Job(threading.Event):
-    """One piece of work; set once it is cancelled."""
+    """One piece of work; set once nobody waits for it any more."""
 
-    def __init__(self, name: str, usual_s: float, quiet_s: float) -> None:
+    def __init__(self, name: str, again: Callable[[], None]) -> None:
         super().__init__()
-        self.name, self.quiet_s = name, quiet_s
-        self.share = 0.0  # how much is done, where the work says so itself
-        self._usual_s, self._began = usual_s, time.monotonic()
+        self.name, self.share = name, 0.0
+        self._again, self._told_at = again, time.monotonic()
 
-    @property
-    def lasted_s(self) -> float:
-        """How long it has been at it."""
-        return time.monotonic() - self._began
-
-    @property
-    def percent(self) -> float:
-        """How far it is, estimated from the time it usually takes; 100 only when done."""
-        return 100.0 * (self.share or 1.0 - math.exp(-1.5 * self.lasted_s / self._usual_s))
+    def tell(self, share: float) -> None:
+        """Say how much is done; raises where nobody waits for it any more."""
+        if self.is_set():
+            raise CancelledError(f"{self.name}: cancelled")
+        self.share = share
+        if time.monotonic() - self._told_at > TICK_S:
+            self._told_at = time.monotonic()
+            self._again()
 
 
 class Jobs:
@@ -46,11 +43,10 @@ class Jobs:
         context: Context,
         part: str,
         again: Callable[[], None],
-        failed: Callable[[str, Exception], None],
+        failed: Callable[[Exception], None],
     ) -> None:
-        self._context, self._part = context, part
-        self._again, self._failed = again, failed
-        self._lock = threading.Lock()
+        self._context, self._part, self._failed = context, part, failed
+        self._again = partial(context.act, again)
         self._job: Job | None = None
 
     @property
@@ -58,54 +54,49 @@ class Jobs:
         """Whether something runs."""
         return self._job is not None
 
-    def start(
-        self, name: str, work: Callable[[Job], None], usual_s: float, quiet_s: float = 0.0
-    ) -> bool:
-        """Start work that is shown once it has lasted `quiet_s`; give whether there was room."""
-        with self._lock:
-            if self._job is not None:
-                return False
-            job = self._job = Job(name, usual_s, quiet_s)
-        watch = partial(self._watch, job, work)
-        threading.Thread(target=watch, name="warpspace-job", daemon=True).start()
+    def start(self, name: str, work: Callable[[Job], None]) -> bool:
+        """Start work; give whether there was room. For the session, as all but the work itself."""
+        if self._job is not None:
+            return False
+        self._job = job = Job(name, self._again)
+        self._context.jobs.add(job)
+        run = partial(self._run, job, work)
+        threading.Thread(target=run, name="warpspace-work", daemon=True).start()
+        self._again()
         return True
 
     def cancel(self) -> None:
         """Cancel what runs; its result is not delivered any more."""
-        if (job := self._job) is not None:
-            job.set()
+        if self._job is not None:
+            self._job.set()
+            self._end(self._job, None)
 
     def html(self) -> Markup:
-        """Say how far it is; nothing where nothing runs that has lasted long enough."""
+        """Say what runs, and how much of it is done where that is known."""
         job = self._job
-        if job is None or job.lasted_s < job.quiet_s:
+        if job is None:
             return EMPTY
-        bar = tag("progress", "", max=100, value=f"{job.percent:.0f}", aria_label=job.name)
-        words = tag("span", f"{job.name}: {number(job.percent, 0)} %")
+        share = number(100.0 * job.share, 0) if job.share else None
+        bar = tag("progress", "", max=100, value=share, aria_label=job.name)
+        words = tag("span", f"{job.name}: {share} %" if share else f"{job.name} …")
         cancel = button("Cancel", f"{self._part}:cancel")
         return tag("div", join((bar, words, cancel)), class_="ws-actions ws-run")
 
-    def _watch(self, job: Job, work: Callable[[Job], None]) -> None:
-        raised: list[Exception] = []
-        done = threading.Event()
+    def _run(self, job: Job, work: Callable[[Job], None]) -> None:
+        error = None
+        try:
+            work(job)
+        except Exception as raised:  # noqa: BLE001 - handed to the session, which shows it
+            error = raised
+        self._context.act(partial(self._end, job, error))
 
-        def run() -> None:
-            try:
-                work(job)
-            except Exception as error:  # noqa: BLE001 - handed to the session, which shows it
-                raised.append(error)
-            done.set()
-
-        threading.Thread(target=run, name="warpspace-work", daemon=True).start()
-        self._context.act(self._again)
-        while not done.wait(TICK_S) and not job.is_set():
-            if not self._context.page.is_open:
-                job.set()
-            self._context.act(self._again)
+    def _end(self, job: Job, error: Exception | None) -> None:
+        self._context.jobs.discard(job)
+        if self._job is not job:  # it has been cancelled, and there may be another
+            return
         self._job = None
-        self._context.act(self._again)
-        errors = [CancelledError(f"{job.name}: cancelled")] if job.is_set() else raised
-        for error in errors:
+        self._again()
+        if error is not None and not isinstance(error, CancelledError):
             if not isinstance(error, WarpspaceError):
                 logger.error("%s", job.name, exc_info=error)
-            self._context.act(partial(self._failed, job.name, error))
+            self._failed(error)

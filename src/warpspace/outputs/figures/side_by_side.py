@@ -63,7 +63,7 @@ def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[Sc
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    title = f"Comparison: A {scenes[0].title}, B {scenes[1].title}"
+    title = f"Comparison of A: {scenes[0].title} and B: {scenes[1].title}"
     return _draw_pair("comparison", title, scenes, settings, [], exact=exact)
 
 
