@@ -205,8 +205,10 @@ def test_a_phone_has_the_drawing_on_top_and_the_columns_below(viewer, browser):
     assert within(box, free)
     assert within(found["legend"], found["room"])
     assert "mean 30.9 µm" in phone.part("head").inner_text()
-    phone.send("errors:set.EXX", "1")
-    phone.page.wait_for_selector("[data-do='page:undo']")
+    for event in (("errors:set.EXX", "1"), ("errors:set.EYY", "1"), ("page:undo",)):
+        phone.send(*event)
+    for step in ("undo", "redo"):
+        phone.page.wait_for_selector(f"[data-do='page:{step}']")
     for part in ("document.documentElement", "document.querySelector('#ws-top')"):
         assert phone.page.evaluate(f"{part}.scrollWidth") <= PHONE[0]
     phone.page.get_by_role("tab", name="Improve").scroll_into_view_if_needed()

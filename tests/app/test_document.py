@@ -464,9 +464,9 @@ def test_a_short_link_with_one_key_of_many_parts_is_refused_at_once():
         open_text(text, "x", "x.toml")
 
 
-def test_a_link_longer_than_an_address_is_not_unpacked():
-    with pytest.raises(OptionError, match="expected at most 8,000"):
-        unpack("A" * 8_001)
+def test_a_link_longer_than_an_address_is_not_followed():
+    with pytest.raises(OptionError, match="expected at most 5,500"):
+        open_link(unpack("A" * 8_000), KNOWN_SCENES)
     assert unpack(pack("scene=dvf5000_first")) == "scene=dvf5000_first"
 
 

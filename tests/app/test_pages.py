@@ -22,6 +22,7 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.tasks import jobs
 from warpspace.app.tasks.errors import used_keys
 from warpspace.app.tasks.jobs import Jobs
+from warpspace.app.tasks.parts import Part
 from warpspace.exceptions import WarpspaceError
 from warpspace.scene.library import load_scene
 
@@ -168,7 +169,7 @@ class Watcher:
 
     def __init__(self):
         self.bars, self.failures, self.ended = [], [], threading.Event()
-        self.jobs = Jobs(Nobody(act=lambda do: do()), "part", self._again, self.failures.append)
+        self.jobs = Jobs(Part(Nobody(act=lambda do: do())), self._again, self.failures.append)
 
     def _again(self):
         self.bars.append(str(self.jobs.html()))

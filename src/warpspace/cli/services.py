@@ -43,9 +43,9 @@ def build_services() -> "Services":
         draw_figure,
         draw_view,
         write_export,
+        write_report,
         draw_concepts,
         draw_compensation,
-        write_report,
         figures=tuple((kind.name, kind.caption) for kind in figure_kinds() if kind.scenes == 1),
         exports=tuple((form.ending, form.about) for form in export_formats() if form.in_app),
     )

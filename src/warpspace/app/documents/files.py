@@ -21,8 +21,6 @@ from warpspace.scene.model import Scene
 # It consists of letters and digits only, since viser's client writes the address anew when it
 # starts (which drops what stands behind a #, and would unpack an encoded value).
 
-MAX_WORD = 8_000  # characters of a packed link: servers take request lines of 8 kB
-
 
 def pack(link: str) -> str:
     """Spell a query string as one word that needs no escaping in an address."""
@@ -31,10 +29,6 @@ def pack(link: str) -> str:
 
 def unpack(word: str) -> str:
     """Read what `pack` has written."""
-    if len(word) > MAX_WORD:
-        raise OptionError(
-            f"the link is {len(word):,} characters long; expected at most {MAX_WORD:,}"
-        )
     try:
         return base64.urlsafe_b64decode(word + "=" * (-len(word) % 4)).decode()
     except (binascii.Error, ValueError):

@@ -10,8 +10,7 @@ from warpspace.app.browser.page import Page
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import Update
-from warpspace.app.tasks.parts import Part
-from warpspace.app.tasks.window import Window
+from warpspace.app.tasks.parts import Part, Window
 from warpspace.app.viewport.shapes import Layer
 
 PAUSE_S = 0.1

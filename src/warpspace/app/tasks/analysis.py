@@ -96,7 +96,7 @@ class AnalysisPart(Section):
         self._answer: Answer | None = None
         self._applied: Question = ()  # what is asked once a change has been applied
         self._problem: tuple[Question, str] | None = None
-        self._jobs = Jobs(context, entry.name, self._again, self._fail)
+        self._jobs = Jobs(self, self._again, self._fail)
         self._asked: Question = ()
         self._version, self._subject = 0, ""
 

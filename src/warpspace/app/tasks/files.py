@@ -29,7 +29,7 @@ from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.jobs import Job, Jobs
-from warpspace.app.tasks.window import Window, actions
+from warpspace.app.tasks.parts import Window, actions
 from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
@@ -52,8 +52,7 @@ class JobWindow(Window):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        again = partial(context.renew, self)
-        self._jobs = Jobs(context, self.name, again, context.page.report)
+        self._jobs = Jobs(self, partial(context.renew, self), context.page.report)
         self.said: dict[str, str] = dict.fromkeys(("figure", "author", "questions"), "")
 
     def make(

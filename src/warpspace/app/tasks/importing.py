@@ -29,8 +29,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.charts import lines_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import PLAIN
-from warpspace.app.tasks.parts import Part
-from warpspace.app.tasks.window import Window, actions
+from warpspace.app.tasks.parts import Part, Window, actions
 from warpspace.exceptions import UnsaidError, WarpspaceError
 from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, Summary, summaries
 from warpspace.formats.registry import (

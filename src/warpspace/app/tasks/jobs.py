@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, join, number, tag
 from warpspace.app.documents.services import CancelledError
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.parts import Part
 from warpspace.exceptions import WarpspaceError
 
 logger = logging.getLogger(__name__)
@@ -39,14 +39,10 @@ class Jobs:
     """Runs the work of a part in threads of its own; what is called back runs in the session."""
 
     def __init__(
-        self,
-        context: Context,
-        part: str,
-        again: Callable[[], None],
-        failed: Callable[[Exception], None],
+        self, part: Part, again: Callable[[], None], failed: Callable[[Exception], None]
     ) -> None:
-        self._context, self._part, self._failed = context, part, failed
-        self._again = partial(context.act, again)
+        self._part, self._failed = part, failed
+        self._again = partial(part.context.act, again)
         self._job: Job | None = None
 
     @property
@@ -59,7 +55,7 @@ class Jobs:
         if self._job is not None:
             return False
         self._job = job = Job(name, self._again)
-        self._context.jobs.add(job)
+        self._part.context.jobs.add(job)
         run = partial(self._run, job, work)
         threading.Thread(target=run, name="warpspace-work", daemon=True).start()
         self._again()
@@ -79,7 +75,7 @@ class Jobs:
         share = number(100.0 * job.share, 0) if job.share else None
         bar = tag("progress", "", max=100, value=share, aria_label=job.name)
         words = tag("span", f"{job.name}: {share} %" if share else f"{job.name} …")
-        cancel = button("Cancel", f"{self._part}:cancel")
+        cancel = button("Cancel", f"{self._part.name}:cancel")
         return tag("div", join((bar, words, cancel)), class_="ws-actions ws-run")
 
     def _run(self, job: Job, work: Callable[[Job], None]) -> None:
@@ -88,10 +84,10 @@ class Jobs:
             work(job)
         except Exception as raised:  # noqa: BLE001 - handed to the session, which shows it
             error = raised
-        self._context.act(partial(self._end, job, error))
+        self._part.context.act(partial(self._end, job, error))
 
     def _end(self, job: Job, error: Exception | None) -> None:
-        self._context.jobs.discard(job)
+        self._part.context.jobs.discard(job)
         if self._job is not job:  # it has been cancelled, and there may be another
             return
         self._job = None

@@ -24,8 +24,7 @@ from warpspace.app.evaluation.machine_edits import (
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.parts import Section
-from warpspace.app.tasks.window import Window
+from warpspace.app.tasks.parts import Section, Window
 from warpspace.machine.description import BodySource, Gantry
 from warpspace.scene.machines import machine_picture
 from warpspace.units import MICROMETRE

@@ -5,11 +5,12 @@ The server writes pieces into named places; the page sends back events, ``part:w
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import ClassVar, Literal
 
 from markupsafe import Markup
 
-from warpspace.app.browser.html import EMPTY, fold
+from warpspace.app.browser.html import EMPTY, button, fold, join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.context import Context
@@ -77,3 +78,34 @@ class Section(Part):
         title = self.heading(picture) if opened else self.title
         section = fold(self.name, title, body, opens="page:fold", open_=opened, hint=self.sentence)
         return {f"section.{self.name}": section}
+
+
+class Window(Part):
+    """A window over the page, in its one dialog: open while `state.page.window` is its name."""
+
+    title = ""
+
+    def is_seen(self, state: AppState) -> bool:
+        return state.page.window == self.name
+
+    def closed(self, state: AppState) -> AppState:
+        """Close it."""
+        return replace(state, page=replace(state.page, window=""))
+
+    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+        return (object(),)  # written anew each time; what stands there already is not sent
+
+    def body(self, picture: LivePicture) -> Markup:
+        """Give what stands in it."""
+        raise NotImplementedError
+
+    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+        cross = button("✕", "page:close", kind="quiet", hint="Close (Esc)", aria_label="Close")
+        head = tag("header", tag("h2", self.title, id="ws-window-title") + cross)
+        body = tag("div", self.body(picture), class_="ws-body", data_key=f"window-{self.name}")
+        return {"window": head + body}
+
+
+def actions(*buttons: Markup) -> Markup:
+    """Put buttons into a row."""
+    return tag("div", join(buttons), class_="ws-actions")

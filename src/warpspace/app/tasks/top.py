@@ -14,8 +14,7 @@ from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
-from warpspace.app.tasks.parts import Part
-from warpspace.app.tasks.window import Window
+from warpspace.app.tasks.parts import Part, Window
 from warpspace.machine.limits import MAX_SCENE_BYTES
 
 LONGEST_SENTENCE = 110
