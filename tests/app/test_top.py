@@ -11,6 +11,7 @@ from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
+from warpspace.app.state.tree import put
 from warpspace.app.tasks.files import FilesWindow, ReportWindow
 from warpspace.app.tasks.importing import ImportWindow
 from warpspace.app.tasks.top import (
@@ -102,7 +103,7 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
 
 def test_commands_are_found_by_words_and_enter_runs_the_first():
     window = Window(HelpWindow)
-    window.do("find", "zero err")
+    window.store.apply(lambda state: put(state, "page.command", "zero err"))
     assert window.html.count('data-do="help:run"') == 1
     window.do("first", "whatever")
     assert window.sent == [("page:zero", "")]

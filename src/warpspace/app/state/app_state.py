@@ -173,6 +173,7 @@ class PageLook:
         "", "Unfolded error", choices=lambda state: {"": "none", **error_names(state)}, linked=""
     )
     query: str = described("", "Search of errors", longest=LONGEST_QUERY, linked="")
+    command: str = described("", "Search of commands", longest=LONGEST_QUERY, linked="")
     window: str = described("", "Open window", longest=LONGEST_QUERY, linked="")
 
 

@@ -164,31 +164,27 @@ MEANINGS = (
 )
 
 
+def _found(query: str) -> list[Command]:
+    words = query.lower().split()
+    return [one for one in COMMANDS if all(word in one.label.lower() for word in words)]
+
+
 class HelpWindow(Window):
     """All commands, found by their words; what the mouse does, and what is drawn."""
 
     name, title = "help", "Help"
-    _query = ""
-
-    def is_seen(self, state: AppState) -> bool:
-        if not super().is_seen(state):
-            self._query = ""
-        return super().is_seen(state)
-
-    def _found(self) -> list[Command]:
-        words = self._query.lower().split()
-        return [one for one in COMMANDS if all(word in one.label.lower() for word in words)]
 
     def body(self, picture: LivePicture) -> Markup:
-        box = text_box("help:find", self._query, label="Find a command", data_enter="help:first",
-                       placeholder="Find a command", live=True, autofocus=True)  # fmt: skip
+        query, scene = picture.state.page.command, picture.state.scene
+        words = "Find a command"
+        box = text_box("state:set.page.command", query, label=words, placeholder=words, live=True,
+                       data_enter="help:first", autofocus=True)  # fmt: skip
         found = join(
             tag("button", tag("kbd", one.spelt) + one.label, type="button", data_do="help:run",
                 data_value=one.label)
             if ":" in one.event else tag("p", tag("kbd", one.spelt) + one.label)
-            for one in self._found()
+            for one in _found(query)
         )  # fmt: skip
-        scene = picture.state.scene
         about = " ".join(scene.description.split())
         return join((
             tag("div", box + tag("div", found, class_="ws-list"), data_list=True),
@@ -200,11 +196,9 @@ class HelpWindow(Window):
         ))  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "find":
-            self._query = value[:80]
-            self.context.act(partial(self.context.renew, self))
-        found = [one for one in self._found() if ":" in one.event]
-        runs = found[:1] if word == "first" else [one for one in found if one.label == value]
+        query = state.page.command
+        found = [one for one in _found(query) if ":" in one.event]
+        runs = found[: bool(query)] if word == "first" else [o for o in found if o.label == value]
         if word not in ("first", "run") or not runs:
             return state
         self.context.send(runs[0].event, runs[0].value)
@@ -239,7 +233,7 @@ class PagePart(Part):
         updates: dict[str, Callable[[], AppState]] = {
             "task": partial(put, state, "page.task", value),
             "fold": partial(toggled, state, "page.open", value),
-            "open": partial(put, state, "page.window", value),
+            "open": partial(put, put(state, "page.command", ""), "page.window", value),
             "close": partial(put, state, "page.window", ""),
             "tour": partial(put, state, "page.window", ""),
             "include": partial(replace, state, exclusions=Exclusions()),
