@@ -17,15 +17,7 @@ import numpy as np
 import viser
 from markupsafe import escape
 
-from warpspace.app.browser.html import (
-    attributes,
-    fill,
-    join,
-    lowered,
-    number,
-    rows,
-    tag,
-)
+from warpspace.app.browser.html import attributes, fill, join, lowered, number, rows, tag
 from warpspace.app.documents.legend import (
     kept_words,
     legend_html,
@@ -49,10 +41,7 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction
 from warpspace.picture.model import choose_scale
-from warpspace.picture.words import (
-    own_axes,
-    spell_point,
-)
+from warpspace.picture.words import own_axes, spell_point
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 
