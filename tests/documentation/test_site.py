@@ -9,10 +9,10 @@ import tomllib
 from unittest.mock import MagicMock
 
 import pytest
-from warpspace.app.state.page_look import TASKS
 
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
+from warpspace.app.state.app_state import TASKS
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.parts import Section
 from warpspace.app.tasks.top import COMMANDS as KEYS
