@@ -4,14 +4,13 @@ from collections import Counter
 from dataclasses import replace
 
 from axe_playwright_python.sync_playwright import Axe
-from warpspace.app.state.page_look import TASKS
 
 from app.frames import new_visitor
 from app.page_tab import SCENES, Tab, wait_until_open
 from app.wire import end_work
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.state.app_state import start_state
+from warpspace.app.state.app_state import TASKS, start_state
 
 START = start_state(SCENES[0])
 TITLES = ["The bent volume", "Its errors", "Five tasks"]

@@ -250,10 +250,10 @@ def test_a_change_after_undo_forgets_the_future():
 
 
 def test_the_past_is_bounded():
-    history = History(FIRST, limit=10)
-    for tick in range(50):
+    history = History(FIRST)
+    for tick in range(STEPS + 20):
         history = history.push(FIRST.with_amplitude("EAX", 0.1 * (tick + 1)), at=10.0 * tick)
-    assert len(history.past) == 10
+    assert len(history.past) == STEPS
 
 
 def test_what_changes_nothing_is_no_step():

@@ -288,27 +288,12 @@ def _with_sides(state: AppState, given: Mapping[str, str], find: Find) -> AppSta
 MOST_OPENED = 20
 
 
-class SceneList(Mapping[str, Scene]):
+class SceneList(dict[str, Scene]):
     """Scenes by the title shown, each title once."""
 
     def __init__(self, scenes: Mapping[str, Scene]) -> None:
-        self._fixed = dict(scenes)
-        self._opened: dict[str, Scene] = {}
-
-    def __getitem__(self, title: str) -> Scene:
-        return self._fixed[title] if title in self._fixed else self._opened[title]
-
-    def __iter__(self) -> Iterator[str]:
-        yield from self._fixed
-        yield from self._opened
-
-    def __len__(self) -> int:
-        return len(self._fixed) + len(self._opened)
-
-    @property
-    def fixed(self) -> tuple[Scene, ...]:
-        """Scenes that whoever opens a link on this server has as well."""
-        return tuple(self._fixed.values())
+        super().__init__(scenes)
+        self.fixed = tuple(scenes.values())  # those that whoever opens a link here has as well
 
     def add(self, scene: Scene) -> tuple[str, str]:
         """Take in an opened scene; give its title, and that of one that has left for it."""
@@ -319,11 +304,11 @@ class SceneList(Mapping[str, Scene]):
         number = 2
         while title in self or title in (PRESENT, NOBODY):
             title, number = f"{own} ({number})", number + 1
-        self._opened[title] = scene
-        dropped = ""
-        if len(self._opened) > MOST_OPENED:
-            dropped = next(iter(self._opened))
-            del self._opened[dropped]
+        self[title] = scene
+        if len(self) <= len(self.fixed) + MOST_OPENED:
+            return title, ""
+        dropped = list(self)[len(self.fixed)]
+        del self[dropped]
         return title, dropped
 
 

@@ -24,6 +24,10 @@ from warpspace.scene.model import Scene
 BEFORE, AFTER = "before", "after"
 """What was pinned, and what is steered beside it."""
 DIGITS = 3  # decimals of a proposed error, µm or µrad: a nanometre is nothing to be set
+LOOKED_AT = (
+    "component", "nodes", "exaggeration", "look", "machine", "shown", "forms", "picked", "lever",
+)  # fmt: skip
+"""What of the present state a side is looked at with."""
 REFUSED = "The working volumes are not the same, so there is no difference node by node."
 
 
@@ -34,41 +38,25 @@ def side_state(now: AppState, side: Side) -> AppState:
         spans = base.position_spans
         at = {a: spans[a].clamp(now.positions.get(a, p), p) for a, p in base.positions.items()}
         base = replace(base, loop=now.loop, placed=now.placed, positions=at)
+    points = base.scene.trace_points_mm == now.scene.trace_points_mm
+    turns_alike = points and base.positions.keys() == now.positions.keys()
     return replace(
         base,
-        component=now.component,
-        nodes=now.nodes,
-        exaggeration=now.exaggeration,
-        look=now.look,
-        machine=now.machine,
-        shown=now.shown,
-        rotary=now.rotary if _turns_alike(base, now) else RotaryLook(),
-        forms=now.forms,
+        rotary=now.rotary if turns_alike else RotaryLook(),
         comparison=Comparison(),
-        picked=now.picked,
-        lever=now.lever,
+        **{name: getattr(now, name) for name in LOOKED_AT},
     )
 
 
-def _turns_alike(one: AppState, other: AppState) -> bool:
-    points = one.scene.trace_points_mm == other.scene.trace_points_mm
-    return points and one.positions.keys() == other.positions.keys()
-
-
 def scene_side(scene: Scene) -> Side:
-    """Make a side of a scene as it is opened."""
     return Side(scene.title or scene.name, start_state(scene), is_scene=True)
 
 
 def pinned_side(state: AppState) -> Side:
     """Make the side "before" of what is steered; it holds no comparison of its own."""
-    edited = len(state.changed_keys)
-    title = state.scene.title or state.scene.name
-    if edited:
-        title += f" · {edited} changed"
-    if table := table_words(state):
-        title += f" · {table}"
-    return Side(f"{BEFORE}: {title}", plain_state(state))
+    edited = f"{len(state.changed_keys)} changed" if state.changed_keys else ""
+    words = (state.scene.title or state.scene.name, edited, table_words(state))
+    return Side(f"{BEFORE}: {' · '.join(filter(None, words))}", plain_state(state))
 
 
 def plain_state(state: AppState) -> AppState:
@@ -80,8 +68,11 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     """Evaluate a state that compares two."""
     chosen = state.comparison
     other_side = chosen.b or Side()
-    a, b = _with_one_factor(
-        state, [single(side_state(state, side)) for side in (chosen.a, other_side)]
+    sides = [single(side_state(state, side)) for side in (chosen.a, other_side)]
+    factor = min(one.exaggeration for one in sides)
+    a, b = (
+        one if one.exaggeration == factor else single(replace(one.state, exaggeration=factor))
+        for one in sides
     )
     refused = "" if same_nodes(a.grid.nominal_mm, b.grid.nominal_mm) else REFUSED
     difference = None if refused else _difference(a, b)
@@ -103,29 +94,12 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     return replace(drawn, state=state, subject=drawn.state, colours=colours, compared=compared)
 
 
-def _with_one_factor(
-    state: AppState, pictures: Sequence[LivePicture]
-) -> tuple[LivePicture, LivePicture]:
-    factor = state.exaggeration or min(picture.exaggeration for picture in pictures)
-    a, b = (
-        replace(
-            picture,
-            exaggeration=factor,
-            slices=tuple(replace(one, exaggeration=factor) for one in picture.slices),
-            traces=tuple(replace(lines, exaggeration=factor) for lines in picture.traces),
-        )
-        for picture in pictures
-    )
-    return a, b
-
-
 def _title(state: AppState, side: Side, beside: Side) -> str:
     if side.state:
         return side.title
     pinned = beside.state is not None and not beside.is_scene
-    title = f"{AFTER if pinned else PRESENT}: {state.scene.title or state.scene.name}"
-    table = table_words(state)
-    return f"{title} · {table}" if table else title
+    words = (state.scene.title or state.scene.name, table_words(state))
+    return f"{AFTER if pinned else PRESENT}: {' · '.join(filter(None, words))}"
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
@@ -186,10 +160,13 @@ def applied(state: AppState, scene: Scene) -> AppState:
     }
     start = {key: state.start.get(key, 0.0) for key in fresh.amplitudes}
     return replace(
-        state, scene=replace(scene, title=own.title, name=own.name), loaded=state.origin,
-        amplitudes={**values, **kept}, start=start,
+        state,
+        scene=replace(scene, title=own.title, name=own.name),
+        loaded=state.origin,
+        amplitudes={**values, **kept},
+        start=start,
         tolerances=scene.tolerances,
-    )  # fmt: skip
+    )
 
 
 def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:

@@ -7,7 +7,7 @@ rotary positions and the loop; a slider move is then one matrix-vector product.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -36,22 +36,10 @@ from warpspace.units import Array
 CACHE_BYTES = 400_000_000
 KEPT = 0.27  # place of the colour of what keeps the limit, on the scale of signed values
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
-
-
-@dataclass(frozen=True, slots=True)
-class Response:
-    """Grid, traces and their first-order responses for one place of the rotary axes."""
-
-    grid: Grid
-    basis: ErrorBasis
-    groups: tuple[TraceGroup, ...]
-    trace_bases: tuple[ErrorBasis, ...]
-
-    @property
-    def size(self) -> int:
-        """Bytes it holds, about."""
-        bases = (self.basis, *self.trace_bases)
-        return sum(basis.position.nbytes + basis.orientation.nbytes for basis in bases)
+T = TypeVar("T")
+Responding: TypeAlias = tuple[T, ErrorBasis]
+"""A grid, or traces of rotary axes, and its first-order response."""
+Response: TypeAlias = tuple[Responding[Grid], tuple[Responding[TraceGroup], ...]]
 
 
 class LiveModel:
@@ -60,60 +48,56 @@ class LiveModel:
     def __init__(self) -> None:
         self._kept: Cache[Any] = Cache(CACHE_BYTES)
 
-    def response(self, state: AppState) -> Response:
-        """Give grid and responses of a state, kept from an earlier one where possible."""
-        key = (
-            Identity(state.scene),
-            state.nodes,
-            tuple(state.positions.items()),
-            state.seen,
-            state.rotary.off,
-            state.rotary.own_mm,
-            tuple(state.rotary.held.items()),
-        )
-        return self._kept.get(key, lambda: _build(state), lambda response: response.size)
-
     def evaluate(self, state: AppState) -> LivePicture:
-        """Evaluate a state."""
         if state.comparison.b is not None:
             return compare_pictures(self._single, state)
         return self._single(state)
 
     def _single(self, state: AppState) -> LivePicture:
-        response = self.response(state)
-        amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-        field = self._field(state, response.grid, response.basis, amplitudes)
-        size = picture_size_mm(state.scene, response.grid)
+        rotary = state.rotary
+        key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
+        response: Response = self._kept.get(key, lambda: _build(state), _size)
+        (grid, basis), traces = response
+        field = self._field(state, grid, basis)
+        size = picture_size_mm(state.scene, grid)
         factor = choose_exaggeration(state.exaggeration, None, float(field.norm_um.max()), size)
-        groups = zip(response.groups, response.trace_bases, strict=True)
         common: dict[str, Any] = {
             "view": state.view(),
             "exaggeration": factor,
             "component": state.component,
             "quantity": state.look.quantity,
-            "colours": _chosen_colours(state, field, response.basis),
+            "colours": _chosen_colours(state, field, basis),
         }
         return LivePicture(
             **common,
-            grid=response.grid,
+            grid=grid,
             field=field,
             cut=state.look.surface == "cut",
             slices=tuple(
-                Slice(**common, grid=grid, axis=axis, position_mm=at,
-                      field=self._field(state, grid, basis, amplitudes))
-                for axis, at, grid, basis in self._slices(state)
+                Slice(**common, grid=plane, axis=axis, position_mm=at, field=on_plane)
+                for axis, at, plane, on_plane in self._slices(state)
             ),
             state=state,
             traces=tuple(
-                TraceLines(group, basis.nominal_mm,
-                           self._field(state, group, basis, amplitudes).error_um, factor)
-                for group, basis in groups
+                TraceLines(group, own.nominal_mm, self._field(state, group, own).error_um, factor)
+                for group, own in traces
             ),
-        )  # fmt: skip
+        )
 
-    def _field(
-        self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis, amplitudes: Array
-    ) -> ErrorField:
+    def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
+        scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
+
+        def build(axis: str, at: float) -> Responding[Grid]:
+            plane = build_slice(scene.model, workspace, axis, at, state.nodes)
+            return plane, grid_basis(scene, plane, state.view())
+
+        if state.look.surface == "slices":
+            for axis, at in slice_positions(scene, state.look, state.machine).items():
+                key = _place(state), axis, at
+                held = self._kept.get(key, partial(build, axis, at), lambda one: _size((one, ())))
+                yield axis, at, held[0], self._field(state, *held)
+
+    def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
         """Evaluate a grid or traces: to first order, or what a table of compensation leaves.
 
         What does not depend on the errors (what the controller adds, where the axes stand then) is
@@ -122,6 +106,7 @@ class LiveModel:
         controller, scene = state.controller, state.scene
         on_trace = isinstance(of, TraceGroup)
         if controller is None:
+            amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
             return basis.evaluate(amplitudes, orientation=state.look.tilts and not on_trace)
         loop, point_mm = (of.loop, of.nominal_mm) if on_trace else (state.loop, None)
         held = tuple((scene.reference or {}).items()), tuple(state.positions.items())
@@ -134,26 +119,29 @@ class LiveModel:
         )
         return kept.field(now.errors)
 
-    def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorBasis]]:
-        """Give grids and responses of slices, kept while they stay in place."""
-        scene = state.scene
-        workspace = scene.workspace.moved(state.positions)
 
-        def build(axis: str, at: float) -> tuple[Grid, ErrorBasis]:
-            grid = build_slice(scene.model, workspace, axis, at, state.nodes)
-            return grid, grid_basis(scene, grid, state.view())
+def _place(state: AppState) -> tuple[object, ...]:
+    """Give what the response of a grid depends on."""
+    return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.seen
 
-        if state.look.surface == "slices":
-            for axis, at in slice_positions(scene, state.look, state.machine).items():
-                place = axis, at, *state.positions.items()
-                key = Identity(scene), state.nodes, place, state.seen
-                yield (
-                    axis,
-                    at,
-                    *self._kept.get(
-                        key, partial(build, axis, at), lambda held: 2 * held[1].position.nbytes
-                    ),
-                )
+
+def _size(held: Response) -> int:
+    return sum(one.position.nbytes + one.orientation.nbytes for _, one in (held[0], *held[1]))
+
+
+def _build(state: AppState) -> Response:
+    scene = state.scene
+    grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.nodes)
+    positions = {**scene.workspace.positions, **state.positions}
+    held = default_held(scene, state.rotary, positions)
+    points = state.rotary.points_mm(scene)
+    groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, held)
+    given = scene.model, scene.errors, scene.parameter_keys
+    traces = tuple(
+        (one, build_basis(*given, one.coordinates, state.view(one.loop), one.nominal_mm))
+        for one in groups
+    )
+    return (grid, grid_basis(scene, grid, state.view())), traces
 
 
 @dataclass(frozen=True)
@@ -178,44 +166,16 @@ class PassFail(ColourScale):
         return (self.low, self.limit, self.high)
 
 
-def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> ColourScale | None:
-    """Give the colours that a user has chosen: fixed, or shared; None for round ends."""
-    quantity, component = state.look.quantity, state.component
+def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> ColourScale:
+    """Give the colours that a user has chosen: fixed, shared, or with round ends."""
+    quantity, component, look = state.look.quantity, state.component, state.look
     values = coloured_values(field, component, quantity)
-    if state.look.pass_fail and quantity == "position" and component == "norm":
-        limit = state.specification.limit_um
-        return PassFail.of(choose_scale([values], component), limit)
-    if state.look.range_mode == "fixed":
-        return choose_scale([values], component, quantity, end=state.look.range_top)
-    if state.look.range_mode == "shared":
+    if look.pass_fail and not look.tilts and component == "norm":
+        return PassFail.of(choose_scale([values], component), state.specification.limit_um)
+    if look.range_mode == "shared":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
-        both = (coloured_error(field, quantity), coloured_error(opened, quantity))
+        both = (coloured_error(one, quantity) for one in (field, opened))
         lengths = [np.linalg.norm(error, axis=-1) for error in both]
         return choose_scale(lengths, component, quantity)
-    return choose_scale([values], component, quantity)
-
-
-def _build(state: AppState) -> Response:
-    scene = state.scene
-    grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.nodes)
-    positions = {**scene.workspace.positions, **state.positions}
-    groups = build_traces(
-        scene.model,
-        state.rotary.points_mm(scene),
-        positions,
-        TRACE_SAMPLES,
-        default_held(scene, state.rotary, positions),
-    )
-    keys = scene.parameter_keys
-    trace_bases = tuple(
-        build_basis(
-            scene.model,
-            scene.errors,
-            keys,
-            group.coordinates,
-            state.view(group.loop),
-            group.nominal_mm,
-        )
-        for group in groups
-    )
-    return Response(grid, grid_basis(scene, grid, state.view()), groups, trace_bases)
+    end = look.range_top if look.range_mode == "fixed" else None
+    return choose_scale([values], component, quantity, end=end)

@@ -53,6 +53,8 @@ LOOP_NAMES = {
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
+KEPT = ("component", "nodes", "shown", "look", "machine", "forms", "page")
+"""What stays when another scene is shown."""
 SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
 """What can be drawn of a comparison; the difference is the change from A to B."""
 PRESENT, NOBODY = "present errors", "nothing"
@@ -295,7 +297,6 @@ class AppState:
 
     @property
     def position_spans(self) -> Mapping[str, Span]:
-        """Ranges of the positions of the rotary axes, degrees."""
         return position_spans(self.scene)
 
     @property
@@ -383,15 +384,9 @@ class AppState:
         fresh = start_state(scene)
         return replace(
             fresh,
-            component=self.component,
-            nodes=self.nodes,
-            shown=self.shown,
             specification=self.specification if scene.limit_um is None else fresh.specification,
-            look=self.look,
-            machine=self.machine,
             rotary=replace(self.rotary, off=frozenset()),
-            forms=self.forms,
-            page=self.page,
+            **{name: getattr(self, name) for name in KEPT},
         )
 
     def reset(self) -> "AppState":

@@ -14,13 +14,15 @@ LEAST_TRANSLATION_UM = 20.0
 LEAST_ROTATION_URAD = 50.0
 LEAST_HALF_WIDTH = 10.0
 FINE_STEP, FINE = 0.1, (5.0, 500.0)  # a slider that ends between has this step
-FINE_UP_TO = 100.0  # µm or µrad: sliders of tolerances that end below have a step of 0.01
 
 
-def round_up(value: float) -> float:
-    """Give the smallest 1, 2 or 5 × 10ⁿ that is not below a positive value."""
-    decade = 10.0 ** math.floor(math.log10(value))
-    return next(step * decade for step in (1, 2, 5, 10) if step * decade >= value * (1.0 - 1e-9))
+def _span(low: float, reach: float) -> Span:
+    """Choose a slider that reaches a value, with a round end: 1, 2 or 5 × 10ⁿ."""
+    decade = 10.0 ** math.floor(math.log10(reach))
+    ends = (step * decade for step in (1, 2, 5, 10) if step * decade >= reach * (1.0 - 1e-9))
+    high = min(*ends, MAX_ERROR)
+    fine = FINE[0] <= high <= FINE[1]
+    return Span(low * high, high, FINE_STEP if fine else 10.0 ** (math.ceil(math.log10(high)) - 3))
 
 
 def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
@@ -29,9 +31,7 @@ def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
     if tolerance is not None:
         reach = abs(tolerance.centre) + tolerance.half_width
         least = reach if reach >= MIN_HALF_WIDTH else least
-    high = min(round_up(max(least, 2.0 * abs(value))), MAX_ERROR)
-    fine = FINE[0] <= high <= FINE[1]
-    return Span(-high, high, FINE_STEP if fine else 10.0 ** (math.ceil(math.log10(high)) - 3))
+    return _span(-1.0, max(least, 2.0 * abs(value)))
 
 
 def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
@@ -60,9 +60,7 @@ def half_width_span(state: AppState, key: str) -> Span:
     """
     found = state.origin.tolerances.get(key)
     widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
-    high = min(round_up(max(widest, half_width_of(state, key))), MAX_ERROR)
-    # number boxes show as many decimals as the step has
-    return Span(0.0, high, 0.01 if high <= FINE_UP_TO else 0.1)
+    return _span(0.0, max(widest, half_width_of(state, key)))
 
 
 def with_scene_tolerances(state: AppState) -> AppState:

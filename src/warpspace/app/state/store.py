@@ -96,7 +96,6 @@ class History:
     past: tuple[Step, ...] = ()  # latest last
     future: tuple[Step, ...] = ()
     changed_at: float = float("-inf")  # when the present was last changed, s
-    limit: int = STEPS  # steps of the past that are kept
 
     def push(self, state: AppState, at: float) -> "History":
         """Take in a new present state."""
@@ -111,24 +110,22 @@ class History:
             and "scene" not in what
             and at - self.changed_at < SAME_STEP_S
         )
-        past = self.past if same else (*self.past, Step(self.present, what))[-self.limit :]
+        past = self.past if same else (*self.past, Step(self.present, what))[-STEPS:]
         return replace(self, present=state, past=past, future=(), changed_at=at)
 
     def undo(self) -> "History":
-        """Go back one step; the same one where there is none."""
         if not self.past:
             return self
         *past, last = self.past
         future = (*self.future, Step(self.present, last.what))
-        return History(_on_page(last.state, self.present), tuple(past), future, limit=self.limit)
+        return History(_on_page(last.state, self.present), tuple(past), future)
 
     def redo(self) -> "History":
-        """Go forward again one step; the same one where there is none."""
         if not self.future:
             return self
         *future, coming = self.future
         past = (*self.past, Step(self.present, coming.what))
-        return History(_on_page(coming.state, self.present), past, tuple(future), limit=self.limit)
+        return History(_on_page(coming.state, self.present), past, tuple(future))
 
     @property
     def undoes(self) -> str:
