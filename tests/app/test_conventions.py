@@ -58,14 +58,13 @@ def test_the_section_offers_what_is_in_force_and_holds_the_point_that_is_picked(
     assert 'value="component_errors=after_motion" checked' in text
     assert "before motion" in text
     state = section.take(START, "choose", "reference=point")
-    state = section.take(state, "set.X", "100,5 mm")
+    state = section.take(state, "set.reference", "X 100,5 mm")
     assert state.scene.reference["X"] == 100.5
-    assert "Held at X" in section.body(LIVE.evaluate(state))
-    section.take(state, "pick", "")
-    section.context.post = lambda update: update
-    assert section.context.next_click is not None
-    section.context.next_click(Picked({"X": 0.0}))
-    assert section.context.next_click is None
+    assert 'value="X 100.5 Y ' in section.body(LIVE.evaluate(state))
+    assert "expected positions" in section.take(state, "set.reference", "<b>").notes[-1]
+    clicked = replace(state, picked=Picked({"X": 0.0, "Y": 10.0, "Z": -280.0}))
+    assert section.take(clicked, "pick", "").scene.reference == clicked.picked.at
+    assert "disabled" in section.body(LIVE.evaluate(state))
     assert section.take(state, "own", "").scene is START.scene
     assert section.take(START, "set.Q", "<b>") is START
 

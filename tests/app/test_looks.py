@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 from warpspace.app.browser.room import read_room
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.machine import drawn_bodies, tool_point
-from warpspace.app.evaluation.rotation import (
+from warpspace.app.evaluation.machine import (
     chosen_trace,
+    drawn_bodies,
     played_axis,
     played_position,
     points_on_traces,
+    tool_point,
 )
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.leaf import Span

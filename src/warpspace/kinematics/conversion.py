@@ -231,7 +231,7 @@ def _line_motion(own: AxisErrors, line: ReferenceLine) -> SmallMotion:
         offset, slope = np.zeros(3), np.zeros(3)
         for index in range(3):
             if index != axis.index:
-                at = _positions(own, own.keys()[index])
+                at = line_positions(own, own.keys()[index])
                 left = without(own, taken, at, own.at(at)).to_errors()[0][:, index]
                 offset[index], slope[index] = fit_line(at, left, line)
         if not offset.any() and not slope.any():
@@ -241,7 +241,8 @@ def _line_motion(own: AxisErrors, line: ReferenceLine) -> SmallMotion:
     return taken
 
 
-def _positions(own: AxisErrors, key: str) -> Array:
+def line_positions(own: AxisErrors, key: str) -> Array:
+    """Give where a line is laid through a curve: its points as measured, else evenly, [n]."""
     low, high = own.span
     points = np.array(own.points(key))
     points = points[(points >= low) & (points <= high)]

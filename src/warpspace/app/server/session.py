@@ -231,7 +231,7 @@ class Session:
             context.act(partial(self._clicked, event.ray_origin, event.ray_direction))
 
     def _clicked(self, origin: object, direction: object) -> None:
-        """Ask why a point is off, or choose a reference point."""
+        """Ask why a point is off."""
         context, picture = self.context, self.context.shown
         if picture is None:
             return
@@ -239,10 +239,7 @@ class Session:
         picked = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         if picked is None:
             return
-        if context.next_click is not None and picked.point_mm is None:
-            context.next_click(picked)
-        else:
-            context.post(lambda state: with_picked(state, picked))
+        context.post(lambda state: with_picked(state, picked))
 
     def _hear(self, event: Event) -> None:
         """Take note of what a page says of itself."""

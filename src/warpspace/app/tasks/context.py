@@ -18,7 +18,7 @@ from warpspace.app.browser.page import Page
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState, Picked
+from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, Update
 from warpspace.app.viewport.camera import CameraMemory, TabCamera
 from warpspace.app.viewport.moving import MovingLayer
@@ -46,7 +46,6 @@ class Context:
         self.store, self.scenes, self.services = store, scenes, services
         self.shown: LivePicture | None = None
         self.stage: MovingLayer | None = None
-        self.next_click: Callable[[Picked], None] | None = None
         self.renew: Callable[[Part], None] = lambda _: None  # write a part anew, at once
         self.closed: Callable[[], None] = lambda: None  # the page has closed its window by itself
         self.jobs: set[threading.Event] = set()  # work that goes on; set when the page has gone

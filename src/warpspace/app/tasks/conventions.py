@@ -4,7 +4,7 @@ Changed conventions live in the state's scene, so that everything drawn from it 
 exports) has them; `AppState.origin` keeps the scene's own ones.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 
@@ -13,26 +13,29 @@ from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState, Picked
+from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity, Span
-from warpspace.app.state.typed_numbers import read_typed
+from warpspace.app.state.tree import EXAMPLE
+from warpspace.app.state.typed_numbers import read_positions
 from warpspace.app.tasks.parts import Section
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import build_grid
 from warpspace.kinematics import transforms
+from warpspace.kinematics.axis_errors import AxisErrors
 from warpspace.kinematics.chain import branch_frames, nominal_point
 from warpspace.kinematics.conversion import (
     ReferenceLine,
     SquarenessSign,
     convert_squareness,
     fit_line,
+    line_positions,
     move_measuring_line,
 )
 from warpspace.kinematics.model import Loop, Model, convention_names, find_convention
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
 from warpspace.machine.description import Vector
-from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Poly, Table
+from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Poly
 from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.scene.save import covered_spans
 from warpspace.units import Array
@@ -188,8 +191,6 @@ def _effect(weights: Array, change_um: Array) -> Effect:
 
 # --- What it would cost if errors had been measured in another convention than is read ------------
 
-EVENLY = 101  # positions that a line is laid through where a curve has no points of its own
-
 
 def convention_costs(scene: Scene, view: View, nodes: int = 21) -> dict[str, Effect]:
     """Find what each wrong convention would cost over the working volume, to first order.
@@ -227,19 +228,11 @@ def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
             there = errors.evaluate_at(row.key, middle, scene.model.direction)
             found["zero_at"][row.key] = Constant(span, -float(there))
             if axis.is_linear and not row.is_rotation and row.direction != axis.index:
+                at = line_positions(AxisErrors(scene.model, errors, row.axis, span), row.key)
                 for line in ReferenceLine:
-                    found[line][row.key] = _taken_out(errors, row.key, span, line)
+                    offset, slope = fit_line(at, errors.evaluate(row.key, at), line)
+                    found[line][row.key] = Poly(span, (-offset, -slope))
     return found
-
-
-def _taken_out(errors: ErrorSet, key: str, span: tuple[float, float], line: str) -> Poly:
-    """Give what takes the reference line out of a curve."""
-    function = errors.functions[key]
-    points = np.array(function.kinks if isinstance(function, Table) else ())
-    points = points[(points >= span[0]) & (points <= span[1])]
-    at = points if len(points) > 1 else np.linspace(*span, EVENLY)
-    offset, slope = fit_line(at, errors.evaluate(key, at), line)
-    return Poly(span, (-offset, -slope))
 
 
 def _measured_in_the_middle(scene: Scene) -> ErrorSet:
@@ -293,14 +286,13 @@ class ConventionsSection(Section):
         return (
             Identity(state.origin), Identity(state.scene), tuple(state.active.items()),
             tuple(state.positions.items()), state.seen, state.nodes,
-            self.context.next_click is None,
+            Identity(state.picked),
         )  # fmt: skip
 
     def body(self, picture: LivePicture) -> Markup:
         state = picture.state
         effects, in_force = effects_of(state), chosen(state.scene)
         own = chosen(with_own_conventions(state).scene)
-
         lines = [fill("<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>")]
         for head, members in choices_of(state.scene).items():
             lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', *head))
@@ -313,44 +305,35 @@ class ConventionsSection(Section):
         back = button("Back to the scene's", "conventions:own", disabled=in_force == own)
         return join((
             tag("table", join(lines), class_="ws-choices-table"), tag("p", NOTE, class_="ws-tiny"),
-            self._reference(state), tag("div", back, class_="ws-actions"), _wrong(state),
+            _reference(state), tag("div", back, class_="ws-actions"), _wrong(state),
         ))  # fmt: skip
-
-    def _reference(self, state: AppState) -> Markup:
-        if state.scene.reference is None:
-            return EMPTY
-        boxes: list[Markup] = []
-        held = {**state.scene.workspace.positions, **state.scene.reference}
-        for axis in reference_spans(state.scene):
-            name, unit = f"conventions:set.{axis}", state.scene.machine.axes[axis].unit
-            box = text_box(name, f"{held[axis]:g}", size="short")
-            boxes.append(field(f"Held at {axis}", box, name, unit))
-        waits = self.context.next_click is not None
-        words = "Click a point of the box …" if waits else "Pick it in the drawing"
-        pick = button(words, "conventions:pick", pressed=waits)
-        return join((*boxes, tag("div", pick, class_="ws-actions")))
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "choose":
             return with_choice(state, value)
         if word == "own":
             return with_own_conventions(state)
-        if word == "pick":
-            waits = self.context.next_click is not None
-            self.context.act(lambda: self._wait(None if waits else self._choose))
-        axis = word.removeprefix("set.")
-        if axis in reference_spans(state.scene) and state.scene.reference is not None:
-            typed = read_typed(value, state.scene.machine.axes[axis].unit)
-            return state if typed is None else with_reference(state, {axis: typed})
+        if word == "pick" and state.picked is not None:
+            return with_reference(state, state.picked.at)
+        if word == "set.reference":
+            at = read_positions(value)
+            if at is not None:
+                return with_reference(state, at)
+            expected = f"expected positions of the axes, for instance {EXAMPLE}"
+            return state.noted(f"point {value[:40]!r}: {expected}")
         return state
 
-    def _wait(self, choose: Callable[[Picked], None] | None) -> None:
-        self.context.next_click = choose
-        self.context.renew(self)
 
-    def _choose(self, picked: Picked) -> None:
-        self._wait(None)
-        self.context.post(lambda state: with_reference(state, picked.at))
+def _reference(state: AppState) -> Markup:
+    if state.scene.reference is None:
+        return EMPTY
+    held = {**state.scene.workspace.positions, **state.scene.reference}
+    spelled = " ".join(f"{axis} {held[axis]:g}" for axis in reference_spans(state.scene))
+    name, hint = "conventions:set.reference", "Click a point of the box in the drawing first"
+    box = field("Held at", text_box(name, spelled), name, hint="Positions of the axes")
+    nowhere = state.picked is None or state.picked.point_mm is not None
+    pick = button("Hold the clicked point", "conventions:pick", hint=hint, disabled=nowhere)
+    return box + tag("div", pick, class_="ws-actions")
 
 
 def _row(words: object, effect: Effect | None) -> Markup:

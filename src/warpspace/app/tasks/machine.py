@@ -10,8 +10,7 @@ from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
 from warpspace.analysis.blocks import Column, Table
 from warpspace.app.browser.html import button, choice, field, fill, join, switch, tag
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import HERE, standing
-from warpspace.app.evaluation.rotation import chosen_trace, played_axis
+from warpspace.app.evaluation.machine import HERE, chosen_trace, played_axis, standing
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves, put, toggled

@@ -6,7 +6,7 @@ import numpy as np
 
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.rotation import chosen_trace, points_on_traces
+from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
 from warpspace.app.viewport.colours import Rgb, palette
 from warpspace.app.viewport.labels import TICK, Axis, axes, axis_labels, point_labels
 from warpspace.app.viewport.shapes import (

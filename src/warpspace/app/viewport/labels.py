@@ -11,8 +11,7 @@ import numpy as np
 
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import tool_point
-from warpspace.app.evaluation.rotation import chosen_trace
+from warpspace.app.evaluation.machine import chosen_trace, tool_point
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values

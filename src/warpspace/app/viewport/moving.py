@@ -6,7 +6,7 @@ from collections.abc import Callable
 from viser import ClientHandle
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.rotation import played_position
+from warpspace.app.evaluation.machine import played_position
 from warpspace.app.state.leaf import Identity
 from warpspace.app.viewport.around import around, turned_points
 from warpspace.app.viewport.machine import ghost_machine, machine
