@@ -152,7 +152,7 @@ def imported(page: Page) -> None:
     with page.expect_file_chooser() as chooser:
         page.locator("#ws-top [data-upload=files]").click()
     chooser.value.set_files({"name": FILE, "mimeType": "text/csv", "buffer": READINGS.encode()})
-    page.get_by_role("dialog").get_by_role("button", name="Apply").wait_for()
+    page.locator("[data-key=import]").get_by_role("button", name="Apply").wait_for()
 
 
 def reported(page: Page) -> None:
@@ -172,7 +172,7 @@ VISITS = {
     "task_improve": Visit(improved),
     "task_design": Visit(designed),
     "task_machine": Visit(turned, "teach_wobbling_table"),
-    "window_import": Visit(imported),
+    "task_import": Visit(imported),
     "window_report": Visit(reported),
     "errors_row": Visit(opened_row, part="#ws-left"),
 }

@@ -83,10 +83,6 @@ class SceneError(WarpspaceError):
         super().__init__(text)
 
 
-class UnsaidError(SceneError):
-    """A file that can be read once its user says what it does not: its format, or an axis."""
-
-
 def near_miss(name: str, known: Iterable[str]) -> str:
     """Give the tail of a message about an unknown name: the near miss, else all names."""
     names = list(known)

@@ -1,8 +1,9 @@
 """The task Measure: standard tests, calibrations and what imports ask; hostile files and words."""
 
 import time
+from contextlib import suppress
 from dataclasses import replace
-from html import escape, unescape
+from html import unescape
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from app.hostile import upload
 from app.parts import Nobody
 from warpspace.analysis.catalogue import entries
+from warpspace.analysis.description import silent
 from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation import cache
 from warpspace.app.evaluation.compare import with_pin
@@ -18,15 +20,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
-from warpspace.app.tasks.importing import (
-    LONGEST_AXES,
-    LONGEST_PROBLEM,
-    Offer,
-    Said,
-    asking,
-    offered,
-    said_again,
-)
+from warpspace.app.tasks.importing import Import, ImportPart
 from warpspace.app.tasks.measure import (
     MOST_FILES,
     CalibratePart,
@@ -38,7 +32,7 @@ from warpspace.app.tasks.measure import (
 from warpspace.bench.base import bench_names
 from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.readings import find_data
-from warpspace.exceptions import OptionError, SceneError, UnsaidError, WarpspaceError
+from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import formats
 from warpspace.formats.source import Source, source_of_text
@@ -60,12 +54,15 @@ class Column:
         context = Nobody(
             act=lambda do: do(), renew=lambda _: None, reported=self.reported,
             notify=lambda *words: self.said.append(words), shown=None,
-            page=SimpleNamespace(is_open=True), store=self,
+            page=SimpleNamespace(is_open=True), store=self, post=self.post,
         )  # fmt: skip
         self.part = build(context)
         page = replace(state.page, task="measure", open=frozenset({self.part.name}))
         self.state = replace(state, page=page)
         self.part.context.shown = LIVE.evaluate(self.state)
+
+    def post(self, update):
+        self.state = update(self.state)
 
     def do(self, word, value=""):
         self.state = self.part.take(self.state, word, value)
@@ -145,7 +142,7 @@ def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
     for option, text in options.items():
         column.do(f"set.{option}", text)
     html = column.settle()
-    assert escape(message) in html
+    assert message in unescape(html)
     assert "ws-problem" in html
     assert LIVE.evaluate(column.state).bench is None
 
@@ -361,54 +358,71 @@ def test_readings_of_a_standard_test_come_with_its_options():
 
 NOMINAL = load_scene("dvf5000_nominal")
 COMP = "-20 0.001 0.003\n0 0.002 0.004\n20 0.005 0.006\n"
+TABLE = b"X [mm],EXX [um]\n-275,0\n0,5\n275,10\n"
 
 
-def unsaid(text, name):
-    """Offer a file that does not say enough."""
-    source = source_of_text(text, name)
-    with pytest.raises(UnsaidError) as caught:
-        offered([source], NOMINAL)
-    return asking([source], caught.value)
+def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
+    column = Column(ImportPart, replace(STATE, forms={"import.axis": "Y"}))
+    column.part.received(HOSTILE, TABLE)
+    assert (column.state.page.task, column.state.forms) == ("measure", {})
+    html = column.settle()
+    assert "<img" not in html
+    assert "It adds EXX." in html
+    before = LIVE.evaluate(STATE).statistics
+    assert f"{before.mean_um:.1f} → " in html
+    column.do("apply", "0")
+    applied = column.state
+    after = LIVE.evaluate(replace(applied, comparison=STATE.comparison)).statistics
+    assert after.mean_um != pytest.approx(before.mean_um)
+    assert applied.amplitudes["EXX"] == pytest.approx(10.0)
+    assert applied.comparison.a.title == "before import"
+    assert "Applied" in column.html()
+    column.do("apply", "0")
+    assert column.state is applied  # once
+    column.part.received("y.csv", TABLE.replace(b"EXX", b"EYX"))
+    html = column.settle()
+    assert "It adds EYX." in html
+    column.part.received("x.csv", TABLE)
+    assert "It replaces EXX and adds EYX." in column.settle()
+    with pytest.raises(SceneError, match="does not say which axis"):
+        column.part.received("other.comp", COMP.encode())
+    assert [one.name for one in column.part._files] == ["y.csv", "x.csv"]
 
 
-def test_a_format_that_is_not_recognised_is_asked_for():
-    offer = unsaid("0\t0.001\t0.002\n", "data.dat")
-    assert offer.kind is None
-    assert "no format that is known" in offer.problem
-    chosen = said_again(offer, Said(format="linuxcnc-comp"), NOMINAL)
-    assert "which axis" in chosen.problem
-    assert said_again(chosen, Said("linuxcnc-comp", "X"), NOMINAL).can_apply
+def test_a_file_that_does_not_say_its_axis_asks_in_the_words_of_the_page():
+    column = Column(ImportPart, STATE)
+    column.part.received("unnamed.comp", COMP.encode())
+    html = column.settle()
+    assert 'role="alert"' in html
+    assert 'class="ws-options" open' in html
+    assert "--axis" not in html
+    column.do("apply", "0")
+    assert column.state.comparison.b is None
+    column.do("set.axis", HOSTILE * 100_000)
+    assert "<img" not in column.settle()
+    assert len(column.part._problem[1]) <= 1500
+    column.do("set.axis", "X")
+    assert "It adds EXX." in column.settle()
+    with pytest.raises(SceneError):
+        column.part.received("nothing.bin", b"\0\1\2")
 
 
-def test_a_choice_that_does_not_fit_keeps_the_files_and_the_last_preview():
-    good = offered([source_of_text("X [mm],EXX [um]\n-200,1\n200,2\n", "x.csv")], NOMINAL)
-    assert good.can_apply
-    bad = said_again(good, Said(format="heidenhain"), NOMINAL)
-    assert bad.problem.startswith("x.csv: ")
-    assert not bad.can_apply
-    assert bad.sources == good.sources
-    assert bad.reading is good.reading
-    assert bad.made is good.made
-    again = said_again(bad, Said(), NOMINAL)
-    assert again.can_apply
-    assert again.made.text == good.made.text
-
-
-def test_only_what_a_choice_may_mend_is_asked_for():
-    for text, name in (
-        ("X [mm],EXX [um]\n0,1\n0,2\n", "bad.csv"),
-        ("X [mm],EXX [um]\n0,1\n9000,2\n", "far.csv"),
-        ("X [mm],EXX\n0,1\n", "unit.csv"),
-    ):
-        with pytest.raises(SceneError) as caught:
-            offered([source_of_text(text, name)], NOMINAL)
-        assert not isinstance(caught.value, UnsaidError)
-
-
-def test_what_is_said_is_clamped_and_shown_escaped():
-    long = said_again(unsaid(COMP, "joint.comp"), Said(axes=HOSTILE * 100_000), NOMINAL)
-    assert 0 < len(long.problem) <= LONGEST_PROBLEM
-    assert len(long.said.fitting(long.kind).axes) == LONGEST_AXES
+def test_a_format_that_is_not_recognised_or_does_not_fit_is_asked_for():
+    column = Column(ImportPart, STATE)
+    column.part.received("data.dat", b"0\t0.001\t0.002\n")
+    assert "no format that is known" in column.settle()
+    column.do("set.format", "linuxcnc-comp")
+    assert "which axis" in column.settle()
+    column.do("set.axis", "X")
+    assert "It adds EXX." in column.settle()
+    column.do("set.format", "heidenhain")
+    assert "data.dat: " in column.settle()
+    column.do("set.format", HOSTILE)
+    assert "expected one of" in column.settle()
+    column.do("set.format", "linuxcnc-comp")
+    assert "It adds EXX." in column.settle()
+    column.do("remove", "0")
+    assert "Files can also be dropped" in column.html()
 
 
 ENC = (
@@ -438,9 +452,9 @@ def test_any_files_as_any_format_are_read_or_refused_in_words():
     read = 0
     for sources in files():
         for kind in formats():
-            start = Offer(tuple(sources))
-            for axes in ("", "X", "AX1=X, Q=B"):
-                found = said_again(start, Said(kind.name, axes), NOMINAL)
-                assert found.can_apply == (not found.problem)
-                read += found.can_apply
+            for axis in ("", "X", "AX1=X, Q=B"):
+                asked = Import(format=kind.name, axis=axis, sources=tuple(sources))
+                with suppress(WarpspaceError):
+                    assert list(asked.run(NOMINAL, silent).blocks())
+                    read += 1
     assert read >= len(formats())

@@ -1,9 +1,7 @@
-"""The bar at the top and its windows: scenes, files, import, report, commands and keys."""
+"""The bar at the top and its windows: scenes, files, report, commands and keys."""
 
 from dataclasses import replace
 from types import SimpleNamespace
-
-import pytest
 
 from app.parts import Nobody
 from warpspace.app.documents.scene_file import SceneList, open_text
@@ -13,7 +11,6 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.files import FilesWindow, ReportWindow
-from warpspace.app.tasks.importing import ImportWindow
 from warpspace.app.tasks.top import (
     COMMANDS,
     HelpWindow,
@@ -23,14 +20,13 @@ from warpspace.app.tasks.top import (
     TopPart,
     key_events,
 )
-from warpspace.exceptions import SceneError, WarpspaceError
+from warpspace.exceptions import WarpspaceError
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()
 FIRST, SECOND = load_scene("dvf5000_first"), load_scene("dvf5000_second")
 STATE = start_state(FIRST, nodes=5)
 HOSTILE = "<img src=x onerror=alert(1)>.csv"
-TABLE = b"X [mm],EXX [um]\n-275,0\n0,5\n275,10\n"
 
 
 class Window:
@@ -109,40 +105,6 @@ def test_commands_are_found_by_words_and_enter_runs_the_first():
     assert window.sent == [("page:zero", "")]
     window.do("run", HOSTILE)
     assert len(window.sent) == 1
-
-
-def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
-    window = Window(ImportWindow)
-    window.part.offer(HOSTILE, TABLE)
-    assert window.sent == [("page:open", "import")]
-    assert "<img" not in window.html
-    assert "It adds EXX." in window.html
-    before = LIVE.evaluate(STATE).statistics
-    assert f"{before.mean_um:.1f} → " in window.html
-    applied = window.do("apply")
-    after = LIVE.evaluate(replace(applied, comparison=STATE.comparison)).statistics
-    assert after.mean_um != pytest.approx(before.mean_um)
-    assert applied.amplitudes["EXX"] == pytest.approx(10.0)
-    assert applied.comparison.a.title.startswith("before the import of")
-    assert window.do("apply") is applied  # once
-
-
-def test_what_replaces_an_error_says_so():
-    window = Window(ImportWindow, STATE.with_amplitude("EXX", 3.0))
-    window.part.offer("x.csv", TABLE)
-    assert "It replaces EXX." in window.html
-
-
-def test_a_file_that_does_not_say_its_axis_asks_in_the_words_of_the_window():
-    window = Window(ImportWindow)
-    window.part.offer("unnamed.comp", b"-20 0.001 0.003\n0 0.002 0.004\n20 0.005 0.006\n")
-    assert 'role="alert"' in window.html
-    assert "--axis" not in window.html
-    assert window.do("apply") is STATE
-    window.do("set.axes", "X")
-    assert "It adds EXX." in window.html
-    with pytest.raises(SceneError):
-        window.part.offer("nothing.bin", b"\0\1\2")
 
 
 def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():

@@ -60,10 +60,10 @@ class ReadOptions:
         if not known:
             says = f"--axis {bare or 'NAME'}=AXIS says which one it is"
             if self.machine is None:
-                at.unsaid(f"axis {bare!r} is not known", f"X Y Z U V W A B C; {says}")
+                at.refuse(f"axis {bare!r} is not known", f"X Y Z U V W A B C; {says}")
             chain, axes = self.machine.chain, ", ".join(self.machine.axes)
             found = f"axis {bare!r} is none of the machine {chain}, which has {axes}"
-            at.unsaid(found if given else f"{found} ({says})")
+            at.refuse(found if given else f"{found} ({says})")
         return known[0]
 
 
@@ -206,7 +206,7 @@ def recognise(sources: Sequence[Source]) -> Format:
             expected = (
                 f"one of {names} (--format NAME says which; `warpspace import --formats` lists"
             )
-            (source.at(number) if number else source).unsaid(said, f"{expected} what each holds)")
+            (source.at(number) if number else source).refuse(said, f"{expected} what each holds)")
         found[kind.name] = kind
         if len(found) > 1:
             names = " and ".join(found)

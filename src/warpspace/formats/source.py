@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from warpspace.exceptions import SceneError, UnsaidError
+from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
 from warpspace.scene.files import CsvRows, check_file, parse_number
 
@@ -98,10 +98,6 @@ class Source:
     def refuse(self, found: str, expected: str = "") -> NoReturn:
         raise SceneError(self.name, [_joined(found, expected)])
 
-    def unsaid(self, found: str, expected: str = "") -> NoReturn:
-        """Ask for what the file does not say."""
-        raise UnsaidError(self.name, [_joined(found, expected)])
-
     def rows(self, most: int) -> CsvRows:
         """Read it as a table with a header and at most so many rows."""
         return CsvRows(io.StringIO(self.text), self.name, most, once=True)
@@ -133,10 +129,6 @@ class Place:
 
     def refuse(self, found: str, expected: str = "") -> NoReturn:
         self.source.refuse(f"line {self.line}: {found}", expected)
-
-    def unsaid(self, found: str, expected: str = "") -> NoReturn:
-        """Ask for what the line does not say."""
-        self.source.unsaid(f"line {self.line}: {found}", expected)
 
     def number(self, text: str, what: str) -> float:
         """Read one finite number with a decimal point."""

@@ -166,7 +166,7 @@ class PageLook:
 
     task: str = described("understand", "Task", choices=TASKS, linked="")
     open: frozenset[str] = described(
-        frozenset({"worst", "compensate", "repair", "concepts", "allocate"}),
+        frozenset({"worst", "compensate", "repair", "concepts", "allocate", "import"}),
         "Open sections",
         linked="",
     )

@@ -243,6 +243,7 @@ class AnalysisPart(Section):
             return EMPTY
         form = above + form_html(self.name, options, self.values(state), state.scene)
         return tag("details", tag("summary", "Options") + form, class_="ws-options",
+                   open=bool(self.problem_html(state)),
                    data_key=f"{self.name}.options")  # fmt: skip
 
     # --- events --------------------------------------------------------------------------------

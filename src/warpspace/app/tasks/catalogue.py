@@ -13,7 +13,7 @@ from warpspace.app.tasks.controls import ComparePart, ControlsPart
 from warpspace.app.tasks.conventions import ConventionsSection
 from warpspace.app.tasks.errors import ErrorsPart
 from warpspace.app.tasks.files import FilesWindow, ReportWindow
-from warpspace.app.tasks.importing import ImportSection, ImportWindow
+from warpspace.app.tasks.importing import ImportPart
 from warpspace.app.tasks.improve import BestPart
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
@@ -39,7 +39,6 @@ class TasksPart(Part):
         names = {one.name: one.task for one in found}
         names = {name: names[name] for name in (*FIRST, *names)}
         self.sections = {task: [name for name, of in names.items() if of == task] for task in TASKS}
-        self.sections["measure"].insert(0, ImportSection.name)
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         return (picture.state.page.task,)
@@ -74,7 +73,7 @@ def _places(names: Iterable[str]) -> Markup:
 
 def build_parts(context: Context) -> list[Part]:
     """Build the parts of a page."""
-    of_tasks = (WorstPart, VolumePart, TestsPart)
+    of_tasks = (WorstPart, VolumePart, ImportPart, TestsPart)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     found: list[Section] = [
         *(kind(context) for kind in of_tasks),
@@ -84,7 +83,7 @@ def build_parts(context: Context) -> list[Part]:
     first = (TopPart, HeadPart, OrderPart, ControlsPart, ComparePart, ErrorsPart)
     last = (
         BestPart, RoomPart, StatePart, PagePart, ScenesWindow, MachinesWindow, FilesWindow,
-        ImportSection, ImportWindow, ReportWindow, HelpWindow,
+        ReportWindow, HelpWindow,
     )  # fmt: skip
     return [
         *(kind(context) for kind in first),

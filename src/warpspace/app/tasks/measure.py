@@ -45,8 +45,6 @@ from warpspace.calibration.readings import bundled_data, find_data, parse_readin
 from warpspace.calibration.registry import KINDS, RENAMED, test_kinds
 from warpspace.calibration.results import Calibration
 from warpspace.exceptions import OptionError, WarpspaceError
-from warpspace.machine.limits import MAX_CSV_BYTES
-from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -76,7 +74,7 @@ class FilesPart(AnalysisPart):
     def question(self, state: AppState) -> Question:
         return (*super().question(state), self._files)
 
-    def received(self, name: str, text: str) -> None:
+    def received(self, name: str, content: bytes) -> None:
         """Take in a file."""
         raise NotImplementedError
 
@@ -120,8 +118,7 @@ class FilesPart(AnalysisPart):
         return state
 
     def _receive(self, value: str) -> None:
-        name, content = read_upload(value, MOST_BYTES, WHAT)
-        self.received(name, upload_text(content, name, WHAT))
+        self.received(*read_upload(value, MOST_BYTES, WHAT))
 
 
 # --- Standard tests -------------------------------------------------------------------------------
@@ -145,12 +142,13 @@ class TestsPart(FilesPart):
     def question(self, state: AppState) -> Question:
         return (*super().question(state), state.forms.get(TEST))
 
+    def is_ready(self, state: AppState) -> bool:
+        return chosen_test(state) is not None
+
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.question(picture.drawn_state), picture.is_difference, self._version)
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        if chosen_test(state) is None:
-            raise OptionError("choose a test")
         asked: Any = super().ask(state, values, scenes)
         plan_test(asked, scenes[0])
         for one in self._files:
@@ -196,11 +194,11 @@ class TestsPart(FilesPart):
             return with_form(state, "test.path", value)
         return super().take(state, word, value)
 
-    def received(self, name: str, text: str) -> None:
-        self._files = (Held(name, text),)
+    def received(self, name: str, content: bytes) -> None:
+        self._files = (Held(name, upload_text(content, name, WHAT)),)
 
     def _into_report(self) -> None:
-        if self._answer is not None and isinstance(found := self._answer[1], BenchResult):
+        if self._answer is not None and isinstance(found := self._answer.found, BenchResult):
             self.context.reported.append((found.test.title, found))
             self.context.notify("Added to the report", f"{found.test.title}; see Report at the top")
 
@@ -323,8 +321,7 @@ class CalibratePart(FilesPart):
             name = self._kind_of_next.partition(":")[0]
             self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
         elif word == "bundled" and value in bundled_data():
-            text = read_text(find_data(value), MAX_CSV_BYTES)
-            self.attempt(partial(self.received, value, text))
+            self.attempt(partial(self.received, value, find_data(value).read_bytes()))
         elif word == "arrows":
             self._arrows = value if value in ARROWS else ""
             state = edits.with_sight(state, inside=bool(self._arrows))
@@ -333,7 +330,8 @@ class CalibratePart(FilesPart):
         self.context.act(self._again)
         return state
 
-    def received(self, name: str, text: str) -> None:
+    def received(self, name: str, content: bytes) -> None:
+        text = upload_text(content, name, WHAT)
         scene, kind = self.context.state.active_scene(), self._kind_of_next or None
         self._files = (*self._files, take_file(scene, text, name, kind, self._files))
 

@@ -100,7 +100,7 @@ def _looked_up(source: Source, axes: dict[str, list[str]], options: ReadOptions)
     found = (named or [options.axis or last])[0]
     if not found:
         expected = "its .CMA file beside it, or --axis X"
-        source.unsaid("does not say over which axis", expected)
+        source.refuse("does not say over which axis", expected)
     return options.axis_named(found, source)
 
 

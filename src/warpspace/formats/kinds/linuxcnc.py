@@ -130,7 +130,7 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
             letter = source.stem.upper().rsplit("_", 1)[-1]
             axis = options.axis or (letter if len(letter) == 1 and letter in JOINTS else "")
         if not axis:
-            source.unsaid("does not say which axis it is for", "--axis X, or its INI file")
+            source.refuse("does not say which axis it is for", "--axis X, or its INI file")
         axis = options.axis_named(axis, source)
         if any(term.source == axis for term in terms):
             source.refuse(f"is a second table of {axis}", "one a joint, as LinuxCNC takes")

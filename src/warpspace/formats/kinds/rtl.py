@@ -90,7 +90,7 @@ def _axis(source: Source, sections: dict[str, Lines], options: ReadOptions) -> s
     pairs = [(at, _pair(text)) for at, text in sections.get("USER-TEXT", [])]
     named = [(at, pair[1]) for at, pair in pairs if pair and pair[0] == "axis" and pair[1]]
     if not named:
-        source.unsaid("does not name its axis", "--axis X")
+        source.refuse("does not name its axis", "--axis X")
     at, value = named[0]
     return options.axis_named(value.split()[0], at)
 

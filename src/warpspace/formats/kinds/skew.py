@@ -142,7 +142,7 @@ def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str
             (loaded,) = profiles
         elif not loaded or loaded not in profiles:
             which = f"no profile {loaded!r} among" if loaded else "several skew profiles:"
-            source.unsaid(f"{which} {names}", "one of them (--variant NAME)")
+            source.refuse(f"{which} {names}", "one of them (--variant NAME)")
         found |= profiles[loaded]
         notes.append(
             f"profile {loaded!r} is taken as loaded: Klipper loads none by itself, only"
