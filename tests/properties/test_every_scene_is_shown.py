@@ -27,7 +27,7 @@ from warpspace.app.viewport.around import around, words
 from warpspace.app.viewport.box import box, ghost_dashes
 from warpspace.app.viewport.camera import VIEWS, fit_camera
 from warpspace.app.viewport.labels import axes_room_mm
-from warpspace.app.viewport.machine import machine
+from warpspace.app.viewport.moving import machine
 from warpspace.app.viewport.shapes import Nodes
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear

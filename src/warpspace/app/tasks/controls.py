@@ -23,7 +23,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
-from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, PRESENT, SHOWN, AppState, Side
+from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, SHOWN, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
 from warpspace.app.state.tree import leaves, put, spell
@@ -183,7 +183,7 @@ class ComparePart(Part):
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         state, found = picture.state, picture.compared
         chosen = state.comparison
-        known = {title: title for title in (PRESENT, *_own_sides(state), *self.context.scenes)}
+        known = {title: title for title in (*_own_sides(state), *self.context.scenes)}
         b = NOBODY if chosen.b is None else chosen.b.title
         body = [
             field(title, choice(name, side, words), name)
@@ -203,31 +203,25 @@ class ComparePart(Part):
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         """Take what a browser has chosen; a title that nobody has changes nothing."""
-        chosen = state.comparison
+        chosen, scene = state.comparison, self.context.scenes.get(value)
         if word == "pin":
             return with_pin(state)
         if word == "leave" or (word == "set.b" and value == NOBODY):
             return with_sides(state, chosen.a, None)
-        side = self._side(state, value)
+        side = _own_sides(state).get(value)
+        if side is None and scene is not None:
+            side = replace(scene_side(scene), title=value)
         if side is None or word not in ("set.a", "set.b"):
             return state
         a, b = (side, chosen.b or Side()) if word == "set.a" else (chosen.a, side)
         return with_sides(state, a, b)
 
-    def _side(self, state: AppState, title: str) -> Side | None:
-        if title == PRESENT:
-            return Side()
-        scene = self.context.scenes.get(title)
-        own = _own_sides(state).get(title)
-        if own is not None or scene is None:
-            return own
-        return replace(scene_side(scene), title=title)
-
 
 def _own_sides(state: AppState) -> dict[str, Side]:
+    """Give what can be compared beside scenes, by title."""
     chosen = state.comparison
-    used = (chosen.pinned, chosen.a, chosen.b)
-    return {side.title: side for side in used if side is not None and side.state is not None}
+    used = (Side(), chosen.pinned, chosen.a, chosen.b)
+    return {side.title: side for side in used if side is not None}
 
 
 def _sides(found: Compared) -> Markup:

@@ -1,20 +1,64 @@
-"""Everything around the box as one layer, and the table that turns."""
+"""Everything around the box as one layer: the schematic machine, and the table that turns."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from viser import ClientHandle
 
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import played_position
+from warpspace.app.evaluation.machine import drawn_bodies, played_position, tool_point
 from warpspace.app.state.leaf import Identity
 from warpspace.app.viewport.around import around, turned_points
-from warpspace.app.viewport.machine import ghost_machine, machine
-from warpspace.app.viewport.shapes import Nodes
+from warpspace.app.viewport.colours import Rgb, palette
+from warpspace.app.viewport.shapes import Nodes, Shape, Shapes, ball, lines, mesh
+from warpspace.bodies.placed import PlacedBody
 
 STEP_S = 0.125  # between two pictures of a turning table: modest, since each is sent to the page
 LONGEST_STEP_S = 0.5  # time lost is skipped, not made up for
 SPEED_DEG_S = 30.0
+
+EDGE: Rgb = (70, 78, 90)
+DARK_EDGE: Rgb = (150, 158, 170)
+BALL = 0.010  # marker of the tool point, as a part of the longest edge
+OPACITY = 0.045
+GHOST, DARK_GHOST = (120, 132, 150), (150, 160, 176)
+GHOST_EDGE: Rgb = (226, 230, 235)
+DARK_GHOST_EDGE: Rgb = (48, 54, 63)
+
+
+def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
+    """Draw the bodies, moved by the positions of the machine and bent by its errors.
+
+    Some axes may stand elsewhere, degrees, while one is turned; its table is then drawn also where
+    the machine is not.
+    """
+    shown, shapes = picture.state.machine.shown, dict[str, Shape | None]()
+    if shown or turned:
+        edge = DARK_EDGE if picture.state.shown.dark else EDGE
+        for part in drawn_bodies(picture, turned):
+            shapes |= _body("/machine", part, part.body.colour, edge)
+    if shown:
+        at, size = tool_point(picture)[0], BALL * picture.size_mm
+        shapes["/machine/tool_point"] = ball(at, size, palette(picture).edge)
+    return shapes
+
+
+def ghost_machine(picture: LivePicture) -> Shapes:
+    """Draw the nominal machine, nearly transparent: it tells what the box is a part of."""
+    dark = picture.state.shown.dark
+    colour, edge = (DARK_GHOST, DARK_GHOST_EDGE) if dark else (GHOST, GHOST_EDGE)
+    shapes: dict[str, Shape | None] = {}
+    for part in drawn_bodies(picture, nominal=True):
+        shapes |= _body("/ghost_machine", part, colour, edge, opacity=OPACITY)
+    return shapes
+
+
+def _body(root: str, part: PlacedBody, colour: Rgb, edge: Rgb, **more: object) -> Shapes:
+    name, triangles = f"{root}/{part.body.name}", part.body.triangles
+    return {
+        name: mesh(part.vertices_mm, triangles, colour, flat_shading=True, **more),
+        f"{name}_edges": lines(part.edges_mm, edge, 0.9),
+    }
 
 
 class MovingLayer:
