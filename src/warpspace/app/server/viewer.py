@@ -1,7 +1,6 @@
 """The server of the app: starts it, gives each browser tab a session, ends it cleanly."""
 
 import contextlib
-import importlib
 import io
 import logging
 import threading
@@ -117,7 +116,6 @@ class Viewer:
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
         surface_glb(self._live.evaluate(self._start))
-        importlib.import_module("warpspace.app.tasks.design")
 
     async def _connect(self, client: viser.ClientHandle) -> None:
         connection = connection_of(self._server, client)

@@ -1,7 +1,7 @@
 """An analysis on the page: its result, what to do with it, and its options, from its description.
 
 What only a page can do (numbers that follow a drag, a picture in the box) is a hook beside it, by
-the analysis' name: a subclass of `AnalysisPart` in `HOOKS`.
+the analysis' name: a subclass of `AnalysisPart` in `HOOKS` of the catalogue.
 """
 
 import csv
@@ -11,34 +11,38 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from pkgutil import resolve_name
 from typing import NamedTuple, TypeVar
 
 from markupsafe import Markup
 
-from warpspace.analysis.catalogue import Entry, entries
+from warpspace.analysis.catalogue import Entry
 from warpspace.analysis.description import Analysis, Change, Result
 from warpspace.analysis.options import Option
-from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.evaluation.cache import taken_turn
-from warpspace.app.evaluation.compare import with_applied, with_proposal
+from warpspace.app.evaluation.compare import (
+    applied,
+    plain_state,
+    with_applied,
+    with_proposal,
+)
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import LONGEST, read_form
 from warpspace.app.state.leaf import Identity
+from warpspace.app.state.table import without_table
 from warpspace.app.tasks.charts import block_html, result_html
 from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.files import PLAIN
 from warpspace.app.tasks.forms import form_html
 from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.parts import Section
 from warpspace.exceptions import OptionError, WarpspaceError
-from warpspace.field.grid import build_grid
 from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_at
-from warpspace.scene.model import Scene, evaluate_grid
+from warpspace.scene.model import Scene
 
 TITLES = {
     "gains": "Error gains", "line": "Along a line", "reach": "Volume within a limit",
@@ -51,24 +55,9 @@ OF_STATE = frozenset({"loop", "placed"})
 """Options that are set for the whole page, in one place."""
 QUICK_S = 0.4  # what is answered within that time is answered anew with every change
 MOST_STEPS = 4  # errors that a card names one by one
-SAME = 1e-9  # µm or µrad; an error that moves by less stays
+SAME = 1e-3  # µm or µrad; an error that moves by less stays
 T = TypeVar("T")
 Question = tuple[object, ...]
-
-
-class Card(NamedTuple):
-    """A scene that a result proposes, and what it changes in words."""
-
-    change: Change
-    words: Markup
-
-    def html(self, part: str, index: int, *, stale: bool) -> Markup:
-        """Say it, with buttons that preview and apply it."""
-        buttons = button("Preview", f"{part}:preview", index, disabled=stale,
-                         hint="Draw the result beside the present state")  # fmt: skip
-        buttons += button("Apply", f"{part}:apply", index, kind="main", disabled=stale,
-                          hint="Change the errors; the state before it is kept as A")  # fmt: skip
-        return tag("div", self.words + tag("div", buttons, class_="ws-actions"), class_="ws-card")
 
 
 class Answer(NamedTuple):
@@ -76,7 +65,7 @@ class Answer(NamedTuple):
 
     question: Question  # that it answers
     found: Result
-    cards: tuple[Card, ...] = ()
+    cards: tuple[tuple[Change, Markup], ...] = ()  # what it proposes, and that in words
     took_s: float = 0.0
 
 
@@ -186,12 +175,8 @@ class AnalysisPart(Section):
         return self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
-        answer = self._answer
-        question, is_ready, is_quick = (
-            self.question(state),
-            self.is_ready(state),
-            self.is_quick(state),
-        )
+        question, is_quick = self.question(state), self.is_quick(state)
+        is_ready, answer = self.is_ready(state), self._answer
         if is_quick and is_ready and question != self._asked and not self._jobs.busy:
             self._run(state)
         stale = answer is not None and answer.question != question
@@ -227,14 +212,21 @@ class AnalysisPart(Section):
 
     def cards_html(self, question: Question) -> Markup:
         """Offer the changes that the result proposes."""
-        answer = self._answer
+        answer, cards = self._answer, list[Markup]()
         if answer is None:
             return EMPTY
-        stale = answer.question != question
-        return join(
-            answer.cards[index].html(self.name, index, stale=stale)
-            for index in self.offered(answer.found)
-        )
+        hints = {"Preview": "Draw the result beside the present state",
+                 "Apply": "Change the errors; the state before it is kept as A"}  # fmt: skip
+        for index in self.offered(answer.found):
+            buttons = join(
+                button(words, f"{self.name}:{words.lower()}", index, hint=hint,
+                       kind="main" if words == "Apply" else "",
+                       disabled=answer.question != question)
+                for words, hint in hints.items()
+            )  # fmt: skip
+            row = tag("div", buttons, class_="ws-actions")
+            cards.append(tag("div", answer.cards[index][1] + row, class_="ws-card"))
+        return join(cards)
 
     def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
         """Fold its options."""
@@ -273,7 +265,7 @@ class AnalysisPart(Section):
         if answer is None or answer.question != self.question(state):
             return None
         index = index_of(value, len(answer.cards))
-        return None if index is None else answer.cards[index].change
+        return None if index is None else answer.cards[index][0]
 
     def _run(self, state: AppState) -> None:
         question, scenes = self.question(state), self.scenes(state)
@@ -289,9 +281,8 @@ class AnalysisPart(Section):
                 started = time.monotonic()
                 found = asked.run_all(scenes, job.tell)
                 took_s = time.monotonic() - started
-                return Answer(
-                    question, found, make_cards(state, scenes[0], found.changes()), took_s
-                )
+            cards = tuple((one, _change_html(state, one)) for one in found.changes())
+            return Answer(question, found, cards, took_s)
 
         self._make(self.kind.doing, answer, self._take_answer)
 
@@ -342,55 +333,27 @@ def _endings(found: Result) -> tuple[str, ...]:
     return ("JSON",) if found.file_table() is None else ("CSV", "JSON")
 
 
-# --- What a result proposes -----------------------------------------------------------------------
-
-
-def make_cards(state: AppState, scene: Scene, changes: Sequence[Change]) -> tuple[Card, ...]:
-    """Set each proposed scene beside the present one: errors, max and mean from and to."""
-    before = _statistics(state, scene) if changes else None
-    return tuple(Card(one, _changed(state, scene, one, before)) for one in changes)
-
-
-def _statistics(state: AppState, scene: Scene) -> Statistics | None:
-    scene = replace(scene, placed=state.placed)
+def effect_html(before: AppState, after: AppState) -> Markup:
+    """Set the error of the volume in two states beside each other, without any table."""
     try:
-        grid = build_grid(scene.model, scene.workspace, state.nodes)
-        return volume_statistics(evaluate_grid(scene, grid, scene.view(state.loop)), grid)
+        was, then = (PLAIN.evaluate(without_table(one)).statistics for one in (before, after))
     except WarpspaceError:
-        return None
+        return EMPTY
+    pairs = (("max", was.max_um, then.max_um), ("mean", was.mean_um, then.mean_um))
+    return rows((name, f"{number(a)} → {number(b)} µm") for name, a, b in pairs)
 
 
-def _changed(state: AppState, scene: Scene, change: Change, before: Statistics | None) -> Markup:
-    after, moved = _statistics(state, change.scene), list[tuple[float, str]]()
-    for key in {**scene.errors.functions, **change.scene.errors.functions}:
-        was, then = (one.errors.amplitude(key) for one in (scene, change.scene))
-        if abs(then - was) > SAME:
-            said = f"{key} {number(was)} → {number(then)} {parameter(key).unit}"
-            moved.append((-abs(then - was), said))
+def _change_html(state: AppState, change: Change) -> Markup:
+    now = plain_state(state)
+    then = applied(now, change.scene)
+    moved: list[tuple[float, str]] = []
+    for key in {**now.amplitudes, **then.amplitudes}:
+        a, b = (one.amplitudes.get(key, 0.0) for one in (now, then))
+        if abs(b - a) > SAME:
+            said = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
+            moved.append((-abs(b - a), said))
     steps = [said for _, said in sorted(moved)] or [change.words]
     lines = [tag("div", tag("b", said)) for said in steps[:MOST_STEPS]]
     if (more := len(steps) - MOST_STEPS) > 0:
         lines.append(tag("div", f"and {more} more", class_="ws-quiet"))
-    if before is not None and after is not None:
-        pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))
-        lines.append(
-            rows((name, f"{number(was)} → {number(then)} µm") for name, was, then in pairs)
-        )
-    return join(lines)
-
-
-HOOKS: dict[str, str] = {
-    "calibrate": "warpspace.app.tasks.measure:CalibratePart",
-    "repair": "warpspace.app.tasks.improve:RepairPart",
-    "compensate": "warpspace.app.tasks.improve:CompensatePart",
-    "allocate": "warpspace.app.tasks.design:TolerancesPart",
-    "concepts": "warpspace.app.tasks.design:ConceptsPart",
-}
-"""Parts of analyses that do more than their description says: ``module:Class`` by name."""
-
-
-def sections(context: Context) -> list[Section]:
-    """Build a section for each analysis that a page can ask."""
-    kinds = (resolve_name(HOOKS[one.name]) if one.name in HOOKS else AnalysisPart
-             for one in entries())  # fmt: skip
-    return [kind(context, one) for kind, one in zip(kinds, entries(), strict=True)]
+    return join((*lines, effect_html(now, then)))

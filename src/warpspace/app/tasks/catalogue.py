@@ -4,25 +4,32 @@ from collections.abc import Iterable, Mapping
 
 from markupsafe import Markup
 
+from warpspace.analysis.catalogue import entries
 from warpspace.app.browser.html import join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import TASKS
-from warpspace.app.tasks.analysis import sections
+from warpspace.app.tasks.analysis import AnalysisPart
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.controls import ComparePart, ControlsPart
 from warpspace.app.tasks.conventions import ConventionsSection
+from warpspace.app.tasks.design import ConceptsPart, TolerancesPart
 from warpspace.app.tasks.errors import ErrorsPart
 from warpspace.app.tasks.files import FilesWindow, ReportWindow
 from warpspace.app.tasks.importing import ImportPart
-from warpspace.app.tasks.improve import BestPart
+from warpspace.app.tasks.improve import BestPart, CompensatePart, RepairPart
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
-from warpspace.app.tasks.measure import TestsPart
+from warpspace.app.tasks.measure import CalibratePart, TestsPart
 from warpspace.app.tasks.over import HeadPart, OrderPart, RoomPart
 from warpspace.app.tasks.parts import Part, Section
 from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
 from warpspace.app.tasks.understand import VolumePart, WorstPart
 
+HOOKS: dict[str, type[AnalysisPart]] = {
+    "calibrate": CalibratePart, "repair": RepairPart, "compensate": CompensatePart,
+    "allocate": TolerancesPart, "concepts": ConceptsPart,
+}  # fmt: skip
+"""Parts of analyses that do more than their description says, by name."""
 FIRST = ("compensate", "concepts", "allocate")
 """Sections that stand first in their task, short ones before long ones."""
 RARE = frozenset({"volume", "gains", "line", "reach", "certify", "convert", "contributions"})
@@ -77,7 +84,7 @@ def build_parts(context: Context) -> list[Part]:
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     found: list[Section] = [
         *(kind(context) for kind in of_tasks),
-        *sections(context),
+        *(HOOKS.get(one.name, AnalysisPart)(context, one) for one in entries()),
         *(kind(context) for kind in of_machine),
     ]
     first = (TopPart, HeadPart, OrderPart, ControlsPart, ComparePart, ErrorsPart)

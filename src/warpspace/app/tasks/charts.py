@@ -155,8 +155,6 @@ def lines_html(chart: Lines) -> Markup:
         return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", said, "ws-polar")
     xs = np.concatenate([curve.x for curve in chart.curves])
     ys = np.concatenate([curve.y for curve in chart.curves])
-    if chart.log:
-        xs, ys = xs[xs > 0], ys[ys > 0]
     frame = Frame(_ends(xs), _ends(ys))
     frame = frame.to_scale() if chart.kind == "plane" else frame
     curves = join(_curve(one, frame.place(one.x, one.y)) for one in chart.curves)
