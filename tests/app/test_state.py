@@ -80,7 +80,7 @@ def test_unknown_names_change_nothing_and_are_noted(state):
         ("rotary.own_mm", "10; 20,5; -3e3", "10.0,20.5,-2000.0", "clamped to -2000 mm"),
         ("rotary.held.B", "-30 0 90", "-30.0,0.0", "B held at: 90 left out"),
         ("tolerances.EAX", "-1", "0.0", "tolerance of roll of X = -1 is outside 0 to 1000 µrad"),
-        ("specification.costs", "EXX 4; EYX=1", "EXX=4", ""),
+        ("specification.costs", "EXX=4; EYX=1", "EXX=4", ""),
         ("picked", "X 1,5", "X 1.5 Y 0.0 Z -280.0", ""),
         ("page.open", "gains,budget", "budget,gains", ""),
         ("page.task", "improve", "improve", ""),

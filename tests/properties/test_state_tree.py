@@ -23,7 +23,7 @@ STARTS = [start_state(load_scene(name)) for name in SCENES]
 SENT = "|nan|1e999|−3,5 µm|20 µrad|+EXX|-EXX,+EYX|\ud800|<b>|1;2|" + "9" * 50
 HOSTILE = st.text(max_size=60) | st.sampled_from(SENT.split("|"))
 TEXTS = {
-    "specification.costs": ["EXX=2.5", "EXX=4; EYX 0.25", ""],
+    "specification.costs": ["EXX=2.5", "EXX=4; EYX=0.25", ""],
     "picked": ["X 1,5 Y -200", "Z=-300 B 10", ""],
     "picked.trace": ["tool,1.0,2.0,3.0", "relative,0.0,0.0,-1e-05"],
 }

@@ -15,7 +15,7 @@ import binascii
 import math
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from urllib.parse import parse_qsl, urlencode
 
@@ -43,13 +43,12 @@ SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
 # what was compared had a line of its own in files of earlier versions
 _LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
-Find = Callable[[str], Scene | None]
-"""Gives the scene that whoever opens a file or a link also has under a name."""
+Known = Sequence[Scene] | None
+"""Scenes that whoever opens a file or a link also has; None for those of the program."""
 Opened = tuple[AppState, CameraMemory | None]
 
 
 def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
-    """Spell a state as a scene file."""
     scene = state.resulting_scene()
     line = settings_line(replace(state, scene=scene, loaded=None), camera)
     if len(line) > MAX_LINE:
@@ -75,8 +74,10 @@ def _lines(text: str) -> list[str]:
     return _LINES.findall(head[0] if head else "")
 
 
-def _bundled(name: str) -> Scene | None:
-    return load_scene(name) if name in scene_names() else None
+def _find(name: str, known: Known) -> Scene | None:
+    if known is None:
+        return load_scene(name) if name in scene_names() else None
+    return next((scene for scene in known if scene.name == name), None)
 
 
 def _recognised(scene: Scene) -> Scene:
@@ -90,63 +91,50 @@ def _recognised(scene: Scene) -> Scene:
     return replace(scene, model=replace(scene.model, machine=same))
 
 
-def state_to_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
-    """Spell a state as a link."""
-    link = _spell(state, camera, _among(known))
+def state_to_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
+    link = _spell(state, camera, known)
     if len(link) > MAX_LINK:
         raise OptionError("this is too large for a link; save it as a file instead")
     return link
 
 
-def named_link(state: AppState, camera: CameraMemory | None, known: Iterable[Scene]) -> str:
-    """Spell a state of a scene that others have as a link of any length; any other as nothing."""
-    return _named(state, camera, _among(known))
-
-
-def _spell(state: AppState, camera: CameraMemory | None, find: Find) -> str:
-    if link := _named(state, camera, find):
+def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
+    if link := named_link(state, camera, known):
         return link
     text = zlib.compress(state_to_toml(state, camera).encode(), 9)
     word = base64.urlsafe_b64encode(text).decode().rstrip("=")
     return urlencode({NAME: state.scene.name, PACKED: word})
 
 
-def _named(state: AppState, camera: CameraMemory | None, find: Find) -> str:
+def named_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
+    """Spell a state of a scene that others have as a link of any length; any other as nothing."""
     scene = state.scene
     plain = state.loaded is None and state.tolerances == scene.tolerances
-    if not plain or find(scene.name) != scene:
+    if not plain or _find(scene.name, known) != scene:
         return ""
-    line = settings_line(state, camera, find)
+    line = settings_line(state, camera, known)
     return "&".join(filter(None, (urlencode({SCENE: scene.name}), line)))
 
 
-def _among(known: Iterable[Scene]) -> Find:
-    named: dict[str, Scene] = {}
-    for scene in known:
-        named.setdefault(scene.name, scene)
-    return named.get
-
-
-def open_link(link: str, known: Iterable[Scene]) -> Opened:
-    """Build the state that a link describes."""
+def open_link(link: str, known: Known) -> Opened:
     if len(link) > MAX_LINK:
         raise OptionError(
             f"the link is {len(link):,} characters long; expected at most {MAX_LINK:,}"
         )
-    return _read_link(link, _among(known))
+    return _read_link(link, known)
 
 
-def _read_link(link: str, find: Find, *, alone: bool = False) -> Opened:
+def _read_link(link: str, known: Known, *, alone: bool = False) -> Opened:
     pairs = dict(_pairs(link))
     if PACKED in pairs:
         name = safe_name(pairs.get(NAME, ""), "link")
         return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", alone=alone)
     name = pairs.pop(SCENE, "")
-    scene = find(name)
+    scene = _find(name, known)
     if scene is None:
         raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
     line = urlencode(pairs)
-    return with_settings(start_state(scene), line, find, alone=alone), camera_of(line)
+    return with_settings(start_state(scene), line, known, alone=alone), camera_of(line)
 
 
 def _unpack(packed: str) -> str:
@@ -164,9 +152,7 @@ def _unpack(packed: str) -> str:
 # --- The line of settings -------------------------------------------------------------------------
 
 
-def settings_line(
-    state: AppState, camera: CameraMemory | None = None, find: Find = _bundled
-) -> str:
+def settings_line(state: AppState, camera: CameraMemory | None = None, known: Known = None) -> str:
     """Spell how a state is looked at, its amplitudes, and what it is compared with."""
     opened = start_state(state.scene)
     pairs = [
@@ -177,15 +163,15 @@ def settings_line(
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
         pairs.append((CAMERA, ",".join(f"{number:.6g}" for number in numbers)))
-    return urlencode([*pairs, *linked_forms(state), *_sides(state, find)])
+    return urlencode([*pairs, *linked_forms(state), *_sides(state, known)])
 
 
 def with_settings(
-    state: AppState, line: str, find: Find = _bundled, *, alone: bool = False
+    state: AppState, line: str, known: Known = None, *, alone: bool = False
 ) -> AppState:
     """Apply a line of settings to a state; `alone` without a comparison."""
     pairs = [pair for pair in _pairs(line) if not (alone and pair[0].startswith(PREFIX))]
-    state, unread = _with_sides(state, dict(pairs), find), list[str]()
+    state, unread = _with_sides(state, dict(pairs), known), list[str]()
     for name, text in pairs:
         if name == CAMERA or name in SIDES:
             continue
@@ -241,7 +227,7 @@ LONGEST_TITLE = 200
 SIDES = [PREFIX + name for name in ("pinned", "a", "b", "pinned.title", "a.title", "b.title")]
 
 
-def _sides(state: AppState, find: Find) -> Iterator[tuple[str, str]]:
+def _sides(state: AppState, known: Known) -> Iterator[tuple[str, str]]:
     chosen = state.comparison
     for name, side in (("pinned", chosen.pinned), ("a", chosen.a), ("b", chosen.b)):
         if side is None or (name == "a" and side.state is None):
@@ -251,14 +237,14 @@ def _sides(state: AppState, find: Find) -> Iterator[tuple[str, str]]:
         elif name != PINNED and not side.is_scene:
             text, usual = PINNED, side.title
         else:
-            text = _spell(side.state, None, find)
+            text = _spell(side.state, None, known)
             usual = scene_side(side.state.scene).title if side.is_scene else ""
         yield PREFIX + name, text
         if side.title != usual:
             yield f"{PREFIX}{name}.title", side.title
 
 
-def _with_sides(state: AppState, given: Mapping[str, str], find: Find) -> AppState:
+def _with_sides(state: AppState, given: Mapping[str, str], known: Known) -> AppState:
     sides: dict[str, Side | None] = {PINNED: None}
     for name in (PINNED, "a", "b"):
         text = given.get(PREFIX + name)
@@ -269,15 +255,15 @@ def _with_sides(state: AppState, given: Mapping[str, str], find: Find) -> AppSta
             if sides[PINNED] is None:
                 raise OptionError("the comparison is with a pinned state, but holds none")
         else:
-            found, _ = _read_link(text, find, alone=True)
+            found, _ = _read_link(text, known, alone=True)
             if name == PINNED:
                 state = state.noted(*(f"{BEFORE}: {note}" for note in found.notes))
                 side = pinned_side(plain_state(found.without_notes()))
             else:
                 side = scene_side(found.scene)
             title = given.get(f"{PREFIX}{name}.title", "")[:LONGEST_TITLE]
-            known = title in (NOW, PRESENT, NOBODY, "")
-            sides[name] = side if known else replace(side, title=title)
+            usual = title in (NOW, PRESENT, NOBODY, "")
+            sides[name] = side if usual else replace(side, title=title)
     compared = replace(state.comparison, a=sides["a"] or Side(), b=sides["b"], pinned=sides[PINNED])
     return replace(state, comparison=compared)
 

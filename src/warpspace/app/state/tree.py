@@ -11,6 +11,7 @@ from enum import StrEnum
 from functools import lru_cache
 from typing import Any, cast
 
+from warpspace.analysis.options import read_numbers
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, Picked, start_state
 from warpspace.app.state.leaf import (
@@ -24,10 +25,10 @@ from warpspace.app.state.leaf import (
     name_of,
 )
 from warpspace.app.state.look import linear_positions, linear_spans, slice_positions
-from warpspace.app.state.typed_numbers import read_costs, read_list, read_positions, read_typed
+from warpspace.app.state.typed_numbers import read_list, read_positions, read_typed
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import axis_order, parameter
-from warpspace.machine.limits import MAX_HALF_WIDTH, MIN_HALF_WIDTH
+from warpspace.machine.limits import COST, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 
 LONGEST = 4000  # characters that are read
 SHOWN = 40  # characters of a text that a note shows
@@ -187,7 +188,6 @@ def _with(thing: Any, names: Sequence[str], found: Any) -> Any:
 
 
 def _with_half_width(state: AppState, leaf: Leaf, text: str) -> AppState:
-    """Set the half width of one tolerance, µm or µrad; its centre stays."""
     key = leaf.path.rpartition(".")[2]
     widest = max(MAX_HALF_WIDTH, edits.half_width_span(state, key).high)
     kept, note = _number(replace(leaf, span=Span(0.0, widest, 0.1)), text)
@@ -196,7 +196,15 @@ def _with_half_width(state: AppState, leaf: Leaf, text: str) -> AppState:
 
 
 def _with_costs(state: AppState, _leaf: Leaf, text: str) -> AppState:
-    costs = read_costs(text, state.amplitudes.keys())
+    try:
+        costs = read_numbers(text, "error=cost", "EA0Z=4,EXX=0.5") if text.strip() else {}
+    except ValueError as problem:
+        raise Unreadable(str(problem)) from None
+    for key, cost in costs.items():
+        if key not in state.amplitudes:
+            raise Unreadable(f"{key}: no parameter of this machine")
+        if not COST[0] <= cost <= COST[1]:
+            raise Unreadable(f"{key}={cost:g}: expected {COST[0]:g} to {COST[1]:g}")
     found = ",".join(f"{key}={cost:g}" for key, cost in costs.items() if cost != 1.0)
     return replace(state, specification=replace(state.specification, costs=found))
 
@@ -283,7 +291,9 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
                 raise Unreadable("expected 0 or 1")
             return SWITCHES[plain], ""
         case "choice":
-            check_choice(leaf, text)
+            if text not in leaf.choices:
+                known = ", ".join(filter(None, leaf.choices))
+                raise Unreadable(f"expected one of {known}"[:LONGEST_NOTE])
             return (type(old)(text) if isinstance(old, StrEnum) else text), ""
         case "keys" | "names":
             return _read_keys(leaf, text, old)
@@ -309,12 +319,6 @@ def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
         raise Unreadable("expected three numbers")
     found = [_number(leaf, part.strip().rstrip(",")) for part in parts]
     return tuple(kept for kept, _ in found), "; ".join(filter(None, (note for _, note in found)))
-
-
-def check_choice(leaf: Leaf, text: str) -> None:
-    """Refuse what is none of the choices."""
-    if text not in leaf.choices:
-        raise Unreadable(f"expected one of {', '.join(filter(None, leaf.choices))}"[:LONGEST_NOTE])
 
 
 def _read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[str], str]:

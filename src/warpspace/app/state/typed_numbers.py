@@ -2,11 +2,11 @@
 
 import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
-from warpspace.app.state.leaf import MOST_TYPED, Span, Unreadable
+from warpspace.app.state.leaf import MOST_TYPED, Span
 from warpspace.exceptions import OptionError
-from warpspace.machine.limits import COST, MAX_TYPED_NUMBER
+from warpspace.machine.limits import MAX_TYPED_NUMBER
 from warpspace.picture.words import IN_R
 
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
@@ -116,20 +116,3 @@ def read_list(text: str, span: Span) -> tuple[tuple[float, ...], str]:
     if len(found) > MOST_HELD:
         notes.append(f"{len(found)} positions; the first {MOST_HELD} are taken")
     return tuple(sorted(found)[:MOST_HELD]), "; ".join(notes)
-
-
-def read_costs(text: str, known: Collection[str]) -> dict[str, float]:
-    """Read costs: pairs like ``EA0Z=4`` or ``EA0Z 4``, with commas or new lines between."""
-    found: dict[str, float] = {}
-    for part in filter(str.strip, re.split(r"[,;\n]", text)):
-        key, _, number = part.replace("=", " ").strip().partition(" ")
-        cost = read_typed(number)
-        shown = part.strip()[:30]
-        if cost is None:
-            raise Unreadable(f"{shown!r}: expected an error and a number, for instance EA0Z=4")
-        if key.upper() not in known:
-            raise Unreadable(f"{shown!r}: no parameter of this machine")
-        if not COST[0] <= cost <= COST[1]:
-            raise Unreadable(f"{shown!r}: expected {COST[0]:g} to {COST[1]:g}")
-        found[key.upper()] = cost
-    return found

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from warpspace.analysis.blocks import Histogram
 from warpspace.analysis.cases import Case, Over, Plan
 from warpspace.analysis.description import Analysis, Result
-from warpspace.analysis.options import Option
+from warpspace.analysis.options import Option, read_numbers
 from warpspace.app.browser.html import (
     EMPTY,
     button,
@@ -31,7 +31,7 @@ from warpspace.app.evaluation.machine_edits import library
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.typed_numbers import read_costs, spell_typed
+from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.app.tasks.analysis import AnalysisPart, Answer, Question
 from warpspace.app.tasks.charts import histogram_html
 from warpspace.app.tasks.forms import setting
@@ -102,12 +102,11 @@ class TolerancesPart(AnalysisPart):
         asked: Any = super().ask(state, values, scenes)
         wanted, known = state.specification, state.amplitudes.keys()
         fixed = wanted.fixed & known
-        named = {pair.partition("=")[0] for pair in wanted.costs.split(",") if pair}
-        every = read_costs(wanted.costs, {*known, *named})
-        costs = {key: cost for key, cost in every.items() if key in known and key not in fixed}
+        every = read_numbers(wanted.costs, "", "") if wanted.costs else {}
+        costs = tuple((k, cost) for k, cost in every.items() if k in known and k not in fixed)
         return replace(
             asked, limit_um=wanted.limit_um, probability=wanted.percent / 100.0, loop=state.loop,
-            over=wanted.over, distribution=wanted.distribution, costs=tuple(costs.items()),
+            over=wanted.over, distribution=wanted.distribution, costs=costs,
             fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
         )  # fmt: skip
 
