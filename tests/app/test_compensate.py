@@ -11,7 +11,7 @@ import pytest
 
 from app.parts import answer_of, part_of, section
 from still_scenes import still_scene
-from warpspace.app.documents.files import exported_words, file_stem, shown_machines
+from warpspace.app.documents.files import exported_words, file_stem, shown_sides
 from warpspace.app.documents.legend import picture_conditions, subject_words
 from warpspace.app.documents.offline_page import build_offline_html, point_words
 from warpspace.app.documents.scene_file import state_to_toml
@@ -291,7 +291,8 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
 def test_figures_and_exports_are_those_of_the_machine_without_it(controller, box):
     state = with_box(START, box, controller)
     bare = without_tables(LIVE.evaluate(state))
-    assert shown_machines(bare, sheet=True) == shown_machines(LIVE.evaluate(START))
+    (shown,) = shown_sides(bare, sheet=True)
+    assert shown.active_scene() == START.active_scene()
     assert file_stem(LIVE.evaluate(state)) == "dvf5000_first_with_table"
     assert file_stem(LIVE.evaluate(START)) == "dvf5000_first"
 

@@ -7,7 +7,7 @@ import pytest
 
 from app.parts import lone_part
 from warpspace.analysis.repair import repaired
-from warpspace.app.documents.files import shown_machines
+from warpspace.app.documents.files import shown_sides
 from warpspace.app.documents.legend import order_conditions, picture_conditions, subject_words
 from warpspace.app.documents.scene_file import (
     open_text,
@@ -161,8 +161,8 @@ def test_files_and_links_keep_it():
     assert with_settings(start_state(SECOND), settings_line(PLACED)).placed
     scene = PLACED.resulting_scene()
     assert start_state(parse_scene(scene_to_toml(scene), "x")).placed
-    (shown,) = shown_machines(LIVE.evaluate(PLACED))
-    exported = evaluate_picture(shown.scene, grid=PLACED.nodes, loop=shown.loop)
+    (shown,) = shown_sides(LIVE.evaluate(PLACED))
+    exported = evaluate_picture(shown.active_scene(), grid=PLACED.nodes, loop=shown.loop)
     np.testing.assert_allclose(
         exported.field.error_um, LIVE.evaluate(PLACED).field.error_um, atol=1e-9
     )

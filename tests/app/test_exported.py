@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from app.frames import pixels_of_the_map
-from warpspace.app.documents.files import exported_words, file_stem, shown_machines
+from warpspace.app.documents.files import exported_words, file_stem, shown_sides
 from warpspace.app.documents.legend import seen_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
@@ -92,9 +92,9 @@ def test_the_offline_page_says_what_it_shows(shown):
 
 @pytest.mark.render
 def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(renderer):
-    pair = [one.scene for one in shown_machines(picture_of("a"), sheet=True)]
+    pair = [one.active_scene() for one in shown_sides(picture_of("a"), sheet=True)]
     assert [scene.title for scene in pair] == [f"present errors: {FIRST.title}", SECOND.title]
-    settings = FigureSettings(grid=5, exaggeration=pair[0].exaggeration)
+    settings = FigureSettings(grid=5, exaggeration=picture_of("a").exaggeration)
     drawing = draw("comparison", pair, settings)
     difference = picture_of("difference")
     np.testing.assert_allclose(drawing.maps[2].picture.values, difference.values, atol=1e-6)
@@ -156,7 +156,7 @@ def test_volumes_that_differ_export_the_side_that_is_drawn():
     assert picture.compared.refused
     assert picture.compared.difference is None
     assert picture.compared.shown == "b"
-    assert len(shown_machines(picture, sheet=True)) == 1
+    assert len(shown_sides(picture, sheet=True)) == 1
     assert file_stem(picture) == "B_other"
     assert "sheet" not in exported_words(picture)
 

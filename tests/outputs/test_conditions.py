@@ -9,8 +9,8 @@ from dataclasses import replace
 import pytest
 from PIL import Image
 
-from warpspace.app.documents.files import shown_machines
-from warpspace.app.documents.legend import look_words, picture_conditions
+from warpspace.app.documents.files import shown_sides
+from warpspace.app.documents.legend import look_words, picture_conditions, state_conditions
 from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.evaluation.compare import scene_side, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -72,7 +72,7 @@ def test_a_comparison_says_the_conditions_of_each_side():
     assert picture_conditions(picture) == ("A excluded: EA0Z",)
     rows = list(csv.DictReader(io.StringIO(write_export(picture, ".csv").decode())))
     assert rows[0]["conditions"] == "A excluded: EA0Z"
-    conditions = [one.conditions for one in shown_machines(picture)]
+    conditions = [state_conditions(one) for one in shown_sides(picture)]
     assert conditions == [("excluded: EA0Z",), ()]
 
 

@@ -56,14 +56,15 @@ def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event)
 
     Where tilts are coloured it is the orientation map; a comparison is always of position errors.
     """
-    from warpspace.app.documents.files import shown_machines
+    from warpspace.app.documents.files import shown_sides
+    from warpspace.app.documents.legend import state_conditions
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.picture.comparison import conditions_of_both
 
-    machines = shown_machines(picture, sheet=not figure)
-    loops = [machine.loop for machine in machines]
-    if figure and len(machines) == 2:
-        raise OptionError(f"figure {figure!r} is of one machine; show A or B in the tab Compare")
+    sides = shown_sides(picture, sheet=not figure)
+    loops = [side.loop for side in sides]
+    if figure and len(sides) == 2:
+        raise OptionError(f"figure {figure!r} is of one machine; draw A or B, not their difference")
     if len(set(loops)) > 1:
         raise OptionError(
             f"A is seen through the {loops[0]} loop, B through the {loops[1]} loop;"
@@ -71,10 +72,10 @@ def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event)
         )
     state, tilts = picture.state, picture.tilts
     name = figure or ("orientation-map" if tilts else "error-map")
-    conditions, fixed = machines[0].conditions, state.look.range_mode == "fixed"
+    conditions, fixed = state_conditions(sides[0]), state.look.range_mode == "fixed"
     top: float | None = picture.scale.high
-    if len(machines) == 2:
-        name, conditions = "comparison", conditions_of_both(*(one.conditions for one in machines))
+    if len(sides) == 2:
+        name, conditions = "comparison", conditions_of_both(*map(state_conditions, sides))
         # the change has colours of its own, whichever of the three is drawn on the page
         top = top if fixed and not tilts else None
     settings = FigureSettings(
@@ -88,7 +89,7 @@ def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event)
         range_fixed=fixed,
         conditions=conditions,
     )
-    return _render(name, [machine.scene for machine in machines], settings, cancelled)
+    return _render(name, [side.active_scene() for side in sides], settings, cancelled)
 
 
 def draw_view(
@@ -193,24 +194,24 @@ def _wait(
 
 def write_export(picture: "LivePicture", ending: str) -> bytes:
     """Write an export of what a page shows."""
-    from warpspace.app.documents.files import shown_machines
-    from warpspace.app.documents.legend import range_conditions
+    from warpspace.app.documents.files import shown_sides
+    from warpspace.app.documents.legend import range_conditions, state_conditions
     from warpspace.outputs.files import temporary_folder
     from warpspace.picture.comparison import scene_change
     from warpspace.picture.model import evaluate_picture
 
     found, *subtracted = (
         evaluate_picture(
-            machine.scene,
+            side.active_scene(),
             exaggeration=picture.exaggeration,
             grid=picture.state.nodes,
-            loop=machine.loop,
+            loop=side.loop,
             component=picture.component,
             quantity=picture.quantity,
             colours=picture.scale,
-            conditions=(*machine.conditions, *range_conditions(picture)),
+            conditions=(*state_conditions(side), *range_conditions(picture)),
         )
-        for machine in shown_machines(picture)
+        for side in shown_sides(picture)
     )
     if subtracted:
         found = scene_change(found, subtracted[0])
@@ -229,17 +230,17 @@ def write_report(
     cancelled: threading.Event,
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; give the file, and which figures are missing."""
-    from warpspace.app.documents.files import shown_machines
+    from warpspace.app.documents.files import shown_sides
     from warpspace.outputs.files import temporary_folder
     from warpspace.outputs.report import ReportSettings
     from warpspace.outputs.report import write_report as write
 
-    state, machines = picture.state, shown_machines(picture, sheet=True)
+    state, sides = picture.state, shown_sides(picture, sheet=True)
     settings = ReportSettings(
-        loop=machines[0].loop, grid=state.nodes, exaggeration=picture.exaggeration,
+        loop=sides[0].loop, grid=state.nodes, exaggeration=picture.exaggeration,
         spec_um=state.specification.limit_um, author=author, questions=tuple(questions),
     )  # fmt: skip
-    scenes = [one.scene for one in machines if one.loop == machines[0].loop]
+    scenes = [one.active_scene() for one in sides if one.loop == sides[0].loop]
     with _turn(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
         written = write(scenes, target, settings, embed=embed_view, results=results)

@@ -3,19 +3,16 @@
 import base64
 import binascii
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from warpspace.app.documents.legend import state_conditions
 from warpspace.app.evaluation.compare import AFTER, BEFORE
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.exceptions import OptionError
-from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.scene.model import Scene
 
 # --- Links: a state as one word in the page's address ---------------------------------------------
 # It consists of letters and digits only, since viser's client writes the address anew when it
@@ -108,28 +105,14 @@ def robot_text(name: str, content: bytes) -> tuple[str, list[str]]:
 AS_DRAWN = "View and HTML show what is drawn."
 
 
-@dataclass(frozen=True, slots=True)
-class Shown:
-    """A machine as files show it."""
-
-    scene: Scene  # its active errors only, with the factor of the picture
-    loop: Loop
-    conditions: tuple[str, ...]  # which of its errors are excluded
-
-
-def shown_machines(picture: LivePicture, *, sheet: bool = False) -> list[Shown]:
-    """Give the machine that is drawn; A and B of a difference, on a sheet of any comparison."""
-
-    def shown(state: AppState, **named: str) -> Shown:
-        scene = replace(state.active_scene(), exaggeration=picture.exaggeration, **named)
-        return Shown(scene, state.loop, state_conditions(state))
-
+def shown_sides(picture: LivePicture, *, sheet: bool = False) -> list[AppState]:
+    """Give the state that is drawn; A and B of a difference, on a sheet of any comparison."""
     found = picture.compared
     if found is None:
-        return [shown(picture.drawn_state)]
+        return [picture.drawn_state]
     both = [
-        shown(side, name=f"{name}: {title}", title=title)
-        for name, title, side in zip("AB", found.titles, found.sides, strict=True)
+        replace(side, scene=replace(side.scene, name=f"{letter}: {title}", title=title))
+        for letter, title, side in zip("AB", found.titles, found.sides, strict=True)
     ]
     if found.shown == "difference" or (sheet and has_sheet(picture)):
         return both
