@@ -3,8 +3,6 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import pytest
-
 from app.parts import LIVE, body_of, lone_part
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
@@ -43,13 +41,7 @@ def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():
     section = lone_part(RotarySection)
     state = replace(STATE, page=replace(STATE.page, task="machine", open=frozenset({"rotary"})))
     section.context.stage = SimpleNamespace(playing=False, position={"C": 89.7})
-    assert "Stand here" in section.body(LIVE.evaluate(state))
-    assert section.take(state, "stand", "").positions["C"] == 90.0
-    held = dict(section.take(state, "quarters", "").rotary.held)
-    assert held["C"] == (0.0, 90.0, 180.0, 270.0)
-    assert section.take(state, "point.1", "0").rotary.off == {"1"}
-
-
-@pytest.mark.parametrize("word", ["point.x", "point.99", "point.", "stand", "<b>"])
-def test_hostile_events_change_nothing(word):
-    assert lone_part(RotarySection).take(STATE, word, "<script>") == STATE
+    text = section.body(LIVE.evaluate(state))
+    assert 'data-do="state:set.positions.C" data-value="90"' in text
+    assert 'data-do="state:set.rotary.held.C" data-value="0,90,180,270"' in text
+    assert 'data-do="state:set.rotary.off" data-value="+1"' in text

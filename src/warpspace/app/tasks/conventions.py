@@ -14,7 +14,8 @@ from markupsafe import Markup
 from warpspace.app.browser.html import EMPTY, button, field, fill, join, number, tag, text_box
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.leaf import Identity, Span
+from warpspace.app.state.leaf import Identity
+from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import EXAMPLE
 from warpspace.app.state.typed_numbers import read_positions
 from warpspace.app.tasks.parts import Section
@@ -51,35 +52,22 @@ def with_travel(state: AppState, direction: str) -> AppState:
     return _with_scene(state, replace(state.scene.model, direction=TravelDirection(direction)))
 
 
-def reference_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of a reference point, mm: the working volume's, by linear axis."""
-    spanning = scene.workspace.volume_axes
-    return {
-        name: Span(*scene.workspace.ranges[name], 1.0)
-        for name in scene.machine.axes
-        if is_linear(name) or name in spanning
-    }
-
-
 def with_reference(state: AppState, at: Mapping[str, float] | None) -> AppState:
     """Hold a point still, mm in axis coordinates; None shows absolute errors.
 
-    Coordinates outside the working volume are clamped and noted; what is no number stays.
+    Coordinates outside the travels are clamped and noted; what is no number stays.
     """
     scene = state.scene
     if at is None:
         return _with_scene(state, scene.model, None)
+    spans, notes = linear_spans(scene), list[str]()
     kept = {**scene.workspace.positions, **(scene.reference or {})}
-    notes = state.notes
-    spans = reference_spans(scene)
     for name in filter(spans.__contains__, at):
-        kept[name] = spans[name].clamp(at[name], kept[name])
-        if kept[name] != at[name]:
-            unit = scene.machine.axes[name].unit
-            what = f"reference {name}"
-            notes = (*notes, spans[name].clamped_words(at[name], kept[name], what, unit))
-    held = {name: kept[name] for name in spans}
-    return replace(_with_scene(state, scene.model, held), notes=notes)
+        wanted, kept[name] = at[name], spans[name].clamp(at[name], kept[name])
+        if kept[name] != wanted:
+            what, unit = f"reference {name}", scene.machine.axes[name].unit
+            notes.append(spans[name].clamped_words(wanted, kept[name], what, unit))
+    return _with_scene(state, scene.model, {name: kept[name] for name in spans}).noted(*notes)
 
 
 def _with_scene(state: AppState, model: Model, *reference: Mapping[str, float] | None) -> AppState:
@@ -328,7 +316,7 @@ def _reference(state: AppState) -> Markup:
     if state.scene.reference is None:
         return EMPTY
     held = {**state.scene.workspace.positions, **state.scene.reference}
-    spelled = " ".join(f"{axis} {held[axis]:g}" for axis in reference_spans(state.scene))
+    spelled = " ".join(f"{axis} {held[axis]:g}" for axis in linear_spans(state.scene))
     name, hint = "conventions:set.reference", "Click a point of the box in the drawing first"
     box = field("Held at", text_box(name, spelled), name, hint="Positions of the axes")
     nowhere = state.picked is None or state.picked.point_mm is not None

@@ -8,12 +8,12 @@ from markupsafe import Markup
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
 from warpspace.analysis.blocks import Column, Table
-from warpspace.app.browser.html import button, choice, field, fill, join, switch, tag
+from warpspace.app.browser.html import button, choice, field, fill, join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import HERE, chosen_trace, played_axis, standing
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
-from warpspace.app.state.tree import leaves, put, toggled
+from warpspace.app.state.tree import leaves
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.parts import Section
@@ -67,32 +67,29 @@ class RotarySection(Section):
     sentence = "See how traced points run while a rotary axis turns (ISO 230-7)"
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture), *self._played())
-
-    def _played(self) -> tuple[bool, bool]:
-        """Tell whether an axis turns, and whether it is where it stands not."""
         stage = self.context.stage
-        return (False, False) if stage is None else (stage.playing, bool(stage.position))
+        return (id(picture), stage and (stage.playing, bool(stage.position)))
 
     def body(self, picture: LivePicture) -> Markup:
-        if self.context.stage is not None:
-            self.context.stage.moved = self._follow
-        state = picture.state
-        axis = played_axis(state)
+        state, stage = picture.state, self.context.stage
+        axis, playing, position = played_axis(state), False, HERE
         if axis is None:
             return tag("p", "This machine has no rotary axis.", class_="ws-quiet")
-        playing, away = self._played()
-        buttons = {
-            "play": ("Pause" if playing else f"Turn {axis}", "The points run along their circles"),
-            "stop": ("Stop", "Stop and return to the position of the axis"),
-            "stand": ("Stand here", "Move the axis to the paused position"),
-        }
-        shown = ("play", "stop")[: 1 + (playing or away)] + ("stand",) * (away and not playing)
-        found = (button(buttons[do][0], f"rotary:{do}", hint=buttons[do][1]) for do in shown)
+        if stage is not None:
+            stage.moved = self._follow
+            playing, position = stage.playing, stage.position
+        buttons = [button("Pause" if playing else f"Turn {axis}", "rotary:play",
+                          hint="The points run along their circles")]  # fmt: skip
+        if playing or position:
+            hint = "Stop and return to the position of the axis"
+            buttons.append(button("Stop", "rotary:stop", hint=hint))
+        if position and not playing:
+            hint, path = "Move the axis to the paused position", f"state:set.positions.{axis}"
+            buttons.append(button("Stand here", path, round(position[axis]), hint=hint))
         return join((
-            tag("div", join(found), class_="ws-actions"),
+            tag("div", join(buttons), class_="ws-actions"),
             fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
-            _trace(picture), _points(state),
+            _trace(picture), _points(state, axis),
         ))  # fmt: skip
 
     def _follow(self) -> None:
@@ -103,18 +100,7 @@ class RotarySection(Section):
             self.context.renew(self)
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        axis, stage = played_axis(state), self.context.stage
-        what, _, index = word.partition(".")
-        if what == "point" and index.isdecimal() and int(index) < len(state.scene.trace_points_mm):
-            return toggled(state, "rotary.off", str(int(index)))
-        if word == "quarters" and axis is not None:
-            low, high = state.scene.machine.axes[axis].travel
-            high = min(high, low + 359.0)  # a full turn once
-            turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
-            return put(state, f"rotary.held.{axis}", ",".join(str(90 * turn) for turn in turns))
-        if word == "stand":
-            for turned, at in (HERE if stage is None else stage.position).items():
-                state = put(state, f"positions.{turned}", str(round(at)))
+        stage = self.context.stage
         if word in ("play", "stop") and stage is not None:
             on = None if word == "stop" else not stage.playing
             self.context.act(lambda: stage.play(on))
@@ -177,15 +163,20 @@ def _motion(motion: AxisMotion, name: str) -> Markup:
     return join((drawn, fill(KEY), *said, tag("p", ABOUT, class_="ws-tiny")))
 
 
-def _points(state: AppState) -> Markup:
+def _points(state: AppState, played: str) -> Markup:
     parts: list[Markup] = []
     for index, words in leaves(state)["rotary.off"].choices.items():
-        on = index not in state.rotary.off
-        parts.append(switch(f"rotary:point.{index}", f"Trace {words}", on=on))
+        traced = index not in state.rotary.off
+        change = f"{'+' if traced else '-'}{index}"
+        parts.append(button(f"Trace {words}", "state:set.rotary.off", change, pressed=traced))
     parts.append(setting(state, "rotary.own_mm"))
     if len(state.positions) > 1:
         parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
-        hint = "Turn the axis at every quarter turn of the table"
-        parts.append(button("Hold at every 90°", "rotary:quarters", hint=hint))
+        low, high = state.scene.machine.axes[played].travel
+        high = min(high, low + 359.0)  # a full turn once
+        turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
+        every, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis turns"
+        path = f"state:set.rotary.held.{played}"
+        parts.append(button(f"Hold {played} at every 90°", path, every, hint=hint))
     summary = tag("summary", "Traced points and positions")
     return tag("details", summary + join(parts), class_="ws-options")

@@ -183,15 +183,12 @@ def _bodies(own: dict[str, BodySource]) -> Markup:
 
 def _source(source: BodySource) -> str:
     """Say where a body comes from; of a file its name alone, never its folder."""
-    if source.shape:
-        return f"shape {source.shape}"
-    words = [source.file, source.unit or "unit of its format"]
-    placed = (("offset", source.offset_mm, "mm"), ("turned", source.rotation_deg, "°"))
-    words += [
-        f"{label} {', '.join(map(spell_typed, values))} {unit}"
-        for label, values, unit in placed
-        if any(values)
-    ]
+    file = f"{source.file} · {source.unit or 'unit of its format'}"
+    words = [f"shape {source.shape}" if source.shape else file]
+    placed = {"offset {} mm": source.offset_mm, "turned {} °": source.rotation_deg}
+    for said, values in placed.items():
+        if any(values):
+            words.append(said.format(", ".join(map(spell_typed, values))))
     return " · ".join(words)
 
 
