@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from warpspace.analysis import blocks
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.source import Place, Source
 from warpspace.machine.axes import TravelDirection, direction_index, is_linear, parameter
@@ -231,6 +232,31 @@ def summaries(found: Imported) -> list[Summary]:
         last = numbers[-1][1] if kind == "harmonics" else numbers[-1]
         rows.append(Summary(key=key, kind=kind, points=len(numbers), smallest=last, largest=last))
     return rows
+
+
+def summary_table(found: Imported) -> blocks.Table:
+    """List all errors of an import."""
+    rows = [
+        (
+            one.key, one.kind, one.points, one.runs or None, one.directions,
+            f"{one.span[0]:g} … {one.span[1]:g}" if one.span else "",
+            one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
+        )
+        for one in summaries(found)
+    ]  # fmt: skip
+    columns = (
+        blocks.Column("error", leads=True),
+        blocks.Column("as"),
+        blocks.Column("points", "d"),
+        blocks.Column("runs", "d"),
+        blocks.Column("direction"),
+        blocks.Column("from … to"),
+        *blocks.number_columns(("smallest", "largest"), ".3f"),
+        blocks.Column("unit"),
+        blocks.Column("reversal", ".3f"),
+        blocks.Column("u", ".3f"),
+    )
+    return blocks.Table(columns, rows)
 
 
 def _of_series(one: Series) -> Summary:

@@ -20,38 +20,23 @@ MOST_SITES = 20_000  # places of one test
 
 
 @dataclass(frozen=True, slots=True)
-class Prepared:
-    """A test laid on a machine."""
-
-    title: str
-    path: tuple[Whole, ...]  # sites of each stretch of the path
-    nominal_mm: Array  # [n, 3]; sites as they are drawn: as the workpiece sees them
-    # [K, n, 3]; error of the tool against the workpiece at each site, per unit of each amplitude
-    response: Array
-
-    @property
-    def size(self) -> int:
-        """Bytes it holds, about."""
-        return self.response.nbytes + 4 * self.nominal_mm.nbytes
-
-
-@dataclass(frozen=True, slots=True)
 class BenchPicture:
     """The path of a test with the errors of a state."""
 
-    prepared: Prepared
-    error_um: Array  # [n, 3]; at its sites
+    title: str
+    path: tuple[Whole, ...]  # sites of each stretch
+    nominal_mm: Array  # [n, 3]; sites as they are drawn: as the workpiece sees them
+    error_um: Array  # [n, 3]; of the tool against the workpiece
 
     def lines_mm(self, exaggeration: float) -> list[tuple[Array, Array]]:
         """Give each stretch of the path, nominal and actual, [n, 3], mm."""
-        nominal = self.prepared.nominal_mm
-        actual = nominal + exaggeration * MM_PER_UM * self.error_um
-        return [(nominal[rows], actual[rows]) for rows in self.prepared.path]
+        actual = self.nominal_mm + exaggeration * MM_PER_UM * self.error_um
+        return [(self.nominal_mm[rows], actual[rows]) for rows in self.path]
 
     @property
     def largest_um(self) -> float:
         """Largest error along the path, µm."""
-        rows = np.concatenate(self.prepared.path)
+        rows = np.concatenate(self.path)
         return float(np.linalg.norm(self.error_um[rows], axis=-1).max())
 
 
@@ -71,7 +56,8 @@ def plan_test(test: BenchTest, scene: Scene) -> Plan:
     return plan
 
 
-_KEPT: Cache[Prepared] = Cache(CACHE_BYTES)
+_KEPT: Cache[tuple[BenchPicture, Array]] = Cache(CACHE_BYTES)
+"""Paths without errors, and what a unit of each amplitude brings at each site, [K, n, 3]."""
 
 
 def bench_picture(state: AppState) -> BenchPicture | None:
@@ -81,19 +67,19 @@ def bench_picture(state: AppState) -> BenchPicture | None:
     if kind is None or told.get("path") == "0":
         return None
 
-    def prepare() -> Prepared:
+    def prepare() -> tuple[BenchPicture, Array]:
         workspace = state.scene.workspace.moved(state.positions)
         scene = replace(state.scene, workspace=workspace)
         test = read_form(kind, kind.settings(), told, scene)
         plan = plan_test(test, scene)
         nominal = seen_from_workpiece(scene.model, plan.coordinates, scene.workspace, plan.point_mm)
         response = respond_sites(scene, plan, tuple(state.amplitudes))
-        return Prepared(kind.title, plan.path, nominal, response)
+        return BenchPicture(kind.title, plan.path, nominal, 0.0 * nominal), response
 
     key = (Identity(state.scene), tuple(state.positions.items()), tuple(sorted(told.items())))
     try:
-        prepared = _KEPT.get(key, prepare, lambda found: found.size)
+        path, response = _KEPT.get(key, prepare, lambda found: found[1].nbytes)
     except WarpspaceError:  # the section of the test says it
         return None
     amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
-    return BenchPicture(prepared, np.tensordot(amplitudes, prepared.response, axes=1))
+    return replace(path, error_um=np.tensordot(amplitudes, response, axes=1))

@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.blocks import Block, Column, Curve, Lines, Style, Table
+from warpspace.analysis.blocks import Block, Curve, Lines, Style
 from warpspace.analysis.catalogue import Entry
 from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
 from warpspace.analysis.options import Grammar, Option, option, typed_word
-from warpspace.app.browser.html import EMPTY, number, tag, upload_button
+from warpspace.app.browser.html import EMPTY, tag, upload_button
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import read_form
 from warpspace.app.tasks.charts import details_html
@@ -21,7 +21,7 @@ from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
 from warpspace.app.tasks.measure import FilesPart, Held
 from warpspace.exceptions import WarpspaceError
-from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summaries
+from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summary_table
 from warpspace.formats.registry import (
     Format,
     Reading,
@@ -100,13 +100,12 @@ class ImportResult(Result):
         found = self.reading.found
         units = ", ".join(found.units).replace("um", "µm").replace("urad", "µrad")
         yield f"{self.reading.format.title} from {self.files}, in {units}."
-        keys = dict.fromkeys(one.key for one in summaries(found))
-        old = [key for key in keys if self.before.errors.amplitude(key)]
-        new = [key for key in keys if key not in old]
+        old = [key for key in found.keys if self.before.errors.amplitude(key)]
+        new = [key for key in found.keys if key not in old]
         said = [f"replaces {', '.join(old)}"] if old else []
         said += [f"adds {', '.join(new)}"] if new else []
         yield f"It {' and '.join(said) or 'holds no errors'}."
-        yield self._table()
+        yield summary_table(found)
         for one in found.series[:MOST_CURVES]:
             row, place = parameter(one.key), "mm" if is_linear(parameter(one.key).axis) else "°"
             title, curves = f"{one.key} {row.name}", tuple(_curves(one))
@@ -119,23 +118,6 @@ class ImportResult(Result):
                 yield _without_options(one.replace(kept, "unchanged:"))
         if (left := len(found.series) - MOST_CURVES) > 0:
             yield f"{left} more curves are not drawn"
-
-    def _table(self) -> Table:
-        lines: list[tuple[object, ...]] = []
-        for one in summaries(self.reading.found):
-            now = self.before.errors.amplitude(one.key)
-            lines.append((
-                one.key, parameter(one.key).name, f"{number(now)} {one.unit}" if now else "zero",
-                f"{number(one.smallest)} … {number(one.largest)} {one.unit}", one.points,
-                f"{one.runs or ''} {one.directions}".strip(), one.mean_reversal, one.uncertainty,
-            ))  # fmt: skip
-        heads = {"Error": "", "": "", "Now": "", "In the file": "", "Points": "d", "Runs": "",
-                 "Reversal": ".3g", "Uncertainty": ".3g"}  # fmt: skip
-        columns = (
-            Column(head, form, shows=any(cells))  # one that says nothing is left out
-            for (head, form), cells in zip(heads.items(), zip(*lines, strict=True), strict=True)
-        )
-        return Table(tuple(columns) if lines else (), lines)
 
 
 def _curves(one: Series) -> Iterator[Curve]:
@@ -169,7 +151,6 @@ class ImportPart(FilesPart):
         words = "Measured errors, or a controller's table"
         super().__init__(context, Entry(NAME, "measure", words, f"{__name__}:Import"))
         context.offer_import = self.received
-        self._taken = False  # whether they have been applied
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         """Leave out what the format has no choice of."""
@@ -223,11 +204,6 @@ class ImportPart(FilesPart):
     def actions(self, found: Result, *, stale: bool) -> Markup:
         return EMPTY
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        found = super().take(state, word, value)
-        self._taken |= word == "apply" and found is not state
-        return found
-
     def received(self, name: str, content: bytes) -> None:
         """Take a file, with those that are there where they belong together.
 
@@ -235,12 +211,12 @@ class ImportPart(FilesPart):
         say, or another file comes to it.
         """
         own, before, problem = Held(name, open_upload(name, content)), self._files, None
-        held = () if self._taken else tuple(one for one in before if one.name != name)
-        together = [((*held, own), said) for said in (True, False) if 0 < len(held) < MOST_FILES]
+        is_applied = self._applied[-1:] == (before,)
+        held = () if is_applied else tuple(one for one in before if one.name != name)
         state, keeps = self.context.state, False
         scene = state.active_scene()
-        for files, keeps in (*together, ((own,), False)):
-            self._files = files
+        for keeps in (True, False) if 0 < len(held) < MOST_FILES else (False,):
+            self._files = (*held, own) if keeps else (own,)
             try:
                 self.ask(state, self.values(state) if keeps else {}, [scene]).run(scene, silent)
                 break
@@ -250,7 +226,6 @@ class ImportPart(FilesPart):
             if held and problem is not None:
                 self._files = before
                 raise problem
-        self._taken = False
         self.context.post(partial(_unfolded, keeps=keeps))
         self._again()
 

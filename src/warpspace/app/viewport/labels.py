@@ -171,7 +171,7 @@ def _names(picture: LivePicture) -> Iterator[Label]:
     state, found = picture.state, picture.bench
     if found is not None:
         ends = np.concatenate([other for _, other in found.lines_mm(picture.exaggeration)])
-        words = f"{found.prepared.title}: max {_spell(found.largest_um)}"
+        words = f"{found.title}: max {_spell(found.largest_um)}"
         factor = spell_factor(picture.exaggeration)
         yield Label(f"{words}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = picture.moved_traces

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.analysis.blocks import Column, Table, number_columns
+from warpspace.analysis.blocks import Column
 from warpspace.cli.analyses import command_of, print_blocks
 from warpspace.cli.guard import Commands, InputFile, SceneName, check_files
 from warpspace.cli.options import (
@@ -200,6 +200,7 @@ def import_(
         _import_robot(files, output, tool or "", workpiece or "", mesh_root, force=force)
         return
 
+    from warpspace.formats.measured import summary_table
     from warpspace.formats.registry import ReadOptions, open_files, parse_axis_options, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
     from warpspace.scene.machines import machine_names
@@ -238,7 +239,7 @@ def import_(
         return
     print_text(f"{output}: {kind.title}, {made.scene.machine.chain}")
     print_text(f"  units: {', '.join(reading.found.units)}")
-    _print(reading)
+    print_blocks([summary_table(reading.found)])
     for text in reading.found.assumed:
         print_text(f"  assumed: {text}")
     for text in notes:
@@ -256,32 +257,6 @@ def _errors(reading: "Reading") -> list[dict[str, object]]:
         {key: getattr(one, "span" if key == "range" else key) for key in keys}
         for one in summaries(reading.found)
     ]
-
-
-def _print(reading: "Reading") -> None:
-    from warpspace.formats.measured import summaries
-
-    rows = [
-        (
-            one.key, one.kind, one.points, one.runs or None, one.directions,
-            f"{one.span[0]:g} … {one.span[1]:g}" if one.span else "",
-            one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
-        )
-        for one in summaries(reading.found)
-    ]  # fmt: skip
-    columns = (
-        Column("error", leads=True),
-        Column("as"),
-        Column("points", "d"),
-        Column("runs", "d"),
-        Column("direction"),
-        Column("from … to"),
-        *number_columns(("smallest", "largest"), ".3f"),
-        Column("unit"),
-        Column("reversal", ".3f"),
-        Column("u", ".3f"),
-    )
-    print_blocks([Table(columns, rows)])
 
 
 def _import_robot(
