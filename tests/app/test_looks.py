@@ -228,7 +228,8 @@ def test_grey_and_dark_line_colours_arrive(rgb):
     st.lists(st.tuples(*[st.floats(min_value=-500, max_value=500)] * 3), min_size=2, max_size=12),
 )
 def test_named_views_show_every_point_beside_what_is_written(view, far, aspect, edges, points):
-    spread, fov = np.array([*points, (600.0, 0, 0), (-600.0, 0, 0)]), CameraSetup(view, far).fov_deg
+    box = np.diag([600.0, 600.0, 600.0])  # as wide as deep: what is a line to the eye has no size
+    spread, fov = np.concatenate([points, box, -box]), CameraSetup(view, far).fov_deg
     right, top, bottom = edges
     pose = fit_camera(spread, aspect, VIEWS[view], fov, margins=(0.1, right, top, bottom))
     x, y, depth, back = seen(pose, spread)

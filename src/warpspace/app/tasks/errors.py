@@ -237,7 +237,8 @@ _NEAR = 0.75
 
 
 def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
-    tokens = _tokens(query)
+    words = fold(query[:LONGEST_QUERY]).split()
+    tokens = [word for word in words if word not in _FILLER] or words
     if not tokens:
         return tuple(keys)
     rows = [parameter(key) for key in keys]
@@ -247,12 +248,6 @@ def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
     known = list({word for row in rows for word in _words(row) if len(word) > 2})
     meant = [get_close_matches(token, known, n=1, cutoff=_NEAR) or [token] for token in tokens]
     return tuple(row.key for row in rows if all(_fits(token, row) for (token,) in meant))
-
-
-def _tokens(query: str) -> list[str]:
-    """Cut a query into words that mean something; what is only filler stays."""
-    words = fold(query[:LONGEST_QUERY]).split()
-    return [word for word in words if word not in _FILLER] or words
 
 
 def fold(text: str) -> str:

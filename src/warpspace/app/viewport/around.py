@@ -7,7 +7,7 @@ import numpy as np
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
-from warpspace.app.viewport.colours import Rgb, palette
+from warpspace.app.viewport.colours import Rgb, colour
 from warpspace.app.viewport.labels import TICK, Axis, axes, axis_labels, point_labels
 from warpspace.app.viewport.shapes import (
     SCENE_PER_MM,
@@ -52,8 +52,8 @@ def around(picture: LivePicture) -> Shapes:
 def _axes(picture: LivePicture) -> Shapes:
     if not picture.state.shown.axes or picture.state.machine.shown:
         return {}
-    colour = palette(picture).axis
-    return {"/axes/lines": _axis_lines(axes(picture), TICK * picture.size_mm, colour)}
+    tick, rgb = TICK * picture.size_mm, colour(picture, "axis")
+    return {"/axes/lines": _axis_lines(axes(picture), tick, rgb)}
 
 
 @lru_cache(maxsize=32)
@@ -71,7 +71,7 @@ def _traces(picture: LivePicture) -> Shapes:
     moved = picture.moved_traces
     name = chosen_trace(picture)
     others = [line.actual_mm for other, line in moved.items() if other != name]
-    faint = lines(polylines(others), palette(picture).trace_elsewhere, 1.0)
+    faint = lines(polylines(others), colour(picture, "trace_elsewhere"), 1.0)
     if not name:
         return {"/traces/others": faint}
     nominal, actual = (polylines([at]) for at in (moved[name].nominal_mm, moved[name].actual_mm))
@@ -89,10 +89,9 @@ def _path(picture: LivePicture) -> Shapes:
 
 
 def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Shapes:
-    colours = palette(picture)
     return {
-        f"{root}/nominal": lines(nominal, colours.trace_nominal, 1.5),
-        f"{root}/actual": lines(actual, colours.trace_actual, 3.0),
+        f"{root}/nominal": lines(nominal, colour(picture, "trace_nominal"), 1.5),
+        f"{root}/actual": lines(actual, colour(picture, "trace_actual"), 3.0),
     }
 
 
@@ -101,7 +100,7 @@ def _other_side(picture: LivePicture) -> Shapes:
     if other is None or not picture.state.comparison.ghost:
         return {}
     edges = outline_pieces(picture, other)[::2]  # dotted
-    return {"/compare/other": lines(edges, palette(picture).edge, 2.0)}
+    return {"/compare/other": lines(edges, colour(picture, "edge"), 2.0)}
 
 
 def _asked(picture: LivePicture) -> Shapes:
@@ -124,18 +123,18 @@ def _asked(picture: LivePicture) -> Shapes:
 
 
 def _marks(picture: LivePicture) -> Shapes:
-    look, size, colour = picture.state.look, picture.size_mm, palette(picture).edge
+    look, size, rgb = picture.state.look, picture.size_mm, colour(picture, "edge")
     shapes: dict[str, Shape | None] = {}
     if look.arrows:
         chosen = corners(picture.shape)
         start, end = (
             at.reshape(-1, 3)[chosen] for at in (picture.grid.nominal_mm, picture.drawn_mm)
         )
-        shapes["/marks/arrows"] = lines(arrows(start, end, HEAD * size), colour, 1.5)
+        shapes["/marks/arrows"] = lines(arrows(start, end, HEAD * size), rgb, 1.5)
     worst = picture.worst_node
     if look.worst and picture.values.flat[worst]:
         at = picture.drawn_mm.reshape(-1, 3)[worst]
-        shapes["/marks/ball"] = ball(at, BALL * size, colour)
+        shapes["/marks/ball"] = ball(at, BALL * size, rgb)
     return shapes
 
 
@@ -143,11 +142,11 @@ def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
     """Draw the traced points at a position of the axis that is played; none while none is."""
     if not position or not picture.state.shown.traces:
         return {}
-    colours, size = palette(picture), TURNED * picture.size_mm
+    size = TURNED * picture.size_mm
     nominal, actual = points_on_traces(picture, position)
     return {
-        "/rotation/nominal": dots(nominal, size, colours.trace_nominal),
-        "/rotation/actual": dots(actual, size, colours.trace_actual),
+        "/rotation/nominal": dots(nominal, size, colour(picture, "trace_nominal")),
+        "/rotation/actual": dots(actual, size, colour(picture, "trace_actual")),
     }
 
 

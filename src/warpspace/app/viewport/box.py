@@ -14,10 +14,9 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.leaf import Identity
 from warpspace.app.viewport.colours import (
     Rgb,
+    colour,
     colour_levels,
     level_colours,
-    palette,
-    vertex_colours,
 )
 from warpspace.app.viewport.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
 from warpspace.bodies.gltf import GltfTemplate
@@ -34,8 +33,8 @@ from warpspace.units import Array
 SURFACE = "/box/surface"
 DASH, GAP = 0.022, 0.014
 """Dash and gap of the nominal box, as parts of the longest edge."""
-LIGHT_ISOLINE: Rgb = (226, 230, 236)
-DARK_ISOLINE: Rgb = (60, 68, 80)
+ISOLINES: tuple[Rgb, Rgb] = ((226, 230, 236), (60, 68, 80))
+"""Seen on every colour of a scale: of one from a dark end up, and of a diverging one."""
 
 
 def ghost_dashes(picture: LivePicture) -> Array:
@@ -48,7 +47,8 @@ def ghost_dashes(picture: LivePicture) -> Array:
 def surface_glb(picture: LivePicture) -> bytes:
     """Write the coloured map of a picture, or its lines alone, vertices in mm."""
     mesh = line_mesh(picture) if picture.state.look.surface == "grid" else map_mesh(picture)
-    colours = vertex_colours(picture.scale, mesh.values)
+    levels = colour_levels(picture.scale, mesh.values)
+    colours = level_colours(diverging=picture.scale.diverging)[levels]
     return _template(Identity(mesh.triangles), len(mesh.vertices_mm)).fill(
         mesh.vertices_mm, colours
     )
@@ -60,19 +60,18 @@ def _template(triangles: Identity, count: int) -> GltfTemplate:
 
 
 def box(picture: LivePicture) -> Shapes:
-    colours, look, shown = palette(picture), picture.state.look, picture.state.shown
+    look, shown = picture.state.look, picture.state.shown
     surface = Shape("add_glb", UNLIT, {"glb_data": surface_glb(picture)})
     shapes: dict[str, Shape | None] = {SURFACE: surface}
     if look.surface != "grid":
-        shapes["/box/edges"] = lines(edge_pieces(picture), colours.edge, 1.8)
+        shapes["/box/edges"] = lines(edge_pieces(picture), colour(picture, "edge"), 1.8)
         if shown.grid_lines:
-            shapes["/box/grid"] = lines(grid_pieces(picture), colours.grid, 0.7)
+            shapes["/box/grid"] = lines(grid_pieces(picture), colour(picture, "grid"), 0.7)
         if look.isolines or look.pass_fail:
-            # seen on every colour of the scale
-            colour = DARK_ISOLINE if picture.scale.diverging else LIGHT_ISOLINE
-            shapes["/box/isolines"] = lines(isoline_pieces(picture), colour, 1.4)
+            seen = ISOLINES[picture.scale.diverging]
+            shapes["/box/isolines"] = lines(isoline_pieces(picture), seen, 1.4)
     if shown.ghost:
-        shapes["/ghost"] = lines(ghost_dashes(picture), colours.ghost, 1.5)
+        shapes["/ghost"] = lines(ghost_dashes(picture), colour(picture, "ghost"), 1.5)
     return shapes
 
 
@@ -123,7 +122,6 @@ def only_bent(held: LivePicture, picture: LivePicture) -> bool:
         and after.look == before.look and after.shown == before.shown
         and not after.look.isolines and not after.look.pass_fail
         and after.look.surface in ("surface", "cut")
-        and palette(picture) == palette(held)
     )  # fmt: skip
 
 

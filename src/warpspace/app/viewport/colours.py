@@ -5,7 +5,7 @@ inverted: vertices get the colour that the tone map turns into the wanted one. S
 out below 0 or above 1, so they travel as floats.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cache, lru_cache
 
 import numpy as np
@@ -58,10 +58,6 @@ def level_colours(*, diverging: bool) -> Floats:
     return inverse_tone_map(colour_table(diverging=diverging))
 
 
-def vertex_colours(scale: ColourScale, values: Array) -> Floats:
-    return level_colours(diverging=scale.diverging)[colour_levels(scale, values)]
-
-
 def colour_levels(scale: ColourScale, values: Array) -> NDArray[np.uint8]:
     return np.rint(scale.fraction(values) * (LEVELS - 1)).astype(np.uint8)
 
@@ -78,30 +74,19 @@ def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
 # --- Colours of lines, on a light ground and on a dark one ----------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Palette:
-    """Quiet colours around the map, sRGB; only the trace that is looked at stands out."""
-
-    edge: Rgb = (24, 32, 46)
-    grid: Rgb = (24, 32, 46)
-    ghost: Rgb = (140, 150, 165)
-    trace_nominal: Rgb = (130, 139, 153)
-    trace_actual: Rgb = (206, 84, 8)
-    trace_elsewhere: Rgb = (196, 202, 211)
-    axis: Rgb = (110, 120, 135)
-
-
-LIGHT = Palette()
-DARK = Palette(
-    edge=(215, 220, 228),
-    grid=(20, 24, 32),
-    ghost=(130, 138, 150),
-    trace_nominal=(150, 158, 170),
-    trace_actual=(224, 142, 62),
-    trace_elsewhere=(84, 92, 104),
-    axis=(150, 158, 170),
-)
+COLOURS: Mapping[str, tuple[Rgb, Rgb]] = {
+    "edge": ((24, 32, 46), (215, 220, 228)),
+    "grid": ((24, 32, 46), (20, 24, 32)),
+    "ghost": ((140, 150, 165), (130, 138, 150)),
+    "trace_nominal": ((130, 139, 153), (150, 158, 170)),
+    "trace_actual": ((206, 84, 8), (224, 142, 62)),  # only it stands out
+    "trace_elsewhere": ((196, 202, 211), (84, 92, 104)),
+    "axis": ((110, 120, 135), (150, 158, 170)),
+    "body_edge": ((70, 78, 90), (150, 158, 170)),
+    "ghost_body": ((120, 132, 150), (150, 160, 176)),
+    "ghost_body_edge": ((226, 230, 235), (48, 54, 63)),
+}
 
 
-def palette(picture: LivePicture) -> Palette:
-    return DARK if picture.state.shown.dark else LIGHT
+def colour(picture: LivePicture, name: str) -> Rgb:
+    return COLOURS[name][picture.state.shown.dark]
