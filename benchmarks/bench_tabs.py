@@ -15,9 +15,9 @@ from table import Growth, Row, Section
 from timing import best
 
 from warpspace import load_scene
+from warpspace.app.drawing.box import packed
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.app.viewport.box import packed
 from warpspace.picture.mesh import map_mesh
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from app.frames import draw, new_visitor
+from warpspace.app.drawing.camera import CameraSetup
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.viewport.camera import CameraSetup
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:

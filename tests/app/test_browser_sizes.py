@@ -5,9 +5,9 @@ import pytest
 
 from app.frames import new_visitor
 from app.page_tab import Tab
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.scene.library import load_scene
 
 PICTURE = LiveModel().evaluate(start_state(load_scene("dvf5000_first")))

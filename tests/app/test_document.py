@@ -35,6 +35,7 @@ from warpspace.app.documents.scene_file import (
     state_to_toml,
     with_settings,
 )
+from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.tab_keeper import (
@@ -50,7 +51,6 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import Comparison, Picked, Side, start_state
 from warpspace.app.state.tree import leaves, put
 from warpspace.app.tasks.conventions import with_choice, with_reference
-from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Ramp, Table

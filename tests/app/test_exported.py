@@ -17,10 +17,10 @@ from app.frames import pixels_of_the_map
 from warpspace.app.documents.files import exported_words, file_stem, shown_sides
 from warpspace.app.documents.legend import seen_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import Side, start_state
-from warpspace.app.viewport.camera import fit_camera
 from warpspace.cli.services import draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop

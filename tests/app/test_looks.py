@@ -8,6 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace.app.browser.room import read_room
+from warpspace.app.drawing.around import arrows
+from warpspace.app.drawing.camera import VIEWS, CameraSetup, clipping, fit_camera
+from warpspace.app.drawing.colours import inverse_tone_map, line_colour, tone_map
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import (
@@ -22,10 +26,6 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.leaf import Span
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_list
-from warpspace.app.viewport.around import arrows
-from warpspace.app.viewport.camera import VIEWS, CameraSetup, clipping, fit_camera
-from warpspace.app.viewport.colours import inverse_tone_map, line_colour, tone_map
-from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.geometry.colour import colour_table, linear_to_srgb, srgb_to_linear
 from warpspace.geometry.surfaces import isoline_levels

@@ -9,14 +9,14 @@ import pytest
 from app.parts import LIVE, lone_part
 from warpspace import load_scene
 from warpspace.app.documents.legend import kept_words, legend_html, marks
+from warpspace.app.drawing.camera import CameraSetup
+from warpspace.app.drawing.colours import colour_levels
+from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
 from warpspace.app.tasks.over import HeadPart
-from warpspace.app.viewport.camera import CameraSetup
-from warpspace.app.viewport.colours import colour_levels
-from warpspace.app.viewport.labels import axes, point_labels
 from warpspace.exceptions import SceneError
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml

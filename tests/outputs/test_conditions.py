@@ -12,11 +12,11 @@ from PIL import Image
 from warpspace.app.documents.files import shown_sides
 from warpspace.app.documents.legend import look_words, picture_conditions, state_conditions
 from warpspace.app.documents.offline_page import build_offline_html
+from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import scene_side, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import Picked, Side, start_state
 from warpspace.app.state.tree import put
-from warpspace.app.viewport.camera import CameraMemory
 from warpspace.cli.services import write_export
 from warpspace.outputs.animation import shared_palette
 from warpspace.outputs.drawing.settings import FigureSettings

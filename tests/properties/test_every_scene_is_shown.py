@@ -15,6 +15,12 @@ from random_scenes import scenes
 from warpspace import to_pyvista
 from warpspace.app.documents.legend import kept_words, legend_html, numbers_words, subject_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+from warpspace.app.drawing.around import around, words
+from warpspace.app.drawing.box import box, ghost_dashes
+from warpspace.app.drawing.camera import VIEWS, fit_camera
+from warpspace.app.drawing.labels import axes_room_mm
+from warpspace.app.drawing.moving import machine
+from warpspace.app.drawing.shapes import Nodes
 from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -23,12 +29,6 @@ from warpspace.app.state.look import QUANTITIES, SURFACES
 from warpspace.app.tasks.conventions import ConventionsSection
 from warpspace.app.tasks.machine import RotarySection
 from warpspace.app.tasks.understand import WorstPart
-from warpspace.app.viewport.around import around, words
-from warpspace.app.viewport.box import box, ghost_dashes
-from warpspace.app.viewport.camera import VIEWS, fit_camera
-from warpspace.app.viewport.labels import axes_room_mm
-from warpspace.app.viewport.moving import machine
-from warpspace.app.viewport.shapes import Nodes
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.exports.fields import build_vts

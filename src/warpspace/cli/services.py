@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from warpspace.analysis.concepts import Concepts
     from warpspace.analysis.description import Result
     from warpspace.app.documents.services import Services
+    from warpspace.app.drawing.camera import CameraMemory
     from warpspace.app.evaluation.live_picture import LivePicture
-    from warpspace.app.viewport.camera import CameraMemory
     from warpspace.formats.compensation.compensate import Compensation
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.picture.model import ScenePicture

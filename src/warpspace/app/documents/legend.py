@@ -7,12 +7,12 @@ from markupsafe import Markup
 
 from warpspace.analysis.statistics import share_below, volume_statistics
 from warpspace.app.browser.html import fill, join, lowered, number, tag, thousands
+from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.drawing.labels import axis_labels, point_labels
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import table_words
-from warpspace.app.viewport.camera import CameraMemory
-from warpspace.app.viewport.labels import axis_labels, point_labels
-from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture.comparison import conditions_of_both

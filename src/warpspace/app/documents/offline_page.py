@@ -27,15 +27,15 @@ from warpspace.app.documents.legend import (
     place_words,
     subject_words,
 )
+from warpspace.app.drawing.around import around, words
+from warpspace.app.drawing.box import box
+from warpspace.app.drawing.camera import CameraMemory, fit_camera
+from warpspace.app.drawing.labels import axes_room_mm
+from warpspace.app.drawing.shapes import Nodes, light_scene
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import start_state
-from warpspace.app.viewport.around import around, words
-from warpspace.app.viewport.box import box
-from warpspace.app.viewport.camera import CameraMemory, fit_camera
-from warpspace.app.viewport.labels import axes_room_mm
-from warpspace.app.viewport.shapes import Nodes, light_scene
 from warpspace.field.grid import MIN_NODES
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter

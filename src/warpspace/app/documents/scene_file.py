@@ -20,13 +20,13 @@ from dataclasses import replace
 from urllib.parse import parse_qsl, urlencode
 
 from warpspace.app.documents.files import LONGEST_NAME, safe_name
+from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import BEFORE, pinned_side, plain_state, scene_side
 from warpspace.app.evaluation.machine_edits import known_alike
 from warpspace.app.state.app_state import NOBODY, PRESENT, AppState, Side, start_state
 from warpspace.app.state.forms import linked_forms, with_form
 from warpspace.app.state.leaf import Unreadable
 from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
-from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_PACKED_TEXT
 from warpspace.resources import __version__

@@ -7,11 +7,11 @@ from functools import partial
 
 from warpspace.app.browser.incoming import Event
 from warpspace.app.browser.page import Page
+from warpspace.app.drawing.shapes import Layer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import Update
 from warpspace.app.tasks.parts import Part, Window
-from warpspace.app.viewport.shapes import Layer
 
 PAUSE_S = 0.1
 """Pause in the changes after which parts follow: longer than between two moves of a drag."""

@@ -6,7 +6,7 @@ The way of a slider move:
 2. here, `_follow`: the event's part (`tasks/parts.py`) says what it does to the state,
 3. which is applied (`state/store.py`) and
 4. evaluated (`evaluation/evaluate.py`);
-5. all that shows the picture follows (`server/display.py`): layers (`viewport/`) change viser's
+5. all that shows the picture follows (`server/display.py`): layers (`drawing/`) change viser's
    nodes in place, parts write pieces of HTML; what has not changed is not sent.
 
 The session reads the last position of a slider when it gets there, so that is always what is shown,
@@ -28,6 +28,10 @@ from viser import ClientHandle, ViserServer
 from warpspace.app.browser.incoming import Event
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
+from warpspace.app.drawing.box import BoxLayer
+from warpspace.app.drawing.camera import focus
+from warpspace.app.drawing.moving import MovingLayer
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -38,10 +42,6 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, Update, apply_each
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import Context
-from warpspace.app.viewport.box import BoxLayer
-from warpspace.app.viewport.camera import focus
-from warpspace.app.viewport.moving import MovingLayer
-from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.exceptions import WarpspaceError
 
 logger = logging.getLogger(__name__)

@@ -15,12 +15,12 @@ from warpspace.app.documents.scene_file import (
     open_text,
     state_to_toml,
 )
+from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.table import without_table
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Part
-from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_KEPT_TEXT
 from warpspace.scene.model import Scene

@@ -18,8 +18,8 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.state.store import StateStore
-from warpspace.app.viewport.camera import CameraMemory
 
 KEPT_SECONDS = 600.0
 KEPT_TABS = 64

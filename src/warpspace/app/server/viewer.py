@@ -15,6 +15,8 @@ from warpspace.app.browser.page import page_script
 from warpspace.app.browser.viser_private import connection_of, send_script_to_all, serve_with
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
+from warpspace.app.drawing.box import surface_glb
+from warpspace.app.drawing.shapes import light_scene
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.doors import Access, Doors
 from warpspace.app.server.guard import Guard, TabConnection
@@ -31,8 +33,6 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.viewport.box import surface_glb
-from warpspace.app.viewport.shapes import light_scene
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 

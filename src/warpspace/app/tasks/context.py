@@ -17,11 +17,11 @@ from warpspace.app.browser.incoming import LONGEST_VALUE, Event, Events, event_o
 from warpspace.app.browser.page import Page
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
+from warpspace.app.drawing.camera import CameraMemory, TabCamera
+from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore, Update
-from warpspace.app.viewport.camera import CameraMemory, TabCamera
-from warpspace.app.viewport.moving import MovingLayer
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Result

@@ -23,6 +23,7 @@ from warpspace.app.documents.files import (
     unpack,
     upload_text,
 )
+from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
@@ -30,7 +31,6 @@ from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.parts import Window, actions
-from warpspace.app.viewport.camera import CameraMemory
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
 

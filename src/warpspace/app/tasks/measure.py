@@ -28,6 +28,8 @@ from warpspace.app.browser.html import field as labelled
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.documents.files import read_upload, upload_text
+from warpspace.app.drawing.around import residuals
+from warpspace.app.drawing.shapes import Nodes, Shapes
 from warpspace.app.evaluation.bench import chosen_test, plan_test
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state import edits
@@ -36,8 +38,6 @@ from warpspace.app.state.forms import TEST, read_form, with_form
 from warpspace.app.tasks.analysis import AnalysisPart, Question
 from warpspace.app.tasks.charts import block_html, details_html
 from warpspace.app.tasks.context import Context
-from warpspace.app.viewport.around import residuals
-from warpspace.app.viewport.shapes import Nodes, Shapes
 from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate

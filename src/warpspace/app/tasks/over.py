@@ -16,13 +16,13 @@ from warpspace.app.documents.legend import (
     place_words,
     subject_words,
 )
+from warpspace.app.drawing.labels import Label, axis_labels, point_labels
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Part
-from warpspace.app.viewport.labels import Label, axis_labels, point_labels
-from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.geometry.surfaces import corners
 from warpspace.machine.axes import is_linear
 from warpspace.picture.mesh import isoline_labels

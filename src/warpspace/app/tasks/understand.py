@@ -17,13 +17,13 @@ from warpspace.app.browser.html import (
     text_box,
     thousands,
 )
+from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation.budget import Answer, answer, pick_worst, with_lever, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.parts import Section
-from warpspace.app.viewport.camera import fit_camera
 from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
 from warpspace.picture.words import LOOP_WORDS, spell_axes, spell_in_r

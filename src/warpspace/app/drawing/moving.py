@@ -5,12 +5,12 @@ from collections.abc import Callable, Mapping
 
 from viser import ClientHandle
 
+from warpspace.app.drawing.around import around, turned_points
+from warpspace.app.drawing.colours import Rgb, colour
+from warpspace.app.drawing.shapes import Nodes, Shape, Shapes, ball, lines, mesh
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies, played_position, tool_point
 from warpspace.app.state.leaf import Identity
-from warpspace.app.viewport.around import around, turned_points
-from warpspace.app.viewport.colours import Rgb, colour
-from warpspace.app.viewport.shapes import Nodes, Shape, Shapes, ball, lines, mesh
 from warpspace.bodies.placed import PlacedBody
 
 STEP_S = 0.125  # between two pictures of a turning table: modest, since each is sent to the page

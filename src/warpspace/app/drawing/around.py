@@ -4,12 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from warpspace.app.evaluation.budget import answer
-from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
-from warpspace.app.viewport.colours import Rgb, colour
-from warpspace.app.viewport.labels import TICK, Axis, axes, axis_labels, point_labels
-from warpspace.app.viewport.shapes import (
+from warpspace.app.drawing.colours import Rgb, colour
+from warpspace.app.drawing.labels import TICK, Axis, axes, axis_labels, point_labels
+from warpspace.app.drawing.shapes import (
     SCENE_PER_MM,
     Shape,
     Shapes,
@@ -19,6 +16,9 @@ from warpspace.app.viewport.shapes import (
     lines,
     polylines,
 )
+from warpspace.app.evaluation.budget import answer
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
 from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.mesh import outline_pieces
 from warpspace.units import Array

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.page import Page
-from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.leaf import Identity
-from warpspace.app.viewport.colours import (
+from warpspace.app.drawing.colours import (
     Rgb,
     colour,
     colour_levels,
     level_colours,
 )
-from warpspace.app.viewport.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
+from warpspace.app.drawing.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfTemplate
 from warpspace.geometry.surfaces import box_edges, is_thin
 from warpspace.picture.mesh import (

@@ -7,12 +7,12 @@ import numpy as np
 from viser import ClientHandle
 
 from warpspace.app.browser.room import Room, first_room
+from warpspace.app.drawing.labels import axes_room_mm
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
-from warpspace.app.viewport.labels import axes_room_mm
-from warpspace.app.viewport.shapes import SCENE_PER_MM
 from warpspace.picture import model
 from warpspace.picture.model import Direction
 from warpspace.units import Array

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
 
+from warpspace.app.drawing.colours import Rgb, line_colour
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.viewport.colours import Rgb, line_colour
 from warpspace.units import Array
 
 SCENE_PER_MM = 0.01
