@@ -202,7 +202,7 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     asked = []
     part = concepts_part()
     part.context.services = Services(draw_concepts=lambda scenes, *_: asked.append(scenes) or b"")
-    key = next(key for key, (_, scene) in part.offers(START).items() if scene == OTHER)
+    key = next(key for key, scene in part.offers(START).items() if scene == OTHER)
     assert part.take(START, "run", "") is START  # one machine alone is not compared
     chosen = part.take(part.take(START, "set.add", key), "set.add", key)
     assert part.chosen(chosen) == [PRESENT, key]

@@ -87,14 +87,9 @@ def build_parts(context: Context) -> list[Part]:
         *(HOOKS.get(one.name, AnalysisPart)(context, one) for one in entries()),
         *(kind(context) for kind in of_machine),
     ]
-    first = (TopPart, HeadPart, OrderPart, ControlsPart, ComparePart, ErrorsPart)
-    last = (
-        BestPart, RoomPart, StatePart, PagePart, ScenesWindow, MachinesWindow, FilesWindow,
-        ReportWindow, HelpWindow,
+    kinds = (
+        TopPart, HeadPart, OrderPart, ControlsPart, ComparePart, ErrorsPart, RoomPart, StatePart,
+        PagePart, ScenesWindow, MachinesWindow, FilesWindow, ReportWindow, HelpWindow,
     )  # fmt: skip
-    return [
-        *(kind(context) for kind in first),
-        TasksPart(context, found),
-        *found,
-        *(kind(context) for kind in last),
-    ]
+    others = [kind(context) for kind in kinds]
+    return [*others, TasksPart(context, found), *found, BestPart(context)]

@@ -4,14 +4,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from warpspace.analysis.allocating import Ensemble, build_ensemble
 from warpspace.analysis.blocks import Histogram
 from warpspace.analysis.cases import Case, Over, Plan
 from warpspace.analysis.description import Analysis, Result
+from warpspace.analysis.distribution import Distribution, Draws, Probability, Stream, loop_keys
 from warpspace.analysis.options import Option, read_numbers
 from warpspace.app.browser.html import (
     EMPTY,
@@ -43,12 +45,8 @@ from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-if TYPE_CHECKING:
-    from warpspace.analysis.allocating import Ensemble
-    from warpspace.analysis.distribution import Probability, Stream
-
 SAMPLES = 20_000  # machines of a probability on the page
-ENSEMBLES: "Cache[Ensemble]" = Cache(100_000_000)
+ENSEMBLES: Cache[Ensemble] = Cache(100_000_000)
 """Sampled machines before their tolerances are known, for all sessions together."""
 WHERE = {"max": "everywhere", "sampled": "at a random point"}
 SCALES = {"÷ 1.5": 1.0 / 1.5, "−5 %": 0.95, "+5 %": 1.05, "× 1.5": 1.5}
@@ -77,15 +75,9 @@ class TolerancesPart(AnalysisPart):
     def options(self) -> Sequence[Option]:
         return [one for one in super().options() if one.name in ("clip", "cylinder", "seed")]
 
-    def defaults(self, state: AppState) -> Mapping[str, str]:
-        return {}
-
-    def scenes(self, state: AppState) -> Sequence[Scene]:
-        return [state.resulting_scene()]
-
     def question(self, state: AppState) -> Question:
-        return (*_sampled(state), state.tolerances, state.specification,
-                tuple(self.values(state).items()))  # fmt: skip
+        values = tuple(self.values(state).items())
+        return (*_sampled(state), state.tolerances, state.specification, values)
 
     def is_ready(self, state: AppState) -> bool:
         try:
@@ -140,7 +132,7 @@ class TolerancesPart(AnalysisPart):
             state, _controls(state, "over", "distribution", "costs")
         )
 
-    def _probability(self, ensemble: "Ensemble", state: AppState) -> Markup:
+    def _probability(self, ensemble: Ensemble, state: AppState) -> Markup:
         wanted = state.specification
         stream, kept = estimate(ensemble, state.tolerances, wanted.limit_um)
         bars = stream.display_histogram()
@@ -161,7 +153,7 @@ class TolerancesPart(AnalysisPart):
         )
         return told + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
 
-    def _rows(self, ensemble: "Ensemble", state: AppState) -> Markup:
+    def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
         shares = tolerance_shares(ensemble, state.tolerances)
         laid_out: Question = (Identity(state.origin), ensemble.keys)
         if self._order[0] != laid_out:  # no row moves away under a hand
@@ -212,21 +204,15 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
 
 def _sampled(state: AppState) -> Question:
     """Give all that machines depend on before their tolerances are known."""
-    wanted, scene = state.specification, state.scene
+    wanted = state.specification
     moving = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
-    return (
-        Identity(scene.model), Identity(scene.workspace), str(scene.reference),
-        scene.parameter_keys, state.seen, wanted.over, wanted.distribution, moving,
-    )  # fmt: skip
+    return (Identity(state.scene), state.seen, wanted.over, wanted.distribution, moving)
 
 
-def sample_machines(state: AppState) -> "Ensemble":
+def sample_machines(state: AppState) -> Ensemble:
     """Draw the machines that a state's tolerances are held against."""
-    # scipy's distributions take half a second to import: not before the first picture
-    from warpspace.analysis.allocating import build_ensemble
-    from warpspace.analysis.distribution import Distribution, Draws, loop_keys
 
-    def build() -> "Ensemble":
+    def build() -> Ensemble:
         scene, wanted = state.resulting_scene(), state.specification
         keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
         none = np.zeros(len(keys))
@@ -237,18 +223,16 @@ def sample_machines(state: AppState) -> "Ensemble":
     return ENSEMBLES.get(_sampled(state), build, lambda found: found.size)
 
 
-def _centres_and_widths(ensemble: "Ensemble", tolerances: ToleranceSet) -> Array:
+def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
     none = Tolerance(0.0, 0.0)
     found = (tolerances.get(key) or none for key in ensemble.keys)
     return np.array([(one.centre, one.half_width) for one in found]).reshape(-1, 2).T
 
 
 def estimate(
-    ensemble: "Ensemble", tolerances: ToleranceSet, limit_um: float
-) -> "tuple[Stream, Probability]":
+    ensemble: Ensemble, tolerances: ToleranceSet, limit_um: float
+) -> tuple[Stream, Probability]:
     """Work out what a tolerance set gives, and how likely the limit is kept."""
-    from warpspace.analysis.distribution import Stream
-
     norm_um = ensemble.norm_um(*_centres_and_widths(ensemble, tolerances))
     stream = Stream(len(norm_um), limit_um)
     stream.add(norm_um)
@@ -257,7 +241,7 @@ def estimate(
     return stream, kept
 
 
-def tolerance_shares(ensemble: "Ensemble", tolerances: ToleranceSet) -> dict[str, float]:
+def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
     """Say how much each tolerance adds to the scatter of the error."""
     _, half = _centres_and_widths(ensemble, tolerances)
     parts = half**2 * ensemble.mean_square_gain
@@ -266,7 +250,7 @@ def tolerance_shares(ensemble: "Ensemble", tolerances: ToleranceSet) -> dict[str
 
 # --- Concepts -------------------------------------------------------------------------------------
 
-PRESENT = "present"  # the machine that is steered, among those that are compared
+PRESENT = "the present machine"  # the one that is steered, among those that are compared
 ADD = "Compare with …"
 
 
@@ -275,13 +259,13 @@ class ConceptsPart(AnalysisPart):
 
     at_once = True
 
-    def offers(self, state: AppState) -> dict[str, tuple[str, Scene]]:
-        """Give title and scene of each machine that can be compared, by what its choice sends."""
-        found = {PRESENT: (f"{state.scene.title} (as it stands)", state.resulting_scene())}
-        scenes = [(one.machine.title, one) for one in library().values()]
-        for title, scene in (*scenes, *self.context.scenes.items()):
-            if not any(scene is other or scene == other for _, other in found.values()):
-                found[title] = (title, scene)
+    def offers(self, state: AppState) -> dict[str, Scene]:
+        """Give the machines that can be compared, by title."""
+        found = {PRESENT: state.resulting_scene()}
+        own = {one.machine.title: one for one in library().values()}
+        for title, scene in {**own, **self.context.scenes}.items():
+            if scene not in found.values():
+                found[title] = scene
         return found
 
     def chosen(self, state: AppState) -> list[str]:
@@ -297,7 +281,7 @@ class ConceptsPart(AnalysisPart):
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
         offers = self.offers(state)
-        return [offers[key][1] for key in self.chosen(state) if key in offers]
+        return [offers[key] for key in self.chosen(state) if key in offers]
 
     def is_ready(self, state: AppState) -> bool:
         return len(self.chosen(state)) > 1
@@ -314,24 +298,20 @@ class ConceptsPart(AnalysisPart):
 
     def before_result(self, state: AppState) -> Markup:
         """Choose a machine to compare, and list those chosen."""
-        chosen, offers, listed = self.chosen(state), self.offers(state), EMPTY
-        if self.is_ready(state):
-            listed = rows(
-                (tag("b", f"{letter} ") + offers[key][0], self._buttons(key, offers[key][0]))
-                for letter, key in zip(ascii_uppercase, chosen, strict=False)
-                if key in offers
-            )
-        left = {key: title for key, (title, _) in offers.items() if key not in chosen}
+        offers, lines = self.offers(state), list[tuple[Markup, Markup]]()
+        chosen = [key for key in self.chosen(state) if key in offers]
+        for letter, key in zip(ascii_uppercase, chosen, strict=False):
+            opens = button("Open", f"{self.name}:open", key, kind="link", hint="Show it here",
+                           aria_label=f"Open {key}")  # fmt: skip
+            removes = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove it",
+                             aria_label=f"Remove {key}")  # fmt: skip
+            title, opens = (key, opens) if key != PRESENT else (state.scene.title, EMPTY)
+            lines.append((tag("b", f"{letter} ") + title, opens + removes))
+        left = {key: key for key in offers if key not in chosen}
         add = choice(f"{self.name}:set.add", "", {"": ADD, **left},
                      label="Compare with another machine")  # fmt: skip
+        listed = rows(lines) if self.is_ready(state) else EMPTY
         return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + listed
-
-    def _buttons(self, key: str, title: str) -> Markup:
-        opens = button("Open", f"{self.name}:open", key, kind="link", hint="Show it here",
-                       aria_label=f"Open {title}")  # fmt: skip
-        removes = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove it",
-                         aria_label=f"Remove {title}")  # fmt: skip
-        return removes if key == PRESENT else opens + removes
 
     def actions(self, found: Result, *, stale: bool) -> Markup:
         """Give a picture for a review first."""
@@ -348,8 +328,7 @@ class ConceptsPart(AnalysisPart):
         elif word == "remove" and value in chosen:
             chosen.remove(value)
         elif word == "open" and value in offers and value != PRESENT:
-            opened = start_state(offers[value][1])
-            self.context.act(lambda: self._open(opened))
+            self.context.act(partial(self._open, offers[value]))
             return state
         elif word == "sheet":
             self._draw(state)
@@ -359,8 +338,8 @@ class ConceptsPart(AnalysisPart):
         self._answer = None  # other machines are compared
         return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
 
-    def _open(self, opened: AppState) -> None:
-        self.context.show_opened(opened, None, whole=False)
+    def _open(self, scene: Scene) -> None:
+        self.context.show_opened(start_state(scene), None, whole=False)
 
     def _draw(self, state: AppState) -> None:
         draw, found = self.context.services.draw_concepts, self._answer

@@ -152,7 +152,7 @@ class CompensatePart(AnalysisPart):
             return ()
         kind = find_format(self.values(state)["formats"])
         turns = any(not is_linear(axis) for axis in state.scene.machine.axes)
-        unused = {"formats"}
+        unused = {"formats", "sweep"}
         unused |= set() if kind.tables else {"resolution", "sign"}
         unused |= set() if kind.orientation and turns else {"orientation"}
         return [one for one in self.options() if one.name not in unused]
@@ -181,12 +181,10 @@ class CompensatePart(AnalysisPart):
                            " remain.", class_="ws-quiet")  # fmt: skip
 
     def headline(self, found: Result) -> Markup:
-        return EMPTY if isinstance(found, Compensation) else super().headline(found)
+        return EMPTY
 
-    def result_html(self, found: Result) -> Markup:
+    def result_html(self, found: Any) -> Markup:
         """Set before and after beside each other; what was assumed is folded away."""
-        if not isinstance(found, Compensation):
-            return super().result_html(found)
         _, table, *said = found.blocks()
         drawn = [result_html([table])]
         if _is_rounding(found):
@@ -197,10 +195,8 @@ class CompensatePart(AnalysisPart):
                              width="100%"))  # fmt: skip
         return join(drawn) + details_html(said, "Points, loop, what is assumed")
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
+    def actions(self, found: Any, *, stale: bool) -> Markup:
         """Save the table first; then what the box shows, and maps."""
-        if not isinstance(found, Compensation):
-            return super().actions(found, stale=stale)
         state, hint = self.context.state, "Several files come as one ZIP; the box then shows both"
         here, unseen = holds_for(state, found.controller), {LEFT} if _is_rounding(found) else set()
         boxes = join(

@@ -119,7 +119,8 @@ class Compensate(Analysis):
     loop: Literal["tool", "relative"] | None = option(
         None,
         "Structural loop that is corrected",
-        unset="relative where an axis that is corrected carries the workpiece",
+        unset="relative where a linear axis, or with --orientation all rotary axes, carry the"
+        " workpiece",
     )
     placed: bool = option(
         False,
