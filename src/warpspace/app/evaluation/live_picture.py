@@ -34,7 +34,13 @@ class Compared:
     def title(self) -> str:
         """Name of what is drawn."""
         a, b = self.titles
-        return {"a": f"A: {a}", "b": f"B: {b}", "difference": f"B − A: {b} − {a}"}[self.shown]
+        if self.shown != "difference":
+            return f"A: {a}" if self.shown == "a" else f"B: {b}"
+        a, b = (
+            one.partition(": ")[0] if one.startswith(("after", "before")) else one
+            for one in self.titles
+        )
+        return f"B − A: {b} − {a}"
 
 
 @dataclass(frozen=True, kw_only=True)

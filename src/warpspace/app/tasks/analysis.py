@@ -254,7 +254,8 @@ class AnalysisPart(Section):
         elif word in ("preview", "apply") and (change := self._change(state, value)) is not None:
             what = self.title.lower()
             if word == "preview":
-                return with_proposal(state, change.scene, f"after {what}: {change.words}")
+                words = f"after {what}: {change.words.removeprefix(f'after {what}: ')}"
+                return with_proposal(state, change.scene, words)
             found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
             return found
