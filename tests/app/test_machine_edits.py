@@ -25,7 +25,7 @@ from warpspace.app.state.store import History
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.bodies.placed import load_bodies
-from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.exceptions import ChainError, WarpspaceError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.errors import Constant, Directional, Ramp
@@ -355,7 +355,7 @@ def test_an_axis_moves_along_the_chain_across_the_frame_and_away():
     assert str(edit("side Y", scene).machine.chain) == "wBFYXZt"
     for axis in ("B", "Y", "Z"):
         scene = edit(f"remove {axis}", scene)
-    with pytest.raises(OptionError, match="at least one"):
+    with pytest.raises(ChainError, match="no axis"):
         edit("remove X", scene)
 
 

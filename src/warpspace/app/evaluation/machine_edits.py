@@ -144,19 +144,14 @@ def _put(raw: Tables, key: str, frame: str, value: object) -> None:
 
 def _moved(machine: Machine, what: str, axis: str) -> Chain:
     """Move an axis along the written chain, across the frame too; or next to it; or away."""
-    machine.axis(axis)
     places = [*reversed(machine.chain.workpiece), FRAME, *machine.chain.tool]
-    at = places.index(axis)
+    at = places.index(machine.axis(axis).name) + {"left": -1, "right": 1}.get(what, 0)
     places.remove(axis)
     if what == "side":
         at = places.index(FRAME) + (axis not in machine.chain.tool)
     if what != "remove":
-        step = {"left": -1, "right": 1}.get(what, 0)
-        places.insert(max(at + step, 0), axis)
-    elif len(places) == 1:
-        raise OptionError(f"axis {axis} is the only one; expected a machine with at least one")
-    frame = places.index(FRAME)
-    return Chain(tuple(reversed(places[:frame])), tuple(places[frame + 1 :]))
+        places.insert(max(at, 0), axis)
+    return parse_chain(f"w{''.join(places)}t")
 
 
 def _rearrange(raw: Tables, scene: Scene, chain: Chain) -> None:

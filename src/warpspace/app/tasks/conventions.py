@@ -127,8 +127,8 @@ def with_choice(state: AppState, choice: str) -> AppState:
         changed = replace(model, component_errors=given, own_component_errors=())
         return _with_scene(state, changed)
     axis = model.machine.axes[what.removeprefix("direction ")]
-    turned = replace(axis, direction=int(given), direction_given=True)
-    machine = replace(model.machine, axes={**model.machine.axes, axis.name: turned})
+    axes = {**model.machine.axes, axis.name: replace(axis, direction=int(given))}
+    machine = replace(model.machine, axes=axes)
     return _with_scene(state, replace(model, machine=machine))
 
 
@@ -137,10 +137,8 @@ def with_own_conventions(state: AppState) -> AppState:
     own, machine = state.origin, state.scene.machine
     said = {**machine.axes, **own.machine.axes}
     axes = {
-        name: replace(axis, direction=said[name].direction,
-                      direction_given=said[name].direction_given)
-        for name, axis in machine.axes.items()
-    }  # fmt: skip
+        name: replace(axis, direction=said[name].direction) for name, axis in machine.axes.items()
+    }
     # an edited machine may not have all axes of the scene's
     held = {name: at for name, at in (own.reference or {}).items() if name in axes}
     model = replace(
