@@ -164,12 +164,12 @@ def _motion(motion: AxisMotion, name: str) -> Markup:
 
 
 def _points(state: AppState, played: str) -> Markup:
-    parts: list[Markup] = []
+    traced: list[Markup] = []
     for index, words in leaves(state)["rotary.off"].choices.items():
-        traced = index not in state.rotary.off
-        change = f"{'+' if traced else '-'}{index}"
-        parts.append(button(f"Trace {words}", "state:set.rotary.off", change, pressed=traced))
-    parts.append(setting(state, "rotary.own_mm"))
+        on = index not in state.rotary.off
+        change = f"{'+' if on else '-'}{index}"
+        traced.append(button(f"Trace {words}", "state:set.rotary.off", change, pressed=on))
+    parts = [tag("div", join(traced), class_="ws-actions"), setting(state, "rotary.own_mm")]
     if len(state.positions) > 1:
         parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
         low, high = state.scene.machine.axes[played].travel
