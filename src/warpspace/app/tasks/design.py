@@ -284,7 +284,7 @@ class ConceptsPart(AnalysisPart):
         return [offers[key] for key in self.chosen(state) if key in offers]
 
     def is_ready(self, state: AppState) -> bool:
-        return len(self.chosen(state)) > 1
+        return len(self.scenes(state)) > 1  # links may name machines that are not here
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked: Any = super().ask(state, values, scenes)

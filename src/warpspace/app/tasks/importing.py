@@ -183,9 +183,6 @@ class ImportPart(FilesPart):
         asked = read_form(Import, self.shown_options(state), values, scenes[0])
         return replace(asked, sources=tuple(one.content for one in self._files))
 
-    def is_ready(self, state: AppState) -> bool:
-        return bool(self._files)
-
     def is_quick(self, state: AppState) -> bool:
         return True
 

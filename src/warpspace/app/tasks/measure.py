@@ -74,6 +74,9 @@ class FilesPart(AnalysisPart):
     def question(self, state: AppState) -> Question:
         return (*super().question(state), self._files)
 
+    def is_ready(self, state: AppState) -> bool:
+        return bool(self._files)
+
     def received(self, name: str, content: bytes) -> None:
         """Take in a file."""
         raise NotImplementedError
@@ -158,7 +161,10 @@ class TestsPart(FilesPart):
 
     def body(self, picture: LivePicture) -> Markup:
         state, kind = picture.drawn_state, chosen_test(picture.drawn_state)
-        names = {"": "Choose a test …"} | {name: _title(name) for name in bench_names()}
+        tests = [find_test(name) for name in bench_names()]
+        names = {"": "Choose a test …"} | {
+            one.name: f"{one.title} ({one.standard})" for one in tests
+        }
         chosen = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
         if kind is None:
             return chosen
@@ -201,11 +207,6 @@ class TestsPart(FilesPart):
         if self._answer is not None and isinstance(found := self._answer.found, BenchResult):
             self.context.reported.append((found.test.title, found))
             self.context.notify("Added to the report", f"{found.test.title}; see Report at the top")
-
-
-def _title(name: str) -> str:
-    kind = find_test(name)
-    return f"{kind.title} ({kind.standard})"
 
 
 # --- Calibration ----------------------------------------------------------------------------------
@@ -267,8 +268,6 @@ class CalibratePart(FilesPart):
         return {**super().defaults(state), "next_count": "3"}
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        if not self._files:
-            raise OptionError("There are no readings yet: add a file, or choose bundled ones.")
         asked = read_form(CalibrateTexts, self.options(), values, scenes[0])
         return replace(asked, files=self._files)
 
