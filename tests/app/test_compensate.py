@@ -201,11 +201,11 @@ def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
 def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
     both = with_box(START, BOTH, controller)
     assert state_to_toml(without_table(both), None) == state_to_toml(START, None)
-    restored = read_kept(kept_text(both, None, [SCENE]), [SCENE])
-    assert restored.state.controller is None
-    assert restored.state.comparison.b is None
-    assert NO_TABLE in restored.missing
-    assert NO_TABLE not in read_kept(kept_text(START, None, [SCENE]), [SCENE]).missing
+    restored, _, missing = read_kept(kept_text(both, None, [SCENE]), [SCENE])
+    assert restored.controller is None
+    assert restored.comparison.b is None
+    assert NO_TABLE in missing
+    assert NO_TABLE not in read_kept(kept_text(START, None, [SCENE]), [SCENE])[2]
 
 
 def shown(part, state, found):

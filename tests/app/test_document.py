@@ -40,8 +40,6 @@ from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, 
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.tab_keeper import (
     COMPARISON,
-    FILE,
-    LINK,
     NEVER_KEPT,
     START_VALUES,
     kept_text,
@@ -233,41 +231,41 @@ def edited():
     ids=["known scene", "comparison", "edited curve"],
 )
 def test_a_tab_comes_back_whole_with_its_camera(state):
-    found = read_kept(kept_text(state, CAMERA, KNOWN), KNOWN)
-    assert found.state.resulting_scene().errors == state.resulting_scene().errors
+    found, camera, missing = read_kept(kept_text(state, CAMERA, KNOWN), KNOWN)
+    assert found.resulting_scene().errors == state.resulting_scene().errors
     if state.loaded is None:  # so that Reset goes where it went
-        assert found.state == state
-    assert found.camera == CAMERA
-    assert found.missing[: len(NEVER_KEPT)] == NEVER_KEPT
+        assert found == state
+    assert camera == CAMERA
+    assert missing[: len(NEVER_KEPT)] == NEVER_KEPT
 
 
 def test_scene_that_the_server_has_no_more_comes_back_from_its_file():
-    found = read_kept(kept_text(edited(), None, KNOWN), KNOWN[1:])
-    assert found.state.resulting_scene().errors == edited().resulting_scene().errors
-    assert found.state.component == "z"
-    assert found.missing == (*NEVER_KEPT, START_VALUES)
+    found, _, missing = read_kept(kept_text(edited(), None, KNOWN), KNOWN[1:])
+    assert found.resulting_scene().errors == edited().resulting_scene().errors
+    assert found.component == "z"
+    assert missing == (*NEVER_KEPT, START_VALUES)
     # and so does one that has changed under its name
     other = replace(KNOWN[1], name="dvf5000_first")
-    found = read_kept(kept_text(edited(), None, KNOWN), [other])
-    assert found.state.resulting_scene().errors == edited().resulting_scene().errors
+    found, *_ = read_kept(kept_text(edited(), None, KNOWN), [other])
+    assert found.resulting_scene().errors == edited().resulting_scene().errors
 
 
 def test_comparison_that_is_too_large_is_left_out_and_named(monkeypatch):
     state = with_pin(edited()).with_amplitude("EXX", 1.0)
     alone = kept_text(START.with_amplitude("EXX", 1.0), None, KNOWN)
     monkeypatch.setattr("warpspace.app.server.tab_keeper.MAX_KEPT_TEXT", len(alone) + 300)
-    found = read_kept(kept_text(state, None, KNOWN), KNOWN)
-    assert found.state.comparison.b is None
-    assert found.state.amplitudes["EXX"] == 1.0
-    assert COMPARISON in found.missing
+    found, _, missing = read_kept(kept_text(state, None, KNOWN), KNOWN)
+    assert found.comparison.b is None
+    assert found.amplitudes["EXX"] == 1.0
+    assert COMPARISON in missing
     monkeypatch.setattr("warpspace.app.server.tab_keeper.MAX_KEPT_TEXT", 10)
     assert kept_text(state, None, KNOWN) == ""
 
 
 @pytest.mark.parametrize(
     "text",
-    ["", "{", "[]", "7", "[" * 100_000, json.dumps({FILE: 7}), json.dumps({FILE: "x = ["}),
-     json.dumps({LINK: "scene=../../etc", FILE: "\x00"}), "x" * 800_000],
+    ["", "{", "[]", "7", "[" * 100_000, json.dumps({"file": 7}), json.dumps({"file": "x = ["}),
+     json.dumps({"link": "scene=../../etc", "file": "\x00"}), "x" * 800_000],
     ids=range(9),
 )  # fmt: skip
 def test_anything_may_come_from_a_page(text):

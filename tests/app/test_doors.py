@@ -11,13 +11,14 @@ from types import SimpleNamespace
 import pytest
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosedError
+from websockets.http11 import Request
 from websockets.protocol import State
 
 from app.wire import dial
 from page_client import PROTOCOL, pack, said
 from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN
-from warpspace.app.server import guard, network, run, viewer
-from warpspace.app.server.doors import Access, Asked, Doors, Place, read_place
+from warpspace.app.server import guard, network, viewer
+from warpspace.app.server.doors import Access, Doors, Place, read_place
 from warpspace.app.server.guard import Limits, Rate
 from warpspace.app.server.network import draw_code, reachable_address, served_names
 from warpspace.app.server.viewer import Viewer
@@ -191,11 +192,11 @@ def test_a_shared_machine_is_offered_a_token(monkeypatch, token, said):
         raise KeyboardInterrupt
 
     warnings: list[str] = []
-    monkeypatch.setattr(run, "has_other_users", lambda: True)
-    monkeypatch.setattr(run, "open_browser", interrupt)
-    monkeypatch.setattr(run, "limit_log", lambda: None)
+    monkeypatch.setattr(viewer, "has_other_users", lambda: True)
+    monkeypatch.setattr(viewer, "open_browser", interrupt)
+    monkeypatch.setattr(viewer, "limit_log", lambda: None)
     access = Access(token=token)
-    run.run_viewer(SCENE, {}, host="127.0.0.1", port=None, access=access, browser=True,
+    viewer.run_viewer(SCENE, {}, host="127.0.0.1", port=None, access=access, browser=True,
                    say=lambda _: None, warn=warnings.append)  # fmt: skip
     assert sum("--token TEXT" in text for text in warnings) == said
 
@@ -208,16 +209,16 @@ def test_a_proxy_is_allowed(guarded):
     assert ask(guarded, path, UPGRADE, Origin="https://review.example:1")[0] == 403
 
 
-def asked(host, arrived_at="127.0.0.1", **headers):
-    return Asked("/", Headers(Host=host, **headers), arrived_at)
+def asked(host):
+    return Request("/", Headers(Host=host))
 
 
 def test_all_addresses_of_a_machine_are_served_but_not_all_names():
     doors = Doors(served_names("0.0.0.0", "0.0.0.0"), 8080, everywhere=True)
     for host in ("localhost:8080", "192.0.2.7", f"{socket.gethostname()}:8080"):
-        assert doors.check(asked(host, "192.0.2.7")) is None
+        assert doors.check(asked(host), "192.0.2.7") is None
     for host in ("evil.example", "192.0.2.8"):
-        assert doors.check(asked(host, "192.0.2.7")) is not None
+        assert doors.check(asked(host), "192.0.2.7") is not None
 
 
 def test_one_address_of_a_machine_is_served_under_its_name(monkeypatch):

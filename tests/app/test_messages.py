@@ -189,22 +189,23 @@ def test_texts_stay_texts_within_a_script():
 
 def test_who_has_kept_the_server_busy_stands_back():
     turns, order = Turns(), []
+    busy, other, idle = (threading.Event() for _ in range(3))
 
-    def work(name):
-        with turns.take(name):
-            order.append(name)
+    def work(who):
+        with turns.take(who):
+            order.append(who)
 
-    with turns.take("busy"):
+    with turns.take(busy):
         time.sleep(0.05)
-    with turns.take("other"):
-        waiting = [threading.Thread(target=work, args=(name,)) for name in ("busy", "idle")]
+    with turns.take(other):
+        waiting = [threading.Thread(target=work, args=(who,)) for who in (busy, idle)]
         for thread in waiting:
             thread.start()
         while len(turns._waiting) < 2:
             time.sleep(0.01)
     for thread in waiting:
         thread.join()
-    assert order == ["idle", "busy"]
+    assert order == [idle, busy]
 
 
 def test_lines_of_one_kind_are_counted():

@@ -213,7 +213,7 @@ def test_a_signal_that_comes_within_a_finalizer_is_heeded_without_a_traceback(tm
 
 DRAWING_VIEW = """
 import threading, time, sys
-import warpspace.app.server.run as viewer
+import warpspace.app.server.viewer as viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 serve = viewer.run_viewer

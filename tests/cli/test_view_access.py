@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import contextmanager
 from typing import Any
 
-from warpspace.app.server import run
+from warpspace.app.server import viewer
 from warpspace.app.server.doors import Access
 
 Command = Callable[..., Any]
@@ -16,7 +16,7 @@ Command = Callable[..., Any]
 
 def test_options_reach_the_app(warpspace, monkeypatch):
     given: list[dict[str, Any]] = []
-    monkeypatch.setattr(run, "run_viewer", lambda *_, **words: given.append(words))
+    monkeypatch.setattr(viewer, "run_viewer", lambda *_, **words: given.append(words))
     hosts = ("--allow-host", "a.example", "--allow-host", "b.example:1")
     assert warpspace("view", *hosts, "--token", "x" * 12).status == 0
     assert warpspace("view", "--host", "0.0.0.0", "--no-token").status == 0

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from urllib.parse import parse_qsl
 
-from websockets.datastructures import Headers
+from websockets.http11 import Request
 
 from warpspace.exceptions import OptionError
 
@@ -63,7 +63,7 @@ def read_place(text: str) -> Place | None:
         return None
     literal, name, port = found.groups()
     try:
-        host = plain_address(literal) if literal else plain_address(name)
+        host = plain_address(literal or name)
     except ValueError:
         if literal:
             return None
@@ -76,20 +76,6 @@ def plain_address(text: str) -> str:
     address = ipaddress.ip_address(text.partition("%")[0])
     mapped = getattr(address, "ipv4_mapped", None)
     return str(mapped or address)
-
-
-@dataclass(frozen=True)
-class Asked:
-    """A request: its path with the query, its headers, and the address it came in by."""
-
-    path: str
-    headers: Headers
-    arrived_at: str
-
-    def words(self, name: str) -> list[str]:
-        """Give what the query says of a name."""
-        query = self.path.partition("?")[2]
-        return [value for key, value in parse_qsl(query, keep_blank_values=True) if key == name]
 
 
 @dataclass(frozen=True)
@@ -118,34 +104,37 @@ class Doors:
         allow_hosts: Iterable[str] = (),
         token: str | None = None,
     ) -> None:
-        self._allowed = frozenset(_allowed(text) for text in allow_hosts)
+        self._allowed = frozenset(map(_allowed, allow_hosts))
         self._hosts = frozenset(names) | {place.host for place in self._allowed}
         self._everywhere, self._token = everywhere, token
         self._cookie = f"{COOKIE}{port}"
         self._pass = hmac.new((token or "").encode(), b"warpspace cookie", "sha256").hexdigest()
 
-    def check(self, asked: Asked) -> Refusal | None:
-        """Tell why a request is refused, or give None where it is answered."""
-        place = self._place(asked)
-        if place is None:
-            found = ", ".join(asked.headers.get_all("Host")) or "none"
+    def check(self, asked: Request, arrived_at: str) -> Refusal | None:
+        """Tell why a request that came in by an address is refused; None where it is answered."""
+        hosts, origins = (asked.headers.get_all(name) for name in ("Host", "Origin"))
+        place = read_place(hosts[0]) if len(hosts) == 1 else None
+        served = place is not None and (
+            place.host in self._hosts or (self._everywhere and place.host == arrived_at)
+        )
+        if place is None or not served:
+            found = ", ".join(hosts) or "none"
             return Refusal(
                 "host",
                 f"This app does not serve the host {found[:200]!r}. If a proxy does,"
                 " start the app with --allow-host NAME.",
             )
-        origins = asked.headers.get_all("Origin")
         if origins and not (len(origins) == 1 and self._is_own(origins[0], place)):
             return Refusal(
                 "origin",
                 f"Only the app's own page may use it, not one of {origins[0][:200]!r}. If a"
                 " proxy serves the app there, start it with --allow-host NAME.",
             )
-        if any(not self._is_own(url, place) for name in _ELSEWHERE for url in asked.words(name)):
+        if not all(self._is_own(url, place) for url in _words(asked, *_ELSEWHERE)):
             return Refusal(
                 "elsewhere", "The link leads the page to another server; leave that out."
             )
-        if not (self.has_token(asked) or self._has_cookie(asked)):
+        if not (self._has_token(asked) or self._has_cookie(asked)):
             return Refusal(
                 "token",
                 "This app asks for a token: open the link that was printed where it was started"
@@ -153,18 +142,17 @@ class Doors:
             )
         return None
 
-    def has_token(self, asked: Asked) -> bool:
-        """Tell whether the address of a request carries the token, or none is asked for."""
-        token = self._token
-        return token is None or any(_is(word, token) for word in asked.words("token"))
-
-    def cookie(self, asked: Asked) -> str | None:
+    def cookie(self, asked: Request) -> str | None:
         """Give the cookie that spares a page the token from now on; its websocket has no other."""
-        if self._token is None or not self.has_token(asked):
+        if self._token is None or not self._has_token(asked):
             return None
         return f"{self._cookie}={self._pass}; Path=/; HttpOnly; SameSite=Strict"
 
-    def _has_cookie(self, asked: Asked) -> bool:
+    def _has_token(self, asked: Request) -> bool:
+        token = self._token
+        return token is None or any(_is(word, token) for word in _words(asked, "token"))
+
+    def _has_cookie(self, asked: Request) -> bool:
         pairs = (
             pair.strip().partition("=")
             for header in asked.headers.get_all("Cookie")
@@ -172,22 +160,19 @@ class Doors:
         )
         return any(_is(value, self._pass) for name, _, value in pairs if name.startswith(COOKIE))
 
-    def _place(self, asked: Asked) -> Place | None:
-        hosts = asked.headers.get_all("Host")
-        place = read_place(hosts[0]) if len(hosts) == 1 else None
-        if place is None or place.host in self._hosts:
-            return place
-        return place if self._everywhere and place.host == asked.arrived_at else None
-
     def _is_own(self, url: str, place: Place) -> bool:
         found = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
-        if found is None:
+        own = None if found is None else read_place(found[2].partition("/")[0])
+        if found is None or own is None:
             return False
-        scheme, own = found[1].lower(), read_place(found[2].partition("/")[0])
-        if own is None:
-            return False
-        own = own.usual(scheme)
-        return own == place.usual(scheme) or own in {at.usual(scheme) for at in self._allowed}
+        scheme = found[1].lower()
+        return own.usual(scheme) in {at.usual(scheme) for at in (place, *self._allowed)}
+
+
+def _words(asked: Request, *names: str) -> list[str]:
+    """Give what the query of a request says of names."""
+    query = asked.path.partition("?")[2]
+    return [value for key, value in parse_qsl(query, keep_blank_values=True) if key in names]
 
 
 def _is(text: str, secret: str) -> bool:

@@ -16,7 +16,7 @@ from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
 from warpspace.app.browser.incoming import Events, read_message
-from warpspace.app.server.doors import Asked, Doors, Refusal, plain_address
+from warpspace.app.server.doors import Doors, Refusal, plain_address
 
 logger = logging.getLogger(__name__)
 HEADERS = {
@@ -40,8 +40,7 @@ class Limits:
     sessions: int = 64  # tabs that are open at the same time
     # largest message of a page: a picture of the view. A file has 6 MB at most.
     message_bytes: int = 16 * 2**20
-    # of one connection, on average. A page sends 20 a second for each group of widgets in use.
-    messages_per_second: float = 400.0
+    messages_per_second: float = 400.0  # of one connection, on average; a page sends 50
     burst: int = 2000  # messages that may come at once
 
 
@@ -69,17 +68,68 @@ class Rate:
         return True
 
 
-class OnceLog:
-    """Logs the first of each kind of refusal, so that nobody can fill the log."""
+class Guard:
+    """Checks each request before viser answers it, and limits each connection."""
 
-    def __init__(self) -> None:
-        self._known: set[str] = set()
+    def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
+        self.limits, self._doors = limits, doors
+        self._logged: set[str] = set()
+        self._connections = weakref.WeakSet[TabConnection]()
 
     def warn(self, kind: str, text: str, who: object) -> None:
-        """Log a refusal, if it is the first of its kind."""
-        if kind not in self._known:
-            self._known.add(kind)
+        """Log a refusal, if it is the first of its kind: nobody can fill the log."""
+        if kind not in self._logged:
+            self._logged.add(kind)
             logger.warning("refused %s: %s (further ones are not logged)", who, text)
+
+    def cut(self) -> None:
+        """Cut the connections that there are; to be called from another thread than theirs."""
+        for connection in tuple(self._connections):
+            with contextlib.suppress(RuntimeError):  # the event loop has ended with all of them
+                connection.loop.call_soon_threadsafe(connection.abort)
+
+    def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
+        """Give the options that a server of `websockets` starts with, from those viser has."""
+
+        def process_request(connection: ServerConnection, request: Request) -> Any:
+            refusal = self._check(connection, request)
+            if refusal is None:
+                return theirs["process_request"](connection, request)
+            self.warn(refusal.kind, refusal.text, connection.remote_address)
+            return connection.respond(refusal.status, refusal.text + "\n")
+
+        def process_response(_: ServerConnection, request: Request, response: Response) -> None:
+            response.headers.update(HEADERS)
+            if response.status_code < HTTPStatus.BAD_REQUEST:
+                cookie = self._doors.cookie(request)
+                if cookie is not None:
+                    response.headers["Set-Cookie"] = cookie
+
+        def create_connection(*args: Any, **kwargs: Any) -> TabConnection:
+            connection = TabConnection(*args, **kwargs)
+            connection.start(self)
+            self._connections.add(connection)
+            return connection
+
+        return {
+            **theirs,
+            "process_request": process_request,
+            "process_response": process_response,
+            "create_connection": create_connection,
+            "max_size": self.limits.message_bytes,
+        }
+
+    def _check(self, connection: ServerConnection, request: Request) -> Refusal | None:
+        refusal = self._doors.check(request, plain_address(str(connection.local_address[0])))
+        most = self.limits.sessions
+        if refusal is not None or len(connection.server.connections) < most:
+            return refusal
+        return Refusal(
+            "sessions",
+            f"{most} tabs have the app open, which is all it takes at once: close one and try"
+            " again.",
+            HTTPStatus.SERVICE_UNAVAILABLE,
+        )
 
 
 class TabConnection(ServerConnection):
@@ -88,10 +138,10 @@ class TabConnection(ServerConnection):
     What the page's own scripts say goes to its session; viser gets the rest of what may be said.
     """
 
-    def limit(self, limits: Limits, log: OnceLog) -> None:
-        """Set what is too much."""
-        self._rate, self._log = Rate(limits.messages_per_second, limits.burst), log
-        self._words = f"more than {limits.messages_per_second:g} messages a second"
+    def start(self, guard: Guard) -> None:
+        """Begin to count."""
+        self._guard = guard
+        self._rate = Rate(guard.limits.messages_per_second, guard.limits.burst)
         self._closing: asyncio.Task[None] | None = None
         self._early: list[Events] = []
         self._take: Callable[[Events], None] | None = None
@@ -115,13 +165,14 @@ class TabConnection(ServerConnection):
             except ConnectionClosed as closed:
                 if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
                     words = f"a message too large, {closed.sent}"
-                    self._log.warn("size", words, self.remote_address)
+                    self._guard.warn("size", words, self.remote_address)
                 raise
             if self._closing is not None:
                 continue  # until the other side has closed as well
             if not self._rate.take():
-                self._log.warn("rate", self._words, self.remote_address)
-                closing = self.close(CloseCode.POLICY_VIOLATION, self._words)
+                words = f"more than {self._guard.limits.messages_per_second:g} messages a second"
+                self._guard.warn("rate", words, self.remote_address)
+                closing = self.close(CloseCode.POLICY_VIOLATION, words)
                 self._closing = asyncio.ensure_future(closing)
                 continue
             message = read_message(raw)
@@ -132,70 +183,3 @@ class TabConnection(ServerConnection):
                 self._take(message)
             elif len(self._early) < MOST_EARLY:
                 self._early.append(message)
-
-
-class Guard:
-    """Checks each request before viser answers it, and limits each connection."""
-
-    def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
-        self._doors, self._limits = doors, limits
-        self._log = OnceLog()
-        self._connections = weakref.WeakSet[TabConnection]()
-
-    def cut(self) -> None:
-        """Cut the connections that there are; to be called from another thread than theirs."""
-        for connection in tuple(self._connections):
-            with contextlib.suppress(RuntimeError):  # the event loop has ended with all of them
-                connection.loop.call_soon_threadsafe(connection.abort)
-
-    def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
-        """Give the options that a server of `websockets` starts with, from those viser has."""
-        answer = theirs["process_request"]
-
-        def process_request(connection: ServerConnection, request: Request) -> Any:
-            refusal = self._check(connection, request)
-            if refusal is None:
-                return answer(connection, request)
-            self._log.warn(refusal.kind, refusal.text, connection.remote_address)
-            return connection.respond(refusal.status, refusal.text + "\n")
-
-        def process_response(
-            connection: ServerConnection, request: Request, response: Response
-        ) -> None:
-            for name, value in HEADERS.items():
-                response.headers[name] = value
-            if response.status_code < HTTPStatus.BAD_REQUEST:
-                cookie = self._doors.cookie(_asked(connection, request))
-                if cookie is not None:
-                    response.headers["Set-Cookie"] = cookie
-
-        def create_connection(*args: Any, **kwargs: Any) -> TabConnection:
-            connection = TabConnection(*args, **kwargs)
-            connection.limit(self._limits, self._log)
-            self._connections.add(connection)
-            return connection
-
-        return {
-            **theirs,
-            "process_request": process_request,
-            "process_response": process_response,
-            "create_connection": create_connection,
-            "max_size": self._limits.message_bytes,
-        }
-
-    def _check(self, connection: ServerConnection, request: Request) -> Refusal | None:
-        refusal = self._doors.check(_asked(connection, request))
-        if refusal is not None:
-            return refusal
-        if len(connection.server.connections) < self._limits.sessions:
-            return None
-        return Refusal(
-            "sessions",
-            f"{self._limits.sessions} tabs have the app open, which is all it takes at once:"
-            " close one and try again.",
-            HTTPStatus.SERVICE_UNAVAILABLE,
-        )
-
-
-def _asked(connection: ServerConnection, request: Request) -> Asked:
-    return Asked(request.path, request.headers, plain_address(str(connection.local_address[0])))

@@ -99,42 +99,41 @@ def draw_code(link: str) -> str:
     return drawn.getvalue().rstrip("\n")
 
 
-def _bind_error(address: str, port: int) -> OSError | None:
-    family = socket.AF_INET6 if ":" in address else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as probe:
-        if os.name == "posix":
-            # as the server does: a port in TIME_WAIT is free
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((address, port))
-        except (OSError, OverflowError) as error:
-            return error if isinstance(error, OSError) else OSError(errno.EINVAL, str(error))
-    return None
-
-
 def free_port(address: str, port: int | None) -> int:
     """Choose the port to serve on."""
     if port is not None and not 1 <= port <= MAX_PORT:
         raise OptionError(f"--port {port}: expected 1 to {MAX_PORT}")
     first = DEFAULT_PORT if port is None else port
-    last = first + PORTS_TRIED if port is None else first + 1
-    for candidate in range(first, last):
+    last = first + PORTS_TRIED - 1 if port is None else first
+    for candidate in range(first, last + 1):
         error = _bind_error(address, candidate)
         if error is None:
             return candidate
-        if error.errno == errno.EADDRNOTAVAIL:
+        if error == errno.EADDRNOTAVAIL:
             raise OptionError(f"--host {address}: not an address of this machine")
-        if error.errno == errno.EACCES:
+        if error == errno.EACCES:
             raise OptionError(
                 f"--port {candidate} needs administrator rights; expected one above 1023"
             )
-        if error.errno != errno.EADDRINUSE:
-            raise OptionError(f"--port {candidate} on {address}: {error.strerror or error}")
+        if error != errno.EADDRINUSE:
+            raise OptionError(f"--port {candidate} on {address}: {os.strerror(error)}")
     if port is None:
-        raise OptionError(f"ports {first} to {last - 1} are all in use; free one of them")
+        raise OptionError(f"ports {first} to {last} are all in use; free one of them")
     raise OptionError(
         f"--port {port} is in use by another program; leave --port out to take the next free one"
     )
+
+
+def _bind_error(address: str, port: int) -> int | None:
+    with socket.socket(socket.AF_INET6 if ":" in address else socket.AF_INET) as probe:
+        if os.name == "posix":
+            # as the server does: a port in TIME_WAIT is free
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address, port))
+        except OSError as error:
+            return error.errno or errno.EINVAL
+    return None
 
 
 def page_url(address: str, port: int) -> str:
@@ -173,8 +172,8 @@ class RepeatedLines(logging.Filter):
         kind = (record.name, str(record.msg).partition("\n")[0], name)
         now = self._clock()
         with self._lock:
-            since, left_out = self._known.get(kind, (None, 0))
-            if since is not None and now - since < EVERY_S:
+            since, left_out = self._known.get(kind, (-EVERY_S, 0))
+            if now - since < EVERY_S:
                 self._known[kind] = (since, left_out + 1)
                 return False
             if len(self._known) >= MOST_KINDS:

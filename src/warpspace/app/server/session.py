@@ -21,6 +21,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from viser import ClientHandle, ViserServer
@@ -36,10 +37,9 @@ from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.display import Display
-from warpspace.app.server.tab_keeper import TabKeeper
-from warpspace.app.server.tab_memory import TabRecord, new_token
+from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.store import StateStore, Update, apply_each
+from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import Context
 from warpspace.exceptions import WarpspaceError
@@ -59,7 +59,7 @@ class Turns:
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        self._used: dict[object, tuple[float, float]] = {}  # seconds of work, and when that was
+        self._used = WeakKeyDictionary[object, tuple[float, float]]()  # s of work, and until when
         self._waiting: list[object] = []
         self._busy = False
 
@@ -68,7 +68,9 @@ class Turns:
         """Wait for the turn of a tab, and end it."""
         with self._changed:
             self._waiting.append(who)
-            self._changed.wait_for(lambda: not self._busy and who is self._next())
+            self._changed.wait_for(
+                lambda: not self._busy and who is min(self._waiting, key=self._lately)
+            )
             self._waiting.remove(who)
             self._busy, began = True, time.monotonic()
         try:
@@ -76,22 +78,13 @@ class Turns:
         finally:
             with self._changed:
                 ended = time.monotonic()
-                self._used[who] = self._lately(who, ended) + ended - began, ended
+                self._used[who] = self._lately(who) + ended - began, ended
                 self._busy = False
                 self._changed.notify_all()
 
-    def forget(self, who: object) -> None:
-        """Drop what is known of a tab."""
-        with self._changed:
-            self._used.pop(who, None)
-
-    def _next(self) -> object:
-        now = time.monotonic()
-        return min(self._waiting, key=lambda who: self._lately(who, now))
-
-    def _lately(self, who: object, now: float) -> float:
-        seconds, at = self._used.get(who, (0.0, now))
-        return seconds * math.exp((at - now) / USE_FADES_S)
+    def _lately(self, who: object) -> float:
+        seconds, at = self._used.get(who, (0.0, 0.0))
+        return seconds * math.exp((at - time.monotonic()) / USE_FADES_S)
 
 
 TURNS = Turns()
@@ -116,8 +109,7 @@ class Session:
         self.context = Context(server, client, store, scenes, services)
         self.token = new_token()
         self._keeper = TabKeeper(self.context, shared=shared)
-        self.display = Display(self.context.page)
-        self.context.renew, self.context.closed = self.display.renew, self.display.closed
+        self.display = Display(self.context)
         self._is_known = False  # whether the page has said which tab it is
         self._around_at: float | None = None  # when what lies around the map is drawn at the latest
         self._stopped = threading.Event()
@@ -165,24 +157,18 @@ class Session:
                 self._turn()
         finally:
             self.context.store.unsubscribe(self.context.changed)
-            TURNS.forget(self)
 
     def _turn(self) -> None:
         left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
-        stage = self.context.stage
-        turns = None if stage is None else stage.wait_s
-        waits = [wait for wait in (self.display.pause_s, left, turns) if wait is not None]
-        changed = self.context.wait(min(waits, default=None))
-        if changed and not self._stopped.is_set():
+        waits = [wait for wait in (self.display.due_in_s, left) if wait is not None]
+        if self.context.wait(min(waits, default=None)) and not self._stopped.is_set():
             self._guarded(self._follow)
-        if stage is not None and stage.wait_s == 0.0:
-            self._guarded(stage.turn)
         picture = self.context.shown
         if picture is None:
             return
         if self._around_at is not None and time.monotonic() >= self._around_at:
             self._guarded(partial(self._draw_around, picture))
-        if self.display.is_due(paused=not changed):
+        if self.display.due_in_s == 0.0:
             self._guarded(partial(self._settle, picture))
 
     def _guarded(self, step: Callable[[], object]) -> None:
@@ -216,7 +202,6 @@ class Session:
             self.display.add(picture, layers, [*build_parts(context), self._keeper])
             context.page.call("drawn")
         self._around_at = time.monotonic() + ANSWER_S
-        context.shown = picture
 
     def _draw_around(self, picture: LivePicture) -> None:
         self._around_at = None
@@ -256,35 +241,35 @@ class Session:
 
     def _follow(self) -> None:
         context = self.context
-        updates: list[Update] = []
         for event in [context.events.popleft() for _ in range(len(context.events))]:
             if event.part == TAB:
                 self._hear(event)
-            elif (found := self.display.update(event)) is not None:
-                updates.append(found)
-        updates += context.take_updates()
-        notes = context.apply(lambda state: apply_each(state, updates, self._guarded))
+            elif (part := self.display.parts.get(event.part)) is not None:
+                take = partial(part.take, word=event.word, value=event.value)
+                self._guarded(partial(context.apply, take))
         while action := context.take_action():
             self._guarded(action)
+        notes, context.notes = context.notes, []
         state, shown = self.state, context.shown
-        if context.camera.wanted and shown is not None and focus(shown.state) == focus(state):
+        if shown is None:  # it could not be built
+            return
+        if context.camera.wanted and focus(shown.state) == focus(state):
             context.camera.place(shown)
-        if notes or state is not self.display.state:
+        if notes or state is not shown.state:
             with TURNS.take(self):
-                self._show(self._live.evaluate(state), notes)
+                self._show(self._live.evaluate(state), shown, anew=bool(notes))
+        if notes:
+            context.notify("Clamped", "\n".join(notes), "warning")
 
-    def _show(self, picture: LivePicture, notes: tuple[str, ...]) -> None:
-        context, before = self.context, self.context.shown
+    def _show(self, picture: LivePicture, before: LivePicture, *, anew: bool) -> None:
+        context = self.context
         with context.page.as_one():
-            self.display.show(picture, anew=bool(notes))
-            if before is not None and focus(before.state) != focus(picture.state):
+            self.display.show(picture, anew=anew)
+            if focus(before.state) != focus(picture.state):
                 context.page.call("title", picture.state.scene.title)
                 context.camera.place(picture)
-            if before is None or before.state.shown.dark != picture.state.shown.dark:
+            if before.state.shown.dark != picture.state.shown.dark:
                 self._darken(picture)
-        context.shown = picture
-        if notes:
-            context.notify("Not taken as typed", "\n".join(notes), "warning")
 
     def _darken(self, picture: LivePicture) -> None:
         dark = picture.state.shown.dark

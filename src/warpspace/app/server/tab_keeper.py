@@ -1,11 +1,22 @@
-"""Keeps the state of a tab in its page, and takes it back after a restart of the server."""
+"""Which browser tab is which, and what is kept of one: in the server for a while, and in its page.
 
-import json
-import threading
-from collections.abc import Mapping, Sequence
+viser numbers connections, not tabs: after a dropped connection the page connects anew and counts as
+a new client. The page therefore keeps a random token in its `sessionStorage`, which belongs to one
+tab and survives a reload, and says it when it has connected. What a tab leaves behind is kept for
+a while under its token. A page whose browser forbids `sessionStorage`, and a tab that was closed
+and opened anew, start afresh. A restarted server knows no one: then helps what the page has kept.
+"""
+
+import re
+import secrets
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+
+import msgspec
 
 from warpspace.app.documents.files import safe_name
 from warpspace.app.documents.scene_file import (
@@ -18,6 +29,7 @@ from warpspace.app.documents.scene_file import (
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
+from warpspace.app.state.store import StateStore
 from warpspace.app.state.table import without_table
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Part
@@ -25,7 +37,54 @@ from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_KEPT_TEXT
 from warpspace.scene.model import Scene
 
-LINK, FILE, NAME, ALONE, TABLE = "link", "file", "name", "alone", "table"
+# --- In the server --------------------------------------------------------------------------------
+
+KEPT_SECONDS = 600.0
+KEPT_TABS = 64
+_TOKEN = re.compile(r"[0-9a-f]{32}")
+
+
+def new_token() -> str:
+    """Make a token that nobody guesses."""
+    return secrets.token_hex(16)
+
+
+def is_token(text: str) -> bool:
+    """Tell whether a text that a browser has sent may be a token."""
+    return _TOKEN.fullmatch(text) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class TabRecord:
+    """What a tab leaves behind."""
+
+    store: StateStore  # state and history
+    camera: CameraMemory | None
+
+
+class TabMemory:
+    """Keeps what tabs leave behind, bounded in time and number."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._left: OrderedDict[str, tuple[float, TabRecord]] = OrderedDict()
+
+    def keep(self, token: str, left: TabRecord) -> None:
+        self._left.pop(token, None)
+        self._left[token] = (self._clock() + KEPT_SECONDS, left)
+        while len(self._left) > KEPT_TABS:
+            self._left.popitem(last=False)
+
+    def take(self, token: str) -> TabRecord | None:
+        """Give back what a tab has left behind, once; None where there is nothing."""
+        now = self._clock()
+        while self._left and next(iter(self._left.values()))[0] < now:
+            self._left.popitem(last=False)
+        return self._left.pop(token, (0.0, None))[1]
+
+
+# --- In the page ----------------------------------------------------------------------------------
+
 NEVER_KEPT = (
     "what Undo and Redo could go back to",
     "other scenes that were opened in this tab",
@@ -35,66 +94,51 @@ NEVER_KEPT = (
 COMPARISON = "the comparison, which was too large to keep"
 NO_TABLE = "the table of compensation that the box was drawn with, and its comparison"
 START_VALUES = "the values that Reset goes back to: it goes back to those restored"
-UNREADABLE = "what this tab has kept cannot be read"
 
 
-@dataclass(frozen=True, slots=True)
-class Restored:
-    """What has come back."""
+class Kept(msgspec.Struct, omit_defaults=True):
+    """What a page keeps."""
 
-    state: AppState
-    camera: CameraMemory | None
-    missing: tuple[str, ...]  # what has not, in words
+    file: str = ""
+    name: str = ""
+    link: str = ""  # where there is one: it knows what Reset goes back to
+    alone: str = ""  # whether it is without its comparison
+    table: str = ""  # whether it was drawn with a table of compensation
 
 
 def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
     """Spell a state for its page to keep."""
     bare = without_table(state)
-    table, state = bare is not state, bare
-    alone = replace(state, comparison=Comparison())
-    for whole in (state,) if alone == state else (state, alone):
+    table = "yes" if bare is not state else ""
+    alone = replace(bare, comparison=Comparison())
+    for whole in (bare,) if alone == bare else (bare, alone):
         with suppress(OptionError):
-            kept = {NAME: whole.scene.name, FILE: state_to_toml(whole, camera)}
-            link = named_link(whole, camera, known)
-            if link and len(link) <= MAX_LINK:
-                kept[LINK] = link
-            if whole is not state:
-                kept[ALONE] = "yes"
-            if table:
-                kept[TABLE] = "yes"
-            text = json.dumps(kept)
+            file, link = state_to_toml(whole, camera), named_link(whole, camera, known)
+            if not link or len(link) > MAX_LINK:
+                link = ""
+            kept = Kept(file, whole.scene.name, link, "" if whole is bare else "yes", table)
+            text = msgspec.json.encode(kept).decode()
             if len(text) <= MAX_KEPT_TEXT:
                 return text
     return ""
 
 
-def read_kept(text: str, known: Sequence[Scene]) -> Restored:
-    """Build what a page has kept."""
-    kept = _parse(text)
-    file, link = kept.get(FILE, ""), kept.get(LINK, "")
-    lost = {ALONE: COMPARISON, TABLE: NO_TABLE}
-    missing = (*NEVER_KEPT, *(words for key, words in lost.items() if key in kept))
-    with suppress(WarpspaceError):
-        state, camera = open_link(link, known)
-        if state_to_toml(state, camera) == file:
-            return Restored(state, camera, missing)
-    state, camera = open_text(file, safe_name(kept.get(NAME, ""), "kept"), "what this tab has kept")
-    return Restored(state, camera, (*missing, START_VALUES))
-
-
-def _parse(text: str) -> dict[str, str]:
-    if len(text) > MAX_KEPT_TEXT:
-        raise OptionError(UNREADABLE)
+def read_kept(
+    text: str, known: Sequence[Scene]
+) -> tuple[AppState, CameraMemory | None, tuple[str, ...]]:
+    """Build what a page has kept; with what has not come back, in words."""
     try:
-        found = json.loads(text)
+        kept = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=Kept)
     except (ValueError, RecursionError):
-        raise OptionError(UNREADABLE) from None
-    if not isinstance(found, dict):
-        raise OptionError(UNREADABLE)
-    return {str(key): value for key, value in found.items() if isinstance(value, str)}  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        raise OptionError("what this tab has kept cannot be read") from None
+    missing = (*NEVER_KEPT, *[COMPARISON] * bool(kept.alone), *[NO_TABLE] * bool(kept.table))
+    with suppress(WarpspaceError):
+        state, camera = open_link(kept.link, known)
+        if state_to_toml(state, camera) == kept.file:
+            return state, camera, missing
+    state, camera = open_text(kept.file, safe_name(kept.name, "kept"), "what this tab has kept")
+    return state, camera, (*missing, START_VALUES)
 
-
-# --- The memory of a tab --------------------------------------------------------------------------
 
 RESTORED_TITLE = "This tab is restored"
 RESTORED = (
@@ -113,81 +157,58 @@ JOINED = (
     "The server was restarted, and somebody has changed the review since. What this tab had kept"
     " was not brought back."
 )
-CAMERA_PAUSE_S = 1.0  # how long after a move the camera is kept: not with each of its steps
 
 
 class TabKeeper(Part):
-    """The memory of a tab that is in its page."""
+    """Has the page keep what it shows, and takes it back."""
 
     name = "keeper"
     follows = "at rest"
 
     def __init__(self, context: Context, *, shared: bool) -> None:
-        self._context, self._shared = context, shared
-        self._kept: AppState | None = None
+        super().__init__(context)
+        self._shared = shared
         self._may_keep, self._asked = False, False
-        self._due = threading.Lock()
 
         @context.client.camera.on_update
         async def _(_: object) -> None:
-            self._keep_camera_soon()
+            context.act(context.rest_again)
 
         context.page.call("server.watch")
 
     def begin(self, *, known: bool) -> None:
         """Find out what the page has kept, once the server knows whether it knows the tab."""
         self._may_keep, self._asked = True, not known
-        self._context.page.call("server.back", known)
+        self.context.rest_again()
+        self.context.page.call("server.back", known)
+
+    def is_seen(self, state: AppState) -> bool:  # noqa: ARG002
+        return self._may_keep
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        """Keep every state."""
-        return (id(picture.state),)
+        return (id(picture.state), self.context.camera.remember())
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Have the page keep what is shown; nothing is written."""
-        if picture.state is not self._kept:
-            self._keep(picture.state)
+        context = self.context
+        text = kept_text(picture.state, context.camera.remember(), context.scenes.fixed)
+        context.page.call("server.keep", text)
         return {}
 
-    def _keep(self, state: AppState) -> None:
-        if not self._may_keep:
-            return
-        self._kept = state
-        context = self._context
-        text = kept_text(state, context.camera.remember(), context.scenes.fixed)
-        context.page.call("server.keep", text)
-
-    def _keep_camera_soon(self) -> None:
-        if self._kept is None or not self._due.acquire(blocking=False):
-            return
-        timer = threading.Timer(CAMERA_PAUSE_S, self._context.act, [self._keep_camera])
-        timer.name, timer.daemon = "warpspace-keep-camera", True
-        timer.start()
-
-    def _keep_camera(self) -> None:
-        self._due.release()
-        if self._context.shown is not None and self._context.page.is_open:
-            self._keep(self._context.shown.state)
-
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "kept":
-            self._context.act(partial(self._restore, value))
+        if word == "kept" and self._asked:
+            self._asked = False
+            self.context.act(partial(self._restore, value))
         return state
 
     def _restore(self, text: str) -> None:
-        if not self._asked:
-            return
-        self._asked = False
-        if self._shared and self._context.store.history.past:
-            self._say(JOINED_TITLE, JOINED)
+        context, say = self.context, partial(self.context.page.call, "server.say")
+        if self._shared and context.store.history.past:
+            say(JOINED_TITLE, [JOINED])
             return
         try:
-            found = read_kept(text, self._context.scenes.fixed)
+            state, camera, missing = read_kept(text, context.scenes.fixed)
         except WarpspaceError as error:
-            self._say(REFUSED_TITLE, REFUSED.format(error))
+            say(REFUSED_TITLE, [REFUSED.format(error)])
             return
-        self._context.show_opened(found.state, found.camera)
-        self._say(RESTORED_TITLE, RESTORED, MISSING.format("; ".join(found.missing)))
-
-    def _say(self, title: str, *lines: str) -> None:
-        self._context.page.call("server.say", title, lines)
+        context.show_opened(state, camera)
+        say(RESTORED_TITLE, [RESTORED, MISSING.format("; ".join(missing))])

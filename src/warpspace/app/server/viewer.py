@@ -2,12 +2,13 @@
 
 import contextlib
 import io
-import logging
 import threading
-from collections.abc import Mapping
+import time
+import warnings
+import webbrowser
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import viser
 
@@ -21,24 +22,33 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.doors import Access, Doors
 from warpspace.app.server.guard import Guard, TabConnection
 from warpspace.app.server.network import (
+    draw_code,
     free_port,
+    has_other_users,
     is_everywhere,
     is_local,
+    limit_log,
     page_url,
     reachable_address,
     resolve_host,
     served_names,
 )
 from warpspace.app.server.session import Session
-from warpspace.app.server.tab_memory import TabMemory, TabRecord, is_token, new_token
+from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
-logger = logging.getLogger(__name__)
 FAREWELL_S = 0.5
 """How long the end waits for pages to close their connection; some read nothing any more."""
+NO_AUTHENTICATION = (
+    "WARNING: {host} can be reached from other machines, and with --no-token the app asks nobody"
+    " for a token or a password: whoever reaches it sees its scenes, and can use it"
+)
+OTHER_USERS = (
+    "Others who use this machine can open it too, without a token; --token TEXT asks for one"
+)
 
 
 class Viewer:
@@ -178,12 +188,7 @@ class Viewer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
 
@@ -199,15 +204,61 @@ def _with(scene: Scene, scenes: Mapping[str, Scene]) -> dict[str, Scene]:
 def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
     with contextlib.redirect_stdout(io.StringIO()), serve_with(guard.options) as guarded:
         server = viser.ViserServer(host=address, port=port, verbose=False)
+    problem = ""
     if not guarded:
-        server.stop()
-        raise OptionError(
+        problem = (
             f"viser {viser.__version__} starts its server in a way that cannot be guarded;"
             " install the version that the constraints file names"
         )
-    if server.get_port() != port:
+    elif server.get_port() != port:
+        problem = f"--port {port} has just been taken by another program; try again"
+    if problem:
         server.stop()
-        raise OptionError(f"--port {port} has just been taken by another program; try again")
+        raise OptionError(problem)
     # any tab could ask for a tunnel through a public relay
     server.request_share_url = lambda *_args, **_kwargs: None
     return server
+
+
+def open_browser(url: str) -> bool:
+    """Open a page in a graphical browser."""
+    try:
+        browser = webbrowser.get()
+    except webbrowser.Error:
+        return False
+    if type(browser) is webbrowser.GenericBrowser:  # one that takes over the terminal
+        return False
+    return browser.open(url)
+
+
+def run_viewer(
+    scene: Scene,
+    scenes: Mapping[str, Scene],
+    *,
+    code: bool = False,
+    browser: bool,
+    say: Callable[[str], None],
+    warn: Callable[[str], None],
+    **how: Any,
+) -> None:
+    """Serve the app until it is interrupted; `how` goes to `Viewer`."""
+    # a tab may close while something is on its way to it
+    warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
+    limit_log()
+    with Viewer(scene, scenes, **how) as viewer:
+        try:
+            say(f"{scene.title} is shown at {viewer.link} (Ctrl-C ends it)")
+            if not viewer.is_local:
+                say(f"from other machines: {viewer.network_link}")
+                if code:
+                    say(draw_code(viewer.network_link))
+                if viewer.token is None:
+                    warn(NO_AUTHENTICATION.format(host=how["host"]))
+            elif viewer.token is None and has_other_users():
+                warn(OTHER_USERS)
+            if browser and not open_browser(viewer.link):
+                say(f"no browser could be opened; open {viewer.link} yourself")
+            while True:  # a signal that the system gives to another thread is seen within a second
+                time.sleep(1.0)
+        except KeyboardInterrupt:
+            say("\nended")

@@ -6,7 +6,7 @@ overwrites what somebody else has just done with an older state of the whole.
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TypeAlias
 
@@ -204,14 +204,3 @@ class StateStore:
             listeners = [listener for listener in self._listeners if listener != by]
         for listener in listeners:
             listener()
-
-
-def apply_each(
-    state: AppState, updates: Iterable[Update], guarded: Callable[[Callable[[], object]], None]
-) -> AppState:
-    """Apply updates one by one; what one of them raises keeps none of the others back."""
-    for update in updates:
-        found: list[AppState] = []
-        guarded(lambda update=update, state=state, found=found: found.append(update(state)))
-        state = found[0] if found else state
-    return state

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from viser import ClientHandle, ViserServer
@@ -21,6 +22,7 @@ from warpspace.app.drawing.camera import CameraMemory, TabCamera
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
 from warpspace.app.state.store import StateStore, Update
 
 if TYPE_CHECKING:
@@ -46,16 +48,19 @@ class Context:
         self.store, self.scenes, self.services = store, scenes, services
         self.shown: LivePicture | None = None
         self.stage: MovingLayer | None = None
-        self.renew: Callable[[Part], None] = lambda _: None  # write a part anew, at once
-        self.closed: Callable[[], None] = lambda: None  # the page has closed its window by itself
+        # of the display, for the session: write a part anew, at once; what the page has closed by
+        # itself may be opened again; what follows at rest is due once nothing has happened a while
+        self.renew: Callable[[Part], None] = lambda _: None
+        self.closed: Callable[[], None] = lambda: None
+        self.rest_again: Callable[[], None] = lambda: None
         self.jobs: set[threading.Event] = set()  # work that goes on; set when the page has gone
         self.reported: list[tuple[str, Result]] = []  # what is to stand in the report
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
         self.changed_at = time.monotonic()
         self.unfolded = store.state.page  # of this page, also where the state is shared
-        self._own: tuple[AppState, AppState] | None = None
+        self.notes: list[str] = []  # what updates of the state had to clamp
+        self._own: tuple[object, AppState] = (None, store.state)
         self._wake = threading.Event()
-        self._updates: deque[Update] = deque()
         self._actions: deque[Callable[[], None]] = deque()
 
     @property
@@ -64,23 +69,20 @@ class Context:
         shared = self.store.state
         if shared.page is self.unfolded:
             return shared
-        if (
-            self._own is None
-            or self._own[0] is not shared
-            or self._own[1].page is not self.unfolded
-        ):
-            self._own = shared, replace(shared, page=self.unfolded)
+        of = Identity(shared), Identity(self.unfolded)
+        if self._own[0] != of:
+            self._own = of, replace(shared, page=self.unfolded)
         return self._own[1]
 
-    def apply(self, update: Update) -> tuple[str, ...]:
-        """Apply a pure update to the present state; give what it had to clamp."""
+    def apply(self, update: Update) -> None:
+        """Apply a pure update to the present state. For the session."""
 
         def own(state: AppState) -> AppState:
             found = update(replace(state, page=self.unfolded))
             self.unfolded = found.page
             return found
 
-        return self.store.apply(own, by=self.changed, at=self.changed_at)
+        self.notes += self.store.apply(own, by=self.changed, at=self.changed_at)
 
     def wake(self) -> None:
         """Have the session look what there is to be done; returns at once."""
@@ -106,7 +108,7 @@ class Context:
 
     def post(self, update: Update) -> None:
         """Queue a pure update of the state; returns at once."""
-        self._updates.append(update)
+        self.act(partial(self.apply, update))
         self.changed()
 
     def act(self, action: Callable[[], None]) -> None:
@@ -123,10 +125,6 @@ class Context:
         if woken:  # else what has come since the wait ended would be lost
             self._wake.clear()
         return woken
-
-    def take_updates(self) -> list[Update]:
-        """Take the updates that were queued. For the session."""
-        return [self._updates.popleft() for _ in range(len(self._updates))]
 
     def take_action(self) -> Callable[[], None] | None:
         """Take the next action that was queued; None where there is none. For the session."""

@@ -95,7 +95,7 @@ def view(
     # for it beside a browser that draws in software make it thirty times slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from warpspace.app.server.doors import Access
-    from warpspace.app.server.run import run_viewer
+    from warpspace.app.server.viewer import run_viewer
     from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.library import load_scene, scene_names
 
