@@ -229,7 +229,7 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
         tab.until(lambda: "everything is as it was, Undo too" in page.inner_text(BOX))
         tab.until(lambda: tab.state.amplitudes["EXX"] == 7.0)
         # what a page has kept may be anything
-        viewer._memory._cache.clear()
+        viewer._memory._left.clear()
         page.evaluate("sessionStorage.setItem('warpspace-tab', 'f'.repeat(32))")
         page.evaluate(
             "text => sessionStorage.setItem('warpspace-kept', JSON.stringify({at: 0, text}))",

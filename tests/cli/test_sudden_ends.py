@@ -253,10 +253,10 @@ def test_view_ends_at_once_while_a_figure_is_drawn(how, tmp_path):
 
 SIGNALLED_THREAD = """
 import signal, threading
-from warpspace.app.server import run
+from warpspace.app.server import viewer
 from warpspace.cli import main
 heard = threading.Event()
-run.has_other_users = lambda: heard.set() or False
+viewer.has_other_users = lambda: heard.set() or False
 def send():
     heard.wait()
     threading.Event().wait(1.0)  # until the main thread waits for its end
