@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from app.frames import draw, new_visitor
-from warpspace.app.drawing.camera import CameraSetup
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.session import Session
@@ -124,7 +123,7 @@ class Tab:
 
         def forget() -> None:
             session.use(StateStore(start))
-            session.context.camera.stand = CameraSetup()
+            session.context.camera.view, session.context.camera.orthographic = "iso", False
 
         self.actions = 0
         self.page.keyboard.press("Escape")

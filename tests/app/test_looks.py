@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from warpspace.app.browser.room import read_room
 from warpspace.app.drawing.around import arrows
-from warpspace.app.drawing.camera import VIEWS, CameraSetup, clipping, fit_camera
+from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera
 from warpspace.app.drawing.colours import inverse_tone_map, line_colour, tone_map
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.cache import Cache
@@ -229,7 +229,7 @@ def test_grey_and_dark_line_colours_arrive(rgb):
 )
 def test_named_views_show_every_point_beside_what_is_written(view, far, aspect, edges, points):
     box = np.diag([600.0, 600.0, 600.0])  # as wide as deep: what is a line to the eye has no size
-    spread, fov = np.concatenate([points, box, -box]), CameraSetup(view, far).fov_deg
+    spread, fov = np.concatenate([points, box, -box]), 3.0 if far else 22.0
     right, top, bottom = edges
     pose = fit_camera(spread, aspect, VIEWS[view], fov, margins=(0.1, right, top, bottom))
     x, y, depth, back = seen(pose, spread)

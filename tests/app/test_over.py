@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,6 @@ import pytest
 from app.parts import LIVE, lone_part
 from warpspace import load_scene
 from warpspace.app.documents.legend import kept_words, legend_html, marks
-from warpspace.app.drawing.camera import CameraSetup
 from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
@@ -31,8 +31,7 @@ def limited(limit_um):
 
 def pieces(kind, state):
     part = lone_part(kind)
-    part.context.scenes, part.context.camera = {}, part.context
-    part.context.stand = CameraSetup()
+    part.context.scenes, part.context.camera = {}, SimpleNamespace(view="iso", orthographic=False)
     return part.pieces(LIVE.evaluate(state))
 
 

@@ -33,16 +33,6 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class CameraSetup:
-    view: str = "iso"  # A key of `VIEWS`
-    orthographic: bool = False  # whether it is the telephoto
-
-    @property
-    def fov_deg(self) -> float:
-        return TELEPHOTO_DEG if self.orthographic else FOV_DEG
-
-
-@dataclass(frozen=True, slots=True)
 class CameraMemory:
     """Where a camera stands, in units of the drawing."""
 
@@ -54,9 +44,8 @@ class CameraMemory:
     def is_near(self, other: "CameraMemory") -> bool:
         """Tell whether nobody has moved it from there by hand."""
         least = MOVED * float(np.linalg.norm(np.subtract(self.position, self.look_at)))
-        ends = (self.position, other.position), (self.look_at, other.look_at)
-        moved = max(float(np.linalg.norm(np.subtract(one, two))) for one, two in ends)
-        return moved <= least and abs(self.fov_rad - other.fov_rad) < MOVED
+        one, two = ((*at.position, *at.look_at, at.fov_rad) for at in (self, other))
+        return np.allclose(one, two, rtol=0.0, atol=least)
 
 
 def fit_camera(
@@ -109,7 +98,7 @@ class TabCamera:
     def __init__(self, client: ClientHandle) -> None:
         self._camera = client.camera
         self.wanted: CameraMemory | None = None
-        self.stand = CameraSetup()  # named view and lens that were chosen last
+        self.view, self.orthographic = "iso", False  # chosen last: a key of `VIEWS`, the telephoto
         self._told: Room | None = None
         self._put: CameraMemory | None = None
 
@@ -117,16 +106,19 @@ class TabCamera:
         self, picture: LivePicture, view: str | None = None, lens: bool | None = None
     ) -> None:
         """Take a named view, or another lens from where the camera stands."""
-        before = self.stand
-        orthographic = before.orthographic if lens is None else lens
-        self.stand = CameraSetup(view or before.view, orthographic)
+        before, self.view = self.orthographic, view or self.view
+        self.orthographic = before if lens is None else lens
         if view is not None or lens is None:
             self.fit(picture)
-        elif orthographic != before.orthographic:
+        elif self.orthographic != before:
             self._change_lens(picture)
 
+    @property
+    def _fov_deg(self) -> float:
+        return TELEPHOTO_DEG if self.orthographic else FOV_DEG
+
     def _change_lens(self, picture: LivePicture) -> None:
-        now, fov = self.remember(), float(np.deg2rad(self.stand.fov_deg))
+        now, fov = self.remember(), float(np.deg2rad(self._fov_deg))
         ratio = float(np.tan(now.fov_rad / 2.0) / np.tan(fov / 2.0))
         look_at = np.array(now.look_at)
         x, y, z = (look_at + ratio * (now.position - look_at)).tolist()
@@ -158,14 +150,14 @@ class TabCamera:
             self.fit(picture)
             return
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
-        self.stand, self._put = CameraSetup(self.stand.view, bool(telephoto)), None
+        self.orthographic, self._put = bool(telephoto), None
         self._stand_at(memory, np.array([memory.look_at]) / SCENE_PER_MM)
 
     def fit(self, picture: LivePicture) -> None:
         """Fill the room between the panels with the box, its traces and axes."""
-        points, room, stand = self._room_mm(picture), self.room, self.stand
+        points, room = self._room_mm(picture), self.room
         found = fit_camera(
-            points, room.aspect, VIEWS[stand.view], stand.fov_deg, margins=room.margins
+            points, room.aspect, VIEWS[self.view], self._fov_deg, margins=room.margins
         )
         self._stand_at(found, points)
         self._put = self.remember()
@@ -182,7 +174,7 @@ class TabCamera:
     def _stand_at(self, place: CameraMemory, points_mm: Array) -> None:
         camera, points = self._camera, points_mm * SCENE_PER_MM
         camera.near, camera.far = clipping(
-            np.array(place.position), points, orthographic=self.stand.orthographic
+            np.array(place.position), points, orthographic=self.orthographic
         )
         camera.up_direction, camera.fov = place.up, place.fov_rad
         camera.position = place.position

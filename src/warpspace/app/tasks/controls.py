@@ -70,11 +70,11 @@ class ControlsPart(Part):
         return (picture.exaggeration, picture.scale.high, state.exaggeration, state.component,
                 Identity(state.look), Identity(state.shown), Identity(state.machine), state.loop,
                 state.placed, state.nodes, state.specification.limit_um, Identity(state.scene),
-                self.context.camera.stand)  # fmt: skip
+                self.context.camera.view, self.context.camera.orthographic)  # fmt: skip
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        stand = self.context.camera.stand
-        lens = switch("controls:set.lens", "Orthographic", on=stand.orthographic,
+        camera = self.context.camera
+        lens = switch("controls:set.lens", "Orthographic", on=camera.orthographic,
                       hint="Parallel edges stay parallel")  # fmt: skip
         triad = fill(
             '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
@@ -83,7 +83,7 @@ class ControlsPart(Part):
                  _machine(picture.state))  # fmt: skip
         return {
             "controls": join(menus),
-            "triad": menu(triad, _picks("controls:view", VIEWS, stand.view) + lens, key="view",
+            "triad": menu(triad, _picks("controls:view", VIEWS, camera.view) + lens, key="view",
                           label="View from", kind="up",
                           hint="The machine's axes; click to look from another side"),
         }  # fmt: skip

@@ -203,13 +203,14 @@ def _finite(values: Array) -> Array:
 
 def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) -> str:
     """Say what the curve of an error shows, for those who do not see it."""
-    places = [0, len(at) - 1, int(np.argmin(value)), int(np.argmax(value))]
-    words = ("starts with", "ends with", "least", "greatest")
     if np.ptp(value) == 0.0:
         return f"{name}: {spell(float(value[0]))} {unit} everywhere"
+    ends = (0, len(at) - 1)
+    places = {"starts with": ends[0], "ends with": ends[1], "least": int(np.argmin(value)),
+              "greatest": int(np.argmax(value))}  # fmt: skip
     said = [
         f"{word} {spell(float(value[place]))} {unit} at {spell(float(at[place]))} {along}"
-        for word, place in zip(words, places, strict=True)
-        if word.endswith("with") or place not in places[:2]
+        for word, place in places.items()
+        if word.endswith("with") or place not in ends
     ]
     return f"{name}: " + ", ".join(said)
