@@ -9,7 +9,6 @@ _PACKAGE_DIR = Path(__file__).resolve().parent
 
 
 def _data_root() -> Path:
-    """Folder that holds ``scenes`` and ``assets``."""
     installed = _PACKAGE_DIR / "_data"
     return installed if installed.is_dir() else _PACKAGE_DIR.parents[1]
 

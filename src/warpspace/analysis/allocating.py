@@ -161,7 +161,6 @@ def scaled(task: Task, widths: Array, scale_of: ScaleOf) -> Array | None:
 def _scaled(
     task: Task, widths: Array, moving: NDArray[np.bool_], scale_of: ScaleOf
 ) -> Array | None:
-    """Scale those that move, and hold at the widest what would pass it."""
     found, moving = widths.copy(), moving.copy()
     while moving.any():
         scale = scale_of(found, moving)

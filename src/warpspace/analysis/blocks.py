@@ -228,7 +228,6 @@ def table_html(table: Table) -> str:
 
 
 def _bars_html(bars: Bars) -> str:
-    """Give bars as a table whose cells are filled; nothing has to be drawn."""
     head = "".join(f"<th>{escape(panel.title)}{_unit(panel.unit)}</th>" for panel in bars.panels)
     rows = "".join(
         f"<tr><th>{escape(words)}</th>" + "".join(_bar(panel, row) for panel in bars.panels)

@@ -204,7 +204,6 @@ def compare_concepts(
     *,
     progress: Progress | None = None,
 ) -> tuple[Concept, ...]:
-    """Sample machines of several scenes within the same tolerances."""
     asked = asked or Concepts()
     found: list[Concept] = []
     for scene in with_equal_tolerances(scenes, own=asked.own_tolerances):
@@ -245,6 +244,5 @@ def expected_um(concept: Concept, grid: Grid) -> Array:
 
 
 def zero_field(grid: Grid) -> ErrorField:
-    """Give the field of a machine without errors over a grid."""
     zero = np.zeros(grid.nominal_mm.shape)
     return ErrorField(grid.nominal_mm, zero, zero)

@@ -74,7 +74,6 @@ def _average_gains(case: Case) -> Array:
 
 
 def variance_contributions(case: Case, sobol: int | None = None) -> "SharesResult":
-    """Share out the variance of the volumetric error."""
     draws = case.draws
     variance, offset = expected_square(case)
     total = float(variance.sum())
@@ -115,7 +114,6 @@ def _sampled_variance(case: Case) -> Array:
 
 
 def _sobol(case: Case, base: int) -> Mapping[str, tuple[float, float, float]]:
-    """Run a Sobol analysis of a machine's mean |E| through SALib."""
     from SALib.analyze import sobol as analysis
     from SALib.sample import sobol as sampling
 
@@ -220,7 +218,6 @@ class SharesResult(Result):
 
 
 def share_bars(rows: tuple[Share, ...], title: str, subtitle: str) -> Bars:
-    """Give the chart of shares; Sobol indices beside them where there are any."""
     shares = Series([100.0 * row.share for row in rows], "exact", "key", form=".1f")
     sampled = [100.0 * row.sampled_share for row in rows]
     panels = [

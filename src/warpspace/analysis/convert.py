@@ -204,7 +204,6 @@ def _with_reference(scene: Scene, reference: Mapping[str, float] | str) -> Scene
 
 
 def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
-    """Compare the exact fields of two scenes of one machine."""
     random = np.random.default_rng(SEED)
     spans = covered_spans(one.model, one.workspace)
     at = {axis: random.uniform(*span, PROOFS) for axis, span in spans.items()}
@@ -224,7 +223,6 @@ def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
 def _with(target: Target, scene: Scene, name: str, text: str) -> Target:
 
     def by_axis(read: Callable[[str], object], kinds: str = "all") -> dict[str, Any]:
-        """Read values by axis, or one for all."""
         found: dict[str, object] = {}
         for part in text.split(","):
             axis, colon, value = (word.strip() for word in part.rpartition(":"))
@@ -257,7 +255,6 @@ def _numbers(text: str, count: int) -> tuple[float, ...]:
 
 
 def _choose_axes(scene: Scene, text: str, value: object, kinds: str) -> dict[str, object]:
-    """Give a value to one axis, to "linear" or "rotary" ones, or to "all"."""
     axes = scene.machine.axes
     groups = {
         "all": [name for name in axes if kinds == "all" or axes[name].is_linear],

@@ -101,7 +101,6 @@ class Stream:
         self._fine = np.zeros(_BINS + 2, dtype=np.int64) if self._values is None else None
 
     def add(self, values: Array) -> None:
-        """Take in samples, [n], µm."""
         exact = self.exact_quantiles
         self.merge(summarise([values], self.spec_um, keep=exact, count=not exact))
 
@@ -217,7 +216,6 @@ def _fine_bins(values: Array) -> NDArray[np.int64]:
 
 
 def _fine_centres() -> Array:
-    """Middle of every bin of the fine histogram, the first and last being what lies beyond, µm."""
     inner = LOWEST_UM * np.exp((np.arange(_BINS) + 0.5) * math.log1p(RELATIVE_STEP))
     return np.concatenate([[0.0], inner, [HIGHEST_UM]])
 

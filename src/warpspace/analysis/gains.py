@@ -42,7 +42,6 @@ Part = tuple[str, tuple[float, float, float]]  # name and vector in R, mm
 
 
 def lever_parts(model: Model, loop: Loop, key: str, at: Mapping[str, float]) -> tuple[Part, ...]:
-    """Take a lever apart into the motions and offsets it is made of."""
     row = parameter(key)
     on_tool = row.axis in model.machine.chain.tool
     if loop is Loop.RELATIVE and not on_tool:
@@ -241,7 +240,6 @@ def _sweep(
 
 
 def _default_step(ranges: Mapping[str, tuple[float, float]], rotary: Sequence[str]) -> float:
-    """Choose the step of rotary axes, degrees, so that there are not too many positions."""
     spans = [ranges[name][1] - ranges[name][0] for name in rotary]
     for step in DEFAULT_STEPS_DEG:
         if math.prod(math.ceil(span / step) + 1 for span in spans) <= MAX_DEFAULT_NODES:
@@ -379,7 +377,6 @@ class GainsResult(Result, Sequence[Gain]):
 def gain_bars(
     gains: Sequence[Gain], title: str, subtitle: str, share: float, *, signed: bool = False
 ) -> Bars:
-    """Give the chart of gains, like figures 4-3 to 4-6 of the thesis."""
     panels = tuple(
         Panel(
             title="|E|" if name == "norm" else name,

@@ -410,7 +410,6 @@ def _numbers(found: MonteCarlo) -> dict[str, Any]:
 def sampled_histogram(
     found: MonteCarlo, title: str, subtitle: str, printed: float | None = None
 ) -> Histogram:
-    """Give the distribution of |E| with its mean, mode, P95 and limit."""
     edges, kept = found.histogram.edges_um, found.probability
     marks = [("mode", found.mode_um), ("mean", found.mean_um), ("P95", found.p95_um)]
     return Histogram(
@@ -447,7 +446,6 @@ def sampled_second_order(*found: "tuple[Scene, MonteCarlo]") -> SecondOrder:
 
 
 def case_of(scene: "Scene", found: MonteCarlo) -> Case:
-    """Give what was sampled of a scene."""
     return Case(scene.model, found.draws, scene.workspace, found.view, found.plan)
 
 
@@ -502,7 +500,6 @@ def sweep(
 
 
 def with_half_widths(scene: "Scene", half_widths: Mapping[str, float]) -> "Scene":
-    """Give a scene other half widths, by parameter key or class."""
     if not half_widths:
         return scene
     tolerances = scene.tolerances

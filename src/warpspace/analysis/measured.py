@@ -69,7 +69,6 @@ class Measured:
 
 
 def check_errors(errors: ErrorSet, tolerances: ToleranceSet) -> tuple[Check, ...]:
-    """Compare the amplitude of every error that is given with its tolerance."""
     rows: list[Check] = []
     for key in (key for key in PARAMETERS if key in errors.functions):
         tolerance = tolerances.get(key)
@@ -181,7 +180,6 @@ def uncertain_case(
 
 
 def scene_uncertainty(scene: Scene, loop: Loop) -> Mapping[str, ErrorFunction]:
-    """Collect the standard uncertainties of the errors that act in a loop of a scene."""
     if not scene.uncertainty:
         problem = "has no uncertainties; expected an [uncertainty] section, for instance EXX = 0.4"
         raise SceneError(scene.name, [problem])

@@ -58,7 +58,6 @@ def montecarlo(
     executor: Executor | None = None,
     take: Take | None = None,
 ) -> MonteCarlo:
-    """Sample machines and collect the distribution of their volumetric error."""
     (found,) = montecarlo_each(
         [case], workers=case.plan.workers, executor=executor, progress=progress, take=take
     )
@@ -197,7 +196,6 @@ def run_in_order(
 
 @contextmanager
 def threads(workers: int) -> Generator[Executor | None]:
-    """Start threads; None for one of them. Tasks not begun are dropped at the end."""
     if workers == 1:
         yield None
         return

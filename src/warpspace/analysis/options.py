@@ -231,7 +231,6 @@ def _build(name: str, default: Any, hint: Any, said: Mapping[str, Any]) -> Optio
 
 
 def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
-    """Take a hint apart: what it is without None, and how it is typed."""
     if get_origin(hint) is Annotated:
         base, *extras = get_args(hint)
         grammar = next((one for one in extras if isinstance(one, Grammar)), None)

@@ -322,7 +322,6 @@ class RepairResult(Result):
 
 
 def repaired(scene: "Scene", adjust: Mapping[str, float]) -> "Scene":
-    """Give a scene with some errors adjusted: new amplitudes by key, µm or µrad."""
     errors = scene.errors
     for key, value in adjust.items():
         errors = errors.with_amplitude(key, value, scene.axis_span(parameter(key).axis))

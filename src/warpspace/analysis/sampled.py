@@ -27,7 +27,6 @@ def read_cylinder(text: str, _scene: "Scene | None" = None) -> Cylinder:
 def scene_draws(
     scene: "Scene", loop: Loop, distribution: Distribution | str, *, clip: bool
 ) -> Draws:
-    """Collect the distributions of the parameters that act in a loop of a scene."""
     keys = loop_keys(scene.model, loop, scene.parameter_keys)
     return build_draws(scene.tolerances, keys, distribution, clip=clip, source=scene.name)
 

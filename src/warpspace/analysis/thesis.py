@@ -95,7 +95,6 @@ def _text(table: str, key: str, printed: str, computed: str, unit: str = "", not
 
 
 def _tolerance(centre: float, half_width: float) -> str:
-    """Spell a tolerance as the thesis prints it: ``±10``, ``-8±6``."""
     return f"{centre:g}±{half_width:g}" if centre else f"±{half_width:g}"
 
 
@@ -267,12 +266,10 @@ def table_5_5(case: ThesisCase) -> Iterator[Row]:
 
 
 def _checks(case: ThesisCase, scene: Scene) -> dict[str, Check]:
-    """Judge a machine by the proposed tolerance."""
     return {one.key: one for one in check_errors(scene.errors, case.proposed.tolerances)}
 
 
 def _tolerance_row(case: ThesisCase, table: str, check: Check) -> Row:
-    """Tolerance of a key error as tables 5-3 to 5-5 repeat it from table 4-7."""
     printed = _tolerance(*printed_tables()["table_4_7"][check.key])
     ours = _own_tolerance(case.proposed.tolerances, check.key)
     return _text(table, f"{check.key} tolerance", printed, ours, check.unit)

@@ -68,7 +68,6 @@ def read_table(path: str | Path, columns: Sequence[DataColumn]) -> Table:
 
 
 def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Table:
-    """Read the text of a file of readings; see `read_table`."""
     rows = CsvRows(io.StringIO(text, newline=""), source, MAX_POINTS, once=True)
     if not rows.header:
         raise SceneError(source, ["is empty; expected a header " + _header(columns)])

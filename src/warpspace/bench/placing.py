@@ -77,7 +77,6 @@ def motion_direction(model: Model, coordinates: Coordinates, axis: str) -> Array
 
 
 def axis_line(model: Model, coordinates: Coordinates, axis: str) -> AxisLine:
-    """Find where a rotary axis lies nominally."""
     frames, sign = _frames_of(model, coordinates, axis)
     before, index = np.asarray(frames.before), frames.axis.index
     along, across, upright = (before[..., :3, (index + step) % 3] for step in range(3))
@@ -85,7 +84,6 @@ def axis_line(model: Model, coordinates: Coordinates, axis: str) -> AxisLine:
 
 
 def _frames_of(model: Model, coordinates: Coordinates, axis: str) -> tuple[AxisFrames, float]:
-    """Find the frames of an axis, and +1 where it carries the tool, −1 where the workpiece."""
     for side, sign in (("tool", 1.0), ("workpiece", -1.0)):
         for frames in branch_frames(model, side, coordinates):
             if frames.axis.name == axis:
@@ -250,7 +248,6 @@ def default_ball(
 def followed(
     scene: Scene, model: Model, axis: str, angle_deg: Array, ball_mm: Array, stand: Coordinates
 ) -> dict[str, Array]:
-    """Turn a rotary axis with the tool held on a ball of the workpiece: positions of all axes."""
     coordinates = {
         name: np.broadcast_to(values, angle_deg.shape)
         for name, values in {**stand, axis: angle_deg}.items()
@@ -310,7 +307,6 @@ def reachable(
 def circle_directions(
     model: Model, axis: str, coordinates: Coordinates, point_mm: Array
 ) -> dict[str, Array]:
-    """Give the radial, tangential and axial directions at the ball in every pose, [n, 3]."""
     line = axis_line(model, coordinates, axis)
     axial = np.broadcast_to(line.direction, point_mm.shape)
     arm = point_mm - line.origin_mm
@@ -333,7 +329,6 @@ def lay_followed(
     angle_deg: Array,
     sense: Array,
 ) -> Plan:
-    """Lay the plan of a radial, tangential or axial bar on a ball beside a rotary axis."""
     axis = rotary_axis(scene.machine, name)
     ball = default_ball(scene, model, axis, stand, radius_mm)
     coordinates = followed(scene, model, axis, angle_deg, ball, stand)

@@ -201,7 +201,6 @@ def fit_setup(plan: Plan, readings: Array) -> tuple[Array, Array]:
 
 
 def _differences(plan: Plan, values: Array) -> Array:
-    """Take the values of sites against each other, [..., n, 3] to [..., m, 3]."""
     shift = values[..., plan.site, :].copy()
     held = plan.against != NONE
     shift[..., held, :] -= values[..., plan.against[held], :]

@@ -53,7 +53,6 @@ class _Frame:
 
     @property
     def middle(self) -> float:
-        """Place of the spindle line across, mm."""
         return float(self.spine[self.i])
 
     def around(self, half: float) -> Range:
@@ -63,7 +62,6 @@ class _Frame:
         return self.sign * (float(point_mm[self.j]) - self.zero_mm)
 
     def swept(self) -> float:
-        """Give the depth of all that the stack sweeps, with some room, mm."""
         back = self.depth(self.stack.centre_mm) + float(self.stack.swept_mm[self.j])
         return back + self.layout.gap_mm
 
@@ -80,7 +78,6 @@ class _Frame:
         self.parts.stand(i, self._in_r(j), along=self.i)
 
     def posts(self, frame: str, what: str, inner: float, j: Range, z: Range, roof: float) -> None:
-        """Add two posts beside the spindle line, and what joins them at their upper ends."""
         thick = 1.1 * self.u
         for post in beside(self.middle, inner, thick):
             self.box(frame, what, post, j, z)
@@ -197,11 +194,9 @@ class _Overhead(_Frame):
     # --- room -----------------------------------------------------------------------------------
 
     def _behind(self, least: float = -np.inf) -> float:
-        """Give a position in depth behind the volume and all that the stack sweeps, mm."""
         return max(least, self.depth(self.layout.high_mm) + self.layout.gap_mm, self.swept())
 
     def _clear_half(self) -> float:
-        """Give a half width across beside the volume and all that the stack sweeps, mm."""
         i, stack = self.i, self.stack
         swept = float(stack.swept_mm[i] + abs(stack.centre_mm[i] - self.middle))
         own = max(self.layout.high_mm[i] - self.middle, self.middle - self.layout.low_mm[i])

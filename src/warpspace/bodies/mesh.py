@@ -207,7 +207,6 @@ def build_body(
 
 
 def crease_edges(mesh: Any) -> Array:
-    """Find the edges at which a mesh bends sharply."""
     sharp = mesh.face_adjacency_angles > np.deg2rad(CREASE_DEG)
     return np.asarray(mesh.vertices[mesh.face_adjacency_edges[sharp]], dtype=float)
 
@@ -225,7 +224,6 @@ def _check_geometry(scene: Any) -> None:
 
 
 def open_meshes(path: Path, what: str) -> Any:
-    """Open a file of meshes with trimesh; nothing in it is changed or merged."""
     try:
         size = path.stat().st_size
         if size > MAX_MESH_MB * 1_000_000:

@@ -95,7 +95,6 @@ def _check_size(path: Path, longest_mm: float, unit: str) -> None:
 
 
 def _clean(mesh: Any) -> int:
-    """Join vertices where triangles do not share any, turn the outside out, count open edges."""
     from trimesh.grouping import group_rows
 
     if not mesh.is_watertight:
@@ -177,7 +176,6 @@ def frame_meshes(
 
 
 def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
-    """Build one shape in its frame, mm; None where there is none, an error where it cannot be."""
     from trimesh import creation
 
     placed = np.eye(4) if visual.origin is None else np.array(visual.origin, dtype=float)

@@ -33,7 +33,6 @@ def load_bodies(machine: Machine) -> tuple[Body, ...]:
 def _error_values(
     errors: ErrorSet, amplitudes: Mapping[str, float], coordinates: Coordinates, direction: str
 ) -> dict[str, float]:
-    """Evaluate error curves at one position, with amplitudes of their own."""
     return {
         key: amplitude * float(errors.shape_at(key, coordinates, direction))
         for key, amplitude in amplitudes.items()
@@ -137,7 +136,6 @@ def scene_motions(
     amplitudes: Mapping[str, float] | None = None,
     positions: Mapping[str, float] | None = None,
 ) -> dict[str, BodyMotion]:
-    """Find place and small motion of every frame of a scene's machine."""
     if amplitudes is None:
         amplitudes = {key: scene.errors.amplitude(key) for key in scene.errors}
     known = {**scene.workspace.positions, **(positions or {})}

@@ -259,7 +259,6 @@ def _way(axis: Axis, pose: Array) -> Way:
 
 
 def _find_slant(machine: Machine, poses: Mapping[str, Array]) -> Array:
-    """Find how the slides of a machine are turned against the axes of R."""
     linear = [poses[axis.name][:3, axis.index] for axis in machine.axes.values() if axis.is_linear]
     if all(np.abs(way).max() > _ALIGNED for way in linear):
         return np.eye(3)
@@ -288,8 +287,6 @@ def _completed(triad: list[Array]) -> Array:
 
 
 def _nearest(triad: Array, linear: Array) -> Array:
-    """Order and point three directions so that they are turned least, [3, 3], as columns."""
-
     def rank(turned: Array) -> tuple[float, float]:
         level = np.abs(linear @ turned[:, 2]) < 0.5
         return round(float(np.trace(turned)), 6), float(level.sum())

@@ -420,5 +420,4 @@ def _predict(
 
 
 def _values(stack: Stack, known: Mapping[str, float]) -> Array:
-    """Give the unknowns of a stack, [m], mm."""
     return np.array([known[name] for name in stack.unknowns])

@@ -112,7 +112,6 @@ class FromVectors(Kind):
 
 
 def _error_mm(scene: Scene, readings: Readings, guess: Guess) -> Array:
-    """Evaluate the error at the poses of readings, exactly, [n, 3], mm."""
     field = evaluate_exact(scene.model, guess.errors, readings.coordinates, VIEW)
     return field.error_um * MM_PER_UM
 
@@ -338,19 +337,16 @@ class Lengths(FromVectors):
         return beam[:, None, :], by_unknown
 
     def _beams(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Indices, Array]:
-        """Give where the unknowns of stations begin, [n], and the way from there, [n, 3], mm."""
         at = self._stations(readings, guess.unknowns)
         places = np.stack([guess.values[at + component] for component in range(3)], -1)
         return at, readings.nominal_mm + error_mm - places
 
     def _stations(self, readings: Readings, unknowns: tuple[str, ...]) -> Indices:
-        """Give where the unknowns of each reading's station begin, [n]."""
         index = {name: at for at, name in enumerate(unknowns)}
         return np.array([index[f"station {name} x"] for name in readings.session], np.intp)
 
 
 def _locate(points_mm: Array, length_mm: Array) -> Array:
-    """Find a station that has given lengths to points: place and dead path, [4], mm."""
     from scipy.optimize import least_squares
 
     middle = points_mm.mean(axis=0)

@@ -47,7 +47,6 @@ def _spans(scene: Scene) -> dict[str, tuple[float, float]]:
 
 
 def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
-    """Give positions of all axes; those that are not given stand where the scene has them."""
     count = max(len(values) for values in positions.values())
     still = scene.workspace.positions
     return {
@@ -139,7 +138,6 @@ def _spheres(scene: Scene) -> Iterator[Candidate]:
 
 
 def _reached(scene: Scene, at: Mapping[str, Array]) -> dict[str, Array]:
-    """Leave out poses at which a linear axis would stand beyond its travel."""
     inside = np.ones(max(map(len, at.values())), dtype=bool)
     for name, axis in scene.machine.axes.items():
         if axis.is_linear:
@@ -218,7 +216,6 @@ def separating(
 
 
 def _information(stack: Stack, terms: Terms, noise_mm: float) -> Array:
-    """Give the information on the parameters that does not go into the set-ups, [K, K]."""
     by_parameter, by_unknown = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
     weights = np.concatenate(stack.weights(noise_mm))[:, None]
     rows = without(weights * by_parameter, orthonormal(weights * by_unknown))
@@ -249,5 +246,4 @@ def map_weights(scene: Scene, terms: Terms) -> Array:
 
 
 def _map_um(weigh: Array, covariance: Array) -> float:
-    """Give the standard uncertainty of the map, root mean square, µm."""
     return float(np.sqrt(max(np.sum(weigh * covariance), 0.0)))

@@ -187,7 +187,6 @@ def read_readings(
 def parse_readings(
     text: str, source: str, scene: Scene, kind: str | None = None, frame: str | None = None
 ) -> Readings:
-    """Read the text of a file of readings; see `read_readings`."""
     from warpspace.calibration.registry import find_kind, recognise
 
     found = None if kind is None else find_kind(kind)

@@ -351,7 +351,6 @@ class Calibration(Result):
         return Lines("lines", title, "reading", "length [µm]", tuple(curves), bands)
 
     def _told(self) -> Iterator[Found]:
-        """Give the parameters of which something is told; combinations under their first."""
         together = {next(iter(one.factors)): one for one in self.combinations}
         for one in self.parameters:
             if (total := together.get(one.key)) is not None:
@@ -373,5 +372,4 @@ def _circle_words(circle: Circle) -> str:
 
 
 def _joined(start: Array, end: Array) -> Array:
-    """Give one curve through all pairs, with gaps between them, [3 n]."""
     return np.stack([start, end, np.full(len(start), np.nan)], axis=-1).ravel()

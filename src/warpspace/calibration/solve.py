@@ -339,7 +339,6 @@ def solve(
     *,
     robust: bool = False,
 ) -> Solved:
-    """Minimise the weighted residuals over amplitudes and unknowns."""
     from scipy.optimize import OptimizeResult, least_squares
 
     weights = np.concatenate(stack.weights())

@@ -139,7 +139,6 @@ def has_centres(table: ReadingTable, scene: Scene) -> bool:
 
 
 def spread_mm(table: ReadingTable) -> float:
-    """Give how far the centres of one session wander, mm."""
     observed, labels = table.need(READ), table.session or ("",) * len(table)
     groups = [np.array(labels) == name for name in dict.fromkeys(labels)]
     return max(float(np.ptp(observed[group], axis=0).max()) for group in groups)

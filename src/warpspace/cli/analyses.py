@@ -177,7 +177,6 @@ def write_result(
 
 
 def write_texts(texts: Mapping[str, str], path: Path, *, force: bool) -> list[str]:
-    """Write the files of a result: one of this name, others beside it."""
     targets = {add: path.with_name(f"{path.stem}{add}") if add else path for add in texts}
     check_files(click.get_current_context(), [target for add, target in targets.items() if add])
     for add, target in targets.items():

@@ -199,14 +199,12 @@ def check_files(context: click.Context, beside: Iterable[Path] = ()) -> None:
 
 
 def _each(value: object) -> tuple[Any, ...]:
-    """Give the values of a parameter, which may be given several times or not at all."""
     if isinstance(value, tuple):
         return cast("tuple[Any, ...]", value)
     return () if value is None else (value,)
 
 
 def _is_one(first: Path, second: Path) -> bool:
-    """Tell whether two files that need not exist are one, also where case does not count."""
     if str(first.resolve()).casefold() == str(second.resolve()).casefold():
         return True
     return first.exists() and second.exists() and first.samefile(second)

@@ -80,7 +80,6 @@ class RenamedCommand(click.Command):
 
 
 def task_of(name: str) -> "Task":
-    """Give the task that a command belongs to; those of plug-ins stand with scenes and machines."""
     tasks: dict[str, Task] = {entry.name: entry.task for entry in entries()}
     tasks |= {one: task for task, names in BUNDLED.items() for one in names.split()}
     return tasks.get(name, "machine")

@@ -29,7 +29,6 @@ class RenamedOption(click.Option):
         self.former = former
 
     def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
-        """Let the parser know the former flags beside the present ones."""
         listed = self.opts
         self.opts = [*listed, *self.former]
         try:
@@ -125,7 +124,6 @@ at_option = click.option(
 
 
 def grid_option(default: int | None = 21, of: str = "of the working volume") -> Decorator:
-    """Add the option --grid: nodes per axis of what is named."""
     unsaid = "" if default else "  [21]"
     return click.option(
         "--grid",
@@ -146,7 +144,6 @@ def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[
 
 
 def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
-    """Say on stderr where a position lies outside the travel of its axis."""
     from warpspace.analysis.options import outside_travel
 
     warn(*(f"--at {words}" for words in outside_travel(machine, point)))
@@ -161,7 +158,6 @@ def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = F
 
 
 def say_first_order(loop: str, *scenes: "Scene") -> None:
-    """Say of scenes whose errors are evaluated to first order what that leaves out."""
     from warpspace.scene.model import second_order
 
     say_second_order(*(second_order(scene, loop) for scene in scenes))
@@ -221,7 +217,6 @@ def plot_option(what: str) -> Decorator:
 
 
 def write_text(path: str | Path, text: str, *, force: bool) -> None:
-    """Write a text whole or not at all; its ends of lines stay as they are."""
     from warpspace.outputs.files import write_atomically
 
     with write_atomically(path, overwrite=force) as temporary:
@@ -251,7 +246,6 @@ def read_size(
 
 
 def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator:
-    """Add the options of a map; where its size in px depends, `sizes` says on what."""
     options = (
         component_option,
         exaggeration_option,
@@ -303,7 +297,6 @@ def draw_figure_file(
     force: bool,
     silent: bool = False,
 ) -> None:
-    """Draw a figure and write it; the ending chooses the format."""
     from warpspace.outputs.processes import LEAST_MB
     from warpspace.outputs.save import write_figure
     from warpspace.resources import check_address_space

@@ -118,7 +118,6 @@ def draw_view(
 def draw_concepts(
     scenes: "Sequence[Scene]", plan: "Concepts", dark: bool, cancelled: threading.Event
 ) -> bytes:
-    """Draw machines side by side as a PNG; otherwise as `draw_figure`."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
     settings = FigureSettings(dark=dark, loop=str(plan.loop), concepts=plan)

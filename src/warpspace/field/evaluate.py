@@ -100,7 +100,6 @@ class ErrorBasis:
         )
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:
-        """One matrix-vector product, [..., 3], without the rows of parameters that are zero."""
         flat = response.reshape(len(self.keys), self.nominal_mm.size)
         used = np.flatnonzero(amplitudes)
         if 2 * len(used) > len(self.keys):
@@ -161,7 +160,6 @@ def placement_effect(
 
 
 def _columns(model: Model, coordinates: Coordinates, point_mm: Array) -> Array:
-    """Give what each of the six does to points, [..., 3, 6], µm per µm or µrad, in R."""
     pose = branch_pose(model, "workpiece", coordinates)
     own = pose[..., :3, :3]
     about = transforms.skew(pose[..., :3, 3] - point_mm) @ own * UM_PER_MM_URAD
@@ -223,7 +221,6 @@ def error_values(model: Model, errors: ErrorSet, coordinates: Coordinates) -> di
 
 
 def _result_rotation(model: Model, view: View, coordinates: Coordinates) -> Array | None:
-    """Rotation from R to the frame of the result, [..., 3, 3]; None for R itself."""
     if view.frame == "machine":
         return None
     pose = branch_pose(model, "workpiece", coordinates)[..., :3, :3]

@@ -172,7 +172,6 @@ class Imported:
 
 
 def merge(parts: Sequence[Imported]) -> Imported:
-    """Put the contents of several files together, all of one format."""
     found: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
     for name in (entry.name for entry in fields(Imported)[1:]):
         values = [getattr(part, name) for part in parts]
@@ -363,14 +362,12 @@ def in_one_direction(held: Imported, wanted: Wanted) -> Imported:
 
 
 def _ways(curve: ErrorFunction) -> dict[int, ErrorFunction]:
-    """Give the curves of both directions of travel; none where they are the same."""
     if not isinstance(curve, Directional):
         return {}
     return {FORWARD: curve.forward, BACKWARD: curve.backward}
 
 
 def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
-    """Give the other axis that an error depends on, with its positions; None where none is."""
     surfaces = [one for one in (curve, *_ways(curve).values()) if isinstance(one, TwoArguments)]
     others = {one.axes[1] for one in surfaces}
     if len(others) != 1:
@@ -410,7 +407,6 @@ def tables_of(held: Imported) -> list[ErrorTable]:
 
 
 def distinct(at: np.ndarray) -> np.ndarray:
-    """Give the positions, each once, ascending."""
     ordered = np.sort(at)
     return ordered[np.concatenate([[True], np.diff(ordered) > SAME])]
 
@@ -418,7 +414,6 @@ def distinct(at: np.ndarray) -> np.ndarray:
 def plane_of(
     key: str, axes: tuple[str, str], points: Sequence[Point], source: Source, where: str = ""
 ) -> Plane:
-    """Build an error of two axes from its points."""
     first = distinct(np.array([point[1] for point in points]))
     second = distinct(np.array([point[2] for point in points]))
     values = np.full((len(first), len(second)), math.nan)

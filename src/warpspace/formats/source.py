@@ -228,7 +228,6 @@ def source_of_text(text: str, name: str, notes: tuple[str, ...] = ()) -> Source:
 
 
 def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
-    """Decode bytes: UTF-8, UTF-16 with or without its mark, else the Windows alphabet."""
     wide = _wide(content)
     if wide:
         try:
@@ -247,7 +246,6 @@ def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _wide(content: bytes) -> str:
-    """Name the UTF-16 alphabet that bytes are in; empty where they are in none."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     sample = content[:4096]

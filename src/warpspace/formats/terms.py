@@ -66,7 +66,6 @@ class Line:
 
     @property
     def is_directed(self) -> bool:
-        """Whether it depends on the direction of travel."""
         return bool(self.direction or self.backward)
 
     def at(self, position: Array, direction: int = 0) -> Array:
@@ -199,7 +198,6 @@ class Tables:
         return sum(term.size for term in self.terms)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> Mapping[str, Array]:
-        """Add up all corrections, mm or degrees, by axis."""
         total: dict[str, Array] = {}
         for term in self.terms:
             for axis, value in term.corrections(coordinates, direction).items():
@@ -275,7 +273,6 @@ def side(machine: Machine | None, axis: str) -> float:
 
 
 def _factor(machine: Machine | None, source_axis: str, target: str) -> float:
-    """Factor from a correction in mm or degrees of an axis to the error in µm or µrad."""
     size = MM_TO_UM if is_linear(target) else DEG_TO_URAD
     return -size * sense(machine, target) * side(machine, source_axis)
 
@@ -322,7 +319,6 @@ def _plane(term: Product, machine: Machine | None, source: Source) -> Plane:
 
 
 def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[Plane], float]:
-    """Split a grid of corrections into errors of two axes each; give what is left over, µm."""
     planes: list[Plane] = []
     left = 0.0
     for index, target in enumerate(term.axes):

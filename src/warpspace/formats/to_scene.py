@@ -48,7 +48,6 @@ def base_scene(machine: str) -> Scene:
 
 
 def plain_scene(found: Imported) -> Scene:
-    """Give a machine of X, Y and Z for errors that name none."""
     other = [axis for axis in found.axes if axis not in ("X", "Y", "Z")]
     if other:
         raise OptionError(

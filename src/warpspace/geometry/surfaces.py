@@ -335,7 +335,6 @@ def isoline_segments(
 
 
 def _bilinear(corners: Array, row: Array, column: Array) -> Array:
-    """Interpolate a patch of points at fractional rows and columns, [n, 3]."""
     i = np.clip(np.floor(row).astype(int), 0, corners.shape[0] - 2)
     j = np.clip(np.floor(column).astype(int), 0, corners.shape[1] - 2)
     u, v = (row - i)[:, None], (column - j)[:, None]

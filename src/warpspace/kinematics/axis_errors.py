@@ -55,7 +55,6 @@ class SmallMotion:
 
     @property
     def _cosine(self) -> Array:
-        """Cosine of half the angle, [..., 1]."""
         return np.sqrt(1.0 - np.sum(self.half**2, axis=-1, keepdims=True))
 
     def arm(self, lever_mm: Array) -> Array:
@@ -179,15 +178,12 @@ class AxisErrors:
                 )
 
     def _values(self, along: Along, way: str) -> Callable[[Array], Array]:
-        """Give the new values of the six errors at positions, [n, 6]."""
-
         def values(position: Array) -> Array:
             return np.concatenate(along(position, self.at(position, way)).to_errors(), axis=-1)
 
         return values
 
     def _changes(self, along: Along, way: str) -> Callable[[Array], Array]:
-        """Give the changes of the six errors at positions, [n, 6]."""
         values = self._values(along, way)
 
         def changes(position: Array) -> Array:

@@ -115,7 +115,6 @@ def carry_outwards(model: Model, side: str, coordinates: Coordinates, point_mm: 
 
 
 def _nominal_step(axis: Axis, coordinates: Coordinates) -> Array:
-    """Offset and motion of an axis, [..., 4, 4]."""
     place = transforms.placed(axis.offset_mm, axis.rotation_deg)
     return place @ motion(axis, coordinates[axis.name])
 
@@ -167,7 +166,6 @@ NO_DEVIATION = Deviation(components.ZERO, components.ZERO_ROWS)
 def build_links(
     model: Model, coordinates: Coordinates, values: ErrorValues, *, exact: bool
 ) -> LoopLinks:
-    """Work out the steps of both branches; errors at coordinates of one axis stay over that."""
     make = _exact_link if exact else _first_order_link
     tool, workpiece = (
         tuple(make(model, axis, coordinates, values) for axis in model.machine.branch(side))
@@ -227,7 +225,6 @@ def _first_order_link(
 def solve_links(
     links: LoopLinks, loop: Loop, point_mm: Triple, *, exact: bool
 ) -> tuple[Triple, Triple]:
-    """Evaluate the error of a loop."""
     axis = links.tool_axis
     for link in reversed(links.tool):
         axis = components.rotate(link.nominal, axis)
@@ -304,7 +301,6 @@ def _walk(links: tuple[Link, ...]) -> Deviation:
 
 
 def _between(start: Triple, end: Triple) -> Triple:
-    """Rotation vector that takes one unit vector to another the short way, µrad."""
     cross = components.cross(start, end)
     sine = np.sqrt(components.dot(cross, cross))
     angle = np.arctan2(sine, components.dot(start, end))
@@ -356,7 +352,6 @@ def rotation_gain(lever_mm: ArrayLike, direction: ArrayLike) -> Array:
 def column(
     model: Model, row: Parameter, frames: AxisFrames, point_mm: ArrayLike, sign: float = 1.0
 ) -> Column:
-    """Build the Jacobian column of one parameter."""
     pose = model.convention(row.axis).frame(frames, row)
     direction = pose[..., :3, row.direction]
     lever = np.asarray(point_mm, dtype=float) - pose[..., :3, 3]

@@ -238,7 +238,6 @@ def axis_parameters(axis: str) -> tuple[Parameter, ...]:
 
 @lru_cache(maxsize=4096)
 def _row(key: str) -> Parameter | None:
-    """Give the parameter of a key; None where it is no key."""
     matched = _KEY.fullmatch(key)
     if matched is None:
         return None

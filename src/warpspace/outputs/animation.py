@@ -155,7 +155,6 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
 
 
 def _swept(part: PlacedBody) -> Array:
-    """Give corners of what a body sweeps when it turns upright, so that the camera stands still."""
     points = part.nominal_mm
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low + high) / 2.0

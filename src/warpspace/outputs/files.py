@@ -180,7 +180,6 @@ def _machine() -> str:
 def mesh_files(
     target: Path, frames: Iterable[str], *, overwrite: bool, inputs: Iterable[Path]
 ) -> dict[str, Path]:
-    """Name the meshes beside a file."""
     files = {frame: target.with_name(f"{target.stem}_{frame}.stl") for frame in frames}
     read = tuple(inputs)
     for file in files.values():

@@ -307,7 +307,6 @@ class FigureWorker:
             ) from None
 
     def _give_up(self, pool: ProcessPool) -> None:
-        """End the process of a figure; others that waited for it may be begun again."""
         with self._lock:
             if self._pool is pool:
                 self._pool = None

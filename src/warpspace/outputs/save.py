@@ -53,7 +53,6 @@ def figure_bytes(drawing: "Drawing", form: str) -> bytes:
 def render_figure(
     name: str, scenes: Sequence[Scene], settings: FigureSettings, form: str = "png"
 ) -> bytes:
-    """Draw a figure and give it as a file's bytes; see `draw_figure` and `figure_bytes`."""
     gc.collect()  # a figure refers to itself: 100 MB of those before would wait for the collector
     with mpl.rc_context(SAVE_RC):
         drawing = draw_figure(name, scenes, settings, exact=form == "png")

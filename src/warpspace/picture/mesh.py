@@ -107,7 +107,6 @@ def line_mesh(picture: Picture) -> MapMesh:
 
 
 def _collect(found: list[tuple[Part, Index, Index]]) -> MapMesh:
-    """Put the used nodes of all parts together; cells that need no new numbers stay the same."""
     vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in found]
     values = [part.values.reshape(-1).take(used) for part, used, _ in found]
     if len(found) == 1:
@@ -198,7 +197,6 @@ def isoline_labels(picture: Picture) -> list[IsolineLabel]:
 
 
 def _part_way(line: Array, share: float) -> tuple[Array, float]:
-    """Find the point at a share of the length of a polyline, [n, 3], and that length."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     at = share * along[-1]
     return np.array([np.interp(at, along, line[:, k]) for k in range(3)]), float(along[-1])

@@ -145,7 +145,6 @@ class Picture:
 
     @property
     def topology(self) -> Topology:
-        """What is drawn of the grid, as indices into its nodes."""
         return topology(self.grid.shape, cut=self.cut)
 
     @cached_property
@@ -185,7 +184,6 @@ def coloured_error(field: ErrorField, quantity: str) -> Array:
 
 
 def coloured_values(field: ErrorField, component: str, quantity: str = "position") -> Array:
-    """Give the values that are coloured, [...], µm or µrad."""
     if component == "norm" and quantity == "position":
         return field.norm_um
     return component_values(coloured_error(field, quantity), component)
@@ -466,7 +464,6 @@ class ConceptPicture(ScenePicture):
 
 
 def picture_concept(concept: Concept, nodes: int) -> ConceptPicture:
-    """Evaluate the expected error of a concept over its working volume."""
     scene = concept.scene
     grid = build_grid(scene.model, scene.workspace, nodes)
     return ConceptPicture(

@@ -60,7 +60,6 @@ class TraceLines:
 def evaluate_traces(
     scene: Scene, exaggeration: float, samples: int = SAMPLES
 ) -> tuple[TraceLines, ...]:
-    """Evaluate the traces of a scene's points over its rotary axes, seen as the scene says."""
     groups = build_traces(scene.model, scene.trace_points_mm, scene.workspace.positions, samples)
     return tuple(
         TraceLines(
@@ -104,7 +103,6 @@ def name_trace(trace: Trace) -> str:
 def evaluate_axis_motion(
     scene: Scene, line: TraceLine, evaluate: Evaluate = evaluate_first_order
 ) -> AxisMotion | None:
-    """Evaluate the error motion of the axis that a trace is over."""
     trace = line.trace
     found = build_traces(
         scene.model,

@@ -64,7 +64,6 @@ def spell_at(axes: Mapping[str, SupportsFloat]) -> str:
 
 
 def _plain(value: float) -> str:
-    """Spell a number with as many digits as it has, no more than six decimals, never as −0."""
     return f"{round(value, _DIGITS) + 0.0:.{_DIGITS}f}".rstrip("0").rstrip(".")
 
 

@@ -40,7 +40,6 @@ CLOSE = 1e-5  # largest deviation of a sampled sum half way between its points, 
 
 
 def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> ErrorFunction:
-    """Add two curves, each times a number."""
     span = first.span
     for one, other in ((first, second), (second, first)):
         weight = weights[0] if one is first else weights[1]

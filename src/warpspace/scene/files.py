@@ -167,7 +167,6 @@ def _cut(text: str) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Put a text between quotes, with nothing in it that a terminal would obey."""
     shown = text[: SHOWN + 1]
     return (
         '"'

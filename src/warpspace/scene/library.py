@@ -164,7 +164,6 @@ def parse_scene(
 def _machine(
     raw: Mapping[str, object], name: str, folder: Path | None, problems: Problems
 ) -> Machine:
-    """Read the machine of a document, with the bodies it has there."""
     given, machine = raw.get("machine"), None
     if not isinstance(given, str):
         machine = machine_of(given, "machine", name, problems, folder=folder)
@@ -184,7 +183,6 @@ def _machine(
 def _conventions(
     convention: Mapping[str, Any], machine: Machine, problems: Problems
 ) -> tuple[tuple[str, tuple[tuple[str, str], ...]], dict[str, Any]]:
-    """Give the order of component errors, with the axes that have another, and measuring lines."""
     kinds, default = ("linear", "rotary"), str(ComponentErrors.AFTER_MOTION)
     asked = convention.get("component_errors", default)
     table: Mapping[str, str] = {} if isinstance(asked, str) else asked
@@ -209,7 +207,6 @@ def _conventions(
 
 
 def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str, float] | None:
-    """Read the point held still: a linear axis that is not given stands in its middle."""
     given = None if view is None else view["reference"]
     if given is None:
         return None

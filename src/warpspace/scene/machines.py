@@ -27,7 +27,6 @@ from warpspace.scene.schema import Problems
 def read_bodies(
     raw: object, machine: Machine, folder: Path | None, problems: Problems
 ) -> dict[str, BodySource]:
-    """Read where the bodies of a machine come from."""
     found: dict[str, BodySource] = {}
     frames = (*machine.axes, *BODY_FRAMES)
     for frame, value in problems.table("bodies", raw).items():
@@ -96,7 +95,6 @@ def machine_picture(name: str) -> Path | None:
 
 @lru_cache(maxsize=64)
 def load_machine(name: str) -> Machine:
-    """Load a bundled machine; its file is read once."""
     if name not in machine_names():
         raise UnknownNameError("machine", name, machine_names())
     folder = assets_dir() / "machines" / name

@@ -194,7 +194,6 @@ def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
 
 
 def in_direction(scene: Scene, direction: str | None) -> Scene:
-    """Give a scene whose errors are looked at for a direction of travel."""
     if direction is None:
         return scene
     if direction not in [*TravelDirection]:
@@ -214,7 +213,6 @@ def placed_in(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
 
 
 def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:
-    """Build a view of a scene from a user's words."""
     if loop not in [*Loop]:
         raise OptionError(f"loop {loop!r}; expected one of {', '.join(Loop)}")
     if frame not in FRAMES:

@@ -64,7 +64,6 @@ def over_ranges(errors: ErrorSet, model: Model, workspace: Workspace) -> ErrorSe
 def read_errors(
     model: Model, errors: ErrorSet, workspace: Workspace, notation: Notation, source: str
 ) -> ErrorSet:
-    """Read errors that are written in a notation."""
     errors = convert_squareness(model.machine, errors, notation.squareness)
     lines = notation.measuring_line_mm
     if not lines:
@@ -78,7 +77,6 @@ def read_errors(
 
 
 def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
-    """Write the errors of a scene in a notation."""
     spans = covered_spans(scene.model, scene.workspace)
     lines, errors = notation.measuring_line_mm, scene.errors
     if lines:
@@ -150,7 +148,6 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
 
 
 def _bundled(machine: Machine) -> Machine | None:
-    """Give the bundled machine that need only be named; None where there is none such."""
     if machine.name not in machine_names():
         return None
     try:
@@ -161,7 +158,6 @@ def _bundled(machine: Machine) -> Machine | None:
 
 
 def _bodies_section(machine: Machine, known: Machine | None) -> str:
-    """Spell the bodies that are not those of the bundled machine."""
     values: dict[str, object] = {}
     for frame, source in machine.bodies.items():
         if known is not None and known.bodies.get(frame) == source:
@@ -214,7 +210,6 @@ def _tolerances_section(scene: Scene) -> str:
 def _section(
     name: str, values: Mapping[str, object], remarks: Mapping[str, Parameter] | None = None
 ) -> str:
-    """Spell a table with one entry a line; empty where there is none."""
     if not values:
         return ""
     lines = [f"[{name}]"]

@@ -50,7 +50,6 @@ class Layout:
 
 
 def layout(chain: Chain) -> Layout:
-    """Choose sizes for a chain."""
     spanning = _spanning(chain)
     lying = _is_lying(chain)
     up = 1 if lying else 2
@@ -96,7 +95,6 @@ def _arms(chain: Chain) -> tuple[str, ...]:
 
 
 def _travel(axis: str, up: int, spans: bool, is_arm: bool) -> Range:
-    """Choose the travel of an axis, mm or degrees."""
     index = direction_index(axis)
     if is_linear(axis):
         return SECOND_TRAVEL if not spans else (UP_TRAVEL if index == up else LEVEL_TRAVEL)[index]
@@ -108,7 +106,6 @@ def _travel(axis: str, up: int, spans: bool, is_arm: bool) -> Range:
 def _tool_places(
     chain: Chain, arms: tuple[str, ...], tip: float, *, lying: bool
 ) -> dict[str, Vector]:
-    """Place the frames of the tool branch in R, mm: the spindle points up, or to the rear."""
     linear = [axis for axis in chain.tool if is_linear(axis)]
     over = ARM_END if len(arms) == len(ARMS_AT) else ARMS_AT[1] if arms else (0.0, 0.0)
     places: dict[str, Vector] = {}
@@ -130,7 +127,6 @@ def _tool_places(
 
 
 def _workpiece_places(chain: Chain, up: int) -> dict[str, Vector]:
-    """Place the frames of the workpiece branch in R, mm."""
     places: dict[str, Vector] = {}
     for axis in chain.workpiece:
         if is_linear(axis):
@@ -169,7 +165,6 @@ EXAMPLES = {
 
 
 def starter_scene(chain: str | Chain, title: str = "", name: str = "") -> Scene:
-    """Build the scene that `starter_text` spells."""
     parsed = parse_chain(chain) if isinstance(chain, str) else chain
     return parse_scene(starter_text(parsed, title), name or str(parsed))
 
@@ -206,12 +201,10 @@ def _line(text: str, remark: str = "") -> str:
 
 
 def _spell(value: Any) -> str:
-    """Spell a number, or numbers in a list; without decimals where there are none."""
     return f"[{', '.join(map(_spell, value))}]" if isinstance(value, tuple) else f"{value:.10g}"
 
 
 def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
-    """Spell example errors of a chain: a few that act, and a few to switch on."""
     given, further = _example_keys(chain)
     lines = [_line("[errors]", "examples; what is absent is 0, # takes one out")]
     for key, kind in given:

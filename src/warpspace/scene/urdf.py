@@ -50,7 +50,6 @@ def read_robot(path: Path) -> tuple[Any, tuple[str, ...]]:
 
 
 def _check_xml(text: str, source: str) -> tuple[str, ...]:
-    """Refuse what is no XML of a robot, and XML that defines text of its own."""
     try:
         from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
     except ImportError:
@@ -154,7 +153,6 @@ def root_of(robot: Any) -> str:
 
 
 def path_to(robot: Any, link: str) -> list[Any]:
-    """List the joints from the root to a link."""
     by_child = {joint.child: joint for joint in robot.joints}
     found: list[Any] = []
     while link in by_child and len(found) <= len(by_child):
@@ -356,7 +354,6 @@ def _finite_direction(joint: Any) -> bool:
 
 
 def _stands(joint: Any) -> bool:
-    """Tell whether a joint that could move has one position only."""
     limit = joint.limit
     if joint.type not in ("revolute", "prismatic") or limit is None:
         return False
@@ -367,7 +364,6 @@ def _stands(joint: Any) -> bool:
 
 
 def _pose_mm(joints: Sequence[Any]) -> Array:
-    """Multiply the origins of joints, all at zero, [4, 4], mm."""
     pose = np.eye(4)
     for joint in joints:
         if joint.origin is not None:
@@ -378,7 +374,6 @@ def _pose_mm(joints: Sequence[Any]) -> Array:
 
 
 def _axis_names(joints: Sequence[Any], directions: dict[str, Array]) -> dict[str, str]:
-    """Name the axes: as their joints where that fits, else by direction, repeated with digits."""
     letters = {
         joint.name: ("XYZ" if joint.type == "prismatic" else "ABC")[
             int(np.argmax(np.abs(directions[joint.name])))
@@ -451,7 +446,6 @@ LONGEST_NOTE = 300
 def imported_text(
     machine: Machine, source: str, notes: Sequence[str], meshes: Mapping[str, str]
 ) -> str:
-    """Spell the scene of a machine that was read from another format."""
     scene = Scene(
         name="imported",
         title=machine.title or source,
@@ -476,7 +470,6 @@ def _plain(text: str) -> str:
 
 
 def _ranges(machine: Machine) -> dict[str, Range]:
-    """Choose the working volume: linear axes by direction, else rotary ones of the tool side."""
     taken: set[int] = set()
     found: dict[str, Range] = {}
     for name, axis in machine.axes.items():
@@ -519,7 +512,6 @@ _NO_PLACE: tuple[tuple[str, str, Callable[[Any], object]], ...] = (
 
 
 def left_out(robot: Any, others: Sequence[str], kept: Collection[str]) -> list[str]:
-    """Name the parts of a robot that a machine does not hold."""
     gone = [link.name for link in robot.links if link.name not in kept]
     mimics = [one.name for one in robot.joints if one.child in gone and one.mimic is not None]
     found = [

@@ -317,7 +317,6 @@ class Circular(BenchTest):
         )  # fmt: skip
 
     def _squareness(self, fit: CircleFit, plan: Plan) -> Curve:
-        """Draw what mean radius and squareness alone would give."""
         angle = np.linspace(0.0, TURN, 181)
         sign = float(plan.marks["gain_sign"][0])
         half = sign * (fit.squareness_urad or 0.0) * self.radius_mm * UM_PER_MM_URAD / 2.0
@@ -332,7 +331,6 @@ def check_circle(
     radius_mm: float,
     angle_deg: Array,
 ) -> None:
-    """Refuse a circle or arc that leaves the working volume."""
     problems: list[str] = []
     full = is_full(angle_deg)
     ends = np.deg2rad(angle_deg)

@@ -194,7 +194,6 @@ class Positioning(BenchTest):
 
 
 def _numbers(found: Statistics) -> list[tuple[str, str, float]]:
-    """Give key, words and value of every number; NaN where a direction is missing."""
     mean, spread = found.mean, COVERAGE * found.deviation
     both = not np.isnan(mean).any()
     reversal = mean[0] - mean[1]

@@ -359,7 +359,6 @@ class Squareness(BenchTest):
 
 
 def _arms(plan: Plan, readings: Array) -> list[tuple[Array, Array, dict[str, ReferenceLine]]]:
-    """Give the positions along each axis, the mean deviations there, and their lines."""
     arms = [plan.marks["line"] == index for index in (0.0, 1.0)]
     along = plan.marks["along_mm"]
     means = [mean_by_position(along[chosen], readings[chosen]) for chosen in arms]

@@ -201,7 +201,6 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 
 
 def laser_tracer_um(scene: "Scene") -> float | None:
-    """Give the volumetric error measured on a machine of the thesis, µm; None for any other."""
     from warpspace.analysis.thesis import MACHINES, printed_tables
 
     names = [f"dvf5000_{name}" for name in MACHINES]
@@ -266,7 +265,6 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
 
 
 def _print(rows: "tuple[Row, ...]") -> None:
-    """Print a table of each source, then the rows that do not agree with their reasons."""
     columns = (
         Column(leads=True),
         Column("quantity", wraps=True, leads=True),

@@ -49,7 +49,6 @@ Points: TypeAlias = int | tuple[tuple[str, int], ...]
 
 
 def read_points(text: str, _scene: Scene | None = None) -> Points:
-    """Read points per axis as a user types them: 9, or X=9,Y=5."""
     try:
         if "=" not in text:
             return parse_whole(text)
@@ -307,7 +306,6 @@ def compensate(
     *,
     watch: Callable[[], None] = lambda: None,
 ) -> Compensation:
-    """Write the compensation of a scene, have it read and evaluated, and give what is left."""
     kind, loop, sign = find_format(asked.formats[0]), asked.loop or "", asked.sign or ""
     if kind.write is None:
         raise OptionError(

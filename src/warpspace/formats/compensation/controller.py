@@ -34,7 +34,6 @@ class Corrected:
     volume: "tuple[Grid, Corrected] | None" = None
 
     def field(self, errors: ErrorSet) -> ErrorField:
-        """Evaluate what is left with errors, by the exact chain, µm and µrad."""
         placement = None
         if self.volume is not None:
             grid, nodes = self.volume
@@ -128,7 +127,6 @@ class Controller:
         loop: Loop | None = None,
         point_mm: Array | None = None,
     ) -> ErrorField:
-        """Evaluate the error that is left, by the exact chain."""
         errors = (scene or self.scene).errors
         return self.at(coordinates, nominal_mm, scene, loop, point_mm).field(errors)
 
@@ -242,7 +240,6 @@ def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter
 def reversal_notes(
     there: BeforeAfter, back: BeforeAfter, errors: ErrorSet, direction: str
 ) -> tuple[str, ...]:
-    """Say what of the reversal a format has no place for."""
     before, after = (
         float(np.linalg.norm(one.error_um - other.error_um, axis=-1).max())
         for one, other in ((there.before, back.before), (there.after, back.after))

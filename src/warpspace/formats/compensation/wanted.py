@@ -116,13 +116,11 @@ class Corrector:
         return point, point - rides, np.cross(turned, end)
 
     def _tool_point(self, before: Coordinates, after: Coordinates, point_mm: Array | None) -> Array:
-        """Give where a point of the tool side nominally is after a move, [..., 3], mm."""
         if point_mm is None:
             return nominal_point(self.model, Loop.TOOL, after)
         return transforms.apply(self._carried("tool", before, after), point_mm)
 
     def _carried(self, side: str, before: Coordinates, after: Coordinates) -> Array:
-        """Motion in R of what rides on a branch, [..., 4, 4]."""
         return branch_pose(self.model, side, after) @ transforms.inverse(
             branch_pose(self.model, side, before)
         )
@@ -146,7 +144,6 @@ class Corrector:
         return total
 
     def _response(self, coordinates: Coordinates, axes: Sequence[str]) -> tuple[Array, Array]:
-        """Displacement and turn of the tool per move of each axis, [..., 3, K] twice."""
         shifts: list[Array] = []
         turns: list[Array] = []
         shape = (*batch_shape(coordinates), 3)
@@ -168,7 +165,6 @@ class Corrector:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Invert, as far as it can be, without directions that hardly act, [..., n, m]."""
     if not matrix.shape[-1]:
         return np.swapaxes(matrix, -1, -2)
     return np.asarray(np.linalg.pinv(matrix, rcond=CUT), dtype=np.float64)
@@ -179,7 +175,6 @@ def _times(matrix: Array, vector: Array) -> Array:
 
 
 def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) -> Corrector:
-    """Build the corrector of a scene: its linear axes, with its rotary ones for the orientation."""
     machine = scene.machine
     linear = tuple(axis for axis in machine.axes if is_linear(axis))
     rotary = tuple(axis for axis in machine.axes if not is_linear(axis))
@@ -245,7 +240,6 @@ class Wanted:
         return tuple(axis for axis in self.scene.machine.axes if axis in spanning)
 
     def places(self, axis: str) -> Array:
-        """Give the positions of a table along an axis, equal steps over the working volume."""
         return np.linspace(*self.scene.workspace.ranges[axis], self.points[axis])
 
     def factor(self, usual: str) -> float:
@@ -287,7 +281,6 @@ class Wanted:
         return self.corrector.moves(coordinates)
 
     def averaged(self, kept: Sequence[str]) -> dict[str, Array]:
-        """Give the corrections over some axes, averaged over the volume along all others."""
         places = {
             axis: self.places(axis)
             if axis in kept

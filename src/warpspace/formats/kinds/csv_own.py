@@ -70,7 +70,6 @@ def _lines(rows: Iterable[Iterable[str]]) -> str:
 
 
 def surface_template(axes: tuple[str, str], places: tuple[Sequence[float], Sequence[float]]) -> str:
-    """Write a table to fill in for the errors of the first axis over it and a second one."""
     axis, other = axes
     lines = [
         f"# Errors of the {axis} axis over {axis} and {other}: actual - nominal, a row a point.",
@@ -82,7 +81,6 @@ def surface_template(axes: tuple[str, str], places: tuple[Sequence[float], Seque
 
 
 def template(axis: str, places: Sequence[float] = ()) -> str:
-    """Write a table to fill in for an axis."""
     spans = places or usual_places(axis)
     lines = [
         f"# Errors of the {axis} axis: actual - nominal, a row a position of a run.",

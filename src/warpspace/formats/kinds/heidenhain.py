@@ -166,7 +166,6 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 
 def write(wanted: Wanted) -> Files:
-    """Write a table for each axis that spans the volume, and the file that assigns them."""
     stem = wanted.stem.upper()
     files: dict[str, str] = {}
     mean = {axis: float(value) for axis, value in wanted.averaged([]).items()}

@@ -38,7 +38,6 @@ _SECTION = re.compile(r"\[JOINT_([0-9])\]")
 
 
 def _is_comp(head: str, name: str) -> bool:
-    """Tell it by rows of three numbers, or by the keys of its INI section."""
     if re.search(r"^\s*COMP_FILE\s*=", head, re.MULTILINE):
         return True
     rows = [line for line in head.splitlines() if line.strip()]
@@ -50,7 +49,6 @@ def _is_comp(head: str, name: str) -> bool:
 def _assignment(
     sources: Sequence[Source],
 ) -> tuple[dict[str, tuple[str, str, float]], list[Source]]:
-    """Read INI sections: file name to axis, type and mm in a unit of it; and give the tables."""
     known: dict[str, tuple[str, str, float]] = {}
     tables: list[Source] = []
     for source in sources:

@@ -107,7 +107,6 @@ def _run_count(source: Source, lines: Lines) -> int:
 
 
 def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray]:
-    """Read the deviations of each run, at its targets in their order."""
     rows: list[tuple[Place, int, int, float]] = []
     for at, text in lines:
         if re.match(r"Run\s+Target\s+Data", text, re.IGNORECASE):

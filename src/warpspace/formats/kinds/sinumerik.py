@@ -99,7 +99,6 @@ class Table:
 
 
 def _assigns(name: str) -> Callable[[str, str], bool]:
-    """Tell files that assign a variable, or one whose name begins so."""
     return has(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
 
 
@@ -134,7 +133,6 @@ def _index(text: str, at: Place) -> int:
 
 
 def _axis_name(text: str, at: Place) -> str:
-    """Read the name of an axis: X1, (X1) or "X1"."""
     bare = text.strip().strip("()").strip().strip('"').strip()
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]{0,15}", bare):
         at.refuse(f"axis {shown(text)}", "the name of an axis")
@@ -142,7 +140,6 @@ def _axis_name(text: str, at: Place) -> str:
 
 
 def _point_lines(prefix: str, point: Callable[[int], str], values: Array) -> list[str]:
-    """Spell the values of a table; the indices of each point are given by a function."""
     return [f"${prefix}[{point(i)}]={spell(v, DIGITS)}" for i, v in enumerate(values.tolist())]
 
 
@@ -165,7 +162,6 @@ def _read(
     key_of: Callable[[list[str], Place], tuple[Any, str]],
     settings: Sequence[str] = (*RANGE, IS_MODULO),
 ) -> dict[Any, Table]:
-    """Read the tables of a variable, by what its indices say; words for a table go with that."""
     found: dict[Any, Table] = {}
     for at, setting, parts, value in _assignments(source, prefix, settings, indices):
         name = f"${prefix}_{setting}" if setting else f"${prefix}"
@@ -396,7 +392,6 @@ def _factors(both: Array, most: int) -> Iterator[tuple[Array, Array]]:
 
 
 def _interaction(both: Array) -> Array:
-    """Take out of a table of two axes what depends on one of them alone, [n1, n2]."""
     one, other = (shares(count) for count in both.shape)
     first, second = both @ other, one @ both
     return both - first[:, None] - second + one @ first

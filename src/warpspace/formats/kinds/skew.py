@@ -64,7 +64,6 @@ def skew_lengths(factor: float) -> tuple[float, float, float]:
 
 
 def factor_of(lengths: tuple[float, float, float], at: Place, what: str) -> float:
-    """Give the factor of measured lengths."""
     ac, bd, ad = lengths
     # the diagonals of a parallelogram are together longer than twice a side, and differ by less
     if not (min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd)):
@@ -231,7 +230,6 @@ _COMMENT = re.compile(r"/\*.*?(?:\*/|$)|//[^\n]*", re.DOTALL)
 
 
 def _is_marlin(head: str, name: str) -> bool:
-    """Tell it by its command, or by a setting of Configuration.h."""
     known = re.search(r"^\s*M852\b|SKEW_CORRECTION", head, re.MULTILINE)
     return known is not None or name.endswith("Configuration.h")
 

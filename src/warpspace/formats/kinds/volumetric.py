@@ -74,12 +74,10 @@ def factor_of(key: str) -> float:
 
 
 def left_out(names: Sequence[str]) -> tuple[str, ...]:
-    """Say which parameters of a file are no errors."""
     return (f"{', '.join(names)}: no errors, left out",) if names else ()
 
 
 def check_axes(held: Imported, name: str) -> None:
-    """Refuse errors of axes that the file has no name for."""
     if other := next((axis for axis in held.axes if axis not in ARGUMENTS), ""):
         raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
 
@@ -126,7 +124,6 @@ def _about_distorted_axis(found: Imported, axis: str, options: ReadOptions) -> I
 def _plus(
     found: Imported, key: str, offset: float = 0.0, cosine: float = 0.0, sine: float = 0.0
 ) -> Imported:
-    """Add a constant and a wave a turn to an error: to its points, or as a curve of its own."""
     size = math.hypot(cosine, sine)
     if not size and not offset:
         return found
@@ -375,7 +372,6 @@ def _iso_row(
 
 
 def _write_iso(wanted: Wanted) -> Files:
-    """Write the errors of a scene; those of two axes have no place and are left out."""
     held = in_one_direction(sampled(wanted), wanted)
     check_axes(held, ISO)
     lines = [f"// {wanted.title}", "// mm, rad, degrees; variant Vendor"]

@@ -317,7 +317,6 @@ class ErrorFunction(ABC):
 
     @cached_property
     def _peak(self) -> float:
-        """Largest value over the span: looked for once, since a curve never changes."""
         values = self.evaluate(np.linspace(*self.span, self.samples))
         return float(values[np.argmax(np.abs(values))])
 

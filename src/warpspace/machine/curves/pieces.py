@@ -45,7 +45,6 @@ class Pieces(ErrorFunction):
 
     @cached_property
     def _padded(self) -> Array:
-        """Coefficients with zeros behind, [n, 6]."""
         padded = np.zeros((len(self.starts), DEGREE + 1))
         for row, own in zip(padded, self.coefficients, strict=True):
             row[: len(own)] = own
@@ -140,7 +139,6 @@ def fit_curves(
 
 
 def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
-    """Interpolate in Chebyshev points of each piece: coefficients [n, 6, K], worst miss [n]."""
     width = np.diff(at)
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     checks = np.linspace(-0.97, 0.97, 9)
@@ -178,7 +176,6 @@ def _power_matrix() -> Array:
 
 
 def _simplest(span: Span, at: Array, coefficients: Array) -> ErrorFunction | None:
-    """Give the simplest kind of curve with pieces of these coefficients, [n, 6]."""
     width = np.diff(at)[:, None]
     reach = np.abs(coefficients) * width ** np.arange(DEGREE + 1.0)
     kept = np.where(reach > SMALL / 4.0, coefficients, 0.0)

@@ -162,7 +162,6 @@ def _points(raw: object, reader: ValueReader) -> tuple[Point, ...]:
 
 
 def _first_unsorted(points: Sequence[Point]) -> tuple[int, float, float] | None:
-    """Give the number of the first row whose position does not ascend, and both positions."""
     for number, ((low, _), (high, _)) in enumerate(pairwise(points), start=2):
         if not low < high:
             return number, low, high
@@ -233,7 +232,6 @@ class TwoArguments(ErrorFunction):
         return self._bilinear(own, other)
 
     def _bilinear(self, own: Array, other: Array) -> Array:
-        """Interpolate, [...]."""
         low, high, share = _cell(self.positions[0], own)
         left, right, across = _cell(self.positions[1], other)
         grid = self._grid

@@ -68,7 +68,6 @@ def style() -> Any:
 def sheet(
     width: float, height: float, title: str, subtitle: str, top_in: float
 ) -> tuple[Figure, float]:
-    """Start a figure with a title and a line below it."""
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
     left = 0.3 / width
     for words, size, down, weight, colour in (

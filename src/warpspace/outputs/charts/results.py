@@ -183,7 +183,6 @@ def _planes(found: "Compensation") -> list[tuple[int, int]]:
 
 
 def _fields(found: "Compensation") -> Sequence[tuple[str, "ErrorField", float]]:
-    """List the maps: their words, the field, and the upper end of their colours, µm."""
     before, after = (
         max(float(field.norm_um.max()), LEAST_UM) for field in (found.before, found.after)
     )

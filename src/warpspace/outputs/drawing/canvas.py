@@ -36,7 +36,6 @@ def _font(weight: str) -> FontProperties:
 
 @lru_cache(maxsize=4096)
 def text_extent(text: str, weight: str) -> tuple[float, float]:
-    """Width and height of a line of text of size 1."""
     width, height, _ = text_to_path.get_text_width_height_descent(text, _font(weight), ismath=False)
     return width / 100.0, height / 100.0
 
@@ -90,7 +89,6 @@ class Canvas:
     def fit(
         self, text: str, room: float, size: float = SIZES.text, weight: str = "normal"
     ) -> tuple[str, float]:
-        """Shrink a line of text into a width, shorten it where that is not enough."""
         text = clean(text)
         room *= 0.98  # what is drawn may be a little wider than what was measured
         width = self.text_size(text, size, weight)[0]
@@ -121,7 +119,6 @@ class Canvas:
         zorder: float = 6.0,
         room: float = math.inf,
     ) -> Rect:
-        """Write a line of text, fitted into a width where one is given."""
         text, size = self.fit(text, room, size, weight)
         drawn = self.axes.text(
             x, y, text, ha=ha, va=va, rotation=rotation, zorder=zorder, parse_math=False,
@@ -195,7 +192,6 @@ class Canvas:
         )  # fmt: skip
 
     def ring(self, centre: Array, radius: float) -> None:
-        """Draw a ring around a point, seen on any ground."""
         for width, colour in ((4.5, self.theme.paper), (2.2, self.theme.accent)):
             self.axes.add_patch(
                 Circle((float(centre[0]), float(centre[1])), self.px(radius), fill=False,
@@ -345,7 +341,6 @@ def place_label(
     taken: Occupancy,
     unit: float,
 ) -> Placed | None:
-    """Find the free place nearest to one of several points."""
     best: Placed | None = None
     best_score = math.inf
     half_w, half_h = size[0] / 2.0 + 3.0 * unit, size[1] / 2.0 + 3.0 * unit
@@ -401,7 +396,6 @@ def write_label(
 
 
 def draw_leader(canvas: Canvas, placed: Placed, colour: str, zorder: float = 3.0) -> None:
-    """Draw a line from a label to what it names."""
     x = min(max(placed.anchor[0], placed.rect[0]), placed.rect[2])
     y = min(max(placed.anchor[1], placed.rect[1]), placed.rect[3])
     canvas.line([(x, y), placed.anchor], width=SIZES.hair, colour=colour, zorder=zorder)

@@ -139,7 +139,6 @@ def _amount(length_um: float, *, largest: bool) -> str:
 
 
 def _is_seen(projection: Projection, points_mm: Array, raster: Raster | None) -> bool:
-    """Tell whether any of some points can be seen: not behind the body."""
     if raster is None:
         return True
     surface = raster.depth_at(projection.project(points_mm), spread=True)
@@ -267,7 +266,6 @@ def _draw_surface_lines(
     raster: Raster | None,
     taken: Occupancy,
 ) -> None:
-    """Draw grid lines, creases and isolines where the surface does not hide them."""
     if not faces:
         return
     theme, shape = canvas.theme, picture.shape

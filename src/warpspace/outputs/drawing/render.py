@@ -52,12 +52,10 @@ class Projection:
         return -((points_mm - self.centre_mm) @ self.towards)
 
     def moved(self, shift_px: Array) -> "Projection":
-        """Give the same projection elsewhere in the figure."""
         return replace(self, centre_px=self.centre_px + shift_px)
 
 
 def view_axes(view: str) -> tuple[Array, Array, Array]:
-    """Give the unit vectors right, up and towards of a named view."""
     towards = np.array(VIEWS[view])
     upwards = np.array(UPWARDS.get(view, (0.0, 0.0, 1.0)))
     towards /= np.linalg.norm(towards)
@@ -143,7 +141,6 @@ class Raster:
         return np.asarray(image.convert("RGBA"))
 
     def depth_at(self, points_px: Array, *, spread: bool = False) -> Array:
-        """Read the depth at pixels of the figure."""
         left, _, _, top = self.rect
         i = np.floor((top - points_px[..., 1]) * self.sampling).astype(np.intp)
         j = np.floor((points_px[..., 0] - left) * self.sampling).astype(np.intp)

@@ -160,7 +160,6 @@ def check_size(size: tuple[int, int]) -> None:
 def evaluate_for(
     settings: FigureSettings, scene: Scene, quantity: str = "position"
 ) -> ScenePicture:
-    """Evaluate the picture that a figure of a scene draws."""
     picture = evaluate_picture(
         scene,
         grid=settings.grid,

@@ -79,7 +79,6 @@ def line_entry(
 def draw_legend(
     canvas: Canvas, legend: Sequence[LegendEntry], x: float, y: float, room: float
 ) -> None:
-    """Draw the entries of a legend in a row; those that do not fit are left out."""
     swatch, gap = canvas.px(36.0), canvas.px(10.0)
     end = x + room
     for entry in legend:
@@ -206,7 +205,6 @@ HINTED = 0.92
 
 
 def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
-    """Write title and subtitle with a rule below."""
     margin = canvas.margin
     room = canvas.width - 2.0 * margin
     y = canvas.height - canvas.px(54.0)
@@ -338,7 +336,6 @@ def map_legend(
 def metadata(
     title: str, scenes: Sequence[Scene], settings: FigureSettings, exaggeration: float, figure: str
 ) -> dict[str, str]:
-    """Collect what the file says about itself; no dates, so that it can be repeated."""
     top, factor = settings.range_top, f"{exaggeration:.10g}"
     chosen = {
         "component": settings.component,
@@ -380,7 +377,6 @@ class Sheet:
         rows: Sequence[Row],
         bars: tuple[float, float | None] | None,
     ) -> None:
-        """Draw colour bar, statistics and scale bars beside the content."""
         canvas, rect = self.canvas, self.panel
         left, _, right, top = rect
         y = (rect[1] if bars is None else draw_scale_bars(canvas, rect, *bars)) + canvas.px(24.0)
@@ -405,7 +401,6 @@ class Sheet:
         )
 
     def finish(self, factor: float, maps: Sequence[DrawnMap] = ()) -> Drawing:
-        """Say what the file says about itself; no dates, so that it can be repeated."""
         about = metadata(self.title, self.scenes, self.settings, factor, self.name)
         return Drawing(self.canvas.figure, self.title, about, tuple(maps), tuple(self.canvas.rects))
 
@@ -422,7 +417,6 @@ def start_sheet(
     panel: bool = True,
     errors: bool = True,
 ) -> Sheet:
-    """Start a figure and draw what surrounds its content."""
     printed = settings.printed
     canvas = Canvas(*settings.size, settings.theme, exact=exact, printed=printed)
     margin = 0.0 if printed else canvas.margin

@@ -169,7 +169,6 @@ def _write_vts(record: FieldRecord, path: Path) -> None:
 
 
 def structured_grid(points_mm: Array, arrays: Mapping[str, Array]) -> "pv.StructuredGrid":
-    """Build a structured grid from nodes and what is known at them."""
     import pyvista as pv
 
     mesh = pv.StructuredGrid()
@@ -182,7 +181,6 @@ def structured_grid(points_mm: Array, arrays: Mapping[str, Array]) -> "pv.Struct
 
 
 def _in_order_of_vtk(values: Array) -> Array:
-    """Order node values as VTK does, the first axis fastest: [n] or [n, 3]."""
     tail = values.shape[3:]
     return np.ascontiguousarray(np.swapaxes(values, 0, 2)).reshape(-1, *tail)
 

@@ -110,7 +110,6 @@ def _loop(scene: Scene, settings: FigureSettings) -> str:
 def _draw(
     name: str, title: str, scene: Scene, settings: FigureSettings, draw: Callable[[], Figure]
 ) -> Drawing:
-    """Give a chart the width asked for (its height follows) and say where it comes from."""
     with on_ground(settings.theme):
         figure = draw()
     width, height = figure.get_size_inches()

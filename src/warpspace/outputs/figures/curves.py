@@ -92,7 +92,6 @@ def _has_width(tolerance: Tolerance | None) -> bool:
 
 
 def _left_out_words(scene: Scene, shown: Sequence[Errors]) -> str:
-    """Say which charts are left out since all their errors are zero; empty where none is."""
     drawn = {(axis.name, kind) for axis, _, _, kind in shown}
     missing = [
         f"{kind}s of {', '.join(names)}"
@@ -130,7 +129,6 @@ def _chart(scene: Scene, axis: Axis, letters: str, unit: str, kind: str) -> Line
 
 
 def _curves(scene: Scene, key: str, at: Array, colour: int) -> list[Curve]:
-    """Give an error as its curves (directions of travel, sections) and its readings."""
     function = scene.errors.functions.get(key)
     if function is None or scene.errors.amplitude(key) == 0.0:
         found = [Curve(f"{key}: zero", at, np.zeros_like(at), colour, "thin")]
@@ -151,7 +149,6 @@ def _curves(scene: Scene, key: str, at: Array, colour: int) -> list[Curve]:
 
 
 def _constants(scene: Scene) -> Bars | None:
-    """Give the constant errors that are not zero or have a tolerance, angles first."""
     keys = [
         key
         for key in scene.parameter_keys

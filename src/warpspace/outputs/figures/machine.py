@@ -62,7 +62,6 @@ DARKER = 0.62
 
 
 def _drawn_body(part: PlacedBody, theme: Theme) -> Body:
-    """Give what is drawn of a placed body on the ground of a theme."""
     shade = 1.0 if theme.name == "light" else DARKER
     red, green, blue = (shade * channel / 255.0 for channel in part.body.colour)
     triangles = part.body.triangles.astype(np.intp)
@@ -180,7 +179,6 @@ def _label_bodies(
     raster: Raster,
     right: float,
 ) -> None:
-    """Name bodies in a column at the right, with leaders to a spot of each that can be seen."""
     spots = [(_visible_spot(part, projection, raster), part.label) for part in placed]
     wanted = sorted((spot[1], name, spot) for spot, name in spots if spot is not None)
     column = right - canvas.px(120.0)

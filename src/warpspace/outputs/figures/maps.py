@@ -78,7 +78,6 @@ def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: 
 def say_statistics(
     sheet: Sheet, picture: Picture, px_per_mm: float, *, above: Sequence[Row] = ()
 ) -> None:
-    """Draw colours, statistics and scale bars of a picture beside it."""
     found, values = picture.statistics, picture.values
     rows: list[Row] = [
         ("max |E|", f"{spell(found.max_um)} µm"),
@@ -114,7 +113,6 @@ def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
 
 
 def _place_rows(at: Mapping[str, float], point_mm: Sequence[float]) -> list[Row]:
-    """Spell a point in both ways, one row each: axis positions, and a point of R."""
     linear = {name: value for name, value in at.items() if is_linear(name)}
     point = " ".join(
         f"{name} {spell_coordinate(value)}" for name, value in zip("xyz", point_mm, strict=True)
@@ -308,7 +306,6 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
 
 
 def _lean_factor(largest_urad: float) -> float:
-    """Choose a round factor that makes the largest lean easy to see; 1000 where there is none."""
     if not largest_urad > 0.0:
         return 1000.0
     return round_down(max(LEAN_RAD / (largest_urad * RAD_PER_URAD), 1.0))

@@ -49,7 +49,6 @@ from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 
 
 def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[ScenePicture]:
-    """Evaluate two scenes with one exaggeration and one scale of colours."""
     pictures = share_exaggeration(
         [evaluate_for(settings, scene) for scene in scenes],
         settings.exaggeration,
@@ -219,7 +218,6 @@ def _draw_machines(
     rooms: Sequence[Rect],
     settings: FigureSettings,
 ) -> tuple[tuple[DrawnMap, ...], float]:
-    """Draw machines into their rooms in one scale; give the maps and the px of a mm."""
     view = settings.view
     bodies = [bodies_of(picture, 1.0) for picture in pictures]
     seen = [_points_mm(picture, own) for picture, own in zip(pictures, bodies, strict=True)]

@@ -152,7 +152,6 @@ def _attribute_page(page: str) -> Markup:
 
 
 def render_pdf(report: Report) -> bytes:
-    """Typeset a report; all text reaches the template as data and never as markup."""
     import matplotlib as mpl
     import typst
 

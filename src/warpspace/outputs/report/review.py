@@ -136,7 +136,6 @@ class Review:
 
 
 def share_pictures(scenes: Sequence[Scene], settings: ReportSettings) -> tuple[ScenePicture, ...]:
-    """Evaluate the volumes of one scene or two, drawn with the same factor."""
     if not 1 <= len(scenes) <= 2:
         raise OptionError(f"a report is about one scene or two; given {len(scenes)}")
     Plan(settings.samples, settings.seed, spec_um=settings.spec_um).check()
@@ -285,7 +284,6 @@ def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings
 
 
 def first_page(review: Review, picture: Block) -> list[Block]:
-    """Give the verdict, four numbers of each scene, a picture and what to do."""
     names = ["mean |E|", "P95", "max"]
     limited = any(one.scene.limit_um is not None for one in review.scenes)
     rows: list[list[str]] = []

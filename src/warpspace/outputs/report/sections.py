@@ -251,7 +251,6 @@ def build_report(
 
 
 def _letters(number: int) -> str:
-    """Name an appendix, counted from 1: A to Z, then AA."""
     rest, last = divmod(number - 1, 26)
     return (chr(64 + rest) if rest else "") + chr(65 + last)
 
@@ -278,7 +277,6 @@ def said(found: Iterable[AnyBlock], painter: ReportFigures | None = None) -> Ite
 
 
 def _is_zero(columns: Sequence[Column], row: Sequence[object]) -> bool:
-    """Tell whether all numbers of a row are zero as they are spelled."""
     cells = [
         column.spell(value)
         for column, value in zip(columns, row, strict=True)
@@ -380,7 +378,6 @@ def explanation(reviewed: Reviewed) -> Table:
 
 
 def parameters(reviewed: Reviewed) -> Block:
-    """List every error that is not zero or misses its tolerance."""
     scene = reviewed.scene
     rows: list[tuple[str, ...]] = []
     marks: list[Mark] = []
@@ -413,7 +410,6 @@ def parameters(reviewed: Reviewed) -> Block:
 
 
 def differences(review: Review) -> Iterator[Block]:
-    """List the parameters in which two scenes differ."""
     first, second = (reviewed.scene for reviewed in review.scenes)
     rows: list[tuple[str, ...]] = []
     for key in dict.fromkeys([*first.parameter_keys, *second.parameter_keys]):
@@ -455,14 +451,12 @@ def compare_with(
 
 
 def concept_blocks(found: ConceptsResult, painter: ReportFigures) -> Iterator[Block]:
-    """Tell how machines compare, with pictures in one scale."""
     yield from said(found.blocks())
     caption = "The machines in one scale; colours are the RMS of |E| within tolerance."
     yield painter.concepts([one.scene for one in found.concepts], found.asked, caption)
 
 
 def conventions(review: Review) -> Items:
-    """Say how to read signs, frames and factors."""
     second_order = ", ".join(
         f"{spell(max(one.linearisation_um, 0.0), 2)} µm" + (one.letter and f" in {one.letter}")
         for one in review.scenes
@@ -504,7 +498,6 @@ def _reference(scene: Scene) -> str:
 
 
 def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
-    """Tell what the report was made from and with."""
     settings = review.settings
     rows = [
         ("program", f"warpspace {__version__}"),
