@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from warpspace.outputs.drawing.canvas import (
     LINE_COST,
     Canvas,
     Occupancy,
+    Points,
     draw_leader,
     write_label,
 )
@@ -41,6 +43,34 @@ from warpspace.outputs.drawing.sheet import DrawnMap
 from warpspace.picture.model import Picture, map_faces
 from warpspace.units import MICROMETRE, Array, spell, spell_short
 
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """A volume on its canvas, while it is drawn."""
+
+    canvas: Canvas
+    picture: Picture
+    projection: Projection
+    raster: Raster | None  # the drawn body; None where there is no surface
+    taken: Occupancy
+    frame: Rect | None  # that labels stay in; None where nothing is labelled
+
+    def split(self, lines_mm: Iterable[Array]) -> tuple[list[Array], list[Array]]:
+        """Split polylines into what can be seen and what the body hides, px."""
+        return split_visible(lines_mm, self.projection, self.raster)
+
+    def label(self, text: str, anchors: Points) -> None:
+        """Write a displacement beside one of several points, where there is room."""
+        if self.frame is None:
+            return
+        canvas, colour = self.canvas, self.canvas.theme.accent
+        placed = write_label(
+            canvas, text, anchors, self.frame, self.taken, weight="bold", colour=colour
+        )
+        if placed and placed.distance > canvas.px(LEADER_FROM) and len(anchors) > 1:
+            draw_leader(canvas, placed, colour, 3.9)
+
+
 # --- Labels of isolines and corners ---------------------------------------------------------------
 
 ARROW_COST = 12.0
@@ -49,13 +79,10 @@ _CANDIDATE_LINES = 3
 
 
 def label_isolines(
-    canvas: Canvas,
-    by_level: Mapping[float, Sequence[Array]],
-    colour: str,
-    halo: str,
-    taken: Occupancy,
+    stage: Stage, by_level: Mapping[float, Sequence[Array]], colour: str, halo: str
 ) -> None:
     """Write each level once, along a long visible piece of its line."""
+    canvas, taken = stage.canvas, stage.taken
     for level, lines in by_level.items():
         text = spell_short(level)
         size = canvas.text_size(text, SIZES.small)
@@ -92,15 +119,9 @@ def _beside(line: Array, share: float, size: tuple[float, float]) -> tuple[float
     return float(x[1] - lift * np.sin(tilt)), float(y[1] + lift * np.cos(tilt)), angle
 
 
-def draw_corners(
-    canvas: Canvas,
-    picture: Picture,
-    projection: Projection,
-    raster: Raster | None,
-    taken: Occupancy,
-    frame: Rect | None,
-) -> None:
+def draw_corners(stage: Stage) -> None:
     """Draw the displacement of the corners and label those that can be seen."""
+    canvas, picture, projection = stage.canvas, stage.picture, stage.projection
     nominal, drawn = picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)
     length = np.linalg.norm(picture.field.error_um.reshape(-1, 3), axis=-1)
     worst = int(np.argmax(length))
@@ -111,26 +132,20 @@ def draw_corners(
     for corner, deep in zip(found, depth, strict=True):
         tail, tip = projection.project(nominal[corner]), projection.project(drawn[corner])
         ends = np.stack([nominal[corner], drawn[corner]])
-        near = bool(deep <= front) or _is_seen(projection, ends, raster)
+        near = bool(deep <= front) or _is_seen(stage, ends)
         opacity = 1.0 if near else 0.4
         canvas.arrow(tail, tip, alpha=opacity, zorder=4.0 if near else 3.4)
         if np.hypot(*(tip - tail)) > 0.1:
             canvas.disc(tail, 4.0, canvas.theme.accent, alpha=opacity)
-            taken.add_lines([np.stack([tail, tip])], ARROW_COST)
+            stage.taken.add_lines([np.stack([tail, tip])], ARROW_COST)
         if near:
             wanted.append((_amount(length[corner], largest=corner == worst), tail, tip))
-    if worst not in found and _is_seen(projection, drawn[worst][None], raster):
+    if worst not in found and _is_seen(stage, drawn[worst][None]):
         spot = projection.project(drawn[worst])
         canvas.ring(spot, 7.0)
         wanted.append((_amount(length[worst], largest=True), spot, spot))
-    colour = canvas.theme.accent
-    if frame is None:
-        return
     for text, tail, tip in wanted:
-        anchors = [tip, tail, (tip + tail) / 2.0]
-        placed = write_label(canvas, text, anchors, frame, taken, weight="bold", colour=colour)
-        if placed is not None and placed.distance > canvas.px(LEADER_FROM):
-            draw_leader(canvas, placed, colour, 3.9)
+        stage.label(text, [tip, tail, (tip + tail) / 2.0])
 
 
 def _amount(length_um: float, *, largest: bool) -> str:
@@ -138,10 +153,11 @@ def _amount(length_um: float, *, largest: bool) -> str:
     return f"{spell(float(length_um))} {MICROMETRE}{tail}"
 
 
-def _is_seen(projection: Projection, points_mm: Array, raster: Raster | None) -> bool:
-    if raster is None:
+def _is_seen(stage: Stage, points_mm: Array) -> bool:
+    projection = stage.projection
+    if stage.raster is None:
         return True
-    surface = raster.depth_at(projection.project(points_mm), spread=True)
+    surface = stage.raster.depth_at(projection.project(points_mm), spread=True)
     return bool(np.any(projection.depth_mm(points_mm) <= surface + 2.0 / projection.px_per_mm))
 
 
@@ -152,7 +168,7 @@ INSETS = (112.0, 92.0, 84.0, 46.0)
 SMALL_INSETS = (70.0, 74.0, 40.0, 40.0)
 GHOST_DASHES = (11.0, 7.0)
 LONE_LINE_COST = 8.0  # labels keep off the line that is all there is of a volume
-Annotate = Callable[[Canvas, Picture, Projection, Raster | None, Occupancy, Rect | None], None]
+Annotate = Callable[[Stage], None]
 
 
 def draw_map(
@@ -166,23 +182,23 @@ def draw_map(
     annotate: Annotate | None = draw_corners,
     ghost: bool = True,
 ) -> DrawnMap:
-    nodes = picture.drawn_mm.reshape(-1, 3)
     projection = projection or fit_map(canvas, [picture], rect, view, labels=labels)
     faces = map_faces(picture.shape, cut=view == "iso")
     raster = render_bodies(surface_bodies(picture, faces), projection)
     start = len(canvas.rects)
     taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    stage = Stage(canvas, picture, projection, raster, taken, rect if labels else None)
     if raster is not None:
         draw_raster(canvas, raster)
         taken.add_mask(raster.rgba[..., 3] > 0, raster.rect)
-    _draw_surface_lines(canvas, picture, faces, projection, raster, taken)
+    _draw_surface_lines(stage, faces)
     draw_lone_line(canvas, picture, projection, taken)
     if ghost:
-        _draw_ghost(canvas, picture, projection, raster, taken)
-    draw_axes(canvas, picture.grid.nominal_mm, nodes, projection, taken, titles=labels)
+        _draw_ghost(stage)
+    _draw_axes(stage)
     taken.add_rects(canvas.rects[start:])
     if annotate is not None:
-        annotate(canvas, picture, projection, raster, taken, rect if labels else None)
+        annotate(stage)
     return DrawnMap(projection, picture, raster)
 
 
@@ -258,22 +274,16 @@ def map_room_mm(picture: Picture) -> Array:
     return np.concatenate(points)
 
 
-def _draw_surface_lines(
-    canvas: Canvas,
-    picture: Picture,
-    faces: list[Index],
-    projection: Projection,
-    raster: Raster | None,
-    taken: Occupancy,
-) -> None:
+def _draw_surface_lines(stage: Stage, faces: list[Index]) -> None:
     if not faces:
         return
+    canvas, picture, taken = stage.canvas, stage.picture, stage.taken
     theme, shape = canvas.theme, picture.shape
     nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
     nx, ny, nz = (line_spacing(count) for count in shape)
 
     def visible(lines: Iterable[Index]) -> list[Array]:
-        return split_visible((nodes[line] for line in lines), projection, raster)[0]
+        return stage.split(nodes[line] for line in lines)[0]
 
     grid = visible(face_lines(faces, shape, (nx, ny, nz)))
     canvas.lines(grid, width=SIZES.hair, colour=theme.grid, alpha=0.42, zorder=2.0)
@@ -285,14 +295,13 @@ def _draw_surface_lines(
     by_level: dict[float, list[Array]] = {}
     for face in faces:
         for level, line in isolines(face, nodes, values, levels):
-            seen = split_visible([line], projection, raster)[0]
-            by_level.setdefault(level, []).extend(seen)
+            by_level.setdefault(level, []).extend(stage.split([line])[0])
     colour = theme.grid if diverging else theme.isoline
     for level, lines in by_level.items():
         width = SIZES.line if diverging and level == 0.0 else SIZES.thin
         canvas.lines(lines, width=width, colour=colour, alpha=0.95, zorder=2.5)
     taken.add_lines([line for lines in by_level.values() for line in lines], 0.5)
-    label_isolines(canvas, by_level, colour, theme.isoline if diverging else theme.grid, taken)
+    label_isolines(stage, by_level, colour, theme.isoline if diverging else theme.grid)
 
 
 def draw_lone_line(
@@ -316,17 +325,10 @@ def draw_lone_line(
         canvas.disc(spot, 4.5, colour)
 
 
-def _draw_ghost(
-    canvas: Canvas,
-    picture: Picture,
-    projection: Projection,
-    raster: Raster | None,
-    taken: Occupancy,
-) -> None:
-    nodes = picture.grid.nominal_mm.reshape(-1, 3)
-    edges = (nodes[edge] for edge in box_edges(picture.shape))
-    seen, hidden = split_visible(edges, projection, raster)
-    theme = canvas.theme
+def _draw_ghost(stage: Stage) -> None:
+    canvas, taken, theme = stage.canvas, stage.taken, stage.canvas.theme
+    nodes = stage.picture.grid.nominal_mm.reshape(-1, 3)
+    seen, hidden = stage.split(nodes[edge] for edge in box_edges(stage.picture.shape))
     canvas.lines(
         hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.6, dashes=GHOST_DASHES, zorder=3.2
     )
@@ -340,26 +342,19 @@ TICK = 7.0
 SHORTEST = 40.0  # axes seen nearly end-on, shorter than this in the picture, are left out
 
 
-def draw_axes(
-    canvas: Canvas,
-    nominal_mm: Array,
-    drawn_mm: Array,
-    projection: Projection,
-    taken: Occupancy,
-    *,
-    titles: bool = True,
-) -> None:
+def _draw_axes(stage: Stage) -> None:
     """Draw the axes of the machine frame beside the silhouette of the nominal volume."""
-    flat = nominal_mm.reshape(-1, 3)
+    projection = stage.projection
+    flat = stage.picture.grid.nominal_mm.reshape(-1, 3)
     low, high = flat.min(axis=0), flat.max(axis=0)
-    spots = projection.project(np.concatenate([flat, drawn_mm.reshape(-1, 3)]))
+    spots = projection.project(np.concatenate([flat, stage.picture.drawn_mm.reshape(-1, 3)]))
     for axis in range(3):
         ends = _silhouette_edge(axis, low, high, projection)
-        if ends is None or np.hypot(*np.diff(projection.project(ends), axis=0)[0]) < canvas.px(
-            SHORTEST
-        ):
+        if ends is None:
             continue
-        _draw_axis(canvas, axis, ends, projection, spots, taken, titles=titles)
+        length = np.hypot(*np.diff(projection.project(ends), axis=0)[0])
+        if length >= stage.canvas.px(SHORTEST):
+            _draw_axis(stage, axis, ends, spots)
 
 
 def _silhouette_edge(axis: int, low: Array, high: Array, projection: Projection) -> Array | None:
@@ -386,17 +381,9 @@ def _silhouette_edge(axis: int, low: Array, high: Array, projection: Projection)
     return edges[min(outer, key=lambda at: (round(float(key[at]), 3), at))]
 
 
-def _draw_axis(
-    canvas: Canvas,
-    axis: int,
-    ends_mm: Array,
-    projection: Projection,
-    spots: Array,
-    taken: Occupancy,
-    *,
-    titles: bool,
-) -> None:
-    start, end = projection.project(ends_mm)
+def _draw_axis(stage: Stage, axis: int, ends_mm: Array, spots: Array) -> None:
+    canvas = stage.canvas
+    start, end = stage.projection.project(ends_mm)
     along = (end - start) / np.hypot(*(end - start))
     normal = np.array([along[1], -along[0]])
     upright = abs(along[1]) > 2.0 * abs(along[0])
@@ -410,7 +397,7 @@ def _draw_axis(
     theme = canvas.theme
     line = np.stack([start + base, end + base])
     canvas.line(line, width=SIZES.thin, colour=theme.muted, zorder=2.0)
-    taken.add_lines([line], LINE_COST)
+    stage.taken.add_lines([line], LINE_COST)
     low, high = float(ends_mm[0, axis]), float(ends_mm[1, axis])
     reach = 0.0
     for value in tick_values(low, high, float(np.hypot(*(end - start))) / canvas.px(78.0)):
@@ -428,7 +415,7 @@ def _draw_axis(
             centre[0], centre[1], text, size=SIZES.small, colour=theme.muted, ha="center",
             va="center_baseline",
         )  # fmt: skip
-    if titles:
+    if stage.frame is not None:
         angle = math.degrees(math.atan2(along[1], along[0]))
         angle = (angle + 90.0) % 180.0 - 90.0 if abs(abs(angle) - 90.0) > 1e-6 else 90.0
         height = canvas.text_size("X", SIZES.text)[1]

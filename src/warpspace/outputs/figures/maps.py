@@ -24,9 +24,10 @@ from warpspace.geometry.surfaces import (
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
 from warpspace.machine.axes import is_linear
-from warpspace.outputs.drawing.canvas import Canvas, Occupancy, write_label
+from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import (
     GHOST_DASHES,
+    Stage,
     draw_map,
     draw_raster,
     fit_map,
@@ -34,8 +35,6 @@ from warpspace.outputs.drawing.map3d import (
 )
 from warpspace.outputs.drawing.render import (
     Body,
-    Projection,
-    Raster,
     Rect,
     fit_projection,
     render_bodies,
@@ -321,32 +320,21 @@ def _needles(picture: ScenePicture, factor: float, view: str) -> Needles:
     return Needles(axis, lean, length, tilt, _feet(picture, view))
 
 
-def _draw_needles(
-    needles: Needles,
-    canvas: Canvas,
-    content: Picture,
-    projection: Projection,
-    raster: Raster | None,
-    taken: Occupancy,
-    frame: Rect | None,
-) -> None:
-    nodes, theme = content.grid.nominal_mm.reshape(-1, 3), canvas.theme
+def _draw_needles(needles: Needles, stage: Stage) -> None:
+    nodes, theme = stage.picture.grid.nominal_mm.reshape(-1, 3), stage.canvas.theme
     nominal, drawn = needles.ends_mm(nodes, needles.feet)
     for ends, colour, width, dashes in (
         (nominal, theme.ghost, SIZES.thin, NEEDLE_DASHES),
         (drawn, theme.accent, SIZES.bold, None),
     ):
-        lines, _ = split_visible(ends, projection, raster)
-        canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
-        taken.add_lines(lines)
-    if frame is None:
-        return
-    found = corners(content.shape)
+        lines, _ = stage.split(ends)
+        stage.canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
+        stage.taken.add_lines(lines)
+    found = corners(stage.picture.shape)
     for corner, ends in zip(found, needles.ends_mm(nodes, found)[1], strict=True):
-        if split_visible([ends], projection, raster)[0]:
+        if stage.split([ends])[0]:
             text = f"{spell(float(needles.tilt_urad[corner]))} {MICRORADIAN}"
-            tip = [projection.project(ends[1])]
-            write_label(canvas, text, tip, frame, taken, weight="bold", colour=theme.accent)
+            stage.label(text, [stage.projection.project(ends[1])])
 
 
 def _feet(content: Picture, view: str) -> Index:
