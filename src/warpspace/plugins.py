@@ -1,8 +1,13 @@
 """Additions of other packages: analyses, figures, formats, curves and conventions they register."""
 
 import logging
+from collections.abc import Mapping
 from functools import cache
+from typing import Generic, TypeVar
 
+from warpspace.exceptions import OptionError, UnknownNameError
+
+T = TypeVar("T")
 logger = logging.getLogger(__name__)
 GROUP = "warpspace.plugins"
 
@@ -21,3 +26,33 @@ def load_plugins() -> None:
             entry.load()
         except Exception:
             logger.exception("the plug-in %s cannot be loaded and is left out", entry.name)
+
+
+class Registry(dict[str, T], Generic[T]):
+    """Things of one kind by name: those of the house, and what plug-ins register."""
+
+    def __init__(self, what: str, own: Mapping[str, T], key: str = "name") -> None:
+        super().__init__(own)
+        self._what, self._key = what, key
+
+    def register(self, one: T) -> None:
+        """Add one; it then appears wherever these are listed."""
+        name = getattr(one, self._key)
+        if name in self:
+            raise OptionError(f"{self._what} {name!r} is there already; expected another name")
+        self[name] = one
+
+    def unregister(self, name: str) -> None:
+        """Take one away again."""
+        del self[name]
+
+    def every(self) -> tuple[T, ...]:
+        load_plugins()
+        return tuple(self.values())
+
+    def find(self, name: str) -> T:
+        if name not in self:  # plug-ins are looked for only where they may matter
+            load_plugins()
+        if name not in self:
+            raise UnknownNameError(self._what, name, self)
+        return self[name]

@@ -16,9 +16,8 @@ from warpspace.analysis.options import File, Option, Place, option, options_of
 from warpspace.bench.data import DataColumn, read_table, unit_notes
 from warpspace.bench.data import Table as DataTable
 from warpspace.bench.plan import Outcome, Plan, fit_setup, simulate
-from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics.model import Model, complete_coordinates
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry, load_plugins
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -322,30 +321,23 @@ def lay_polar(chart: Lines) -> PolarLayout:
 
 
 _HERE = "warpspace.bench.kinds"
-_TESTS: dict[str, type[BenchTest] | str] = {
-    "positioning": f"{_HERE}.positioning:Positioning",
-    "circular": f"{_HERE}.circular:Circular",
-    "diagonals": f"{_HERE}.diagonals:Diagonals",
-    "straightness": f"{_HERE}.straightness:Straightness",
-    "squareness": f"{_HERE}.straightness:Squareness",
-    "rotary-axis": f"{_HERE}.rotary_axis:RotaryAxis",
-    "sphere": f"{_HERE}.rotary_axis:Sphere",
-    "ball-plate": f"{_HERE}.ball_plate:BallPlate",
-    "cone-frustum": f"{_HERE}.cone_frustum:ConeFrustum",
-}
+_TESTS: Registry[type[BenchTest] | str] = Registry(
+    "test",
+    {
+        "positioning": f"{_HERE}.positioning:Positioning",
+        "circular": f"{_HERE}.circular:Circular",
+        "diagonals": f"{_HERE}.diagonals:Diagonals",
+        "straightness": f"{_HERE}.straightness:Straightness",
+        "squareness": f"{_HERE}.straightness:Squareness",
+        "rotary-axis": f"{_HERE}.rotary_axis:RotaryAxis",
+        "sphere": f"{_HERE}.rotary_axis:Sphere",
+        "ball-plate": f"{_HERE}.ball_plate:BallPlate",
+        "cone-frustum": f"{_HERE}.cone_frustum:ConeFrustum",
+    },
+)
+register_test, unregister_test = _TESTS.register, _TESTS.unregister
 FORMER = {"ballbar": f"{_HERE}.circular:FormerBallbar"}
 """Tests under a former name: understood, not listed."""
-
-
-def register_test(test: type[BenchTest]) -> None:
-    """Add a kind of test; it then appears on the command line and in the app."""
-    if test.name in _TESTS:
-        raise OptionError(f"a test {test.name!r} is there already")
-    _TESTS[test.name] = test
-
-
-def unregister_test(name: str) -> None:
-    del _TESTS[name]
 
 
 def bench_names() -> tuple[str, ...]:
@@ -354,13 +346,5 @@ def bench_names() -> tuple[str, ...]:
 
 
 def find_test(name: str) -> type[BenchTest]:
-    load_plugins()
-    if name not in _TESTS and name not in FORMER:
-        raise UnknownNameError("test", name, _TESTS)
-    found = _TESTS.get(name) or FORMER[name]
-    if isinstance(found, str):
-        loaded: type[BenchTest] = resolve_name(found)
-        if name in _TESTS:
-            _TESTS[name] = loaded
-        return loaded
-    return found
+    found = FORMER[name] if name in FORMER else _TESTS.find(name)
+    return resolve_name(found) if isinstance(found, str) else found

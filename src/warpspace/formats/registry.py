@@ -10,14 +10,14 @@ from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
 
-from warpspace.exceptions import OptionError, SceneError, UnknownNameError
+from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.measured import Imported, merge
 from warpspace.formats.source import MAX_BYTES, Place, Source, read_source, source_of_bytes
 from warpspace.formats.terms import Tables, errors_of
 from warpspace.machine.axes import is_axis_name
 from warpspace.machine.description import Machine
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry
 from warpspace.scene.files import check_file
 
 ERROR, CORRECTION = "error", "correction"
@@ -160,36 +160,29 @@ def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
 
 
 _KINDS = ["csv_own", "volumetric", "rtl", "sinumerik", "heidenhain", "fanuc_3d", "linuxcnc", "skew"]
-_ADDED: dict[str, Format] = {}
 
 
 @cache
-def _own() -> dict[str, Format]:
+def _known() -> Registry[Format]:
     kinds = (resolve_name(f"{__package__}.kinds.{kind}:FORMATS") for kind in _KINDS)
-    return {one.name: one for kind in kinds for one in kind}
+    return Registry("format", {one.name: one for kind in kinds for one in kind})
 
 
 def formats() -> tuple[Format, ...]:
-    load_plugins()
-    return (*_own().values(), *_ADDED.values())
+    return _known().every()
 
 
 def find_format(name: str) -> Format:
-    known = {one.name: one for one in formats()}
-    if name not in known:
-        raise UnknownNameError("format", name, known)
-    return known[name]
+    return _known().find(name)
 
 
 def register_format(found: Format) -> None:
     """Add a format; it is then recognised, listed, read and written."""
-    if found.name in {**_own(), **_ADDED}:
-        raise OptionError(f"format {found.name!r} is there already; expected a name of its own")
-    _ADDED[found.name] = found
+    _known().register(found)
 
 
 def unregister_format(name: str) -> None:
-    del _ADDED[name]
+    _known().unregister(name)
 
 
 def recognise(sources: Sequence[Source]) -> Format:

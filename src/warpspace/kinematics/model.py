@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import Parameter, TravelDirection
 from warpspace.machine.description import ORIGIN, Axis, Machine, Vector
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry
 from warpspace.units import Array
 
 
@@ -128,32 +128,15 @@ class BeforeMotion(Convention):
         return frames.before
 
 
-_CONVENTIONS: dict[str, Convention] = {
-    convention.name: convention for convention in (AfterMotion(), BeforeMotion())
-}
+_CONVENTIONS: Registry[Convention] = Registry(
+    "convention", {one.name: one for one in (AfterMotion(), BeforeMotion())}
+)
+find_convention = _CONVENTIONS.find
+register_convention, unregister_convention = _CONVENTIONS.register, _CONVENTIONS.unregister
 
 
 def convention_names() -> tuple[str, ...]:
-    load_plugins()
-    return tuple(_CONVENTIONS)
-
-
-def find_convention(name: str) -> Convention:
-    # Asked for each parameter of a Jacobian: plug-ins are looked for only where they may matter.
-    if name not in _CONVENTIONS and name not in convention_names():
-        raise UnknownNameError("convention", name, _CONVENTIONS)
-    return _CONVENTIONS[name]
-
-
-def register_convention(convention: Convention) -> None:
-    """Add a convention; it appears in scene files, the app, reports and figures."""
-    if convention.name in _CONVENTIONS:
-        raise OptionError(f"convention {convention.name!r} is there already")
-    _CONVENTIONS[convention.name] = convention
-
-
-def unregister_convention(name: str) -> None:
-    del _CONVENTIONS[name]
+    return tuple(one.name for one in _CONVENTIONS.every())
 
 
 Coordinates = Mapping[str, Array]

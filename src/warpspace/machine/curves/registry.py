@@ -7,21 +7,20 @@ from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.pieces import Pieces
 from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry
 
 CurveKind = type[ErrorFunction]
 Form = tuple[str, ...]  # keys of the table that spells a curve in a scene file
 
-_KINDS: dict[str, CurveKind] = {
-    kind.name: kind
-    for kind in (Constant, Ramp, Poly, Harmonics, Table, TwoArguments, Directional, Pieces)
-}
+_KINDS: Registry[CurveKind] = Registry(
+    "kind of curve",
+    {
+        kind.name: kind
+        for kind in (Constant, Ramp, Poly, Harmonics, Table, TwoArguments, Directional, Pieces)
+    },
+)
 """By name, in the order of lists: simplest first."""
-
-
-def curve_kinds() -> tuple[CurveKind, ...]:
-    load_plugins()
-    return tuple(_KINDS.values())
+curve_kinds, unregister_curve = _KINDS.every, _KINDS.unregister
 
 
 def curve_kind(title: str) -> CurveKind:
@@ -35,16 +34,12 @@ def register_curve(kind: CurveKind) -> None:
     """Add a kind of curve; it appears in scene files, the app, reports and figures."""
     for other in _KINDS.values():
         keys = {form[0] for form in kind.forms} & {form[0] for form in other.forms}
-        if keys or kind.name == other.name or kind.title == other.title:
+        if keys or kind.title == other.title:
             raise OptionError(
-                f"kind of curve {kind.name!r}: {other.name!r} is there already with the same name,"
-                " title or key"
+                f"kind of curve {kind.name!r}: {other.name!r} is there already with the same title"
+                " or key"
             )
-    _KINDS[kind.name] = kind
-
-
-def unregister_curve(name: str) -> None:
-    del _KINDS[name]
+    _KINDS.register(kind)
 
 
 def find_form(raw: Mapping[str, object]) -> tuple[CurveKind, Form] | None:

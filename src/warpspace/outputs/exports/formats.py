@@ -7,7 +7,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from warpspace.exceptions import OptionError
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry, load_plugins
 
 if TYPE_CHECKING:
     from warpspace.picture.model import ScenePicture
@@ -29,26 +29,10 @@ class ExportFormat:
         return resolve_name(self.write) if isinstance(self.write, str) else self.write
 
 
-_FORMATS: dict[str, ExportFormat] = {}
-
-
-def register_format(form: ExportFormat) -> None:
-    """Add a format; it then appears on the command line and in the app."""
-    if form.ending in _FORMATS:
-        raise OptionError(f"export format {form.ending!r} is there already")
-    _FORMATS[form.ending] = form
-
-
-def unregister_format(ending: str) -> None:
-    del _FORMATS[ending]
-
-
-def export_formats() -> tuple[ExportFormat, ...]:
-    load_plugins()
-    return tuple(_FORMATS.values())
-
-
 _HERE = "warpspace.outputs.exports"
+_FORMATS: Registry[ExportFormat] = Registry("export format", {}, key="ending")
+export_formats, register_format = _FORMATS.every, _FORMATS.register
+unregister_format = _FORMATS.unregister
 for _form in (
     ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.meshes:write_glb"),
     ExportFormat(".vts", "ParaView", f"{_HERE}.fields:write_vts"),

@@ -7,9 +7,9 @@ from importlib.resources import files
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
-from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MOST_CONCEPTS
-from warpspace.plugins import load_plugins
+from warpspace.plugins import Registry, load_plugins
 
 if TYPE_CHECKING:
     from warpspace.outputs.drawing.settings import FigureSettings
@@ -36,24 +36,12 @@ class FigureKind:
 
 
 _TABLE = (files("warpspace.outputs.figures") / "catalogue.toml").read_text("utf-8")
-_KINDS = {name: FigureKind(name, **row) for name, row in tomllib.loads(_TABLE).items()}
+_KINDS = Registry(
+    "figure", {name: FigureKind(name, **row) for name, row in tomllib.loads(_TABLE).items()}
+)
 _KINDS["concepts"] = replace(_KINDS["concepts"], most_scenes=MOST_CONCEPTS)
-
-
-def register_figure(kind: FigureKind) -> None:
-    """Add a kind of figure; it then appears on the command line, in the app and in reports."""
-    if kind.name in _KINDS:
-        raise OptionError(f"figure {kind.name!r} is there already")
-    _KINDS[kind.name] = kind
-
-
-def unregister_figure(name: str) -> None:
-    del _KINDS[name]
-
-
-def figure_kinds() -> tuple[FigureKind, ...]:
-    load_plugins()
-    return tuple(_KINDS.values())
+figure_kinds = _KINDS.every
+register_figure, unregister_figure = _KINDS.register, _KINDS.unregister
 
 
 def figure_command(name: str) -> str:
@@ -76,10 +64,7 @@ def draw_figure(
 ) -> "Drawing":
     from warpspace.outputs.drawing.settings import FigureSettings
 
-    load_plugins()
-    kind = _KINDS.get(name)
-    if kind is None:
-        raise UnknownNameError("figure", name, tuple(_KINDS))
+    kind = _KINDS.find(name)
     most = kind.most_scenes or kind.scenes
     if not kind.scenes <= len(scenes) <= most:
         words = "one scene" if kind.scenes == 1 else "two scenes"
