@@ -94,44 +94,23 @@ class Result(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis(ABC):
-    """A question about a scene. A subclass is one file; its fields are its options.
+    """A question about a scene. A subclass is one file; its fields are its options."""
 
-    Attributes
-    ----------
-    name : str
-        Of the command.
-    task : str
-        Where it stands: one of `catalogue.TASKS`.
-    scenes : tuple of (int, int or None)
-        How many scenes it takes, at least and at most.
-    doing : str
-        What is said while it works.
-    makes_scenes : bool
-        Whether its results propose scenes, so that there is an -o.
-    scene_help : str
-        What that -o writes.
-    file_help : str
-        What -o writes where that is no scene; empty where there is no such -o.
-    has_chart : bool
-        Whether its results hold a chart, so that there is a --plot.
-    chart_help : str
-        What that --plot draws.
-    has_table : bool
-        Whether its results hold a table for --csv.
-    """
-
-    name: ClassVar[str]
-    task: ClassVar[Task]
+    name: ClassVar[str]  # of the command
+    task: ClassVar[Task]  # where it stands: one of `catalogue.TASKS`
+    # how many scenes it takes, at least and at most
     scenes: ClassVar[tuple[int, int | None]] = (1, 1)
-    doing: ClassVar[str] = "computing"
+    doing: ClassVar[str] = "computing"  # what is said while it works
+    # whether its results propose scenes, so that there is an -o
     makes_scenes: ClassVar[bool] = False
-    scene_help: ClassVar[str] = "Write the scene proposed last"
+    scene_help: ClassVar[str] = "Write the scene proposed last"  # what that -o writes
+    # what -o writes where that is no scene; empty where there is no such -o
     file_help: ClassVar[str] = ""
     file_endings: ClassVar[tuple[str, ...]] = ()  # of what -o writes there; any where empty
     needs_file: ClassVar[bool] = False  # whether a command line must give -o
-    has_chart: ClassVar[bool] = False
-    chart_help: ClassVar[str] = "chart"
-    has_table: ClassVar[bool] = False
+    has_chart: ClassVar[bool] = False  # whether its results hold a chart, so that there is a --plot
+    chart_help: ClassVar[str] = "chart"  # what that --plot draws
+    has_table: ClassVar[bool] = False  # whether its results hold a table for --csv
 
     def __post_init__(self) -> None:
         """Take words and mappings as Python users give them; refuse numbers out of range."""

@@ -36,21 +36,13 @@ UNIT_ENDINGS = ("_mm", "_um", "_urad", "_deg")
 
 @dataclass(frozen=True, slots=True)
 class Grammar:
-    """How a value is typed that is no number, word or choice: ``Annotated[T, Grammar(…)]``.
+    """How a value is typed that is no number, word or choice: ``Annotated[T, Grammar(…)]``."""
 
-    Attributes
-    ----------
-    metavar : str
-        What stands in its place in a help text.
-    read : callable
-        Takes what was typed and the scene, gives the value, which is hashable; raises `ValueError`
-        with what was expected.
-    many : bool
-        Whether it may be typed in several parts, with commas between or one by one.
-    """
-
-    metavar: str
+    metavar: str  # what stands in its place in a help text
+    # takes what was typed and the scene, gives the value, which is hashable; raises `ValueError`
+    # with what was expected
     read: Callable[[str, Any], Any]
+    # whether it may be typed in several parts, with commas between or one by one
     many: bool = False
     each: bool = False  # whether it may be given several times, each value read by itself
     is_file: bool = False  # whether it names a file that is read

@@ -53,33 +53,15 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class BenchTest(Analysis):
-    """A test with its options. A subclass is a kind of test, its fields are its options.
-
-    Attributes
-    ----------
-    name : str
-        As it is asked for.
-    title : str
-        What it is.
-    standard : str
-        Where its formulas come from.
-    words : str
-        What is done and what comes out, a few sentences.
-    columns : tuple of DataColumn
-        Of a file of readings.
-    at : mapping of str to float, mm or degrees
-    tool_extension_mm : float, mm
-    data : str, optional
-        File of measured readings.
-    """
+    """A test with its options. A subclass is a kind of test, its fields are its options."""
 
     task = "measure"
     has_chart = True
     chart_help = "figure of the test"
-    title: ClassVar[str]
-    standard: ClassVar[str]
-    words: ClassVar[str]
-    columns: ClassVar[tuple[DataColumn, ...]]
+    title: ClassVar[str]  # what it is
+    standard: ClassVar[str]  # where its formulas come from
+    words: ClassVar[str]  # what is done and what comes out, a few sentences
+    columns: ClassVar[tuple[DataColumn, ...]]  # of a file of readings
     at: Place = option(
         (),
         "Where axes stand that the test does not move",

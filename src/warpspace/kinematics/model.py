@@ -26,24 +26,13 @@ class AxisFrames:
 
 
 class Convention(ABC):
-    """The order of the constant errors, the motion and the component errors of an axis.
+    """The order of the constant errors, the motion and the component errors of an axis."""
 
-    Attributes
-    ----------
-    name : str
-        As scene files have it, for instance "after_motion".
-    title : str
-        In lists of choices.
-    place : str
-        Where component errors stand in the product, for instance "after the motion".
-    meaning : str
-        What component errors do, after the words "component errors".
-    """
-
-    name: ClassVar[str]
-    title: ClassVar[str]
+    name: ClassVar[str]  # as scene files have it, for instance "after_motion"
+    title: ClassVar[str]  # in lists of choices
+    # where component errors stand in the product, for instance "after the motion"
     place: ClassVar[str]
-    meaning: ClassVar[str]
+    meaning: ClassVar[str]  # what component errors do, after the words "component errors"
 
     @abstractmethod
     def factors(

@@ -209,33 +209,18 @@ Spell = Callable[[float], str]  # writes one number for people
 
 @dataclass(frozen=True)
 class ErrorFunction(ABC):
-    """A value that may vary along an axis. A subclass is a kind of curve.
+    """A value that may vary along an axis. A subclass is a kind of curve."""
 
-    Attributes
-    ----------
-    span : tuple of float, (2,)
-        Lower and upper end of the axis range it is meant for, mm or degrees.
-    name : str
-        Short name of the kind, for instance "poly".
-    title : str
-        Name of the kind in lists, for instance "polynomial".
-    forms : tuple of tuple of str
-        The tables that spell it in a scene file, each by its keys; none where it is a number.
-    row_words : str
-        How its numbers are written as rows.
-    slider : str
-        What the amplitude is; the name of the kind and the axis stand in braces.
-    edited_as_rows : bool
-        Whether people can write its numbers as rows; if not, it comes from files.
-    """
-
-    name: ClassVar[str]
-    title: ClassVar[str]
+    name: ClassVar[str]  # short name of the kind, for instance "poly"
+    title: ClassVar[str]  # name of the kind in lists, for instance "polynomial"
+    # the tables that spell it in a scene file, each by its keys; none where it is a number
     forms: ClassVar[tuple[tuple[str, ...], ...]]
-    row_words: ClassVar[str]
+    row_words: ClassVar[str]  # how its numbers are written as rows
+    # what the amplitude is; the name of the kind and the axis stand in braces
     slider: ClassVar[str] = "{name} along {axis}; this is its largest value"
+    # whether people can write its numbers as rows; if not, it comes from files
     edited_as_rows: ClassVar[bool] = True
-    span: Span
+    span: Span  # lower and upper end of the axis range it is meant for, mm or degrees
 
     @abstractmethod
     def evaluate(self, position: Array) -> Array:
