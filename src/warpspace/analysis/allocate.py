@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +32,8 @@ from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import compare_orders
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import COST, LIMIT_UM, MAX_HALF_WIDTH, PROBABILITY
+from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
 
 DIGITS = 3
 """Significant digits of an allocated half width; it is rounded down, so that the limit is kept."""
@@ -49,7 +47,7 @@ Progress = Callable[[float], object]
 """Called with the share of the work that was done since the last call."""
 
 
-def read_costs(text: str, _scene: "Scene") -> tuple[tuple[str, float], ...]:
+def read_costs(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
     """Read costs by parameter."""
     return tuple(read_numbers(text, "KEY=NUMBER", "EA0Z=4,EXX=0.5").items())
 
@@ -101,7 +99,7 @@ class Allocate(KeptLimit):
     )
     fixed: Fixed = option((), "Errors whose tolerance stays as it is")
 
-    def run(self, scene: "Scene", watch: Watch, /) -> "AllocateResult":
+    def run(self, scene: Scene, watch: Watch, /) -> "AllocateResult":
         done = 0.0
 
         def report(share: float) -> None:
@@ -146,7 +144,7 @@ class AllocateResult(Result):
     """Tolerances that keep a limit, and how sure that is."""
 
     asked: Allocate
-    scene: "Scene | None" = None
+    scene: Scene | None = None
     draws: Draws  # the tolerances before
     half_width: Array  # [K], µm or µrad; after, in the order of `draws.keys`
     free: NDArray[np.bool_]  # [K]; which of them were allocated

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
+from warpspace.scene.model import Scene, choose_view, evaluate_grid
 from warpspace.units import Array
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
 
 PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
 
@@ -50,9 +48,7 @@ class Certify(Analysis):
     nodes: int = option(11, "Nodes per axis of the working volume", low=3, high=41, flag="--grid")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
 
-    def run(self, scene: "Scene", watch: Watch, /) -> "CertifyResult":
-        from warpspace.scene.model import choose_view, evaluate_grid
-
+    def run(self, scene: Scene, watch: Watch, /) -> "CertifyResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from string import ascii_uppercase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +25,8 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import TOLERANCE_CLASSES, ErrorSet, ToleranceSet
 from warpspace.machine.limits import LIMIT_UM, MOST_CONCEPTS
+from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
 
 THREE = ("mean", "P95", "max")
 NAMED = 3  # errors that are named of each machine
@@ -39,7 +37,7 @@ LETTERS = ascii_uppercase[:MOST_CONCEPTS]  # what the machines are called, in th
 class Concept:
     """One machine among others."""
 
-    scene: "Scene"  # with the tolerances that were taken, its errors absolute
+    scene: Scene  # with the tolerances that were taken, its errors absolute
     sampled: MonteCarlo  # |E| of machines within tolerance
     # what each tolerance adds to the variance of E, the largest first
     shares: SharesResult
@@ -109,10 +107,10 @@ class Concepts(KeptLimit):
         False, "Each scene with its own tolerances instead of those of the first one by class"
     )
 
-    def run(self, scene: "Scene", watch: Watch, /) -> "ConceptsResult":
+    def run(self, scene: Scene, watch: Watch, /) -> "ConceptsResult":
         return self.run_all((scene,), watch)
 
-    def run_all(self, scenes: "Sequence[Scene]", watch: Watch, /) -> "ConceptsResult":
+    def run_all(self, scenes: Sequence[Scene], watch: Watch, /) -> "ConceptsResult":
         total, done = self.samples * len(scenes), 0
 
         def advance(count: int) -> None:
@@ -199,7 +197,7 @@ class ConceptsResult(Result):
 
 
 def compare_concepts(
-    scenes: "Sequence[Scene]",
+    scenes: Sequence[Scene],
     asked: Concepts | None = None,
     *,
     progress: Progress | None = None,
@@ -215,7 +213,7 @@ def compare_concepts(
     return tuple(found)
 
 
-def with_equal_tolerances(scenes: "Sequence[Scene]", *, own: bool = False) -> "tuple[Scene, ...]":
+def with_equal_tolerances(scenes: Sequence[Scene], *, own: bool = False) -> tuple[Scene, ...]:
     """Give scenes the tolerances of the first one by class, and no point held still."""
     absolute = [replace(scene, reference=None, placed=False) for scene in scenes]
     if own or not scenes:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,10 +25,8 @@ from warpspace.kinematics.chain import columns, nominal_point
 from warpspace.kinematics.model import Coordinates, Model
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorSet
+from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
 
 # --- Which tolerances matter: how the parameters share the variance of the volumetric error -------
 
@@ -165,7 +162,7 @@ class Shares(Sampled):
         unset="none",
     )
 
-    def run(self, scene: "Scene", watch: Watch, /) -> "SharesResult":
+    def run(self, scene: Scene, watch: Watch, /) -> "SharesResult":
         if self.sobol is not None and self.sobol < 2:
             raise OptionError(f"{{sobol}} {self.sobol}; expected a power of two, 2 or above")
         plan = Plan(seed=self.seed, cylinder=self.cylinder)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,11 +29,8 @@ from warpspace.kinematics.chain import columns as responses
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.machine.axes import Parameter, is_linear, is_rotary, parameter
 from warpspace.machine.description import Machine
+from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
-
 
 # --- Levers taken apart ---------------------------------------------------------------------------
 # The motions and offsets between an error and the functional point.
@@ -280,7 +277,7 @@ class Gains(Analysis):
         "Key errors: the largest that together make up this share of the sum of squares",
     )
 
-    def run(self, scene: "Scene", _watch: Watch, /) -> "GainsResult":
+    def run(self, scene: Scene, _watch: Watch, /) -> "GainsResult":
         if self.at and self.over_travel:
             raise OptionError("{at}: expected one point, and none with {over_travel}")
         if self.step_deg is not None and not self.over_travel:
@@ -294,7 +291,7 @@ class Gains(Analysis):
             found = gains_at(scene.model, self.loop, keys, place, self.share)
         return GainsResult(gains=found, asked=self, machine=scene.machine)
 
-    def warnings(self, scene: "Scene") -> Iterable[str]:
+    def warnings(self, scene: Scene) -> Iterable[str]:
         return (f"{{at}} {words}" for words in outside_travel(scene.machine, dict(self.at)))
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +11,8 @@ from warpspace.analysis.options import LOOP_HELP, Place, option, outside_travel,
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.axes import is_linear
+from warpspace.scene.model import Scene, evaluate
 from warpspace.units import Array
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
 
 SHOWN = 21  # points that the table of a longer line shows; the file has all
 
@@ -44,9 +41,7 @@ class Line(Analysis):
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     exact: bool = option(False, "The exact chain instead of the first order")
 
-    def run(self, scene: "Scene", watch: Watch, /) -> "LineResult":
-        from warpspace.scene.model import evaluate
-
+    def run(self, scene: Scene, watch: Watch, /) -> "LineResult":
         ends = self._ends(scene)
         share = np.linspace(0.0, 1.0, self.points)
         axes = {name: low + (high - low) * share for name, (low, high) in ends.items()}
@@ -64,7 +59,7 @@ class Line(Analysis):
             title=f"{scene.title} · {self.loop} loop",
         )
 
-    def _ends(self, scene: "Scene") -> dict[str, tuple[float, float]]:
+    def _ends(self, scene: Scene) -> dict[str, tuple[float, float]]:
         ranges, stand = scene.workspace.ranges, scene.workspace.positions
         low = {name: ranges.get(name, (at,))[0] for name, at in stand.items()}
         high = {name: ranges.get(name, (at,))[-1] for name, at in stand.items()}
@@ -78,7 +73,7 @@ class Line(Analysis):
             raise OptionError("{start} and {end} are one point; expected two")
         return ends
 
-    def warnings(self, scene: "Scene") -> Iterator[str]:
+    def warnings(self, scene: Scene) -> Iterator[str]:
         for name, place in (("start", self.start), ("end", self.end)):
             for words in outside_travel(scene.machine, dict(place)):
                 yield f"{{{name}}} {words}"

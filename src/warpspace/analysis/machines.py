@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import islice, product
 from math import prod
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
@@ -24,9 +24,7 @@ from warpspace.field.evaluate import SecondOrder, compare_orders
 from warpspace.machine.errors import TOLERANCE_CLASSES
 from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, SWEEP_CASES
 from warpspace.scene.files import parse_number, parse_whole
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, second_order
 
 NUMBERS = {
     "mean": "mean_um", "RMS": "rms_um", "median": "median_um", "P95": "p95_um", "P99": "p99_um",
@@ -50,7 +48,7 @@ class Source(StrEnum):
     UNCERTAINTY = "uncertainty"
 
 
-def read_steps(text: str, _scene: "Scene") -> tuple[str, tuple[float, ...]]:
+def read_steps(text: str, _scene: Scene) -> tuple[str, tuple[float, ...]]:
     """Read half widths of one parameter or class."""
     key, _, values = text.partition("=")
     try:
@@ -79,7 +77,7 @@ Steps: TypeAlias = Annotated[
 class SweepPoint:
     """One scene with one choice of half widths."""
 
-    scene: "Scene"  # with the tolerances that were taken
+    scene: Scene  # with the tolerances that were taken
     half_widths: Mapping[str, float]  # µm or µrad; those that are swept, by key or class
     sampled: MonteCarlo
 
@@ -156,12 +154,12 @@ class Machines(SampledMachines):
         False, "A row for each scene, as --tolerance gives for each combination of half widths"
     )
 
-    def run(self, scene: "Scene", watch: Watch, /) -> "MachinesResult":
+    def run(self, scene: Scene, watch: Watch, /) -> "MachinesResult":
         return self.run_all((scene,), watch)
 
     def run_all(
         self,
-        scenes: "Sequence[Scene]",
+        scenes: Sequence[Scene],
         watch: Watch,
         /,
         *,
@@ -231,7 +229,7 @@ class Machines(SampledMachines):
 
     def points(
         self,
-        scenes: "Iterable[Scene]",
+        scenes: Iterable[Scene],
         *,
         executor: Executor | None = None,
         workers: int | None = None,
@@ -257,7 +255,7 @@ class Machines(SampledMachines):
         ):
             yield SweepPoint(*waiting.popleft(), sampled)
 
-    def _case(self, scene: "Scene", plan: Plan) -> Case:
+    def _case(self, scene: Scene, plan: Plan) -> Case:
         if self.source is Source.TOLERANCES:
             return self.case(scene, plan)
         from warpspace.analysis.measured import uncertain_case
@@ -267,8 +265,6 @@ class Machines(SampledMachines):
     def _left_out(self, points: Sequence[SweepPoint], widest: SweepPoint) -> SecondOrder:
         if self.source is Source.TOLERANCES:
             return sampled_second_order((widest.scene, widest.sampled))
-        from warpspace.scene.model import second_order
-
         return max(second_order(point.scene, self.loop) for point in points)
 
 
@@ -341,7 +337,7 @@ class MachinesResult(Result):
         if (left := len(rows) - PRINTED) > 0:
             yield f"… and {left:,} {'rows' if asked.in_rows else 'scenes'} more"
 
-    def _one(self, scene: "Scene", found: MonteCarlo) -> Iterator[Block]:
+    def _one(self, scene: Scene, found: MonteCarlo) -> Iterator[Block]:
         from warpspace.analysis.contributions import expected_square
 
         asked = self.asked
@@ -430,7 +426,7 @@ def sampled_histogram(
     )
 
 
-def printed_um(scene: "Scene", found: MonteCarlo) -> float | None:
+def printed_um(scene: Scene, found: MonteCarlo) -> float | None:
     """Give what the thesis prints for this distribution; None where it has none."""
     from warpspace.analysis.thesis import printed_tables
 
@@ -440,17 +436,17 @@ def printed_um(scene: "Scene", found: MonteCarlo) -> float | None:
     return float(printed) if printed and here and found.plan.over == Over.SAMPLED else None
 
 
-def sampled_second_order(*found: "tuple[Scene, MonteCarlo]") -> SecondOrder:
+def sampled_second_order(*found: tuple[Scene, MonteCarlo]) -> SecondOrder:
     """Compare first order and exact chain on machines drawn for the scene with the largest |E|."""
     return compare_orders(*both_orders(case_of(*max(found, key=lambda one: one[1].max_um))))
 
 
-def case_of(scene: "Scene", found: MonteCarlo) -> Case:
+def case_of(scene: Scene, found: MonteCarlo) -> Case:
     return Case(scene.model, found.draws, scene.workspace, found.view, found.plan)
 
 
 def sweep(
-    scenes: "Iterable[Scene]",
+    scenes: Iterable[Scene],
     half_widths: Mapping[str, Sequence[float]] | None = None,
     *,
     workers: int | None = None,
@@ -499,7 +495,7 @@ def sweep(
     )
 
 
-def with_half_widths(scene: "Scene", half_widths: Mapping[str, float]) -> "Scene":
+def with_half_widths(scene: Scene, half_widths: Mapping[str, float]) -> Scene:
     if not half_widths:
         return scene
     tolerances = scene.tolerances

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,7 @@ from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_ERROR
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, choose_view, evaluate_grid
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # parts of the volume whose limit the table says
 
@@ -41,9 +38,7 @@ class Reach(Analysis):
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     nodes: int = option(21, "Nodes per axis of the working volume", low=2, high=61, flag="--grid")
 
-    def run(self, scene: "Scene", watch: Watch, /) -> "ReachResult":
-        from warpspace.scene.model import choose_view, evaluate_grid
-
+    def run(self, scene: Scene, watch: Watch, /) -> "ReachResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         field = evaluate_grid(scene, grid, choose_view(scene, self.loop))
         watch(0.3)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from warpspace.analysis.description import Analysis, Change, Result, Watch, sile
 from warpspace.analysis.options import ALL, LOOP_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Statistics, Summary, volume_statistics
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import ErrorBasis, amplitudes_of, placed_words
+from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
@@ -23,11 +23,8 @@ from warpspace.machine.limits import (
     REPAIR_COUNT,
     REPAIR_NODES,
 )
+from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order
 from warpspace.units import Array, spell, spell_short
-
-if TYPE_CHECKING:
-    from warpspace.field.evaluate import View
-    from warpspace.scene.model import Scene
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
 MOST_BARS, MOST_VALUES = 14, 3
@@ -130,7 +127,7 @@ class Repair(Analysis):
         """The loop, where none is given too."""
         return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
 
-    def seen(self, scene: "Scene") -> "tuple[Scene, View]":
+    def seen(self, scene: Scene) -> tuple[Scene, View]:
         """Give a scene as it is looked at, and how."""
         if self.placed and self.seen_loop is not Loop.RELATIVE:
             raise OptionError(
@@ -140,9 +137,7 @@ class Repair(Analysis):
         scene = replace(scene, placed=True) if self.placed else scene
         return scene, scene.view(self.seen_loop)
 
-    def run(self, scene: "Scene", watch: Watch = silent, /) -> "RepairResult":
-        from warpspace.scene.model import evaluate_grid, grid_basis, second_order
-
+    def run(self, scene: Scene, watch: Watch = silent, /) -> "RepairResult":
         scene, view = self.seen(scene)
         nodes = build_grid(scene.model, scene.workspace, self.grid)
         basis = grid_basis(scene, nodes, view, self.included(scene))
@@ -159,7 +154,7 @@ class Repair(Analysis):
         left_out = second_order(scene, self.seen_loop)
         return replace(found, repairs=tuple(sets), second_order=left_out)
 
-    def included(self, scene: "Scene") -> Sequence[str]:
+    def included(self, scene: Scene) -> Sequence[str]:
         """List the errors that are looked at: all of a scene."""
         return scene.parameter_keys
 
@@ -176,7 +171,7 @@ class RepairResult(Result):
     keys = ("objective", "before", "errors", "adjustable", "repairs", "all_sets_compared")
     no_change = "there is nothing to adjust in this loop"
     asked: Repair
-    scene: "Scene"
+    scene: Scene
     before: Summary
     # every error that is not zero and acts in the loop; the one whose best value helps the
     # objective most comes first
@@ -321,7 +316,7 @@ class RepairResult(Result):
         )
 
 
-def repaired(scene: "Scene", adjust: Mapping[str, float]) -> "Scene":
+def repaired(scene: Scene, adjust: Mapping[str, float]) -> Scene:
     errors = scene.errors
     for key, value in adjust.items():
         errors = errors.with_amplitude(key, value, scene.axis_span(parameter(key).axis))
@@ -333,7 +328,7 @@ def find_repairs(
     grid: Grid,
     amplitudes: Array,
     asked: Repair,
-    scene: "Scene",
+    scene: Scene,
     watch: Watch = silent,
 ) -> RepairResult:
     """Find what repairs a machine: from the first-order response of the nodes of a grid."""

@@ -1,7 +1,7 @@
 """Options of every analysis that draws machines from the tolerances of a scene."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from warpspace.analysis.cases import DEFAULT_NODES, DEFAULT_SAMPLES, Case, Cylinder, Over, Plan
 from warpspace.analysis.description import Analysis
@@ -10,12 +10,10 @@ from warpspace.analysis.options import LOOP_HELP, Grammar, option
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import LOCAL_WORKERS, SAMPLES
 from warpspace.scene.files import parse_number
-
-if TYPE_CHECKING:
-    from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene
 
 
-def read_cylinder(text: str, _scene: "Scene | None" = None) -> Cylinder:
+def read_cylinder(text: str, _scene: Scene | None = None) -> Cylinder:
     """Read the size of a workpiece as a user types it, ``550x450``."""
     first, _, second = text.lower().replace("×", "x").partition("x")
     try:
@@ -24,9 +22,7 @@ def read_cylinder(text: str, _scene: "Scene | None" = None) -> Cylinder:
         raise ValueError("expected diameter x height in mm, as in 550x450") from None
 
 
-def scene_draws(
-    scene: "Scene", loop: Loop, distribution: Distribution | str, *, clip: bool
-) -> Draws:
+def scene_draws(scene: Scene, loop: Loop, distribution: Distribution | str, *, clip: bool) -> Draws:
     keys = loop_keys(scene.model, loop, scene.parameter_keys)
     return build_draws(scene.tolerances, keys, distribution, clip=clip, source=scene.name)
 
@@ -60,10 +56,10 @@ class Sampled(Analysis):
     def drawn(self) -> Distribution:
         return self.distribution or Distribution.UNIFORM
 
-    def draws(self, scene: "Scene") -> Draws:
+    def draws(self, scene: Scene) -> Draws:
         return scene_draws(scene, self.loop, self.drawn, clip=self.clip)
 
-    def case(self, scene: "Scene", plan: Plan) -> Case:
+    def case(self, scene: Scene, plan: Plan) -> Case:
         return Case(scene.model, self.draws(scene), scene.workspace, scene.view(self.loop), plan)
 
 
