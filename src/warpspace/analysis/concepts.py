@@ -8,11 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.contributions import (
-    Share,
-    SharesResult,
-    variance_contributions,
-)
+from warpspace.analysis.contributions import Share, SharesResult, variance_contributions
 from warpspace.analysis.description import Result, Watch
 from warpspace.analysis.machines import sampled_second_order
 from warpspace.analysis.montecarlo import MonteCarlo, Progress, montecarlo

@@ -16,13 +16,7 @@ from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_wor
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import Parameter, parameter
-from warpspace.machine.limits import (
-    MAX_ERROR,
-    MAX_TEXT,
-    MIN_HALF_WIDTH,
-    REPAIR_COUNT,
-    REPAIR_NODES,
-)
+from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
 from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order
 from warpspace.units import Array, spell, spell_short
 

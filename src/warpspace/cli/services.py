@@ -6,16 +6,15 @@ Figures are drawn in a process of their own. All is imported when it is done, as
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from warpspace.cli.options import write_text
-from warpspace.exceptions import OptionError, RenderError, WorkersLostError
+from warpspace.exceptions import OptionError
 from warpspace.outputs.exports.formats import ExportFormat, export_formats, register_format
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.catalogue import figure_kinds
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future
     from pathlib import Path
 
     import numpy as np
@@ -28,11 +27,13 @@ if TYPE_CHECKING:
     from warpspace.app.evaluation.live_picture import LivePicture
     from warpspace.formats.compensation.compensate import Compensation
     from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.outputs.processes import FigureWorker
     from warpspace.picture.model import ScenePicture
     from warpspace.scene.model import Scene
 
 MOST_RENDERERS = 2  # figures drawn at the same time for all tabs together
 POLL_S = 0.1
+MAPS = "warpspace.outputs.charts.results:compensation_maps"
 _renderers = threading.Semaphore(MOST_RENDERERS)
 
 
@@ -106,13 +107,13 @@ def draw_view(
     found = picture.statistics
     numbers = {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
     words, px_per_mm = seen_words(picture, camera, *pixels.shape[:2])
-    return _apart(
-        "picture was", cancelled, draw, pixels, picture.title, look_words(picture), picture.scale,
-        marked(picture),
+    given = (
+        pixels, picture.title, look_words(picture), picture.scale, marked(picture),
         [(f"{n} {picture.length_words}", f"{spell(v)} µm") for n, v in numbers.items()],
         None if px_per_mm is None else (px_per_mm, picture.exaggeration), words,
-        dark=picture.state.shown.dark,
+        picture.state.shown.dark,
     )  # fmt: skip
+    return _drawn(lambda worker: worker.call("picture", draw, *given), cancelled)
 
 
 def draw_concepts(
@@ -127,40 +128,33 @@ def draw_concepts(
 def draw_compensation(
     found: "Compensation", dark: bool, narrow: bool, cancelled: threading.Event
 ) -> bytes:
-    from warpspace.outputs.save import draw_maps
-
-    return _apart("maps were", cancelled, draw_maps, found, dark=dark, narrow=narrow)
-
-
-def _apart(
-    what: str, cancelled: threading.Event, draw: Callable[..., bytes], *given: Any, **named: Any
-) -> bytes:
-    """Draw in a process of its own, which ends when it is cancelled."""
-    from warpspace.outputs.processes import ProcessPool
-
-    with _turn(cancelled):
-        pool = ProcessPool(1)
-        try:
-            return _wait(pool.submit(draw, *given, **named), cancelled, pool.kill, what)
-        except WorkersLostError:
-            raise RenderError(f"the {what} not drawn: their process has ended") from None
-        finally:
-            pool.kill()
+    return _drawn(
+        lambda worker: worker.begin_chart("maps", MAPS, "png", found, dark, narrow), cancelled
+    )
 
 
 def _render(
-    name: str,
-    scenes: "Sequence[Scene]",
-    settings: "FigureSettings",
-    cancelled: threading.Event,
+    name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", cancelled: threading.Event
 ) -> bytes:
-    from concurrent.futures import ThreadPoolExecutor
+    return _drawn(lambda worker: worker.begin(name, scenes, settings, "png"), cancelled)
 
+
+def _drawn(
+    begin: "Callable[[FigureWorker], Callable[[], bytes]]", cancelled: threading.Event
+) -> bytes:
+    from concurrent.futures import ThreadPoolExecutor, wait
+
+    from warpspace.app.documents.services import CancelledError
     from warpspace.outputs.processes import FigureWorker
 
     with _turn(cancelled), FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
-        drawn = caller.submit(worker.render, name, scenes, settings, "png")
-        return _wait(drawn, cancelled, lambda: worker.close(wait=False), "figure was")
+        drawn = caller.submit(begin(worker))
+        while not wait([drawn], POLL_S).done:
+            if cancelled.is_set():
+                worker.close(wait=False)
+                wait([drawn])
+                raise CancelledError("the figure was cancelled")
+        return drawn.result()
 
 
 @contextmanager
@@ -174,21 +168,6 @@ def _turn(cancelled: threading.Event) -> Generator[None]:
         yield
     finally:
         _renderers.release()
-
-
-def _wait(
-    drawn: "Future[bytes]", cancelled: threading.Event, end: Callable[[], None], what: str
-) -> bytes:
-    from concurrent.futures import wait
-
-    from warpspace.app.documents.services import CancelledError
-
-    while not wait([drawn], POLL_S).done:
-        if cancelled.is_set():
-            end()
-            wait([drawn])
-            raise CancelledError(f"the {what} cancelled")
-    return drawn.result()
 
 
 def write_export(picture: "LivePicture", ending: str) -> bytes:

@@ -275,13 +275,14 @@ class FigureWorker:
         self, name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form: str
     ) -> Callable[[], bytes]:
         """Begin to draw a figure; what is given waits for it."""
-        return self._begin(name, _draw, name, tuple(scenes), settings, form)
+        return self.call(name, _draw, name, tuple(scenes), settings, form)
 
     def begin_chart(self, name: str, draw: str, form: str, *arguments: Any) -> Callable[[], bytes]:
         """Begin to draw the chart that "module:function" gives; the module is imported there."""
-        return self._begin(name, _draw_chart, draw, form, *arguments)
+        return self.call(name, _draw_chart, draw, form, *arguments)
 
-    def _begin(self, name: str, draw: Callable[..., bytes], *arguments: Any) -> Callable[[], bytes]:
+    def call(self, name: str, draw: Callable[..., bytes], *arguments: Any) -> Callable[[], bytes]:
+        """Begin to draw with a function of a module's own level; what is given waits for it."""
         with self._lock:
             if self._pool is None:
                 self._pool = ProcessPool(1, tasks_per_process=PICTURES_PER_PROCESS)

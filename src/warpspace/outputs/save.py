@@ -13,21 +13,12 @@ from matplotlib.figure import Figure
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from warpspace.outputs.charts.blocks import on_ground
-from warpspace.outputs.charts.results import compensation_chart, compensation_column
-from warpspace.outputs.drawing.settings import (
-    DARK,
-    FIGURE_ENDINGS,
-    LIGHT,
-    SAVE_RC,
-    FigureSettings,
-)
+from warpspace.outputs.drawing.settings import FIGURE_ENDINGS, SAVE_RC, FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.scene.model import Scene
 
 if TYPE_CHECKING:
-    from warpspace.formats.compensation.compensate import Compensation
     from warpspace.outputs.drawing.sheet import Drawing
 
 
@@ -72,12 +63,6 @@ def write_figure(
     with write_atomically(path, overwrite=force) as temporary:
         temporary.write_bytes(content)
     return Path(path)
-
-
-def draw_maps(found: "Compensation", *, dark: bool, narrow: bool) -> bytes:
-    """Draw the maps of a compensation as a PNG: the column, or the sheet of the command."""
-    with on_ground(DARK if dark else LIGHT):
-        return encode_figure((compensation_column if narrow else compensation_chart)(found), "png")
 
 
 def write_chart(figure: Figure, path: str | Path, *, overwrite: bool = True) -> Path:

@@ -32,7 +32,6 @@ def draw_view(
     rows: Sequence[Row],
     bars: tuple[float, float] | None,
     words: Sequence[tuple[str, Array]],
-    *,
     dark: bool,
 ) -> bytes:
     """Draw it as a PNG.

@@ -9,13 +9,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.machine import limits
-from warpspace.machine.curves.curve import (
-    MISSING,
-    ErrorFunction,
-    Points,
-    ValueReader,
-    is_number,
-)
+from warpspace.machine.curves.curve import MISSING, ErrorFunction, Points, ValueReader, is_number
 from warpspace.machine.curves.registry import find_form, spell_forms
 from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments

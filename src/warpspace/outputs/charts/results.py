@@ -26,9 +26,11 @@ from warpspace.outputs.charts.blocks import (
     charts_sheet,
     ground,
     histogram_chart,
+    on_ground,
     sheet,
     style,
 )
+from warpspace.outputs.drawing.settings import DARK, LIGHT
 from warpspace.units import Array
 
 if TYPE_CHECKING:
@@ -176,6 +178,12 @@ def compensation_column(found: "Compensation") -> Figure:
                     bar.ax.tick_params(labelsize=WORDS - 2.0)
                     bar.ax.set_title("|E| [µm]", fontsize=WORDS - 1.5, pad=6.0)
         return figure
+
+
+def compensation_maps(found: "Compensation", dark: bool, narrow: bool) -> Figure:
+    """Draw the column of the app, or the sheet of the command."""
+    with on_ground(DARK if dark else LIGHT):
+        return (compensation_column if narrow else compensation_chart)(found)
 
 
 def _planes(found: "Compensation") -> list[tuple[int, int]]:

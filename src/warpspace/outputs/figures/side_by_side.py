@@ -15,12 +15,7 @@ from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import draw_map, draw_maps_alike
 from warpspace.outputs.drawing.render import Rect, fit_projection
-from warpspace.outputs.drawing.settings import (
-    SIZES,
-    FigureSettings,
-    evaluate_for,
-    shared_colours,
-)
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for, shared_colours
 from warpspace.outputs.drawing.sheet import (
     Drawing,
     DrawnMap,

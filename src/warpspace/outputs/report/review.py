@@ -21,12 +21,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.report.render import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
-from warpspace.picture.model import (
-    Exaggeration,
-    ScenePicture,
-    evaluate_picture,
-    same_nodes,
-)
+from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
 from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r, spell_point
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MINUS, spell, spell_short

@@ -44,12 +44,7 @@ from warpspace.outputs.report.review import (
 from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.model import ScenePicture
 from warpspace.picture.traces import trace_lines
-from warpspace.picture.words import (
-    convention_sentences,
-    list_axes,
-    reference_words,
-    spell_factor,
-)
+from warpspace.picture.words import convention_sentences, list_axes, reference_words, spell_factor
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
