@@ -22,8 +22,6 @@ UM_PER_MM_URAD = 1e-3  # displacement in µm of a lever of 1 mm turned by 1 µra
 MICROMETRE = "µm"
 MICRORADIAN = "µrad"
 
-# --- Numbers on the screen, in pictures and in files ----------------------------------------------
-
 MINUS = "\N{MINUS SIGN}"
 THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
 

@@ -116,9 +116,6 @@ def times_a_turn(values: Array) -> int | None:
     return int(np.argmax(strength > strength.max() * (1.0 - 1e-9))) + 1
 
 
-# --- Circles through traced points ---------------------------------------------------------------
-
-
 def fit_circle(points_mm: Array) -> tuple[Array, float, Array]:
     """Find centre, [3], radius and normal, [3], of points, [n, 3], that lie on a circle, mm."""
     middle = points_mm.mean(axis=0)

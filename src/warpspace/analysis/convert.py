@@ -217,9 +217,6 @@ def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
     return position, tilt
 
 
-# --- What is asked for, as it is typed ------------------------------------------------------------
-
-
 def _with(target: Target, scene: Scene, name: str, text: str) -> Target:
 
     def by_axis(read: Callable[[str], object], kinds: str = "all") -> dict[str, Any]:

@@ -24,8 +24,6 @@ from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene
 
-# --- Printed numbers, the scenes they belong to, and rows -----------------------------------------
-
 
 class ThesisCase(NamedTuple):
     """The bundled scenes of its machine that the tables are recomputed from."""
@@ -103,8 +101,6 @@ def _own_tolerance(tolerances: ToleranceSet, key: str) -> str:
     return "none" if found is None else _tolerance(found.centre, found.half_width)
 
 
-# --- Tables 4-1 to 4-5: dimensions, parameters, gains ---------------------------------------------
-
 COLUMNS = {"|E|": "norm", "x": "x", "y": "y", "z": "z"}  # of a gain, by heading
 STEPPED = {("EBB", "x"), ("EBB", "z"), ("EA0B", "y"), ("EC0B", "y")}
 
@@ -179,8 +175,6 @@ def table_4_5() -> Iterator[Row]:
         yield _number("table_4_5", f"within {k} sigma", value, ours, 4, "%")
 
 
-# --- Tables 4-6 to 4-8: tolerances, and the volumetric error they lead to -------------------------
-
 SAMPLES, SEED = 100_000, 0
 """As many as the thesis has."""
 
@@ -229,8 +223,6 @@ def table_4_8(case: ThesisCase) -> Iterator[Row]:
         key = f"{name.replace('_', ' loop, ')} tolerance: volumetric error"
         yield _number("table_4_8", key, value, found.mean_um, 0, "µm", note)
 
-
-# --- Tables 5-3 to 5-5: the two machines measured -------------------------------------------------
 
 MACHINES = ("first", "second")
 

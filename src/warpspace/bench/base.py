@@ -266,8 +266,6 @@ def run_test(
     )
 
 
-# --- Polar charts laid out: the same for the app and for figures ---------------------------------
-
 BASE = 0.62  # radius of the circle of no deviation; the plot reaches to 1
 RINGS = 2  # rings of round deviations on either side of it
 REACH = 0.36  # room that these take on either side
@@ -297,9 +295,6 @@ def lay_polar(chart: Lines) -> PolarLayout:
     unit = "µrad" if "µrad" in chart.y_label else "µm"
     rings = tuple((step * ring, BASE + per_unit * step * ring) for step in range(-RINGS, RINGS + 1))
     return PolarLayout(ring, unit, rings, tuple(curves))
-
-
-# --- The tests there are -------------------------------------------------------------------------
 
 
 _HERE = "warpspace.bench.kinds"

@@ -316,8 +316,6 @@ class Stack:
         self.parts.add(axis.name, "table", lines_mm=slots)
         self.half_mm, self.swept_mm = np.full(2, radius), np.full(2, radius)
 
-    # --- lines that are not upright -------------------------------------------------------------
-
     def _add_oblique_table(self, axis: Way) -> None:
         """Add a table that turns about a line neither level nor upright: a disc square to it."""
         line = axis.direction * np.sign(axis.direction[2] or 1.0)

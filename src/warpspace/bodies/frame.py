@@ -191,8 +191,6 @@ class _Overhead(_Frame):
         else:
             self._add_base(rear or self._add_cantilever(top))
 
-    # --- room -----------------------------------------------------------------------------------
-
     def _behind(self, least: float = -np.inf) -> float:
         return max(least, self.depth(self.layout.high_mm) + self.layout.gap_mm, self.swept())
 
@@ -201,8 +199,6 @@ class _Overhead(_Frame):
         swept = float(stack.swept_mm[i] + abs(stack.centre_mm[i] - self.middle))
         own = max(self.layout.high_mm[i] - self.middle, self.middle - self.layout.low_mm[i])
         return max(float(own), swept) + self.layout.gap_mm
-
-    # --- axes -----------------------------------------------------------------------------------
 
     def _add_vertical(
         self, axis: Way, rear: _Rear | None, rest: list[Way], at: Array, top: float
@@ -281,8 +277,6 @@ class _Overhead(_Frame):
         for line in pair(self.middle, 0.6 * rear.half, 0.2 * u):
             self.box(name, "saddle", line, j, (rails, rear.low))
         return _Rear(rear.plane, low, rear.high, half + reach, "ledge", reach)
-
-    # --- what stands ----------------------------------------------------------------------------
 
     def _add_beam(self, name: str, rear: _Rear, what: str) -> float:
         u = self.u
@@ -365,8 +359,6 @@ class _Overhead(_Frame):
             for at in (j[0] + 0.5 * u, j[1] - 0.5 * u):
                 self.box(BASE, "rails", i, about(at, 0.18 * u), (bed, bed + 0.2 * u))
         self.stand(i, j)
-
-    # --- rotary axes before linear ones ---------------------------------------------------------
 
     def _add_turning(self, axis: Way, at: Array, top: float) -> tuple[Array, float]:
         u, line = self.u, axis.origin_mm

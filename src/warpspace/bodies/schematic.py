@@ -104,9 +104,6 @@ def cone(lower: float, upper: float, ends: Range) -> Shape:
     return creation.revolve(outline, sections=SIDES)
 
 
-# --- ranges -------------------------------------------------------------------------------------
-
-
 def about(middle: float, half: float) -> Range:
     """Give a range about its middle."""
     return (float(middle) - half, float(middle) + half)
@@ -255,9 +252,6 @@ def _way(axis: Axis, pose: Array) -> Way:
     return Way(axis.name, axis.is_linear, direction, pose[:3, 3], k, reach)
 
 
-# --- slides turned against R ------------------------------------------------------------------
-
-
 def _find_slant(machine: Machine, poses: Mapping[str, Array]) -> Array:
     linear = [poses[axis.name][:3, axis.index] for axis in machine.axes.values() if axis.is_linear]
     if all(np.abs(way).max() > _ALIGNED for way in linear):
@@ -298,8 +292,6 @@ def _nearest(triad: Array, linear: Array) -> Array:
     )
     return max((turned for turned in every if np.linalg.det(turned) > 0.0), key=rank)
 
-
-# --- shapes by the body they belong to ------------------------------------------------------------
 
 Colour = tuple[int, int, int]
 _BODIES = {

@@ -184,9 +184,6 @@ def write_texts(texts: Mapping[str, str], path: Path, *, force: bool) -> list[st
     return [str(target) for target in targets.values()]
 
 
-# --- Scenes of a command -------------------------------------------------------------------------
-
-
 FEW = 32  # scenes that are held in memory together
 
 

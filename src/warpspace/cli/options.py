@@ -185,9 +185,6 @@ def spell_json(value: object) -> str:
     return escape_json(json.dumps(value, ensure_ascii=False, allow_nan=False))
 
 
-# --- Options of the commands that write files ----------------------------------------------------
-
-
 FIGURES = (".png", ".svg", ".pdf")
 ROWS = (".parquet", ".csv")
 SCENES = (".toml",)

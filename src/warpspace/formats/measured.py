@@ -403,9 +403,6 @@ def tables_of(held: Imported) -> list[ErrorTable]:
     return tables
 
 
-# --- errors of two axes from their points --------------------------------------------------------
-
-
 def distinct(at: np.ndarray) -> np.ndarray:
     ordered = np.sort(at)
     return ordered[np.concatenate([[True], np.diff(ordered) > SAME])]

@@ -103,9 +103,6 @@ def build_scale(
     return ColourScale(-top, top, diverging=True, label=label, unit=unit)
 
 
-# --- The transfer curve between sRGB colours and linear light -------------------------------------
-
-
 def srgb_to_linear(srgb: Array) -> Array:
     """Undo the sRGB transfer curve, [..., 3] of 0 … 1."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
@@ -116,8 +113,6 @@ def linear_to_srgb(linear: Array) -> Array:
     positive = np.maximum(linear, 0.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * positive ** (1 / 2.4) - 0.055)
 
-
-# --- Round values along an axis -------------------------------------------------------------------
 
 NO_SPAN = 1e-12  # A range below this part of its ends is rounding, mm a part of 1 mm
 

@@ -163,8 +163,6 @@ def spread_nodes(shape: Shape) -> NDArray[np.intp]:
     return numbers.reshape(-1)
 
 
-# --- Exaggerated displacement: the one place where errors become something to look at -------------
-
 TARGET_FRACTION = 0.1
 """Largest displacement on screen, as a fraction of the volume's longest edge, that auto aims at."""
 NEUTRAL_EXAGGERATION = 1000.0  # what auto chooses where nothing is displaced

@@ -24,8 +24,6 @@ from warpspace.machine.description import Machine, Vector
 from warpspace.machine.errors import ErrorSet
 from warpspace.units import MM_PER_UM, Array
 
-# --- Component errors before or after the motion --------------------------------------------------
-
 
 def convert_order(
     model: Model, errors: ErrorSet, spans: Mapping[str, Span], orders: Mapping[str, str]
@@ -83,9 +81,6 @@ def moved_to_constants(own: AxisErrors, taken: SmallMotion) -> ErrorSet:
     return AxisErrors(own.model, errors, own.axis, own.span).with_constant(own.constant @ taken)
 
 
-# --- Component errors that are zero at a position of their axis -----------------------------------
-
-
 def zero_at(
     model: Model, errors: ErrorSet, spans: Mapping[str, Span], positions: Mapping[str, float]
 ) -> ErrorSet:
@@ -99,8 +94,6 @@ def zero_at(
         errors = moved_to_constants(own, taken)
     return errors
 
-
-# --- The reference point of zero ------------------------------------------------------------------
 
 AT_REST_UM = 1e-6  # µm: a point whose error is smaller is held still by the errors themselves
 
@@ -147,8 +140,6 @@ def held_by_view(model: Model, errors: ErrorSet, at: Coordinates) -> ErrorSet:
     kept = {key: one for key, one in errors.functions.items() if key not in gone}
     return replace(errors, functions=kept)
 
-
-# --- The reference line of straightness -----------------------------------------------------------
 
 EVENLY = 101  # positions that a line is laid through where a curve has no points of its own
 STEPS = 8  # steps to the line of the exact motion; each leaves a millionth of the one before
@@ -284,9 +275,6 @@ def move_measuring_line(
 
         errors = own.with_components(along, adds=True)
     return errors
-
-
-# --- The sign of squareness: by the right-hand rule, or by the angle between two axes -------------
 
 
 class SquarenessSign(StrEnum):

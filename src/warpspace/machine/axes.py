@@ -63,9 +63,6 @@ def axis_order(name: str) -> int:
     return _ORDER[name]
 
 
-# --- Direction of travel --------------------------------------------------------------------------
-
-
 class TravelDirection(StrEnum):
     """What counts of errors that depend on the direction of travel.
 
@@ -87,8 +84,6 @@ DIRECTION_WORDS = {
 }
 """How each is called on figures and pages."""
 
-
-# --- The one table of error parameters ------------------------------------------------------------
 
 _GREEK = {"X": "δ_x", "Y": "δ_y", "Z": "δ_z", "A": "ε_x", "B": "ε_y", "C": "ε_z"}
 _CONSTANT_GREEK = {"X": "δx", "Y": "δy", "Z": "δz", "A": "α", "B": "β", "C": "γ"}

@@ -16,8 +16,6 @@ from warpspace.machine.axes import (
     sort_axes,
 )
 
-# --- The kinematic chain --------------------------------------------------------------------------
-
 
 @dataclass(frozen=True, slots=True)
 class Chain:
@@ -63,8 +61,6 @@ def parse_chain(text: str) -> Chain:
     return Chain(tuple(reversed(workpiece)), tool)
 
 
-# --- A gantry: one linear axis on two parallel guides, each with a positioning error of its own ---
-
 ACROSS = "xyz"  # directions in which the guides of a gantry may lie apart
 _DEFAULT_ACROSS = {"x": "y", "y": "x", "z": "x"}
 URAD_PER_UM_OVER_MM = 1000.0  # A micrometre over a millimetre is a milliradian
@@ -109,8 +105,6 @@ def default_across(axis: str) -> str:
     return _DEFAULT_ACROSS["xyz"[direction_index(axis)]]
 
 
-# --- What a frame of a machine looks like where a description says so -----------------------------
-
 Vector = tuple[float, float, float]
 BODY_FRAMES = ("R", "S", "t", "w")  # frames beside the axes that a body can ride on
 MESH_ENDINGS = (".stl", ".obj", ".ply", ".glb")
@@ -131,8 +125,6 @@ class BodySource:
     rotation_deg: Vector = (0.0, 0.0, 0.0)
     shape: str = ""  # of the tool, one of `TOOL_SHAPES`; empty for a mesh
 
-
-# --- Description of a machine: its kinematic chain, frame offsets, travels and directions ---------
 
 Range = tuple[float, float]
 

@@ -226,8 +226,6 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-# --- Figures drawn in a process of their own ------------------------------------------------------
-
 PICTURES_PER_PROCESS = 100  # A process is replaced after so many figures
 TIMEOUT_S = 300.0
 LEAST_MB = 1600  # address space that the renderer takes for a picture

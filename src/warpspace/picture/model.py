@@ -238,9 +238,6 @@ def subtract_traces(
     )
 
 
-# --- Slices through the working volume: pictures of one plane each --------------------------------
-
-
 @dataclass(frozen=True, kw_only=True)
 class Slice(Picture):
     """A picture of one plane of the working volume."""
@@ -248,8 +245,6 @@ class Slice(Picture):
     axis: str  # the axis that stands still: the grid has one node along it
     position_mm: float  # where it stands
 
-
-# --- Named views: from where a picture is looked at -----------------------------------------------
 
 Direction = tuple[float, float, float]
 
@@ -303,8 +298,6 @@ def choose_exaggeration(
     return auto_exaggeration(largest_um, size_mm) if given is None else given
 
 
-# --- The length that a picture is sized by: labels, markers, axes, the display factor -------------
-
 LEAST_SIZE_MM = 100.0  # of a single point without traces, on a machine without linear axes
 
 
@@ -319,9 +312,6 @@ def picture_size_mm(scene: Scene, grid: Grid) -> float:
             return circle
     travels = (axis.travel[1] - axis.travel[0] for axis in axes if axis.is_linear)
     return max(travels, default=0.0) or LEAST_SIZE_MM
-
-
-# --- The picture of a scene, with what it says of itself ------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -131,8 +131,6 @@ def parse_toml(text: str, source: str) -> dict[str, object]:
         raise SceneError(source, [f"is not valid TOML: {reason}"]) from None
 
 
-# --- Spelling what stands in a scene file ---------------------------------------------------------
-
 SHOWN = 60  # characters of a value or a key that a message shows
 _DEPTH = 6
 _ENTRIES = 8

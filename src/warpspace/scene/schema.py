@@ -54,9 +54,6 @@ class Problems:
         return dict(cast("dict[str, object]", value)) if isinstance(value, dict) else {}
 
 
-# --- kinds of values ------------------------------------------------------------------------------
-
-
 def _number(
     low: float, high: float, least: float = limits.MIN_NUMBER, expected: str = "a number"
 ) -> Kind:
@@ -167,8 +164,6 @@ class Section:
         reader.only(table, path, self.fields)
         return self.build(**found)
 
-
-# --- what sections hold ---------------------------------------------------------------------------
 
 LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
 LENGTH = _number(*LIMIT)

@@ -11,8 +11,6 @@ from warpspace.machine.description import ORIGIN, Chain, Range, Vector, parse_ch
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
-# --- Sizes of a machine that is only a chain so far -----------------------------------------------
-
 LYING: Vector = (90.0, 0.0, 180.0)
 """Turns the frames of a machine with a horizontal spindle, degrees: y points up, z to the rear."""
 LEVEL_TRAVEL: Mapping[int, Range] = {0: (-300.0, 300.0), 1: (-250.0, 250.0), 2: (-250.0, 250.0)}

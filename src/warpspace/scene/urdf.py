@@ -32,8 +32,6 @@ from warpspace.scene.save import scene_to_toml
 from warpspace.scene.starter import error_lines
 from warpspace.units import Array
 
-# --- Reading a URDF file --------------------------------------------------------------------------
-
 MOVING = ("revolute", "continuous", "prismatic")
 JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
 
@@ -161,8 +159,6 @@ def path_to(robot: Any, link: str) -> list[Any]:
     return found[::-1]
 
 
-# --- Frames of axes in R, and the places of frames in the ones before them ------------------------
-
 PARALLEL = 1e-9  # deviation of a direction from x, y or z below which the frame is not turned
 
 
@@ -212,8 +208,6 @@ def roll_pitch_yaw_deg(rotation: Array) -> Array:
         warnings.simplefilter("ignore", UserWarning)  # of a pitch of 90°, where roll is set to 0
         return Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
 
-
-# --- From the joints of a robot to the axes of a machine ------------------------------------------
 
 MOST_DEG = 720.0  # of a limit: an axis that turns further, ±4π, is likely to be in degrees
 LARGEST = 1e9  # metres, or the length of a direction: beyond, products overflow

@@ -131,9 +131,6 @@ def _hysteresis(angle_deg: Array, sense: Array, radial: Array) -> float:
     return float(np.abs(radial[one] - there).max())
 
 
-# --- The test -------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, kw_only=True)
 class Circular(BenchTest):
     """Circular test with a ball bar."""

@@ -223,8 +223,6 @@ def _eccentricity(theta: Array) -> dict[str, Array]:
     }
 
 
-# --- R-test: a ball on the table, the tool held on it while the axis turns -----------------------
-
 AXES = ("x", "y", "z")
 
 

@@ -256,9 +256,6 @@ def _lines_drawn(
     ]
 
 
-# --- Squareness: straightness along two axes, and the angle between their lines -------------------
-
-
 @dataclass(frozen=True, kw_only=True)
 class Squareness(BenchTest):
     """Squareness of two axes with a square or two straightness runs."""

@@ -190,9 +190,6 @@ class _Table:
         return [int(row.get((DIRECTION, DIRECTION), BOTH)) for _, row in self.rows]
 
 
-# --- header -------------------------------------------------------------------------------------
-
-
 def recognise(head: str, name: str) -> bool:
     try:
         header = source_of_text(head, name).rows(1).header
@@ -234,9 +231,6 @@ def _column(at: Place, part: str) -> _Column:
         units = ", ".join(one for one in known if one.isascii())
         at.refuse(f"column {name} has no unit", f"{name} [unit], of {units}")
     return _Column(role, name, at.unit(unit, known, name), unit)
-
-
-# --- rows ---------------------------------------------------------------------------------------
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> Imported:

@@ -167,8 +167,6 @@ def _write_comp(wanted: Wanted) -> Files:
     return {"": "\n".join(lines) + "\n", **files}
 
 
-# --- the matrix of the kinematics -----------------------------------------------------------------
-
 MATRIX_DIGITS = 9
 MOST = 0.1  # of a coefficient's distance from the identity: 0.1 rad or 10 %
 _SETP = re.compile(r"setp\s+matrixkins\.C_([xyz])([xyz])\s+(\S+)", re.IGNORECASE)

@@ -52,9 +52,6 @@ _ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*=\s*(.+)")
 _QUIET = re.compile(r"(%.*|CHANDATA\(\d+\)|M17|M30|M02|N\d+)", re.IGNORECASE)
 
 
-# --- archives -----------------------------------------------------------------------------------
-
-
 @dataclass
 class Table:
     """What a file says of one table, as it is read line by line."""
@@ -180,9 +177,6 @@ def _read(
     return found
 
 
-# --- tables of an axis for itself ---------------------------------------------------------------
-
-
 def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
     terms: list[Line] = []
     notes: list[str] = []
@@ -217,9 +211,6 @@ def _write_enc(wanted: Wanted) -> Files:
             f"${ENC}_{IS_MODULO}[0,{axis}]=0",
         ]
     return _archive("AX_EEC", wanted, SIGN, body)
-
-
-# --- tables of one axis over another --------------------------------------------------------------
 
 
 def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -277,9 +268,6 @@ def _write_cec(wanted: Wanted) -> Files:
             f"${CEC}_IS_MODULO[{index}]=0",
         ]
     return _archive("NC_CEC", wanted, CEC_SIGN, body)
-
-
-# --- the tables that a scene needs --------------------------------------------------------------
 
 
 @dataclass(frozen=True)

@@ -86,8 +86,6 @@ def fitted_factors(wanted: Wanted) -> dict[str, float]:
     return {"XY": xy, "XZ": xz, "YZ": yz}
 
 
-# --- Klipper ------------------------------------------------------------------------------------
-
 LEAST_OFFSET_MM = 1.0  # between probe and nozzle: below it a twist cannot be told from the height
 PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
@@ -218,8 +216,6 @@ def _write_klipper(wanted: Wanted) -> Files:
     head = f"# {wanted.title}\n# [skew_correction] must stand in printer.cfg\n"
     return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
 
-
-# --- Marlin -------------------------------------------------------------------------------------
 
 DIGITS = 6  # behind the point of a factor, as the firmware reports it
 LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}

@@ -150,8 +150,6 @@ def _read_with(
     )
 
 
-# --- ISG CSV ------------------------------------------------------------------------------------
-
 ISG = "isg-csv"
 _SPLIT = re.compile(r"[\s;,]+")
 Block = list[tuple[Place, list[str]]]
@@ -293,8 +291,6 @@ def _write_isg(wanted: Wanted) -> Files:
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
     return {"": f"// {wanted.title}\n// mm, rad, degrees\n" + "\n#\n".join(texts) + "\n"}
 
-
-# --- Etalon exchange format ---------------------------------------------------------------------
 
 ISO = "iso-text"
 _SECTION = re.compile(r"\[\s*([A-Za-z0-9]+)\s*\]")

@@ -346,8 +346,6 @@ class ErrorFunction(ABC):
         """Give the curve at positions, [...], for an amplitude of one; of a zero one `grown`."""
         return self.with_amplitude(1.0).evaluate(position)
 
-    # --- in scene files ---------------------------------------------------------------------------
-
     @classmethod
     @abstractmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
@@ -379,8 +377,6 @@ class ErrorFunction(ABC):
         del span
         return self
 
-    # --- in words ---------------------------------------------------------------------------------
-
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
         """Describe the curve along its axis for a report; values and positions are spelled."""
         del unit, value, position
@@ -389,8 +385,6 @@ class ErrorFunction(ABC):
     def slider_words(self, axis: str) -> str:
         """Say what the amplitude of the curve along an axis is."""
         return self.slider.format(name=self.name, axis=axis)
-
-    # --- edited as rows of numbers ----------------------------------------------------------------
 
     @classmethod
     def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:

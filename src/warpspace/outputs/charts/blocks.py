@@ -91,8 +91,6 @@ def quiet(axes: Axes, grid: str = "x") -> None:
     axes.set_axisbelow(True)
 
 
-# --- Charts ---------------------------------------------------------------------------------------
-
 CHART_IN, ROW_IN, GAP_IN = 4.9, 4.6, 0.25
 """Width, height and distance of charts that stand side by side."""
 WIDTH_IN, PRINTED_IN = 11.0, 7.4
@@ -142,9 +140,6 @@ def charts_sheet(
             else:
                 draw_beside(figure, chart, box)
         return figure
-
-
-# --- Bars -----------------------------------------------------------------------------------------
 
 
 def draw_beside(figure: Figure, bars: Bars, box: Box, size: float = SMALL) -> None:
@@ -282,9 +277,6 @@ def _draw_series(
             words = f"{value:{series.form}}"
             text = axis.text(value + 0.012 * end, place, words, va="center", size=0.9 * size)
             text.set_path_effects([Stroke(linewidth=2.5, foreground=ground().paper), Normal()])
-
-
-# --- Curves ---------------------------------------------------------------------------------------
 
 
 def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> None:

@@ -54,8 +54,6 @@ def result_chart(found: Result) -> Figure:
     return charts_sheet(charts, title, subtitle, 2 if len(charts) == 4 else min(len(charts), 3))
 
 
-# --- A standard test ------------------------------------------------------------------------------
-
 NUMBERS_IN, VALUE_IN, LINE_IN, NOTE_IN = 3.7, 0.95, 0.25, 0.6
 """Widths of the numbers and of one more column of values; heights of a number and of a note."""
 MOST_NUMBERS = 16

@@ -71,8 +71,6 @@ class Stage:
             draw_leader(canvas, placed, colour, 3.9)
 
 
-# --- Labels of isolines and corners ---------------------------------------------------------------
-
 ARROW_COST = 12.0
 _SHARES = (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)
 _CANDIDATE_LINES = 3
@@ -160,8 +158,6 @@ def _is_seen(stage: Stage, points_mm: Array) -> bool:
     surface = stage.raster.depth_at(projection.project(points_mm), spread=True)
     return bool(np.any(projection.depth_mm(points_mm) <= surface + 2.0 / projection.px_per_mm))
 
-
-# --- The map --------------------------------------------------------------------------------------
 
 INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""

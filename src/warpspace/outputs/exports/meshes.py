@@ -162,9 +162,6 @@ def _bodies(picture: ScenePicture) -> list[Part]:
     ]
 
 
-# --- PyVista blocks, for a plotter, a filter or a file of the user's own ------------------------
-
-
 def to_pyvista(
     scene: Scene,
     *,

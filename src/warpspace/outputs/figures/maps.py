@@ -120,8 +120,6 @@ def _place_rows(at: Mapping[str, float], point_mm: Sequence[float]) -> list[Row]
     return [*axes, ("max, in R", point)]
 
 
-# --- Slices through the middle, laid out like an engineering drawing ------------------------------
-
 VIEW_OF = {"Z": "top", "Y": "front", "X": "right"}
 
 
@@ -227,8 +225,6 @@ def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], re
         weight="bold", ha="center", va="top",
     )  # fmt: skip
 
-
-# --- Orientation error of the tool axis -----------------------------------------------------------
 
 LEAN_RAD = 0.45  # largest lean on screen that the factor aims at
 NEEDLE_SHARE = 0.13  # length of a needle, as a share of the longest edge

@@ -130,9 +130,6 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
             canvas.text(x, y, text, ha="right")
 
 
-# --- A repair: before and after the best set of adjustments ---------------------------------------
-
-
 def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
     found = Repair(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
@@ -154,8 +151,6 @@ def _adjusted(found: RepairResult) -> str:
     )
     return f"adjusted for the smallest {found.objective.upper()}: {parts}"
 
-
-# --- Machines within the same tolerances: one scale of length, one of colours ---------------------
 
 BODY_ALPHA = 0.55
 CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0

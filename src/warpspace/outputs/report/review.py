@@ -194,9 +194,6 @@ def _difference(first: ScenePicture, second: ScenePicture | None = None) -> Stat
     return scene_change(first, second).statistics
 
 
-# --- The first page -------------------------------------------------------------------------------
-
-
 def signed(value: float, digits: int = 3) -> str:
     """Spell a computed number with its sign."""
     return _signed(spell(value, digits))
