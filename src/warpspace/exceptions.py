@@ -84,7 +84,6 @@ class SceneError(WarpspaceError):
 
 
 def near_miss(name: str, known: Iterable[str]) -> str:
-    """Give the tail of a message about an unknown name: the near miss, else all names."""
     names = list(known)
     folded = {candidate.casefold(): candidate for candidate in names}
     close = get_close_matches(name.casefold(), folded, n=2, cutoff=0.6)

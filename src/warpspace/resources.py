@@ -14,12 +14,10 @@ def _data_root() -> Path:
 
 
 def scenes_dir() -> Path:
-    """Folder of the bundled scenes."""
     return _data_root() / "scenes"
 
 
 def assets_dir() -> Path:
-    """Folder of the bundled assets."""
     return _data_root() / "assets"
 
 

@@ -48,7 +48,6 @@ Progress = Callable[[float], object]
 
 
 def read_costs(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
-    """Read costs by parameter."""
     return tuple(read_numbers(text, "KEY=NUMBER", "EA0Z=4,EXX=0.5").items())
 
 

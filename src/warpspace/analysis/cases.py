@@ -52,7 +52,6 @@ class Places:
 
 
 def choose_cylinder(model: Model, cylinder: Cylinder | None = None) -> Cylinder:
-    """Give the cylinder that workpiece points are spread over."""
     if cylinder is None:
         x, y, z = model.workpiece_point_mm
         cylinder = Cylinder(2.0 * math.hypot(x, y), z)
@@ -317,7 +316,6 @@ class Case:
     plan: Plan = field(default_factory=Plan)
 
     def check(self) -> None:
-        """Refuse what cannot be sampled, before the work is handed out."""
         self.plan.check()
         if self.view.loop is Loop.WORKPIECE:
             choose_cylinder(self.model, self.plan.cylinder)
@@ -339,7 +337,6 @@ class Case:
         return max(LEAST_BLOCKS, min(self.plan.blocks // TASKS_ASKED, MOST_BLOCKS))
 
     def machines(self, rng: np.random.Generator, count: int) -> Array:
-        """Draw the amplitudes of machines, [count, K]."""
         return self.draws.draw(rng, count)
 
     def responses(self, places: Places) -> Array:
@@ -352,7 +349,6 @@ class Case:
         return find(self.plan.nodes)
 
     def build_job(self) -> Job:
-        """Build what a block of machines goes through."""
         over = Over(self.plan.over)
         if over is Over.SAMPLED:
             site = self.site

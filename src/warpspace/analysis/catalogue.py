@@ -111,7 +111,6 @@ def unregister(name: str) -> None:
 
 
 def first_line(kind: "type[Analysis]") -> str:
-    """Give the sentence that lists say of an analysis."""
     return (kind.__doc__ or "").partition("\n")[0]
 
 
@@ -129,7 +128,6 @@ def find_analysis(name: str) -> "type[Analysis]":
 
 
 def verb(name: str) -> "Verb[Result]":
-    """Give an analysis as a function of scenes and options."""
     from warpspace.analysis.description import silent
     from warpspace.analysis.options import options_of
 

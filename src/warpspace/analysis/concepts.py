@@ -40,7 +40,6 @@ class Concept:
 
     @property
     def leading(self) -> tuple[Share, ...]:
-        """The three errors that matter most."""
         return self.shares.rows[:NAMED]
 
     @property

@@ -282,7 +282,6 @@ def explain(
     view: View | None = None,
     point_mm: Array | None = None,
 ) -> Explanation:
-    """Take the error of one point apart into its parameters."""
     view = view or View()
     point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     keys = [key for key in errors if parameter(key).axis in model.machine.axes]

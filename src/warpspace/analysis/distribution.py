@@ -284,7 +284,6 @@ class Draws:
 
 
 def loop_keys(model: Model, loop: Loop, keys: Sequence[str]) -> tuple[str, ...]:
-    """Keep the parameters whose axis lies in a loop."""
     sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
     axes = {axis.name for side in sides for axis in model.machine.branch(side)}
     if not axes:

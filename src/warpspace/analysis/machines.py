@@ -49,7 +49,6 @@ class Source(StrEnum):
 
 
 def read_steps(text: str, _scene: Scene) -> tuple[str, tuple[float, ...]]:
-    """Read half widths of one parameter or class."""
     key, _, values = text.partition("=")
     try:
         if ":" in values:
@@ -199,7 +198,6 @@ class Machines(SampledMachines):
 
     @property
     def in_rows(self) -> bool:
-        """Whether there is a row for each combination."""
         return self.rows or bool(self.tolerance)
 
     def machines(self, scenes: int) -> int:
@@ -427,7 +425,6 @@ def sampled_histogram(
 
 
 def printed_um(scene: Scene, found: MonteCarlo) -> float | None:
-    """Give what the thesis prints for this distribution; None where it has none."""
     from warpspace.analysis.thesis import printed_tables
 
     name = f"{found.view.loop}_{scene.name.removeprefix('dvf5000_')}"

@@ -110,7 +110,6 @@ def measured(
 
 
 def shear(field: ErrorField) -> dict[str, float]:
-    """Fit an affine map to an error field and give its shear per plane."""
     point = field.nominal_mm.reshape(-1, 3)
     design = np.column_stack([np.ones(len(point)), point - point.mean(axis=0)])
     error = field.error_um.reshape(-1, 3)

@@ -72,7 +72,6 @@ def montecarlo_each(
     progress: Progress | None = None,
     take: Take | None = None,
 ) -> Iterator[MonteCarlo]:
-    """Sample the machines of many cases: a fleet, or the points of a sweep."""
     if executor is not None:
         in_flight = 2 * (workers or EXECUTOR_WORKERS)
         yield from _collect(_sent_tasks(cases, take), executor, in_flight, progress, take)

@@ -87,7 +87,6 @@ class Option:
 
     @property
     def default_words(self) -> str:
-        """What stands for the default in a help text."""
         if self.unset:
             return self.unset
         if self.kind is bool or self.default is None or self.default in ("", ()):
@@ -194,7 +193,6 @@ def option(
 
 @cache
 def options_of(kind: type) -> tuple[Option, ...]:
-    """List the options of an analysis, in the order of its fields."""
     hints = get_type_hints(kind, include_extras=True)
     return tuple(
         _build(entry.name, entry.default_factory(), hints[entry.name], entry.metadata["option"])
@@ -355,7 +353,6 @@ def place_words(place: Mapping[str, float]) -> str:
 
 
 def outside_travel(machine: "Machine", place: Mapping[str, float]) -> list[str]:
-    """Say which positions lie outside the travel of their axes."""
     said: list[str] = []
     for name, value in place.items():
         axis = machine.axes[name]
@@ -370,7 +367,6 @@ def outside_travel(machine: "Machine", place: Mapping[str, float]) -> list[str]:
 
 
 def error_words(key: str) -> str:
-    """Name an error beside its bar: in words, by its symbol and by its key."""
     from warpspace.machine.axes import parameter
 
     row = parameter(key)

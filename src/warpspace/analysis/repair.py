@@ -118,11 +118,9 @@ class Repair(Analysis):
 
     @property
     def seen_loop(self) -> Loop:
-        """The loop, where none is given too."""
         return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
 
     def seen(self, scene: Scene) -> tuple[Scene, View]:
-        """Give a scene as it is looked at, and how."""
         if self.placed and self.seen_loop is not Loop.RELATIVE:
             raise OptionError(
                 f"{{placed}}: the {self.loop} loop does not show where the workpiece lies;"
@@ -149,7 +147,6 @@ class Repair(Analysis):
         return replace(found, repairs=tuple(sets), second_order=left_out)
 
     def included(self, scene: Scene) -> Sequence[str]:
-        """List the errors that are looked at: all of a scene."""
         return scene.parameter_keys
 
     def limit_of(self, key: str) -> float:
@@ -181,7 +178,6 @@ class RepairResult(Result):
 
     @property
     def all_sets_compared(self) -> list[bool]:
-        """Whether all sets of each size were."""
         return [one.proven for one in self.repairs]
 
     def changes(self) -> Sequence[Change]:
@@ -325,7 +321,6 @@ def find_repairs(
     scene: Scene,
     watch: Watch = silent,
 ) -> RepairResult:
-    """Find what repairs a machine: from the first-order response of the nodes of a grid."""
     volume = Volume(basis, grid, amplitudes)
     candidates = _candidates(volume, asked)
     limits = np.array([asked.limit_of(key) for key in basis.keys])

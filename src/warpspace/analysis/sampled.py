@@ -14,7 +14,6 @@ from warpspace.scene.model import Scene
 
 
 def read_cylinder(text: str, _scene: Scene | None = None) -> Cylinder:
-    """Read the size of a workpiece as a user types it, ``550x450``."""
     first, _, second = text.lower().replace("×", "x").partition("x")
     try:
         return Cylinder(parse_number(first), parse_number(second))
@@ -97,7 +96,6 @@ class KeptLimit(SampledMachines):
 
     @property
     def where(self) -> str:
-        """Where a machine has to keep a limit."""
         return "everywhere" if self.over == "max" else "at a random point"
 
     def plan_of(self, limit_um: float | None) -> Plan:

@@ -52,7 +52,6 @@ def volume_statistics(field: ErrorField, grid: Grid) -> Statistics:
 
 
 def statistics(field: ErrorField, axes: Mapping[str, Array] | None = None) -> Statistics:
-    """Summarise points, each counted once."""
     norm = field.norm_um
     if norm.size == 0:
         raise OptionError("statistics of no points; expected at least one")

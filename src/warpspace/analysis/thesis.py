@@ -119,7 +119,6 @@ def table_4_1(case: ThesisCase) -> Iterator[Row]:
 
 
 def table_4_2(case: ThesisCase) -> Iterator[Row]:
-    """Count the parameters per axis."""
     printed = printed_tables()["table_4_2"]
     for axis in "XYZBC":
         own = [row for key in case.keys if (row := parameter(key)).axis == axis]
@@ -131,7 +130,6 @@ def table_4_2(case: ThesisCase) -> Iterator[Row]:
 
 
 def tool_gains(model: Model) -> dict[str, Gain]:
-    """Gains at the point of table 4-3, by key."""
     at = printed_tables()["table_4_3"]["at"]
     return {gain.key: gain for gain in gains_at(model, Loop.TOOL, model.machine.parameter_keys, at)}
 
@@ -146,7 +144,6 @@ def workpiece_gains(model: Model) -> dict[str, Gain]:
 
 
 def gain_rows(table: str, gains: dict[str, Gain]) -> Iterator[Row]:
-    """Rows of a gain table."""
     for key, values in printed_tables()[table].items():
         if key not in gains:
             continue
@@ -180,7 +177,6 @@ SAMPLES, SEED = 100_000, 0
 
 
 def sampled(case: ThesisCase, name: str, distribution: str) -> MonteCarlo:
-    """Sample one of the four distributions of table 4-8."""
     side, _, which = name.partition("_")
     loop, model = Loop(side), case.model
     scene = case.general if which == "general" else case.proposed
@@ -228,7 +224,6 @@ MACHINES = ("first", "second")
 
 
 def squareness_tables(case: ThesisCase) -> Iterator[Row]:
-    """Tables 5-3 and 5-4."""
     for table, scene in (("table_5_3", case.first), ("table_5_4", case.second)):
         checks = _checks(case, scene)
         for key, value in printed_tables()[table].items():

@@ -134,14 +134,12 @@ class BenchTest(Analysis):
         return complete_coordinates(scene.machine, {**positions, **dict(self.at)}, positions)
 
     def model(self, scene: Scene) -> Model:
-        """Give the model with the tool that the test has."""
         if not self.tool_extension_mm:
             return scene.model
         x, y, z = scene.model.tool_point_mm
         return replace(scene.model, tool_point_mm=(x, y, z - self.tool_extension_mm))
 
     def place_words(self, scene: Scene, moving: Sequence[str]) -> str:
-        """Say where the axes stand that do not move."""
         stand = self.stand(scene)
         still = [f"{name} {float(stand[name]):g}" for name in stand if name not in moving]
         tool = f"tool {self.tool_extension_mm:+g} mm" if self.tool_extension_mm else ""

@@ -56,7 +56,6 @@ class Table:
         return len(self.lines)
 
     def refuse(self, *problems: str) -> SceneError:
-        """Build the exception that says what is wrong with the file."""
         return SceneError(self.source, problems)
 
 

@@ -193,7 +193,6 @@ def axis_vector(model: Model, coordinates: Coordinates, axis: str, letter: str =
 
 
 def plane_axes(machine: Machine, plane: str) -> tuple[str, str, str]:
-    """Look up the axes of a plane and the squareness between them."""
     if plane not in PLANES:
         raise OptionError(f"plane {plane!r}; expected one of {', '.join(PLANES)}")
     for name in PLANES[plane][:2]:

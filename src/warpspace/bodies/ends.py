@@ -226,7 +226,6 @@ class Stack:
         return about(self.centre_mm[k], share * float(self.half_mm[k]))
 
     def build(self) -> None:
-        """Build the workpiece side from its outermost axis down to the bed."""
         for place, axis in enumerate(self.branch):
             parent = self.branch[place + 1].name if place + 1 < len(self.branch) else BASE
             if axis.is_linear:
@@ -317,7 +316,6 @@ class Stack:
         self.half_mm, self.swept_mm = np.full(2, radius), np.full(2, radius)
 
     def _add_oblique_table(self, axis: Way) -> None:
-        """Add a table that turns about a line neither level nor upright: a disc square to it."""
         line = axis.direction * np.sign(axis.direction[2] or 1.0)
         radius = float(self.half_mm.min())
         middle = np.append(self.centre_mm, self.bed_mm - 0.75 * radius)

@@ -424,7 +424,6 @@ def _generate(
 
 
 def _add_bed(parts: Parts, top: float) -> None:
-    """Add a slab under everything that stands on the bed, and a plinth a little smaller."""
     from trimesh import convex
 
     u, slant = parts.layout.unit_mm, parts.layout.slant

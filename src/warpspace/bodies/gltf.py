@@ -53,7 +53,6 @@ class Part:
 
 
 def to_gltf(points_mm: Array) -> Array:
-    """Turn points or vectors of R into glTF's frame."""
     x, y, z = np.moveaxis(np.asarray(points_mm), -1, 0)
     return np.stack([x, z, -y], -1) * _M_PER_MM
 

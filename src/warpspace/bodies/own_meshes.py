@@ -134,7 +134,6 @@ def _read(frame: str, source: BodySource) -> LoadedMesh:
 
 
 def check_meshes(machine: Machine) -> tuple[str, ...]:
-    """Read all meshes of a machine and give the warnings about them."""
     return tuple(text for loaded in own_meshes(machine).values() for text in loaded.warnings)
 
 
@@ -146,7 +145,6 @@ LARGEST_M = 1e6  # of a shape, its place and its scale; also keeps NaN out
 def frame_meshes(
     robot: Any, frame_of: dict[str, tuple[str, Array]], folder: Path, root: Path | None = None
 ) -> tuple[dict[str, Any], list[str], list[Path]]:
-    """Put the visual shapes of links together."""
     from trimesh import util
 
     parts: dict[str, list[Any]] = {}

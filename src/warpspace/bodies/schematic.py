@@ -44,7 +44,6 @@ def read_bodies(path: Path) -> tuple[Body, ...]:
 
 
 def frame_of(name: str) -> str:
-    """Frame that a body rides on, from its name."""
     return name.partition("_")[0]
 
 
@@ -105,7 +104,6 @@ def cone(lower: float, upper: float, ends: Range) -> Shape:
 
 
 def about(middle: float, half: float) -> Range:
-    """Give a range about its middle."""
     return (float(middle) - half, float(middle) + half)
 
 
@@ -204,7 +202,6 @@ class Layout:
 
 
 def build_layout(machine: Machine) -> Layout:
-    """Place every frame of a machine at home and find its sizes."""
     axes = tuple(machine.axes.values())
     home = {
         axis.name: np.asarray(
@@ -355,7 +352,6 @@ class Parts:
         self.floor.append(corners[:, ::-1] if along else corners)
 
     def bodies(self) -> tuple[Body, ...]:
-        """Join the shapes of each body, in its own frame."""
         from trimesh import util
 
         found: list[Body] = []

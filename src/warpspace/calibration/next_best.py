@@ -37,7 +37,6 @@ SESSION = "next"  # the set-up of a measurement not made yet: a sphere put somew
 
 
 def candidates(scene: Scene) -> tuple[Candidate, ...]:
-    """List measurements for a machine, each with what its instrument reads and leaves open."""
     return (*_trackers(scene), *_tests(scene), *_spheres(scene))
 
 

@@ -173,7 +173,6 @@ def find_data(name: str) -> Path:
 
 
 def bundled_data() -> tuple[str, ...]:
-    """Name the files of readings that come with warpspace."""
     return tuple(path.name for path in sorted((assets_dir() / "measurements").glob("*/*.csv")))
 
 

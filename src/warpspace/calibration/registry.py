@@ -26,7 +26,6 @@ NAMES = {RENAMED[name]: name for name in RENAMED}
 
 
 def test_kinds() -> tuple[str, ...]:
-    """Name the tests as ``--kind`` takes them."""
     return tuple(NAMES.get(name, name) for name in bench_names())
 
 

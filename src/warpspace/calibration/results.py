@@ -70,7 +70,6 @@ class Combination:
 
     @property
     def words(self) -> str:
-        """Spell the sum, with the unit of each factor that has one."""
         first, *others = self.factors
         words = first
         for key in others:
@@ -82,7 +81,6 @@ class Combination:
 
     @property
     def unit(self) -> str:
-        """Unit of the first, and of the sum."""
         return parameter(next(iter(self.factors))).unit
 
 

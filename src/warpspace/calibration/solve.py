@@ -36,7 +36,6 @@ class Rank:
     alike: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
 
     def is_identifiable(self, key: str) -> bool:
-        """Tell whether the readings alone determine a parameter."""
         return key in self.kept and not any(key in group for group in self.confounded)
 
     def told_with(self, key: str) -> dict[str, float]:
@@ -159,7 +158,6 @@ class Terms:
 
     @property
     def slopes(self) -> frozenset[str]:
-        """Parameters of which a slope is looked for."""
         ramps = (key for key in self.keys if isinstance(self.errors.functions[key], Ramp))
         return frozenset(ramps)
 
@@ -192,7 +190,6 @@ def build_terms(scene: Scene, keys: Sequence[str]) -> Terms:
 
 
 def read_keys(text: str, _scene: Scene) -> tuple[str, ...] | None:
-    """Read keys with commas between, in any case; None for auto."""
     parts = [part.strip() for part in text.split(",") if part.strip()]
     if [part.lower() for part in parts] == [AUTO]:
         return None
@@ -298,7 +295,6 @@ class Stack:
 
     @property
     def has_uncertainties(self) -> bool:
-        """Whether every set says how well it was read."""
         return all(one.sigma_mm is not None for one in self.sets)
 
     @property

@@ -44,7 +44,6 @@ def draw_beside(
     force: bool,
     **_others: object,
 ) -> "ConceptsResult":
-    """Compare the machines, and draw them where that is asked for."""
     from warpspace.outputs.drawing.settings import FigureSettings
 
     settings = FigureSettings(size=size, loop=str(asked.loop), concepts=asked)

@@ -247,7 +247,6 @@ class Ending:
         return "interrupted" if self.number in (0, signal.SIGINT) else "terminated"
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        """Kill the renderers and leave the work begun; the second time end without cleaning up."""
         now = time.monotonic()
         if self.number and not self._is_lost:
             if now - self._since > _PATIENCE_S:
@@ -287,7 +286,6 @@ def _is_importing(frame: FrameType | None) -> bool:
 
 @contextmanager
 def handle_signals() -> Generator[Ending]:
-    """Let signals that end the program raise `Ended`, so that files are cleaned up."""
     ending = Ending()
     before = {}
     if threading.current_thread() is threading.main_thread():

@@ -230,7 +230,6 @@ VIEWS = ("iso", "front", "right", "top")
 def read_size(
     _ctx: click.Context, _param: click.Parameter, text: str | None
 ) -> tuple[int, int] | None:
-    """Read a size as a user types it, for instance ``1600x1200``."""
     if text is None:
         return None
     width, _, height = text.lower().replace("×", "x").partition("x")

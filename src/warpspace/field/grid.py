@@ -44,7 +44,6 @@ def pieces(shape: tuple[int, ...]) -> Iterator[Piece]:
 
 
 def is_small(arrays: Iterable[Array]) -> bool:
-    """Tell whether each of some arrays fits into a piece."""
     return all(array.size <= NODES for array in arrays)
 
 
@@ -59,7 +58,6 @@ def cut(array: Array, piece: Piece) -> Array:
 
 
 def cut_all(values: T, piece: Piece) -> T:
-    """Cut all arrays of nested tuples."""
     if isinstance(values, np.ndarray):
         return cast("T", cut(values, piece))
     if isinstance(values, tuple):
@@ -233,7 +231,6 @@ PLANES: Mapping[str, str] = {"X": "YZ", "Y": "XZ", "Z": "XY"}
 
 
 def slice_ranges(model: Model, workspace: Workspace) -> dict[str, tuple[float, float]]:
-    """List where slices can lie."""
     spanning = [axis for axis in workspace.volume_axes if axis in model.machine.axes]
     if tuple(spanning) != tuple(PLANES):
         return {}
@@ -247,7 +244,6 @@ def build_slice(
     position_mm: float,
     nodes: int = DEFAULT_NODES,
 ) -> Grid:
-    """Lay a grid over one plane of the working volume."""
     ranges = slice_ranges(model, workspace)
     if axis not in ranges:
         raise UnknownNameError("axis of a slice", axis, ranges)

@@ -294,7 +294,6 @@ class ErrorTable:
 
     @property
     def directed(self) -> bool:
-        """Whether they depend on the direction of travel."""
         return any(way != BOTH for _, way, _ in self.rows)
 
 

@@ -125,7 +125,6 @@ def _words() -> dict[str, Any]:
 
 
 def described(name: str) -> dict[str, Any]:
-    """Give the name, words and figures of a format of the house."""
     words = _words()["formats"][name]
     return {**words, "name": name, "endings": tuple(words["endings"])}
 
@@ -145,7 +144,6 @@ def _candidates(bare: str) -> list[str]:
 
 
 def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
-    """Read what a user says of axes: one letter, or NAME=AXIS."""
     axis, names = "", {}
     for text in texts:
         name, equals, target = text.partition("=")
@@ -217,7 +215,6 @@ class Reading:
 
 
 def refuse_unknown(name: str, content: bytes) -> None:
-    """Refuse a file of a structure that nobody has published."""
     lower = name.lower()
     for kind in _words()["unpublished"]:
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
@@ -239,7 +236,6 @@ def open_files(paths: Sequence[Path]) -> list[Source]:
 
 
 def open_upload(name: str, content: bytes) -> Source:
-    """Open what a browser has sent, see `open_files`."""
     refuse_unknown(name, content[:HEAD_BYTES])
     return source_of_bytes(content, name)
 

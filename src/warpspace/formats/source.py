@@ -87,12 +87,10 @@ class Source:
 
     @property
     def base(self) -> str:
-        """Its name without folders."""
         return self.name.replace("\\", "/").rsplit("/", 1)[-1]
 
     @property
     def stem(self) -> str:
-        """Its name without folders and ending."""
         return self.base.rsplit(".", 1)[0]
 
     def refuse(self, found: str, expected: str = "") -> NoReturn:
@@ -131,7 +129,6 @@ class Place:
         self.source.refuse(f"line {self.line}: {found}", expected)
 
     def number(self, text: str, what: str) -> float:
-        """Read one finite number with a decimal point."""
         try:
             return parse_number(text)
         except ValueError:
@@ -198,7 +195,6 @@ def read_source(path: Path) -> Source:
 
 
 def source_of_bytes(content: bytes, name: str) -> Source:
-    """Take the bytes of a file, for instance an upload, as text."""
     if len(content) > MAX_BYTES:
         found = f"is {len(content):,} bytes long; expected at most {MAX_BYTES:,} bytes"
         raise SceneError(name, [found])

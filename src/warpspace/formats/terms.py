@@ -216,7 +216,6 @@ NEGLIGIBLE = 1e-9  # µm or µrad
 def errors_of(
     tables: Tables, name: str, source: Source, machine: Machine | None = None
 ) -> Imported:
-    """Give the errors that the tables of a controller correct."""
     lines = [term for term in tables.terms if isinstance(term, Line)]
     series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
     planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]

@@ -118,7 +118,6 @@ NO_SPAN = 1e-12  # A range below this part of its ends is rounding, mm a part of
 
 
 def tick_values(low: float, high: float, most: float) -> list[float]:
-    """Choose round values within a range."""
     span = high - low
     if not span > NO_SPAN * max(1.0, abs(low), abs(high)):
         return [low]

@@ -53,7 +53,6 @@ def oriented(face: Index, axis: int, *, upper: int) -> Index:
 
 
 def outer_surface(shape: Shape) -> Surface:
-    """Triangulate the outside of a grid."""
     return triangulate(outer_faces(shape))
 
 
@@ -175,7 +174,6 @@ def deform(nominal_mm: Array, error_um: Array, exaggeration: float) -> Array:
 
 
 def auto_exaggeration(largest_um: float, longest_edge_mm: float) -> float:
-    """Choose a round display factor."""
     largest_mm = largest_um * MM_PER_UM  # zero also where an error is too small to be divided by
     if not largest_mm > 0.0 or not longest_edge_mm > 0.0:
         return NEUTRAL_EXAGGERATION
@@ -224,7 +222,6 @@ def _half(upper: int, middle: int) -> slice:
 
 
 def face_axis(face: Index, shape: Shape) -> int:
-    """Tell which grid direction does not vary over a patch."""
     ends = np.stack(np.unravel_index(face[[0, -1], [0, -1]], shape), -1)
     other = np.stack(np.unravel_index(face[[0, -1], [-1, 0]], shape), -1)
     still = (ends[0] == ends[1]) & (other[0] == other[1])

@@ -64,7 +64,6 @@ class SmallMotion:
 
     @property
     def inverse(self) -> "SmallMotion":
-        """The motion back."""
         back = SmallMotion(-self.half, -self.shift_mm)
         return SmallMotion(-self.half, back.shift_mm + back.arm(back.shift_mm))
 
@@ -91,7 +90,6 @@ class AxisErrors:
 
     @property
     def order(self) -> str:
-        """Name of the convention of component errors."""
         name = self.model.convention(self.axis).name
         if name not in [*ComponentErrors]:
             known = ", ".join(ComponentErrors)
@@ -130,19 +128,16 @@ class AxisErrors:
 
     @property
     def kinks(self) -> Array:
-        """Positions at which the slope of a curve may jump."""
         functions = [self.errors.functions.get(key) for key in self.keys()]
         return np.unique(np.concatenate([np.zeros(0), *(f.kinks for f in functions if f)]))
 
     def points(self, key: str) -> tuple[float, ...]:
-        """Positions at which an error was measured, as far as its curve knows them."""
         function = self.errors.functions.get(key)
         if isinstance(function, Pieces):
             return function.points
         return function.kinks if isinstance(function, Table) else ()
 
     def with_components(self, along: Along, *, adds: bool = False) -> ErrorSet:
-        """Give the set with other component errors of the axis."""
         self.refuse_two_arguments(adds=adds)
         ways = [TravelDirection.MEAN]
         functions = [self.errors.functions.get(key) for key in self.keys()]

@@ -22,7 +22,6 @@ ZERO_ROWS: Rows = (ZERO, ZERO, ZERO)
 
 
 def triple(values: Iterable[Number]) -> Triple:
-    """Give three components as a tuple."""
     x, y, z = values
     return x, y, z
 
@@ -87,7 +86,6 @@ def cross(one: Triple, other: Triple) -> Triple:
 
 
 def rotate(rows: Rows, vector: Triple) -> Triple:
-    """Multiply a matrix by a vector."""
     return triple(dot(row, vector) for row in rows)
 
 

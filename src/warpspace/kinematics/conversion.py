@@ -293,7 +293,6 @@ def angle_sign(key: str) -> int:
 
 
 def squareness_keys(machine: Machine) -> tuple[str, ...]:
-    """List the constants of a machine that are angles between two of its linear axes."""
     directions = {direction_index(axis) for axis in machine.axes if is_linear(axis)}
     found: list[str] = []
     for axis in machine.axes:

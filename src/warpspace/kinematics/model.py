@@ -73,12 +73,10 @@ class Convention(ABC):
 
     @property
     def short_words(self) -> str:
-        """Words for the foot of a figure or page."""
         return f"component errors {self.place}"
 
     @property
     def sentence(self) -> str:
-        """Sentence that says what the convention means, for reports."""
         return f"Component errors {self.meaning} ({self.place})."
 
 
@@ -165,7 +163,6 @@ class Model:
     direction: str = TravelDirection.MEAN
 
     def convention(self, axis: str) -> Convention:
-        """Give the convention for the component errors of an axis."""
         return find_convention(dict(self.own_component_errors).get(axis, self.component_errors))
 
     @property

@@ -227,7 +227,6 @@ def _constant(letter: str, axis: str) -> Parameter:
 
 @cache
 def axis_parameters(axis: str) -> tuple[Parameter, ...]:
-    """List the six component and the six constant errors that an axis can have."""
     return tuple(build(letter, axis) for build in (_component, _constant) for letter in DIRECTIONS)
 
 

@@ -218,7 +218,6 @@ class Machine:
 
     @property
     def parameter_keys(self) -> tuple[str, ...]:
-        """Keys of the error parameters the machine has by default."""
         return default_keys(self.chain.axes)
 
     @property

@@ -46,7 +46,6 @@ class ErrorSet:
 
     @property
     def has_directions(self) -> bool:
-        """Whether any error depends on the direction of travel."""
         return any(function.has_directions for function in self.functions.values())
 
     def arguments(self, key: str) -> tuple[str, ...]:
@@ -122,7 +121,6 @@ class ToleranceSet:
     own: Mapping[str, Tolerance] = field(default_factory=dict[str, Tolerance])
 
     def __bool__(self) -> bool:
-        """Whether any tolerance is given."""
         return bool(self.default or self.own)
 
     def get(self, key: str) -> Tolerance | None:
@@ -133,7 +131,6 @@ class ToleranceSet:
         return None if half_width is None else Tolerance(0.0, half_width)
 
     def missing(self, keys: Sequence[str]) -> tuple[str, ...]:
-        """List the parameters that have no tolerance."""
         return tuple(key for key in keys if self.get(key) is None)
 
     def with_half_widths(self, half_widths: Mapping[str, float]) -> "ToleranceSet":

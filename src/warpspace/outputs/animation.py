@@ -92,7 +92,6 @@ def _exaggeration_frame(scene: Scene, figure: FigureSettings, phase: float) -> D
 
 
 def one_round(scene: Scene) -> tuple[str, Array, list[TraceLine]]:
-    """Give the rotary axis next to a scene's points, its positions, and their traces."""
     groups = evaluate_traces(scene, 1.0, _TRACE_SAMPLES)
     if not groups:
         raise OptionError(

@@ -103,7 +103,6 @@ class ProcessPool(Executor):
             return result
 
     def _find(self) -> "_Worker":
-        """Give a process that has nothing to do; start one where there is none."""
         with self._lock:
             if not self.ended and self._lost <= self._may_lose:
                 if self._idle:
@@ -312,7 +311,6 @@ class FigureWorker:
         pool.kill()
 
     def close(self, *, wait: bool = True) -> None:
-        """End the process; the next request starts a new one."""
         with self._lock:
             pool, self._pool = self._pool, None
         if pool is None:

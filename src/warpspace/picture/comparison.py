@@ -78,7 +78,6 @@ class DifferencePicture(ScenePicture):
 
 
 def check_same_nodes(first: ScenePicture, second: ScenePicture) -> None:
-    """Refuse two pictures whose nodes do not coincide."""
     if not same_nodes(first.field.nominal_mm, second.field.nominal_mm):
         raise OptionError(
             f"{first.scene.name} and {second.scene.name} cannot be compared: their working volumes"

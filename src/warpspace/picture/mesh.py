@@ -91,13 +91,11 @@ def outline_pieces(picture: Picture, nodes_mm: Array) -> Pieces:
 
 
 def map_mesh(picture: Picture) -> MapMesh:
-    """Collect the triangles of a map."""
     surfaces = [(part, part.drawn_of.surface) for part in map_parts(picture)]
     return _collect([(part, surface.nodes, surface.triangles) for part, surface in surfaces])
 
 
 def line_mesh(picture: Picture) -> MapMesh:
-    """Collect grid lines and edges of a map as pieces of line between nodes, [S, 2]."""
     found: list[tuple[Part, Index, Index]] = []
     for part in map_parts(picture):
         segments = np.concatenate([part.drawn_of.grid_segments, part.drawn_of.edge_segments])

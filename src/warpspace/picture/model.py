@@ -69,7 +69,6 @@ class Topology:
 
 @lru_cache(maxsize=32)
 def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
-    """Work out what is drawn of a grid of a shape."""
     faces = map_faces(shape, cut=cut)
     normals = np.array([_normal(face, shape) for face in faces]).reshape(-1, 3)
     outwards = np.zeros((int(np.prod(shape)), 3))
@@ -197,7 +196,6 @@ def choose_scale(
     *,
     change: bool = False,
 ) -> ColourScale:
-    """Choose the colours of pictures that share one bar."""
     symbol, unit = SYMBOLS[quantity]
     largest = max((float(np.abs(part).max(initial=0.0)) for part in values), default=0.0)
     return build_scale(largest, component, quantity=symbol, unit=unit, end=end, change=change)
@@ -220,7 +218,6 @@ def subtract_fields(one: ErrorField, other: ErrorField) -> ErrorField:
 
 
 def subtract_pictures(one: P, other: Picture) -> P:
-    """Subtract the errors of a picture from those of another, one − other, node by node."""
     if not same_nodes(one.grid.nominal_mm, other.grid.nominal_mm):
         raise OptionError("the working volumes are not the same: there is no difference")
     field = subtract_fields(one.field, other.field)
@@ -230,7 +227,6 @@ def subtract_pictures(one: P, other: Picture) -> P:
 def subtract_traces(
     one: Sequence[TraceLines], other: Sequence[TraceLines]
 ) -> tuple[TraceLines, ...]:
-    """Subtract the errors of traces, one − other, where they are the same traces."""
     return tuple(
         replace(first, error_um=first.error_um - second.error_um)
         for first, second in zip(one, other, strict=False)
@@ -302,7 +298,6 @@ LEAST_SIZE_MM = 100.0  # of a single point without traces, on a machine without 
 
 
 def picture_size_mm(scene: Scene, grid: Grid) -> float:
-    """Choose the length that a picture of a scene is sized by."""
     if grid.longest_edge_mm > 0.0:
         return grid.longest_edge_mm
     axes = scene.machine.axes.values()
@@ -327,12 +322,10 @@ class ScenePicture(Picture):
 
     @cached_property
     def traces(self) -> tuple[TraceLines, ...]:
-        """Traces of the scene's points over the rotary axes."""
         return evaluate_traces(self.scene, self.exaggeration)
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """How the scene was looked at, fit for JSON."""
         reference = self.scene.reference
         return {
             "loop": str(self.view.loop),
@@ -375,7 +368,6 @@ class ScenePicture(Picture):
 
 
 def field_remarks(scene: Scene, view: View, *, exact: bool = False) -> dict[str, str]:
-    """Say what a field belongs to, in words: scene, loop, reference, convention, program."""
     held = view.reference
     placement = {} if view.placed_over is None else {"placement": "fitted out"}
     return {
@@ -408,7 +400,6 @@ def evaluate_picture(
     colours: ColourScale | None = None,
     conditions: Sequence[str] = (),
 ) -> ScenePicture:
-    """Evaluate all that a picture of a scene is drawn from."""
     view = choose_view(scene, loop)
     nodes = build_grid(scene.model, scene.workspace, grid)
     field = evaluate(scene, grid=grid, loop=loop)

@@ -89,7 +89,6 @@ MOTION_SAMPLES = 181  # places of a turn: every two degrees
 
 
 def is_moved(line: TraceLine) -> bool:
-    """Tell whether any error moves a trace."""
     return line.largest_um > LEAST_UM
 
 

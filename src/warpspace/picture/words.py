@@ -78,7 +78,6 @@ TOLERANCE_UNITS = {"translation": "µm", "rotation": "µrad", "squareness": "µr
 
 
 def tolerance_words(tolerances: ToleranceSet) -> str:
-    """Spell the half widths of the classes of parameters."""
     return ", ".join(
         f"{name} ±{spell_short(value)} {TOLERANCE_UNITS[name]}"
         for name, value in tolerances.default.items()
@@ -102,7 +101,6 @@ def spell_vector(point: Sequence[float] | Array) -> str:
 
 
 def reference_words(scene: Scene) -> str:
-    """Say what errors are referred to."""
     if scene.reference is None:
         return "absolute errors"
     return f"reference point {list_axes(scene.reference)}"
@@ -125,7 +123,6 @@ def convention_groups(model: Model) -> tuple[tuple[Convention, tuple[str, ...]],
 
 
 def convention_words(scene: Scene) -> str:
-    """Say where component errors act; where axes differ, those of which axes."""
     groups = convention_groups(scene.model)
     if len(groups) == 1:
         return groups[0][0].short_words
@@ -152,5 +149,4 @@ def convention_sentences(scene: Scene) -> tuple[str, ...]:
 
 
 def quantity_words(component: str, unit: str = "µm") -> str:
-    """Say what the colours of a map of position errors mean."""
     return f"|E|  [{unit}]" if component == "norm" else f"{component} component of E  [{unit}]"

@@ -85,7 +85,6 @@ def _refuse(text: str, found: re.Match[str], source: str, problem: str) -> None:
 
 
 def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:
-    """Read a text file that a user named."""
     source = source or str(path)
     check_file(path, limit_bytes, source)
     try:
@@ -265,7 +264,6 @@ def guard_cell(text: str) -> str:
 
 
 def unguard_cell(text: str) -> str:
-    """Give the text that `guard_cell` was given."""
     return text[1:] if text[:1] == "'" and guard_cell(text[1:]) == text else text
 
 

@@ -111,7 +111,6 @@ STAND_IN = build_machine("wFXYZABCt")
 def parse_scene(
     text: str, name: str, source: str | None = None, folder: Path | None = None
 ) -> Scene:
-    """Build a scene from TOML text, for instance an upload."""
     source = source or name
     raw, problems = parse_toml(text, source), Problems()
     machine = _machine(raw, name, folder, problems)
@@ -288,7 +287,6 @@ class _Document:
     problems: Problems
 
     def known(self, section: str) -> dict[str, object]:
-        """Give the entries of a table whose keys are parameters of the machine."""
         known: dict[str, object] = {}
         machine, problems = self.machine, self.problems
         for key, value in problems.table(section, self.raw.get(section)).items():

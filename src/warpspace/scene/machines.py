@@ -115,7 +115,6 @@ def machine_of(
     body_dir: str = "",
     folder: Path | None = None,
 ) -> Machine | None:
-    """Build a machine from its table; note problems and give None where it cannot be."""
     expected = 'expected a machine name or a [machine] table with "chain"'
     if raw is None:
         problems.add(key, f"is missing; {expected}")

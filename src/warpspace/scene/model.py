@@ -176,7 +176,6 @@ def evaluate(
 
 
 def evaluate_grid(scene: Scene, grid: Grid, view: View, *, exact: bool = False) -> ErrorField:
-    """Evaluate the error field of a scene over a grid that is there already."""
     solve = evaluate_exact if exact else evaluate_first_order
     field = solve(scene.model, scene.errors, grid.coordinates, view, grid.point_mm)
     return replace(field, nominal_mm=grid.nominal_mm)
@@ -223,7 +222,6 @@ def choose_view(scene: Scene, loop: Loop | str, frame: str = "machine") -> View:
 def grid_basis(
     scene: Scene, grid: Grid, view: View | None = None, keys: Sequence[str] | None = None
 ) -> ErrorBasis:
-    """Compute the response of every node of a grid to parameters of a scene."""
     basis = build_basis(
         scene.model,
         scene.errors,

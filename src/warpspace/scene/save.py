@@ -30,7 +30,6 @@ class Notation:
     measuring_line_mm: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
 
     def to_toml(self) -> dict[str, object]:
-        """Give the keys of `[convention]` that are not the program's own."""
         found: dict[str, object] = {}
         if self.squareness != SquarenessSign.RIGHT_HAND:
             found["squareness"] = str(self.squareness)

@@ -26,12 +26,10 @@ class Problems:
         self.lines: list[str] = []
 
     def add(self, key: str, text: str, value: object = ...) -> None:
-        """Note one problem: key, value and what was expected."""
         shown = "" if value is ... else f" = {spell_value(value)}"
         self.lines.append(f"{key}{shown}: {text}" if key else text)
 
     def unknown(self, section: str, name: str, known: Iterable[str], what: str) -> None:
-        """Note a name that is not among the known ones."""
         hint = near_miss(name, known) if len(self.lines) < SHOWN_PROBLEMS else ""
         self.lines.append(f"{location(section, [name])}: unknown {what}{hint}")
 
@@ -234,7 +232,6 @@ _PLACE = _number(*LIMIT, expected="a number or [lower, upper]")
 
 
 def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:
-    """Read a half width about zero, or a range."""
     if isinstance(value, dict):
         return _RANGE(reader, value, path)
     return Tolerance(0.0, _WIDTH(reader, value, path))

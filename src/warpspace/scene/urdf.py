@@ -145,7 +145,6 @@ def _twice(names: list[str]) -> list[str]:
 
 
 def root_of(robot: Any) -> str:
-    """Give the name of the link that hangs on nothing."""
     children = {joint.child for joint in robot.joints}
     return next(link.name for link in robot.links if link.name not in children)
 

@@ -72,7 +72,6 @@ def covered_deg(angle_deg: Array) -> float:
 
 
 def is_full(angle_deg: Array) -> bool:
-    """Tell whether angles go all the way round."""
     return covered_deg(angle_deg) >= FULL_DEG
 
 

@@ -38,7 +38,6 @@ PENALTY = 0.02  # of a way of one radian from the position before, where several
 def orient(
     machine: Machine, model: Model, stand: Mapping[str, Array], wanted: Array
 ) -> dict[str, Array]:
-    """Turn two rotary axes so that the tool axis has given directions in the workpiece."""
     names = [axis.name for axis in machine.axes.values() if not axis.is_linear]
     if len(names) < 2:
         raise OptionError(

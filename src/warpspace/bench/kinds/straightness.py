@@ -182,7 +182,6 @@ class Straightness(BenchTest):
     points: int = option(21, "Positions along the axis", low=3, high=2_000)
 
     def directions(self, scene: Scene) -> tuple[str, int]:
-        """Give the axis that runs, and which of x, y, z is sensed."""
         axis = linear_axis(scene.machine, self.axis)
         vector = axis_vector(scene.model, self.stand(scene), axis)
         own = int(np.argmax(np.abs(vector)))

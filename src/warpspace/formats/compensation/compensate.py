@@ -136,7 +136,6 @@ class Compensate(Analysis):
     stem: str = "compensation"  # name of the files
 
     def written(self, stem: str | None) -> "Compensate":
-        """Give it with the name of its files."""
         if not self.sweep and (len(self.formats) != 1 or stem is None):
             raise OptionError(
                 "expected {formats} F and {output} FILE; {sweep} compares several tables"
@@ -171,7 +170,6 @@ class Compensation(BeforeAfter, Result):
 
     @property
     def size(self) -> int:
-        """Numbers that the controller holds."""
         return self.controller.size
 
     @property
@@ -205,7 +203,6 @@ class Compensation(BeforeAfter, Result):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the controller cannot hold, in words."""
         return (*self.controller.notes, *self.reversal)
 
     @property

@@ -58,7 +58,6 @@ class Corrected:
 
     @property
     def nbytes(self) -> int:
-        """Bytes it holds, about."""
         moved = self.moved
         arrays = (*moved.coordinates.values(), moved.point_mm, moved.shift_mm, moved.turn_rad)
         own = sum(array.nbytes for array in arrays)
@@ -136,7 +135,6 @@ class Controller:
 
 
 def toward(scene: Scene, direction: str) -> Scene:
-    """Look at a scene in one direction of travel."""
     return replace(scene, model=replace(scene.model, direction=direction))
 
 

@@ -126,7 +126,6 @@ class Corrector:
         )
 
     def moves(self, coordinates: Coordinates) -> dict[str, Array]:
-        """Give the moves of the axes that leave nothing, or as little as they can."""
         shape = batch_shape(coordinates)
         total = {axis: np.zeros(shape) for axis in self.moved}
         shift, _ = self._response(coordinates, self.axes)
@@ -230,7 +229,6 @@ class Wanted:
 
     @property
     def title(self) -> str:
-        """Title of the scene in one line, for comments."""
         return self.scene.title.replace("\n", " ")
 
     @property

@@ -173,7 +173,6 @@ _SETP = re.compile(r"setp\s+matrixkins\.C_([xyz])([xyz])\s+(\S+)", re.IGNORECASE
 
 
 def squareness(first_diagonal_mm: float, second_diagonal_mm: float) -> float:
-    """Give C_xy of a part from its diagonals."""
     a, b = first_diagonal_mm, second_diagonal_mm
     return (b * b - a * a) / (2.0 * a * b)
 
@@ -203,7 +202,6 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 
 def _write_matrix(wanted: Wanted) -> Files:
-    """Write the matrix that leaves the smallest RMS."""
     allowed = [(row, column) for row in AXES for column in AXES]
     found = wanted.linear_fit(allowed)
     lines = [f"# {wanted.title}"]

@@ -73,7 +73,6 @@ def factor_of(lengths: tuple[float, float, float], at: Place, what: str) -> floa
 
 
 def skew_term(factors: Mapping[str, float]) -> Affine:
-    """Give the corrections of skew factors by plane."""
     xy, xz, yz = (factors.get(plane, 0.0) for plane in PLANES)
     return Affine(AXES, ((0.0, -xy, -(xz - xy * yz)), (0.0, 0.0, -yz), (0.0, 0.0, 0.0)))
 

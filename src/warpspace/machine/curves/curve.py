@@ -134,7 +134,6 @@ class ValueReader:
         return value
 
     def dictionary(self, value: object, path: Path) -> dict[str, object]:
-        """Read a table with any keys."""
         if isinstance(value, dict):
             return cast("dict[str, object]", value)
         self.note(path, "expected a table", value)
@@ -413,20 +412,17 @@ class ErrorFunction(ABC):
 
 
 def single_value(rows: Rows) -> float:
-    """Take the one number there is."""
     if len(rows) != 1 or len(rows[0]) != 1:
         raise OptionError("expected one number")
     return limited(rows[0][0], 1)
 
 
 def limited(value: float, row: int, limit: float = MAX_ERROR, what: str = "value") -> float:
-    """Refuse what is too large."""
     if abs(value) > limit:
         raise OptionError(f"row {row}: {what} {value:g}; expected at most ±{limit:g}")
     return value
 
 
 def refuse_more(count: int, most: int, what: str) -> None:
-    """Refuse too many numbers or rows."""
     if count > most:
         raise OptionError(f"{count} {what}; expected at most {most}")

@@ -50,7 +50,6 @@ def find_form(raw: Mapping[str, object]) -> tuple[CurveKind, Form] | None:
 
 
 def spell_forms() -> str:
-    """Spell all that a scene file may give for an error."""
     tables = (
         "{ " + ", ".join(f"{key} =" for key in form).replace("=,", "= ,") + " }"
         for kind in curve_kinds()

@@ -83,7 +83,6 @@ def sheet(
 
 
 def quiet(axes: Axes, grid: str = "x") -> None:
-    """Leave an axes no more lines than it needs."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     axes.tick_params(length=3.0, width=0.8)
@@ -143,7 +142,6 @@ def charts_sheet(
 
 
 def draw_beside(figure: Figure, bars: Bars, box: Box, size: float = SMALL) -> None:
-    """Draw bars into a part of a figure; text of a size in points."""
     width, height = figure.get_size_inches() * SMALL / size
     left, bottom, wide, high = box
     longest = max((len(words) for words in bars.rows), default=0)
@@ -162,7 +160,6 @@ def draw_beside(figure: Figure, bars: Bars, box: Box, size: float = SMALL) -> No
 
 
 def bars_chart(bars: Bars) -> Figure:
-    """Draw a chart of bars on a sheet of its own."""
     with style():
         beside = max((_beside(panel) for panel in bars.panels), default=1)
         row = BAR_IN * (1.0 + 0.55 * (beside - 1))
@@ -189,7 +186,6 @@ def bars_chart(bars: Bars) -> Figure:
 
 
 def draw_bars(axes: list[Axes], bars: Bars, size: float = SMALL) -> None:
-    """Draw the panels into axes side by side that share their rows; text of a size in points."""
     for index, (axis, panel) in enumerate(zip(axes, bars.panels, strict=True)):
         _draw_panel(axis, panel, bars, size, first=index == 0)
     axes[0].set_yticks(range(len(bars.rows)), list(bars.rows), size=size)
@@ -197,7 +193,6 @@ def draw_bars(axes: list[Axes], bars: Bars, size: float = SMALL) -> None:
 
 
 def legend_handles(bars: Bars) -> list[Patch | Line2D]:
-    """Say what colours and lines mean."""
     return [
         Line2D([], [], color=ground().ink, linestyle=(0, (4, 3)), label=words)
         if role == "before"
@@ -280,7 +275,6 @@ def _draw_series(
 
 
 def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> None:
-    """Draw curves with their legend into a part of a figure; text of a size in points."""
     width, height = figure.get_size_inches() * SMALL / size
     left, bottom, wide, high = box
     names = sum(bool(curve.name) for curve in chart.curves) + len(chart.bands)

@@ -148,7 +148,6 @@ def compensation_chart(found: "Compensation") -> Figure:
 
 
 def compensation_column(found: "Compensation") -> Figure:
-    """Draw the same maps small, three rows of slices."""
     planes = _planes(found)
     with style():
         figure = Figure(figsize=COLUMN_IN, dpi=DPI, facecolor=ground().paper)
@@ -179,7 +178,6 @@ def compensation_column(found: "Compensation") -> Figure:
 
 
 def compensation_maps(found: "Compensation", dark: bool, narrow: bool) -> Figure:
-    """Draw the column of the app, or the sheet of the command."""
     with on_ground(DARK if dark else LIGHT):
         return (compensation_column if narrow else compensation_chart)(found)
 

@@ -201,7 +201,6 @@ class Canvas:
     def rectangle(
         self, left: float, bottom: float, width: float, height: float, **patch: Any
     ) -> None:
-        """Draw a rectangle; styles as in matplotlib."""
         self.axes.add_patch(Rectangle((left, bottom), width, height, clip_on=False, **patch))
 
     def image(self, rgba: np.ndarray[Any, Any], rect: Rect, zorder: float = 1.0) -> None:
@@ -309,7 +308,6 @@ class Occupancy:
         )
 
     def between(self, start: tuple[float, float], end: tuple[float, float]) -> float:
-        """Cost of a leader: high where it runs over text."""
         steps = np.linspace(0.0, 1.0, 24)
         rows = ((start[1] + (end[1] - start[1]) * steps) / self.cell).astype(int)
         columns = ((start[0] + (end[0] - start[0]) * steps) / self.cell).astype(int)

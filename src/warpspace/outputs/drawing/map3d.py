@@ -60,7 +60,6 @@ class Stage:
         return split_visible(lines_mm, self.projection, self.raster)
 
     def label(self, text: str, anchors: Points) -> None:
-        """Write a displacement beside one of several points, where there is room."""
         if self.frame is None:
             return
         canvas, colour = self.canvas, self.canvas.theme.accent
@@ -118,7 +117,6 @@ def _beside(line: Array, share: float, size: tuple[float, float]) -> tuple[float
 
 
 def draw_corners(stage: Stage) -> None:
-    """Draw the displacement of the corners and label those that can be seen."""
     canvas, picture, projection = stage.canvas, stage.picture, stage.projection
     nominal, drawn = picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)
     length = np.linalg.norm(picture.field.error_um.reshape(-1, 3), axis=-1)
@@ -242,7 +240,6 @@ def draw_maps_alike(
     cells: Sequence[Rect],
     view: str,
 ) -> tuple[DrawnMap, ...]:
-    """Draw maps in one projection, each with its name above, into cells of one size."""
     head = canvas.px(30.0)
     rooms = [(left, bottom, right, top - head) for left, bottom, right, top in cells]
     shared = fit_map(canvas, pictures, rooms[0], view)

@@ -206,7 +206,6 @@ GRID_ENDINGS = (".vts",)  # formats that hold grids only
 
 
 def write_csv(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the field of a scene over its grid."""
     record = FieldRecord(picture.grid.coordinates, picture.field, picture.remarks)
     remarks = {name: guard_cell(text) for name, text in picture.remarks.items()}
     with write_atomically(path, overwrite=overwrite) as temporary:

@@ -50,7 +50,6 @@ for _form in (
 
 
 def write_export(picture: "ScenePicture", path: Path, *, overwrite: bool = True) -> None:
-    """Write a picture in the format that the ending of a path names."""
     load_plugins()
     form = _FORMATS.get(path.suffix.lower())
     if form is None:

@@ -74,7 +74,6 @@ def _placed(
 
 
 def _surface(picture: ScenePicture) -> list[Part]:
-    """Build the outside of the deformed grid, with its errors as attributes."""
     field = picture.field
     nominal = thick_nodes(picture, picture.grid.nominal_mm)
     surface = outer_surface(nominal.shape[:3])

@@ -45,13 +45,11 @@ register_figure, unregister_figure = _KINDS.register, _KINDS.unregister
 
 
 def figure_command(name: str) -> str:
-    """Give the command that draws a figure of several scenes; empty for any other name."""
     load_plugins()
     return _KINDS[name].command if name in _KINDS else ""
 
 
 def figure_names(scenes: int = 1) -> tuple[str, ...]:
-    """List the names of the figures that are drawn from so many scenes."""
     return tuple(kind.name for kind in figure_kinds() if kind.scenes == scenes)
 
 

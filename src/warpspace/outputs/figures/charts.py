@@ -93,7 +93,6 @@ def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
 
 
 def first_lines(scene: Scene) -> list[TraceLine]:
-    """Give one trace of every rotary axis: of the first point, the other axes where they stand."""
     stands = scene.workspace.positions
     found: dict[str, TraceLine] = {}
     for line in trace_lines(evaluate_traces(scene, 1.0)):

@@ -26,7 +26,6 @@ Errors = tuple[Axis, str, str, str]
 
 
 def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw every error of a scene along its axis, tolerances behind."""
     scene = scenes[0]
     shown = _shown(scene)
     facts = [

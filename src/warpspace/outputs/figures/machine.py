@@ -71,7 +71,6 @@ def _drawn_body(part: PlacedBody, theme: Theme) -> Body:
 def bodies_of(
     picture: ScenePicture, exaggeration: float, only: Collection[str] | None = None
 ) -> tuple[PlacedBody, ...]:
-    """Place the bodies of a picture's machine, axes at their place in the scene."""
     motions = scene_motions(picture.scene, picture.view)
     return place_bodies(picture.scene, motions, exaggeration, only)
 
@@ -116,7 +115,6 @@ def draw_bodies(
     nominal: bool = True,
     zorder: float = 1.0,
 ) -> Raster | None:
-    """Draw the bodies of a machine with their edges, faintly where these would be nominally."""
     theme = canvas.theme
     raster = render_bodies([_drawn_body(part, theme) for part in placed], projection)
     if raster is None:
@@ -217,7 +215,6 @@ TRACE_DASHES, FADED = (7.0, 5.0), 0.55
 
 
 def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
-    """Draw the nominal and the actual traces of a scene's rotary axes."""
     scene = scenes[0]
     groups = evaluate_traces(scene, 1.0)
     lines = trace_lines(groups)

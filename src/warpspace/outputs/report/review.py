@@ -46,7 +46,6 @@ class ReportSettings:
     questions: tuple[str, ...] = ()  # what is still open, on the first page
 
     def analyses(self, limit_um: float | None) -> dict[str, Analysis]:
-        """Give what is asked of a scene with such a limit."""
         loop, seed = Loop(self.loop), self.seed
         drawn = choose_distribution(self.distribution)
 
@@ -111,7 +110,6 @@ class Reviewed:
         return f" {TIMES} ".join(edges) + " mm"
 
     def titled(self, text: str) -> str:
-        """Put the letter of the scene before a heading."""
         return f"{self.letter}: {text}" if self.letter else text
 
 
@@ -126,7 +124,6 @@ class Review:
 
     @property
     def exaggeration(self) -> float:
-        """Display factor of all pictures."""
         return self.scenes[0].picture.exaggeration
 
 

@@ -99,7 +99,6 @@ class ReportFigures:
             self._evidence.append([self._begin(name, [scene], caption) for name, caption in wanted])
 
     def evidence(self, number: int) -> list[Block]:
-        """Give the maps of one scene: its error map and whatever else the catalogue has."""
         return [drawn() for drawn in self._evidence[number]]
 
     def repair(self, scene: Scene, prefix: str) -> Block:
@@ -173,7 +172,6 @@ def write_report(
     files: Sequence[Path] = (),
     overwrite: bool = True,
 ) -> Report:
-    """Write the design review of one scene or two, with results of other analyses by heading."""
     target = check_target(path, ENDINGS, overwrite=overwrite)
     page = target.suffix.lower() == ".html"
     report = build_report(
@@ -342,7 +340,6 @@ def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterat
 
 
 def explanation(reviewed: Reviewed) -> Table:
-    """Give the contributions at the worst point, adding up to its error."""
     found = reviewed.explanation
     ranked = sorted(found.contributions, key=lambda part: -abs(part.along_um))
     rows: list[tuple[str, ...]] = []
@@ -427,7 +424,6 @@ def differences(review: Review) -> Iterator[Block]:
 def compare_with(
     scenes: Sequence[Scene], others: Sequence[Scene], settings: ReportSettings
 ) -> ConceptsResult | None:
-    """Compare the reviewed machines with others within the tolerances of the first."""
     if not others:
         return None
     every = (*scenes, *others)
