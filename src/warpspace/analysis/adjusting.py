@@ -1,8 +1,4 @@
-"""The best values of errors over the volume: of one set of them, and of the best sets.
-
-The volume is a linear function of its errors. The least RMS of a set is found in closed form, its
-least maximum as a convex problem.
-"""
+"""The best values of errors over the volume: of one set of them, and of the best sets."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

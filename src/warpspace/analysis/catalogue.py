@@ -45,23 +45,7 @@ class Verb(Protocol[R_co]):
     """An analysis as a function: ``warpspace.NAME(scene, **options)``."""
 
     def __call__(self, *scenes: "Scene", watch: "Watch" = ..., **options: Any) -> R_co:
-        """Answer it for a scene, or for several where it takes as many.
-
-        Parameters
-        ----------
-        *scenes : Scene
-        watch : callable, optional
-            Called with the share of the work that is done; what it raises ends the work.
-        **options
-            Those of its command, as Python has them: ``at={"X": 0}``, ``over_travel=True``.
-
-        Raises
-        ------
-        OptionError, UnknownNameError
-            If an option is out of range, or there is none of this name.
-        SceneError
-            If a scene lacks what the analysis needs, for instance tolerances.
-        """
+        """Answer it; options are those of its command: ``at={"X": 0}``, ``over_travel=True``."""
         ...
 
 

@@ -1,7 +1,4 @@
-"""What an analysis is: options as fields, one computation, one result that says itself.
-
-Command, ``--json``, page, section of the report and contract tests come out of it.
-"""
+"""What an analysis is: options as fields, one computation, one result that says itself."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence

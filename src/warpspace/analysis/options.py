@@ -1,7 +1,4 @@
-"""Options of an analysis: fields of its dataclass, and how their values are typed.
-
-Command line and page build theirs from them.
-"""
+"""Options of an analysis: fields of its dataclass, and how their values are typed."""
 
 import math
 import types
@@ -160,28 +157,7 @@ def option(
 ) -> T:
     """Give a field of an analysis that a user may set; its kind comes from its annotation.
 
-    Parameters
-    ----------
-    default : T
-    about : str
-        What it is, without a full stop.
-    unit : str, optional
-    low, high : float, optional
-        Both belong to the range.
-    unset : str, optional
-        What None means, for instance "the middle".
-    needs : str, optional
-        Name of the switch that it belongs to.
-    flag : str, optional
-        On the command line, where the name without its unit does not do.
-    former : tuple of str, optional
-        Flags it had before, which are still understood.
-    label : str, optional
-        On a page; else the name in words.
-    words : mapping of str to str, optional
-        What choices are called on a page.
-    required : bool, optional
-        Whether a command line must give it.
+    See `Option` for the parameters; a flag is given where the name without its unit does not do.
     """
     said = {
         "about": about, "unit": unit, "low": low, "high": high, "unset": unset, "needs": needs,

@@ -1,8 +1,4 @@
-"""Binary glTF files: coloured surfaces and lines that no light changes.
-
-Materials are unlit, colours are linear floats also beyond 0 … 1, lines are pairs of numbered
-points, and there may be places to which a viewer can morph the points.
-"""
+"""Binary glTF files: coloured surfaces and lines that no light changes."""
 
 import json
 import struct

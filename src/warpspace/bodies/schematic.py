@@ -1,8 +1,4 @@
-"""Schematic bodies from simple closed shapes, built by trimesh: read from a file, or generated.
-
-All sizes are mm. A body is described where it stands with every axis at zero, in R, and then moved
-into the frame it rides on.
-"""
+"""Schematic bodies from simple closed shapes, built by trimesh: read from a file, or generated."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

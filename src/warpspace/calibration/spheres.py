@@ -1,8 +1,4 @@
-"""Sphere centres, with TCP correction on or off.
-
-With it the centre should stay where it is; without it the linear axes read circles about the
-rotary ones.
-"""
+"""Sphere centres, with TCP correction on or off."""
 
 from dataclasses import replace
 

@@ -1,8 +1,4 @@
-"""What a command reads and writes: no output is a file that is read, or the file of another output.
-
-The types of its parameters say which they are; they are looked at before a command begins. Numbers
-are read as those of every table are.
-"""
+"""What a command reads and writes: no output is a file that is read, or another output's file."""
 
 from collections.abc import Callable, Iterable, Iterator, MutableMapping
 from contextlib import suppress

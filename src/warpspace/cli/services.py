@@ -1,7 +1,4 @@
-"""What the app and the outputs do for each other: figures and exports of a page, pages of scenes.
-
-Figures are drawn in a process of their own. All is imported when it is done, as for any command.
-"""
+"""What the app and the outputs do for each other: figures, exports, pages of scenes."""
 
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence

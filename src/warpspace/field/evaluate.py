@@ -8,7 +8,7 @@ an array over these.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -305,46 +305,6 @@ def amplitudes_of(errors: ErrorSet, keys: Sequence[str]) -> Array:
     return np.array([errors.amplitude(key) for key in keys], dtype=float)
 
 
-def evaluate_exact(
-    model: Model,
-    errors: ErrorSet,
-    coordinates: Coordinates,
-    view: View | None = None,
-    point_mm: Array | None = None,
-) -> ErrorField:
-    """Evaluate the field with the exact chain, at points in R, [..., 3], or that of the loop.
-
-    Where the model looks at the difference of both directions of travel, it is the field forward
-    minus that backward.
-    """
-    view = view or View()
-    if model.direction == TravelDirection.DIFFERENCE:
-        there, back = (
-            evaluate_exact(replace(model, direction=way), errors, coordinates, view, point_mm)
-            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
-        )
-        return ErrorField(
-            there.nominal_mm,
-            there.error_um - back.error_um,
-            there.orientation_urad - back.orientation_urad,
-        )
-    return _evaluate(model, errors, coordinates, view, point_mm, exact=True)
-
-
-def evaluate_first_order(
-    model: Model,
-    errors: ErrorSet,
-    coordinates: Coordinates,
-    view: View | None = None,
-    point_mm: Array | None = None,
-) -> ErrorField:
-    """Evaluate the field with the first-order model; see `evaluate_exact` for the parameters.
-
-    The same numbers as the basis gives for the amplitudes of the set, without its memory.
-    """
-    return _evaluate(model, errors, coordinates, view or View(), point_mm, exact=False)
-
-
 def find_placement(
     model: Model, errors: ErrorSet, view: View, *, exact: bool = False
 ) -> Array | None:
@@ -361,11 +321,28 @@ def _evaluate(
     model: Model,
     errors: ErrorSet,
     coordinates: Coordinates,
-    view: View,
-    point_mm: Array | None,
+    view: View | None = None,
+    point_mm: Array | None = None,
     *,
     exact: bool,
 ) -> ErrorField:
+    """Evaluate the field at points in R, [..., 3], or at that of the loop.
+
+    Where the model looks at the difference of both directions of travel, the exact field is that
+    forward minus that backward. To first order the numbers are those of the basis, without its
+    memory.
+    """
+    view = view or View()
+    if exact and model.direction == TravelDirection.DIFFERENCE:
+        there, back = (
+            evaluate_exact(replace(model, direction=way), errors, coordinates, view, point_mm)
+            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        )
+        return ErrorField(
+            there.nominal_mm,
+            there.error_um - back.error_um,
+            there.orientation_urad - back.orientation_urad,
+        )
     point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
     error, orientation = np.empty(shape), np.empty(shape)
@@ -398,3 +375,7 @@ def _evaluate(
         join(found, error[nodes])
         join(tilt, orientation[nodes])
     return ErrorField(np.broadcast_to(point, shape), error, orientation)
+
+
+evaluate_exact = partial(_evaluate, exact=True)
+evaluate_first_order = partial(_evaluate, exact=False)

@@ -1,8 +1,4 @@
-"""One error set in another convention: the same field from other numbers, exactly.
-
-What is exact is the rigid motion of every body at every position of its axis: products of full
-rotations, nothing linearised.
-"""
+"""One error set in another convention: the same field from other numbers, exactly."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,8 +1,4 @@
-"""The errors of a machine: the curve of every parameter, tolerances, and what was measured.
-
-The kinds of curve are in `warpspace.machine.curves`; those that come with warpspace can be imported
-from here as well.
-"""
+"""The errors of a machine: the curve of every parameter, tolerances, and what was measured."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

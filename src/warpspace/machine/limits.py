@@ -1,8 +1,4 @@
-"""Every limit on what a user may give, in one table: for files, options, widgets and drawing.
-
-Where a limit is a pair of numbers both ends are allowed. Whatever lies within passes through the
-whole program; whatever lies beyond is refused where it comes in, or brought back by a widget.
-"""
+"""Every limit on what a user may give, in one table: for files, options, widgets and drawing."""
 
 import sys
 

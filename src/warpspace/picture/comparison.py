@@ -1,7 +1,4 @@
-"""Two scenes over one working volume: what they share, and the change from A to B.
-
-The change is always B − A: of the error vectors node by node, and of each statistic.
-"""
+"""Two scenes over one working volume: what they share, and the change from A to B."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace

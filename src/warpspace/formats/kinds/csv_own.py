@@ -1,7 +1,4 @@
-"""The measurement table of warpspace: a CSV file whose header names errors with their units.
-
-Documented in docs/import.md; `warpspace import --template AXIS` writes one to fill in.
-"""
+"""The measurement table of warpspace: a CSV file whose header names errors with their units."""
 
 import math
 import re

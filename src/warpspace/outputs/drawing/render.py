@@ -1,7 +1,4 @@
-"""Bodies drawn off screen in a parallel projection, and which parts of lines they hide.
-
-Colours are exact, the background is transparent, depths are in millimetres.
-"""
+"""Bodies drawn off screen in a parallel projection, and which parts of lines they hide."""
 
 import os
 import sys

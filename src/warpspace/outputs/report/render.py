@@ -1,7 +1,4 @@
-"""A report as one HTML file, and as PDF typeset by Typst: vector figures, tables over pages.
-
-Plain text throughout: templates escape, nobody writes markup.
-"""
+"""A report as one HTML file, and as PDF typeset by Typst: vector figures, tables over pages."""
 
 import json
 import os
