@@ -10,7 +10,7 @@ from warpspace.bench.plan import simulate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.kinds import VIEW
 from warpspace.calibration.next_best import Candidate, candidates, map_weights, next_best
-from warpspace.calibration.readings import Readings, find_data, nominal_tip, read_table
+from warpspace.calibration.readings import Readings, find_data, nominal_tip, parse_table
 from warpspace.calibration.solve import build_terms, spell_rank
 from warpspace.calibration.spheres import circles_of
 from warpspace.field.evaluate import evaluate_exact
@@ -22,7 +22,7 @@ HEAD = {"EX0B": 60.0, "EA0B": -140.0, "EA0C": 90.0, "EB0C": -70.0, "EC0B": 210.0
 
 
 def sphere_circles(axis):
-    table = read_table(find_data("tcp_off.csv"))
+    table = parse_table(find_data("tcp_off.csv").read_text(), "tcp_off.csv")
     return [circle for circle in circles_of(table, FORK) if circle.axis == axis]
 
 
@@ -327,7 +327,7 @@ def test_predicted_covariance_of_the_next_measurement_is_the_one_obtained(instru
     first = replace(first, session=("before",) * len(first), sigma_mm=np.full(len(first), 1e-3))
     found = calibrate(scene, [first], Calibrate(fit=keys))
     choice = [one for one in candidates(scene) if one.name.startswith(instrument)][:1]
-    (step,) = next_best(scene, [first], found, 1, choice, noise_mm=1e-3)
+    (step,) = next_best(scene, [first], found, 1, choice)
     second = replace(choice[0].readings, sigma_mm=np.full(len(choice[0].readings), 1e-3))
     both = calibrate(scene, [first, second], Calibrate(fit=keys))
     asked = [one.key for one in found.parameters]
@@ -360,7 +360,7 @@ def test_a_ball_bar_is_no_thirty_six_error_vectors():
         lines=tuple(range(36)),
     )
     (said,), (full,) = (
-        next_best(scene, [corners], found, 1, [Candidate("", one)], noise_mm=1e-3)
+        next_best(scene, [corners], found, 1, [Candidate("", one)])
         for one in (bar.readings, vectors)
     )
     gains = [step.map_before_um - step.map_after_um for step in (said, full)]

@@ -190,8 +190,6 @@ Block: TypeAlias = str | Table | Bars | Lines | Histogram
 """A sentence (the blanks it begins with indent it in text), a table or a chart."""
 
 
-# --- As escaped HTML: for pages, reports and notebooks --------------------------------------------
-
 MOST_ROWS = 200  # rows of a table that a page shows; it counts the others
 
 

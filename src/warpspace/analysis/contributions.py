@@ -28,8 +28,6 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-# --- Which tolerances matter: how the parameters share the variance of the volumetric error -------
-
 CHECK_MACHINES = 20_000
 CHECK_NODES = 512
 SOBOL_NODES = 5
@@ -243,9 +241,6 @@ def share_bars(rows: tuple[Share, ...], title: str, subtitle: str) -> Bars:
         title, subtitle, [error_words(row.key) for row in rows], tuple(panels),
         legend=tuple(legend),
     )  # fmt: skip
-
-
-# --- Why a point is where it is: the contribution of every parameter to its error -----------------
 
 
 @dataclass(frozen=True, slots=True)

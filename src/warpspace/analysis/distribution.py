@@ -220,9 +220,6 @@ def _fine_centres() -> Array:
     return np.concatenate([[0.0], inner, [HIGHEST_UM]])
 
 
-# --- Machines drawn from a tolerance set ---------------------------------------------------------
-
-
 SIGMAS = 3.0
 """Standard deviations of a normal distribution between centre and limit (thesis, section 4.3)."""
 

@@ -32,7 +32,6 @@ from warpspace.machine.description import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-# --- Levers taken apart ---------------------------------------------------------------------------
 # The motions and offsets between an error and the functional point.
 
 Part = tuple[str, tuple[float, float, float]]  # name and vector in R, mm

@@ -120,8 +120,6 @@ def shear(field: ErrorField) -> dict[str, float]:
     }
 
 
-# --- What the standard uncertainty of measured errors does to the field, and to |E| ---------------
-
 SIGMAS_OF = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: 3.0**0.5}
 """Half width in standard uncertainties."""
 

@@ -74,11 +74,11 @@ def montecarlo_each(
 ) -> Iterator[MonteCarlo]:
     if executor is not None:
         in_flight = 2 * (workers or EXECUTOR_WORKERS)
-        yield from _collect(_sent_tasks(cases, take), executor, in_flight, progress, take)
+        yield from _collect(_tasks(cases, take, sent=True), executor, in_flight, progress, take)
         return
     count = min(workers or min(os.cpu_count() or 1, MOST_THREADS), LOCAL_WORKERS[1])
     with threads(count) as pool:
-        yield from _collect(_own_tasks(cases, take), pool, 2 * count, progress, take)
+        yield from _collect(_tasks(cases, take, sent=False), pool, 2 * count, progress, take)
 
 
 def sample_chunks(job: Job, plan: Plan) -> Iterator[Array]:
@@ -98,20 +98,13 @@ _Task = tuple[Case, int, int, bool, Job | None]
 """A case, its first block and the one after the last, whether samples are kept, and the job."""
 
 
-def _own_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
+def _tasks(cases: Iterable[Case], take: Take | None, *, sent: bool) -> Iterator[_Task]:
     for case in cases:
         case.check()
-        job = case.build_job()
-        for index in range(case.plan.blocks):
-            yield case, index, index + 1, take is not None, job
-
-
-def _sent_tasks(cases: Iterable[Case], take: Take | None) -> Iterator[_Task]:
-    for case in cases:
-        case.check()
-        size, blocks = case.task_blocks, case.plan.blocks
+        size, job = (case.task_blocks, None) if sent else (1, case.build_job())
+        blocks = case.plan.blocks
         for first in range(0, blocks, size):
-            yield case, first, min(first + size, blocks), take is not None, None
+            yield case, first, min(first + size, blocks), take is not None, job
 
 
 def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> Part | MonteCarlo:
@@ -164,9 +157,6 @@ def _finish(case: Case, stream: Stream) -> MonteCarlo:
         probability=stream.probability(),
         exact_quantiles=stream.exact_quantiles,
     )
-
-
-# --- Tasks on any executor of `concurrent.futures`, their results in order ------------------------
 
 
 def run_in_order(

@@ -208,8 +208,6 @@ def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
     return hint, None
 
 
-# --- Values that are typed as text: axis positions, parameters, numbers by parameter --------------
-
 ALL = "all"
 LOOP_HELP = "Structural loop: tool point, workpiece point, or tool relative to workpiece"
 AT_HELP = (

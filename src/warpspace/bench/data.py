@@ -39,6 +39,12 @@ class DataColumn:
     default: float | str | None = None  # where the file has no such column; None where it must
 
 
+DIRECTION, ANGLE = DataColumn("direction", "sign", default="+"), DataColumn("angle_deg", "number")
+ALONG = (DIRECTION, DataColumn("position_mm", "number"), DataColumn("deviation_um"))
+"""Of readings along a line."""
+XYZ = tuple(DataColumn(f"{letter}_um") for letter in "xyz")
+
+
 @dataclass(frozen=True)
 class Table:
     """What a file of readings holds."""
@@ -57,6 +63,19 @@ class Table:
 
     def refuse(self, *problems: str) -> SceneError:
         return SceneError(self.source, problems)
+
+    def check_angles(self, least: int, way: str, what: str = "positions") -> None:
+        if len(self) < least:
+            raise self.refuse(f"has {len(self)} {what}; expected at least {least}")
+        if np.ptp(self["angle_deg"]) < 1.0:
+            raise self.refuse(f"all readings are at one angle; expected angles along the {way}")
+
+    def unknown_words(self, name: str, known: Sequence[str], expected: str) -> list[str]:
+        return [
+            f"line {int(line)}, {name}: {word!r}; expected {expected}"
+            for line, word in zip(self.lines, self.words[name], strict=True)
+            if word not in known
+        ]
 
 
 def read_table(path: str | Path, columns: Sequence[DataColumn]) -> Table:

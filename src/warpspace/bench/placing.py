@@ -157,8 +157,6 @@ def check_travel(scene: Scene, coordinates: Mapping[str, Array], what: str) -> N
         raise OptionError(f"{what} leaves the travel: {'; '.join(problems)}")
 
 
-# --- Planes of two linear axes: which way these run in R, and the squareness between them ---------
-
 PLANES: Mapping[str, tuple[str, str, str]] = {
     "XY": ("X", "Y", "EC0Y"),
     "XZ": ("X", "Z", "EB0Z"),
@@ -211,9 +209,6 @@ def find_plane(model: Model, stand: Coordinates, plane: str) -> Plane:
         for name, vector in ((first, along), (second, up))
     )
     return Plane(first, second, key, along, up, sign, (ways[0], ways[1]))
-
-
-# --- Circles about a rotary axis that the linear axes follow -------------------------------------
 
 
 BAR_MM = 100.0  # length of a bar beside a rotary axis: what across it does is of second order

@@ -123,8 +123,6 @@ class Outcome:
         return next(quantity.value for quantity in self.quantities if quantity.key == key)
 
 
-# --- Readings that a test would take on the model: exactly, and linear in the errors -------------
-
 RELATIVE = View(Loop.RELATIVE)
 
 

@@ -178,7 +178,6 @@ def _material(material: Material) -> Json:
     return spelled
 
 
-# --- A binary glTF file that is written again and again with other points and colours -------------
 # A slider move replaces positions, colours and bounds in a file that is laid out once.
 
 

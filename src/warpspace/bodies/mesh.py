@@ -25,7 +25,6 @@ from warpspace.machine.limits import (
 )
 from warpspace.units import Array
 
-# --- Counting what a mesh file holds before trimesh builds it -------------------------------------
 # A small file can ask for much.
 
 _STL_HEAD, _STL_TRIANGLE = 84, 50

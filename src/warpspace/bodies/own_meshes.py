@@ -15,8 +15,6 @@ from warpspace.machine.description import BodySource, Machine
 from warpspace.machine.limits import MAX_MESH_MB, MAX_URDF_TRIANGLES
 from warpspace.units import Array
 
-# --- A user's own mesh as a body of a machine: STL, OBJ, PLY or GLB -------------------------------
-
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 """Units of length a mesh may be in, in mm."""
 UP_AXES = ("y", "z")

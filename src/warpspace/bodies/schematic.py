@@ -147,7 +147,6 @@ def bar(start: Array, end: Array, half_width: float, half_height: float) -> Shap
     return mesh
 
 
-# --- what generated bodies are laid out around ---------------------------------------------------
 # Everything is built where the machine stands at home, in R: linear axes in the middle of their
 # travel, rotary axes at zero or as near as their travel allows. A machine whose slides are turned
 # against R, as on the slant bed of a lathe, is built upright along its own slides, turned as they

@@ -27,7 +27,6 @@ from warpspace.field.grid import build_grid
 from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import Array
 
-# --- Measurements that could be made next ---------------------------------------------------------
 # Poses and small tests on the machine of a scene.
 
 PLACES = (0.0, 0.5, 1.0)  # shares of the working volume, the ends at the ends
@@ -155,7 +154,6 @@ def next_best(
     found: Calibration,
     count: int = 1,
     choice: Sequence[Candidate] | None = None,
-    noise_mm: float | None = None,
     watch: Watch = unwatched,
 ) -> tuple[Step, ...]:
     """Choose measurements one after the other, each for the greatest gain.
@@ -168,9 +166,9 @@ def next_best(
     """
     keys = tuple(one.key for one in found.parameters)
     terms = build_terms(found.scene, keys)
-    noise = max(noise_mm or found.sigma_mm, LEAST_NOISE_MM)
+    noise = max(found.sigma_mm, LEAST_NOISE_MM)
     stated = [one.sigma_mm for one in sets if one.sigma_mm is not None]
-    if len(stated) == len(sets) and noise_mm is None:
+    if len(stated) == len(sets):
         noise = float(np.median(np.concatenate(stated)))
     known = _information(Stack.of(scene, sets, watch), terms, noise) + _prior(scene, keys)
     weigh = map_weights(found.scene, terms)

@@ -61,10 +61,6 @@ class ReadingTable:
         return next((self.labels[name] for name in LABELS if name in self.labels), None)
 
 
-def read_table(path: Path) -> ReadingTable:
-    return parse_table(read_text(path, MAX_CSV_BYTES), str(path))
-
-
 def parse_table(text: str, source: str) -> ReadingTable:
     """Read the text of a CSV file with a header, or what ``field --json`` printed."""
     if text.lstrip().startswith("{"):

@@ -53,6 +53,7 @@ def find_rank(keys: Sequence[str], by_parameter: Array, by_unknown: Array) -> Ra
     set_up = orthonormal(by_unknown)
     norms = np.linalg.norm(by_parameter, axis=0)
     largest = norms.max(initial=0.0)
+    units = without(by_parameter / np.where(norms > 0.0, norms, 1.0), set_up)
     kept: list[int] = []
     basis: list[Array] = []
     unseen: list[str] = []
@@ -61,7 +62,7 @@ def find_rank(keys: Sequence[str], by_parameter: Array, by_unknown: Array) -> Ra
         if norms[at] <= BLIND * largest or not norms[at]:
             unseen.append(key)
             continue
-        rest = without(by_parameter[:, at] / norms[at], set_up)
+        rest = units[:, at]
         for _ in range(2):  # twice: the second pass takes what rounding left
             for direction in basis:
                 rest = rest - direction * (direction @ rest)
@@ -69,31 +70,16 @@ def find_rank(keys: Sequence[str], by_parameter: Array, by_unknown: Array) -> Ra
             kept.append(at)
             basis.append(rest / np.linalg.norm(rest))
             continue
-        alike[key] = _partners(keys, at, kept, by_parameter, norms, set_up)
+        alike[key] = {}
+        if kept and np.linalg.norm(units[:, at]) > BLIND:
+            shares, *_ = np.linalg.lstsq(units[:, kept], units[:, at], rcond=None)
+            alike[key] = {
+                keys[one]: float(share * norms[at] / norms[one])
+                for one, share in zip(kept, shares, strict=True)
+                if abs(share) > SHARE
+            }
     groups = tuple((key, *others) for key, others in alike.items())
     return Rank(len(kept), tuple(keys[at] for at in kept), tuple(unseen), groups, alike)
-
-
-def _partners(
-    keys: Sequence[str],
-    at: int,
-    kept: Sequence[int],
-    by_parameter: Array,
-    norms: Array,
-    set_up: Array,
-) -> dict[str, float]:
-    if not kept:
-        return {}
-    columns = np.stack([without(by_parameter[:, one] / norms[one], set_up) for one in kept], -1)
-    target = without(by_parameter[:, at] / norms[at], set_up)
-    if np.linalg.norm(target) <= BLIND:
-        return {}
-    shares, *_ = np.linalg.lstsq(columns, target, rcond=None)
-    return {
-        keys[one]: float(share * norms[at] / norms[one])
-        for one, share in zip(kept, shares, strict=True)
-        if abs(share) > SHARE
-    }
 
 
 def orthonormal(columns: Array) -> Array:
@@ -131,8 +117,6 @@ def spell_rank(rank: Rank, slopes: Collection[str] = ()) -> tuple[str, ...]:
             words.append(f"{first} and {joined} cannot be told apart by these readings")
     return tuple(words)
 
-
-# --- Several sets of readings as one problem: predictions and derivatives, weighted ---------------
 
 AUTO = "auto"
 CURVES = ("constant", "ramp")

@@ -211,9 +211,6 @@ def _is_nowhere() -> bool:
     return False
 
 
-# --- Sudden ends ---------------------------------------------------------------------------------
-
-
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 _PATIENCE_S = 1.0
 """A signal that comes again sooner is taken for the same one: some programs send it twice."""

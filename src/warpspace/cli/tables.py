@@ -144,9 +144,6 @@ def _draw(columns: "Sequence[Column]", rows: Sequence[Row], gap: int, width: int
     return "\n".join(line.rstrip() for line in page.getvalue().splitlines())
 
 
-# --- Texts on their way to a terminal ------------------------------------------------------------
-
-
 _STEERING = re.compile(
     "[\x00-\x1f\x7f-\x9f"  # control characters
     "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # direction of writing

@@ -18,8 +18,6 @@ from warpspace.machine.axes import direction_index, is_linear, sort_axes
 from warpspace.machine.limits import GRID_NODES
 from warpspace.units import Array
 
-# --- A large batch in pieces that stay in the processor's cache -----------------------------------
-
 NODES = 32_768  # points that are evaluated at a time: a number of each of them takes 256 kB
 
 Piece: TypeAlias = tuple[slice, ...]
@@ -222,7 +220,6 @@ def seen_from_workpiece(
     return seen
 
 
-# --- Planar slices through the working volume -----------------------------------------------------
 # A slice at any position is a grid of n × 1 × m nodes with one axis standing still, so that its
 # errors come from the model and not from interpolation between the nodes of the volume.
 

@@ -17,7 +17,6 @@ from warpspace.machine.curves.table import Table
 from warpspace.machine.errors import ErrorSet
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array
 
-# --- Small rigid motions that keep their digits ---------------------------------------------------
 # A rotation by its half-angle vector, and a shift.
 #
 # Matrices near the unit matrix lose the digits of small angles; here every number is as small as

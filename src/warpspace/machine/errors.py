@@ -8,7 +8,14 @@ import numpy as np
 
 from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
-from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
+from warpspace.machine.curves.simple import (
+    NOTHING,
+    Constant,
+    Directional,
+    Harmonics,
+    Poly,
+    Ramp,
+)
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.units import Array
 
@@ -44,17 +51,17 @@ class ErrorSet:
     def has_directions(self) -> bool:
         return any(function.has_directions for function in self.functions.values())
 
+    def _function(self, key: str) -> ErrorFunction:
+        return self.functions.get(key, NOTHING)
+
     def arguments(self, key: str) -> tuple[str, ...]:
         """List the axes whose positions one error depends on; none where it is constant or zero."""
-        function = self.functions.get(key)
-        own = parameter(key).axis
-        named = () if function is None else function.arguments
+        own, named = parameter(key).axis, self._function(key).arguments
         return tuple(dict.fromkeys(own if axis == OWN else axis for axis in named))
 
     def evaluate(self, key: str, position: Array) -> Array:
         """Give one error along its axis, the mean of both directions of travel, [...]."""
-        function = self.functions.get(key)
-        return np.zeros(np.shape(position)) if function is None else function.evaluate(position)
+        return self._function(key).evaluate(position)
 
     def evaluate_at(
         self,
@@ -63,16 +70,11 @@ class ErrorSet:
         direction: str = TravelDirection.MEAN,
     ) -> Array:
         """Give one error where the axes it depends on stand, reached in a direction, [...]."""
-        axis = parameter(key).axis
-        function = self.functions.get(key)
-        if function is None:
-            return np.zeros(np.shape(coordinates[axis]))
-        return function.evaluate_at(axis, coordinates, direction)
+        return self._function(key).evaluate_at(parameter(key).axis, coordinates, direction)
 
     def shape(self, key: str, position: Array) -> Array:
         """Give the curve of one error for an amplitude of one, [...]; 1 where it is absent."""
-        function = self.functions.get(key)
-        return np.ones(np.shape(position)) if function is None else function.shape(position)
+        return self._function(key).shape(position)
 
     def shape_at(
         self,
@@ -81,14 +83,11 @@ class ErrorSet:
         direction: str = TravelDirection.MEAN,
     ) -> Array:
         """Give `evaluate_at` for an amplitude of one; an absent error is a constant."""
-        axis = parameter(key).axis
-        function = self.functions.get(key) or Constant((0.0, 1.0))
-        return function.shape_at(axis, coordinates, direction)
+        return self._function(key).shape_at(parameter(key).axis, coordinates, direction)
 
     def amplitude(self, key: str) -> float:
         """Give the amplitude of one error, µm or µrad; 0 where it is absent."""
-        function = self.functions.get(key)
-        return 0.0 if function is None else function.amplitude
+        return self._function(key).amplitude
 
     def with_amplitude(self, key: str, amplitude: float, span: tuple[float, float]) -> "ErrorSet":
         """Give the set with one amplitude changed; an absent one becomes a constant."""

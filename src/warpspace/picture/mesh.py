@@ -156,7 +156,6 @@ def _joined(parts: list[Pieces]) -> Pieces:
     return kept[0] if len(kept) == 1 else np.concatenate(kept)
 
 
-# --- Values written on isolines -------------------------------------------------------------------
 # Where they stand, so that few of them say what each line means.
 
 LEAST_LENGTH = 0.2  # shortest line that carries its value, as a part of the longest edge

@@ -37,7 +37,6 @@ from warpspace.scene.model import Scene, choose_view, evaluate, second_order
 from warpspace.scene.save import scene_to_toml
 from warpspace.units import Array
 
-# --- What is drawn of a grid, as indices into its nodes -------------------------------------------
 # Whole surface, or without an octant.
 
 Floats = NDArray[np.float32]
@@ -267,7 +266,6 @@ def view_words(view: str, shape: Shape) -> str:
     return VIEW_WORDS[view]
 
 
-# --- Which display factor a picture is drawn with -------------------------------------------------
 # What is asked for, the scene's, or a round one.
 
 Exaggeration = float | Literal["auto"] | None

@@ -9,7 +9,6 @@ from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 
-# --- A point in both of its coordinates -----------------------------------------------------------
 # Positions of the axes, and the point of R they lead to.
 
 IN_R = "in R"  # what a point of the machine frame is introduced by

@@ -145,8 +145,6 @@ def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
         count = min(2 * count - 1, MOST_SAMPLES)
 
 
-# --- Reading columns of a CSV file beside a scene -------------------------------------------------
-
 GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
 RUN, DIRECTION = "run", "direction"
 """Columns that a file of runs may have."""

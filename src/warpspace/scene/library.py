@@ -219,9 +219,6 @@ def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str,
     return {**middle, **given}
 
 
-# --- Which axes span the working volume, and where the others stand -------------------------------
-
-
 def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) -> Workspace:
     given: dict[str, Range] = {}
     for name, value in raw.items():
@@ -268,8 +265,6 @@ def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
             found[name] = (at, at)
     return found
 
-
-# --- What stands under the keys of error parameters -----------------------------------------------
 
 LIMITS = ((-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM), (-limits.MAX_ERROR, limits.MAX_ERROR))
 """Of position and reading."""

@@ -150,8 +150,6 @@ def _turned(vector: Vector) -> Vector:
     return (0.0 - x, z, y)
 
 
-# --- The text of a scene to start from ------------------------------------------------------------
-
 _COLUMN = 40  # where remarks begin
 EXAMPLES = {
     "positioning": ("{ ramp = 12 }", "0 at the lower end of the axis, 12 at the upper"),

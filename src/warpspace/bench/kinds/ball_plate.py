@@ -9,7 +9,7 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.data import XYZ, DataColumn, Table
 from warpspace.bench.placing import (
     PLANES,
     axis_vector,
@@ -42,14 +42,7 @@ class BallPlate(BenchTest):
         " of both axes and their squareness; the largest error of a distance between any two balls"
         " is what acceptance tests ask for."
     )
-    columns = (
-        DataColumn("position", "number"),
-        DataColumn("row", "number"),
-        DataColumn("column", "number"),
-        DataColumn("x_um"),
-        DataColumn("y_um"),
-        DataColumn("z_um"),
-    )
+    columns = (*(DataColumn(name, "number") for name in ("position", "row", "column")), *XYZ)
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the plate")
     balls: int = option(5, "Balls along each side", low=2, high=20)
     pitch_mm: float | None = option(

@@ -11,7 +11,7 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.description import Watch
 from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchResult, BenchTest, Run, run_test
-from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.data import ANGLE, DIRECTION, DataColumn, Table
 from warpspace.bench.placing import (
     PLANES,
     find_plane,
@@ -35,7 +35,6 @@ ALIKE_UM = 1e-6  # runs that differ by less are drawn as one
 SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
 
 
-# --- What a circle of radial readings comes to ----------------------------------------------------
 # Centre, radius, ellipse, hysteresis (ISO 230-4).
 
 FULL_DEG = 314.0
@@ -147,11 +146,7 @@ class Circular(BenchTest):
         " --rotary the linear axes follow a ball on a rotary axis, and the bar stands in the"
         " radial, tangential or axial direction of its circle; these readings count as they are."
     )
-    columns = (
-        DataColumn("direction", "sign", default="+"),
-        DataColumn("angle_deg", "number"),
-        DataColumn("radial_um"),
-    )
+    columns = (DIRECTION, ANGLE, DataColumn("radial_um"))
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the circle")
     radius_mm: float = option(100.0, "Radius of the circle", unit="mm")
     start_deg: float = option(
@@ -350,9 +345,6 @@ def check_circle(
         )
         hint = f"; largest radius about this centre: {room:g} mm" if full and room > 0.0 else ""
         raise OptionError(f"the circle leaves the working volume: {'; '.join(problems)}{hint}")
-
-
-# --- In the words of a ball bar, to first order ---------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Vector, option
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.data import ANGLE, DataColumn, Table
 from warpspace.bench.kinds.circular import fit_circle_readings
 from warpspace.bench.placing import (
     ball_columns,
@@ -26,8 +26,6 @@ from warpspace.kinematics.model import Model
 from warpspace.machine.description import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-# --- Rotary axes that turn the tool axis where it is wanted on the workpiece ----------------------
 
 SEEDS = 73  # positions of each rotary axis at which a start is looked for
 STEPS = 30
@@ -113,10 +111,7 @@ class ConeFrustum(BenchTest):
         " circle, or the roundness of the machined cone, gives the radial deviation: circularity"
         " about the least-squares centre."
     )
-    columns = (
-        DataColumn("angle_deg", "number"),
-        DataColumn("radial_um"),
-    )
+    columns = (ANGLE, DataColumn("radial_um"))
     radius_mm: float = option(50.0, "Radius of the circle", unit="mm")
     half_apex_deg: float = option(15.0, "Half the apex angle of the cone", unit="°")
     tilt_deg: float = option(10.0, "Tilt of its base, about y of the workpiece", unit="°")
@@ -132,15 +127,11 @@ class ConeFrustum(BenchTest):
         return self._lay(scene, np.linspace(0.0, 360.0, self.points, endpoint=False))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        if len(table) < 8:
-            raise table.refuse(f"has {len(table)} readings; expected at least 8")
         if len(table) > MOST:
             raise table.refuse(f"has {len(table):,} readings; expected at most {MOST:,}")
+        table.check_angles(8, "circle", "readings")
         order = np.argsort(table["angle_deg"], kind="stable")
-        angle = table["angle_deg"][order]
-        if np.ptp(angle) < 1.0:
-            raise table.refuse("all readings are at one angle; expected angles along the circle")
-        return self._lay(scene, angle), table["radial_um"][order]
+        return self._lay(scene, table["angle_deg"][order]), table["radial_um"][order]
 
     def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
         if not 0.0 < self.radius_mm < 1e4:

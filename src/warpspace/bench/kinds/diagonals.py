@@ -9,15 +9,13 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.data import ALONG, DataColumn, Table
 from warpspace.bench.kinds.positioning import target_statistics
 from warpspace.bench.placing import PLANES, find_plane, following_axes, relative_point, tool_points
 from warpspace.bench.plan import Outcome, Plan, Quantity, Whole, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-# --- Diagonals of a volume: their names, what readings along them come to (ISO 230-6) -------------
 
 BODY = ("PPP", "NPP", "PNP", "PPN")  # which way x, y and z run: P upwards, N downwards
 KINDS = ("body", "face", "step")
@@ -30,14 +28,13 @@ def diagonal_names(kind: str) -> tuple[str, ...]:
     return BODY
 
 
-def diagonal_signs(name: str) -> Array:
-    """Give which way x, y and z run along a diagonal, [3]: +1, −1, or 0 where one stands."""
-    plane, colon, ways = name.partition(":")
-    if not colon:
-        return np.array([1.0 if way == "P" else -1.0 for way in plane])
-    signs = np.zeros(3)
-    for axis, way in zip(plane, ways, strict=True):
-        signs["XYZ".index(axis)] = 1.0 if way == "P" else -1.0
+def diagonal_signs(names: Sequence[str]) -> Array:
+    """Give which way x, y and z run along diagonals, [d, 3]: +1, −1, or 0 where one stands."""
+    signs = np.zeros((len(names), 3))
+    for row, name in enumerate(names):
+        first, _, second = name.partition(":")
+        for axis, way in zip(first if second else "XYZ", second or first, strict=True):
+            signs[row, "XYZ".index(axis)] = 1.0 if way == "P" else -1.0
     return signs
 
 
@@ -96,12 +93,7 @@ class Diagonals(BenchTest):
         " diagonal; diagonals of different length betray squareness errors. Step diagonals move"
         " one axis after the other, so that the part of each axis can be told."
     )
-    columns = (
-        DataColumn("diagonal", "name"),
-        DataColumn("direction", "sign", default="+"),
-        DataColumn("position_mm", "number"),
-        DataColumn("deviation_um"),
-    )
+    columns = (DataColumn("diagonal", "name"), *ALONG)
     kind: Literal["body", "face", "step"] = option("body", "Which diagonals")
     targets: int = option(11, "Targets along each diagonal", low=2, high=500)
 
@@ -121,11 +113,7 @@ class Diagonals(BenchTest):
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
         names = diagonal_names(self.kind)
         given = table.words["diagonal"]
-        problems = [
-            f"line {int(line)}, diagonal: {word!r}; expected one of {', '.join(names)}"
-            for line, word in zip(table.lines, given, strict=True)
-            if word not in names
-        ]
+        problems = table.unknown_words("diagonal", names, f"one of {', '.join(names)}")
         if problems:
             raise table.refuse(*problems)
         number = np.array([names.index(word) for word in given], dtype=float)
@@ -153,20 +141,23 @@ class Diagonals(BenchTest):
     def _box(self, scene: Scene, names: Sequence[str]) -> tuple[Array, Array]:
         axes = following_axes(scene.model)
         ranges = np.array([scene.workspace.ranges[name] for name in axes]).T
-        needed = {index for name in names for index in np.flatnonzero(diagonal_signs(name))}
-        flat = [axes[index] for index in sorted(needed) if not ranges[0, index] < ranges[1, index]]
+        needed = np.abs(diagonal_signs(names))
+        flat = [
+            axes[index]
+            for index in np.flatnonzero(needed.any(axis=0))
+            if not ranges[0, index] < ranges[1, index]
+        ]
         if flat:
             raise OptionError(
                 f"diagonals need a range of {', '.join(flat)} in [workspace]; expected [low, high]"
             )
-        extent = np.array([np.abs(diagonal_signs(name)) for name in names]) * np.ptp(ranges, axis=0)
-        return ranges, np.linalg.norm(extent, axis=-1)
+        return ranges, np.linalg.norm(needed * np.ptp(ranges, axis=0), axis=-1)
 
     def _positions(self, scene: Scene, names: Sequence[str]) -> tuple[Array, Array]:
         ranges, _ = self._box(scene, names)
         stand = self.stand(scene)
         here = np.array([float(stand[name]) for name in following_axes(scene.model)])
-        signs = np.array([diagonal_signs(name) for name in names])
+        signs = diagonal_signs(names)
         low, high = ranges
         start = np.where(signs > 0.0, low, np.where(signs < 0.0, high, here))
         end = np.where(signs > 0.0, high, np.where(signs < 0.0, low, here))
@@ -177,9 +168,10 @@ class Diagonals(BenchTest):
         start, end = self._positions(scene, names)
         index = number.astype(np.intp)
         positions = start[index] + share[:, None] * (end - start)[index]
-        signs = np.array([diagonal_signs(name) for name in names])[index]
         marks = {"diagonal": number, "way": way}
-        return self._plan(scene, positions, signs * way[:, None], index, marks)
+        return self._plan(
+            scene, positions, diagonal_signs(names)[index] * way[:, None], index, marks
+        )
 
     def _steps(self, scene: Scene) -> Plan:
         names = diagonal_names("step")
@@ -192,13 +184,12 @@ class Diagonals(BenchTest):
         index = np.repeat(np.arange(len(names)), len(share))
         positions = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3)
         moved = np.concatenate([[-1.0], np.tile([0.0, 1.0, 2.0], steps)])  # the start by none
-        signs = np.array([diagonal_signs(name) for name in names])[index]
         marks = {
             "diagonal": index.astype(float),
             "way": np.ones(len(index)),
             "axis": np.tile(moved, len(names)),
         }
-        return self._plan(scene, positions, signs, index, marks)
+        return self._plan(scene, positions, diagonal_signs(names)[index], index, marks)
 
     def _step_data(self, scene: Scene, table: Table, number: Array) -> tuple[Plan, Array]:
         plan = self._steps(scene)
@@ -255,8 +246,7 @@ class Diagonals(BenchTest):
             site=rows,
             against=first + index,
             travel={
-                name: np.append(ways[:, column], (np.array(
-                    [diagonal_signs(one) for one in names]))[:, column])
+                name: np.append(ways[:, column], diagonal_signs(names)[:, column])
                 for column, name in enumerate(axes)
             },
             setup=zero,

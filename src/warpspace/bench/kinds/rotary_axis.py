@@ -9,7 +9,7 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, Vector, option
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.data import ANGLE, XYZ, DataColumn, Table
 from warpspace.bench.kinds.circular import is_full
 from warpspace.bench.placing import (
     axis_line,
@@ -65,11 +65,7 @@ class RotaryAxis(BenchTest):
         " readings over a full turn is the axis average line: where the axis is and how it leans,"
         " as the place of the test sees it."
     )
-    columns = (
-        DataColumn("angle_deg", "number"),
-        *(DataColumn(name) for name in CHANNELS[:5]),
-        DataColumn("c_urad", default=0.0),
-    )
+    columns = (ANGLE, *map(DataColumn, CHANNELS[:5]), DataColumn("c_urad", default=0.0))
     axis: Axis = option("", "Rotary axis that turns", unset="the last one")
     height_mm: float | None = option(
         None,
@@ -87,10 +83,7 @@ class RotaryAxis(BenchTest):
         return self._lay(scene, np.linspace(low, end, self.points, endpoint=not full))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        if len(table) < 8:
-            raise table.refuse(f"has {len(table)} positions; expected at least 8")
-        if np.ptp(table["angle_deg"]) < 1.0:
-            raise table.refuse("all readings are at one angle; expected angles along a turn")
+        table.check_angles(8, "turn")
         readings = np.concatenate([table[name] for name in CHANNELS])
         return self._lay(scene, table["angle_deg"]), readings
 
@@ -241,12 +234,7 @@ class Sphere(BenchTest):
         " standard asks for; with the ball's place fitted (it is never known as well) the ranges"
         " that are left are given too."
     )
-    columns = (
-        DataColumn("angle_deg", "number"),
-        DataColumn("x_um"),
-        DataColumn("y_um"),
-        DataColumn("z_um"),
-    )
+    columns = (ANGLE, *XYZ)
     axis: Axis = option("", "Rotary axis that turns", unset="the last one")
     ball: Vector = option(
         None,
@@ -267,10 +255,7 @@ class Sphere(BenchTest):
         return self._lay(scene, reachable(*where, self.start, self.end, self.points))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        if len(table) < 4:
-            raise table.refuse(f"has {len(table)} positions; expected at least 4")
-        if np.ptp(table["angle_deg"]) < 1.0:
-            raise table.refuse("all readings are at one angle; expected angles along the way")
+        table.check_angles(4, "way")
         readings = np.concatenate([table[f"{name}_um"] for name in AXES])
         return self._lay(scene, table["angle_deg"]), readings
 

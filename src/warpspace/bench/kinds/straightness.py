@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, option
 from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.data import ALONG, DataColumn, Table
 from warpspace.bench.placing import (
     PLANES,
     axis_vector,
@@ -25,7 +25,6 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-# --- Reference lines of straightness and squareness -----------------------------------------------
 # End points, least squares, minimum zone.
 
 REFERENCES = ("end_points", "least_squares", "minimum_zone")  # ISO 230-1, 3.4.10 to 3.4.12
@@ -170,11 +169,7 @@ class Straightness(BenchTest):
         " parallel lines of least distance (minimum zone). How the edge lies is no error: a"
         " squareness error does not count."
     )
-    columns = (
-        DataColumn("direction", "sign", default="+"),
-        DataColumn("position_mm", "number"),
-        DataColumn("deviation_um"),
-    )
+    columns = ALONG
     axis: Axis = option("", "Linear axis that runs", unset="the first one")
     across: Literal["x", "y", "z"] | None = option(
         None, "Direction that is sensed", unset="the next one"
@@ -270,12 +265,7 @@ class Squareness(BenchTest):
         " End-point, least-squares and minimum-zone lines may differ. The square itself is taken"
         " as perfect."
     )
-    columns = (
-        DataColumn("line", "name"),
-        DataColumn("direction", "sign", default="+"),
-        DataColumn("position_mm", "number"),
-        DataColumn("deviation_um"),
-    )
+    columns = (DataColumn("line", "name"), *ALONG)
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the two axes")
     points: int = option(21, "Positions along each axis", low=3, high=2_000)
 
@@ -291,12 +281,8 @@ class Squareness(BenchTest):
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
         axes = plane_axes(scene.machine, self.plane)[:2]
-        problems = [
-            f"line {int(line)}, line: {word!r}; expected {axes[0]} or {axes[1]} (--plane"
-            f" {self.plane})"
-            for line, word in zip(table.lines, table.words["line"], strict=True)
-            if word not in axes
-        ]
+        expected = f"{axes[0]} or {axes[1]} (--plane {self.plane})"
+        problems = table.unknown_words("line", axes, expected)
         which = np.array([float(word == axes[1]) for word in table.words["line"]])
         for index, axis in enumerate(axes):
             count = len(np.unique(np.round(table["position_mm"][which == index], 6)))

@@ -17,8 +17,6 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
-# --- By how much the axes of a machine are moved so that no error is left -------------------------
-
 STEPS = 2  # newton steps: an error grows by a ten-thousandth of the correction at most
 SMALL_MM, SMALL_DEG = 1e-2, 1e-3
 """Moves by which the response of the tool to an axis is measured."""

@@ -20,8 +20,6 @@ from warpspace.machine.axes import TravelDirection
 from warpspace.machine.limits import MAX_ERROR, MIN_NUMBER
 from warpspace.units import Array
 
-# --- Checks of the raw values that a scene file spells, each problem with its place ---------------
-
 Path = tuple[int | str, ...]  # keys and indices below the error, for instance ``("table", 3, 0)``
 Points = Sequence[tuple[float, float]]
 CsvColumn = Callable[[str, str], Points]
@@ -406,9 +404,6 @@ class ErrorFunction(ABC):
         if not isinstance(present, cls):
             raise OptionError(cls.row_words)
         return replace(present, span=span)
-
-
-# --- Checks of the rows of numbers that a user edits; problems name the row -----------------------
 
 
 def single_value(rows: Rows) -> float:

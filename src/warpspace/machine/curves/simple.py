@@ -1,7 +1,7 @@
 """The plain kinds of curve: constant, ramp, polynomial and harmonics; one each way of travel."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -337,10 +337,11 @@ class Directional(ErrorFunction):
     def parts(self) -> tuple[ErrorFunction, ...]:
         return (*self.forward.parts, *self.backward.parts)
 
+    def _each(self, change: Callable[[ErrorFunction], ErrorFunction]) -> Self:
+        return replace(self, forward=change(self.forward), backward=change(self.backward))
+
     def scaled(self, factor: float) -> Self:
-        return replace(
-            self, forward=self.forward.scaled(factor), backward=self.backward.scaled(factor)
-        )
+        return self._each(lambda one: one.scaled(factor))
 
     @property
     def amplitude(self) -> float:
@@ -348,8 +349,7 @@ class Directional(ErrorFunction):
         return back if math.isnan(back) or abs(back) > abs(there) else there
 
     def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
-        there, back = (one.without_axes(positions) for one in (self.forward, self.backward))
-        return replace(self, forward=there, backward=back)
+        return self._each(lambda one: one.without_axes(positions))
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -360,11 +360,7 @@ class Directional(ErrorFunction):
         return max(self.forward.samples, self.backward.samples)
 
     def grown(self) -> Self:
-        return replace(
-            self,
-            forward=self.forward.with_amplitude(1.0),
-            backward=self.backward.with_amplitude(1.0),
-        )
+        return self._each(lambda one: one.with_amplitude(1.0))
 
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
@@ -381,15 +377,10 @@ class Directional(ErrorFunction):
         return {"forward": self.forward.to_toml(), "backward": self.backward.to_toml()}
 
     def for_span(self, span: Span) -> ErrorFunction:
-        there, back = (
-            replace(curve.for_span(span), span=span) for curve in (self.forward, self.backward)
-        )
-        return replace(self, span=span, forward=there, backward=back)
+        return replace(self._each(lambda one: replace(one.for_span(span), span=span)), span=span)
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        there, back = (
-            curve.describe(unit, value, position) for curve in (self.forward, self.backward)
-        )
+        there, back = (one.describe(unit, value, position) for one in (self.forward, self.backward))
         return f"forward {there}, backward {back}"
 
     def rows(self) -> Rows:

@@ -391,8 +391,6 @@ def _handles(chart: Lines) -> list[Line2D | Patch]:
     return [*lines, *bands]
 
 
-# --- Distributions, like figures 4-8 and 4-9 of the thesis ----------------------------------------
-
 HISTOGRAM_IN = 9.0, 5.4
 LABEL_ROWS = 4  # rows of labels above the bars, at most
 

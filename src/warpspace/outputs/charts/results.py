@@ -114,8 +114,6 @@ def _numbers(
         y -= NOTE_IN / height
 
 
-# --- A compensation: |E| before and after in slices -----------------------------------------------
-
 PLANE_IN = 3.2
 COLUMN_IN = 4.3, 5.0  # of the maps in a column of the app
 WORDS = 9.0

@@ -262,8 +262,6 @@ def _text_rect(
     return min(xs), min(ys), max(xs), max(ys)
 
 
-# --- Where labels go: next to what they name, off the lines, inside the figure --------------------
-
 _ANGLES = tuple(2.0 * math.pi * turn / 24 for turn in range(24))
 _DISTANCES = (8.0, 14.0, 22.0, 34.0, 50.0, 70.0, 100.0, 140.0)
 LEADER_FROM = 20.0

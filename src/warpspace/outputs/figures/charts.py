@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -31,8 +32,6 @@ from warpspace.resources import __version__
 from warpspace.scene.model import Scene, choose_view
 from warpspace.units import spell_count
 
-CIRCLE = Circular(plane="XY", radius_mm=150.0)
-
 
 def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
@@ -40,13 +39,12 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
     title = f"Error gains: {scene.machine.title}"
     where = f"{_loop(scene, settings)} · largest absolute gains over the travel"
     chart = replace(bars, title=title, subtitle=where)
-    return _draw("gains", title, scene, settings, lambda: bars_chart(chart))
+    return _draw("gains", title, scene, settings, bars_chart, chart)
 
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    asked = Machines(loop=Loop(settings.loop))
-    found = montecarlo(asked.case(scene, Plan()))
+    found = montecarlo(Machines(loop=Loop(settings.loop)).case(scene, Plan()))
     title = f"Machines within tolerance: {scene.title}"
     loop = " · ".join((_loop(scene, settings), *placed_words(found.view)))
     what = (
@@ -54,19 +52,17 @@ def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
         f" {found.draws.distribution} over the tolerances · seed {found.plan.seed}"
     )
     histogram = sampled_histogram(found, title, what)
-    draw = lambda: histogram_chart(histogram)  # noqa: E731
-    return _draw("montecarlo", title, scene, settings, draw)
+    return _draw("montecarlo", title, scene, settings, histogram_chart, histogram)
 
 
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    found = run_test(scene, CIRCLE)
+    found = run_test(scene, Circular(plane="XY", radius_mm=150.0))
     title = f"Circular test: {scene.title}"
-    return _draw("ballbar", title, scene, settings, lambda: bench_chart(found, title))
+    return _draw("ballbar", title, scene, settings, bench_chart, found, title)
 
 
 def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
-    """Draw radial, axial and tilt error motion of every rotary axis of a scene, one row an axis."""
     scene = scenes[0]
     chosen = first_lines(scene)
     if not chosen:
@@ -88,8 +84,7 @@ def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     for name in (name_trace(line.trace) for line in chosen):
         if not any(chart.title.startswith(name) for chart in charts):
             what += f" · {name}: the point lies on the axis"
-    draw = lambda: charts_sheet(charts, title, what, columns=3)  # noqa: E731
-    return _draw("rotary", title, scene, settings, draw)
+    return _draw("rotary", title, scene, settings, charts_sheet, charts, title, what, 3)
 
 
 def first_lines(scene: Scene) -> list[TraceLine]:
@@ -107,10 +102,15 @@ def _loop(scene: Scene, settings: FigureSettings) -> str:
 
 
 def _draw(
-    name: str, title: str, scene: Scene, settings: FigureSettings, draw: Callable[[], Figure]
+    name: str,
+    title: str,
+    scene: Scene,
+    settings: FigureSettings,
+    draw: Callable[..., Figure],
+    *shown: Any,
 ) -> Drawing:
     with on_ground(settings.theme):
-        figure = draw()
+        figure = draw(*shown)
     width, height = figure.get_size_inches()
     dpi = settings.size[0] / width
     figure.set_size_inches(round(width * dpi) / dpi, round(height * dpi) / dpi)

@@ -208,8 +208,6 @@ def _visible_spot(
     return float(best[0]), float(best[1])
 
 
-# --- Traces of the rotary axes: the circles that points should and do run through -----------------
-
 PIECE = 2  # samples of a trace in one piece of one colour
 TRACE_DASHES, FADED = (7.0, 5.0), 0.55
 

@@ -53,9 +53,6 @@ def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[Sc
     return [replace(picture, colours=scale) for picture in pictures]
 
 
-# --- Two scenes and their change: one projection; the change in its own colours -------------------
-
-
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     title = f"Comparison of A: {scenes[0].title} and B: {scenes[1].title}"
     return _draw_pair("comparison", title, scenes, settings, [], exact=exact)

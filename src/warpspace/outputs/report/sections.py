@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -167,22 +168,14 @@ def write_report(
     settings: ReportSettings | None = None,
     *,
     embed: Embed | None = None,
-    concepts: Sequence[Scene] = (),
-    results: Mapping[str, Result] | None = None,
-    files: Sequence[Path] = (),
     overwrite: bool = True,
+    **parts: Any,
 ) -> Report:
+    """Write the report of one scene or two; see `build_report` for its parts."""
     target = check_target(path, ENDINGS, overwrite=overwrite)
     page = target.suffix.lower() == ".html"
-    report = build_report(
-        scenes,
-        settings,
-        form="svg" if page else "pdf",
-        embed=embed if page else None,
-        concepts=concepts,
-        results=results,
-        files=files,
-    )
+    form, embed = ("svg", embed) if page else ("pdf", None)
+    report = build_report(scenes, settings, form=form, embed=embed, **parts)
     from warpspace.outputs.report.render import render_html, render_pdf
 
     content = render_html(report).encode() if page else render_pdf(report)
@@ -201,7 +194,6 @@ def build_report(
     results: Mapping[str, Result] | None = None,
     files: Sequence[Path] = (),
 ) -> Report:
-    """Put the report of one scene or two together; see `write_report` for the parameters."""
     if form not in ("svg", "pdf"):
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
     settings = settings or ReportSettings()
