@@ -10,8 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
-"""Array of doubles; the shape is given in each docstring."""
+Array: TypeAlias = NDArray[np.float64]  # array of doubles; the shape is given in each docstring
 
 UM_PER_MM = 1e3
 MM_PER_UM = 1e-3

@@ -23,7 +23,7 @@ from warpspace.analysis.allocating import (
 )
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.cases import Case, Over, both_orders
-from warpspace.analysis.description import Change, Result, Watch
+from warpspace.analysis.description import Change, Result, Watch, counting
 from warpspace.analysis.distribution import Draws, Probability, machines_needed
 from warpspace.analysis.montecarlo import montecarlo, sample_chunks
 from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
@@ -99,15 +99,8 @@ class Allocate(KeptLimit):
     fixed: Fixed = option((), "Errors whose tolerance stays as it is")
 
     def run(self, scene: Scene, watch: Watch, /) -> "AllocateResult":
-        done = 0.0
-
-        def report(share: float) -> None:
-            nonlocal done
-            done += share
-            watch(min(done, 1.0))
-
         case = self.case(scene, self.plan_of(self.limit_um))
-        return replace(allocate(case, self, report), scene=scene)
+        return replace(allocate(case, self, counting(watch, 1.0)), scene=scene)
 
     def check_keys(self, known: Sequence[str]) -> None:
         for key in (*dict(self.costs), *self.fixed):

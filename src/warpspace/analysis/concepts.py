@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.contributions import Share, SharesResult, variance_contributions
-from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.description import Result, Watch, counting
 from warpspace.analysis.machines import sampled_second_order
 from warpspace.analysis.montecarlo import MonteCarlo, Progress, montecarlo
 from warpspace.analysis.options import option
@@ -106,14 +106,8 @@ class Concepts(KeptLimit):
         return self.run_all((scene,), watch)
 
     def run_all(self, scenes: Sequence[Scene], watch: Watch, /) -> "ConceptsResult":
-        total, done = self.samples * len(scenes), 0
-
-        def advance(count: int) -> None:
-            nonlocal done
-            done += count
-            watch(done / total)
-
-        found = compare_concepts(scenes, self, progress=advance)
+        progress = counting(watch, self.samples * len(scenes))
+        found = compare_concepts(scenes, self, progress=progress)
         left_out = sampled_second_order(*((one.scene, one.sampled) for one in found))
         return ConceptsResult(asked=self, concepts=found, second_order=left_out)
 

@@ -35,10 +35,8 @@ FORMS = {
     "measuring_line": "points in the frames of axes in mm, x/y/z: X:0/150/-80,…",
     "squareness": "right_hand, over_90 or under_90",
 }
-"""What each convention takes."""
 MAX_SHOWN = 40
-SEED, PROOFS = 0, 500
-"""Of the positions at which both fields are compared, and their number."""
+SEED, PROOFS = 0, 500  # of the positions at which both fields are compared, and their number
 
 
 @dataclass(frozen=True, kw_only=True)

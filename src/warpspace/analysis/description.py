@@ -160,6 +160,18 @@ def silent(_share: float) -> None:
     """Watch nothing."""
 
 
+def counting(watch: Watch, total: float) -> Watch:
+    """Give what is called with the work that was done since its last call."""
+    done = 0.0
+
+    def advance(step: float) -> None:
+        nonlocal done
+        done += step
+        watch(min(done / total, 1.0))
+
+    return advance
+
+
 def plain(value: Any) -> Any:
     """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class."""
     keys: Sequence[str] = getattr(type(value), "keys", ())

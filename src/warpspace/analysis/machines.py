@@ -14,7 +14,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_columns
 from warpspace.analysis.cases import DEFAULT_NODES, Case, Over, Plan, both_orders
-from warpspace.analysis.description import Result, Watch, plain
+from warpspace.analysis.description import Result, Watch, counting, plain
 from warpspace.analysis.distribution import Distribution
 from warpspace.analysis.montecarlo import MonteCarlo, Progress, Take, montecarlo_each
 from warpspace.analysis.options import Grammar, option
@@ -30,10 +30,8 @@ NUMBERS = {
     "mean": "mean_um", "RMS": "rms_um", "median": "median_um", "P95": "p95_um", "P99": "p99_um",
     "max": "max_um",
 }  # fmt: skip
-"""Of a row, by heading."""
 PRINTED = 200  # rows that are printed
 WHERE = {Over.SAMPLED: "at one random point", Over.MAX: "everywhere", Over.MEAN: "in the mean"}
-"""Where a machine keeps a limit."""
 WHAT = {
     Over.SAMPLED: "|E| at one random point each",
     Over.MAX: "largest |E| of each",
@@ -168,12 +166,10 @@ class Machines(SampledMachines):
         take: Take | None = None,
     ) -> "MachinesResult":
         self.check_against(len(scenes))
-        total, done = self.machines(len(scenes)), 0
+        counted = counting(watch, self.machines(len(scenes)))
 
         def advance(count: int) -> None:
-            nonlocal done
-            done += count
-            watch(done / total)
+            counted(count)
             if progress is not None:
                 progress(count)
 

@@ -210,6 +210,10 @@ def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
 
 ALL = "all"
 LOOP_HELP = "Structural loop: tool point, workpiece point, or tool relative to workpiece"
+PLACED_HELP = (
+    "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted for"
+    " the least RMS over the working volume. Looks at the relative loop"
+)
 AT_HELP = (
     "Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480; axes left out stand at their"
     " place in the scene"
@@ -304,17 +308,14 @@ def _vector(text: str, _scene: "Scene") -> tuple[float, float, float]:
 
 
 File: TypeAlias = Annotated[str | None, Grammar("FILE", typed_word, is_file=True)]
-"""A file that is read."""
 Axis: TypeAlias = Annotated[str, Grammar("AXIS", _axis)]
 """Name of an axis; empty for a choice of its own."""
 Vector: TypeAlias = Annotated[tuple[float, float, float] | None, Grammar("X,Y,Z", _vector)]
 """A point in mm."""
 Files: TypeAlias = Annotated[tuple[str, ...], Grammar("FILE", typed_word, each=True, is_file=True)]
-"""Files that are read: paths, or names of bundled ones."""
 Place: TypeAlias = Annotated[tuple[tuple[str, float], ...], Grammar("X=..,Y=..", _place)]
 """Axis positions in mm and degrees."""
 Keys: TypeAlias = Annotated[tuple[str, ...], Grammar("KEY,…|all", read_keys, many=True)]
-"""Keys of error parameters."""
 Limits: TypeAlias = Annotated[
     tuple[tuple[str, float], ...],
     Grammar("KEY=±VALUE|±VALUE", read_limits, many=True),

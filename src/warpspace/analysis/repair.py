@@ -9,7 +9,7 @@ import numpy as np
 from warpspace.analysis.adjusting import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
-from warpspace.analysis.options import ALL, LOOP_HELP, Keys, Limits, option
+from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Statistics, Summary, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_words
@@ -21,8 +21,7 @@ from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order
 from warpspace.units import Array, spell, spell_short
 
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
-MOST_BARS, MOST_VALUES = 14, 3
-"""Errors in a chart, and values beside a bar."""
+MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
 FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
 
 
@@ -83,11 +82,7 @@ class Repair(Analysis):
     makes_scenes = True
     scene_help = "Write the scene with the last set listed applied"
     loop: Loop | None = option(None, LOOP_HELP, unset="tool; relative with --placed")
-    placed: bool = option(
-        False,
-        "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
-        " for the least RMS over the working volume. Looks at the relative loop",
-    )
+    placed: bool = option(False, PLACED_HELP)
     objective: Objective = option(
         Objective.RMS,
         "What is made as small as possible over the volume: RMS or largest |E|",

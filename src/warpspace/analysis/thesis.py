@@ -168,8 +168,7 @@ def table_4_5() -> Iterator[Row]:
         yield _number("table_4_5", f"within {k} sigma", value, ours, 4, "%")
 
 
-SAMPLES, SEED = 100_000, 0
-"""As many as the thesis has."""
+SAMPLES, SEED = 100_000, 0  # as many as the thesis has
 
 
 def sampled(case: ThesisCase, name: str, distribution: str) -> MonteCarlo:

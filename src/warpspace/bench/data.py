@@ -41,7 +41,6 @@ class DataColumn:
 
 DIRECTION, ANGLE = DataColumn("direction", "sign", default="+"), DataColumn("angle_deg", "number")
 ALONG = (DIRECTION, DataColumn("position_mm", "number"), DataColumn("deviation_um"))
-"""Of readings along a line."""
 XYZ = tuple(DataColumn(f"{letter}_um") for letter in "xyz")
 
 

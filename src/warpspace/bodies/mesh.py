@@ -174,7 +174,6 @@ _COUNTERS: dict[str, Callable[[bytes], object]] = {
 
 
 LIGHT, MIDDLE, DARK, METAL = (206, 210, 216), (178, 184, 192), (104, 112, 124), (150, 157, 167)
-"""Quiet colours of bodies, since colour means error."""
 CREASE_DEG = 30.0  # angle from flat above which an edge is drawn
 
 

@@ -123,11 +123,6 @@ class PlacedBody:
         """Edges where they are drawn, [E, 2, 3], mm in R."""
         return place_points(self.motion, self.body.edges_mm, self.exaggeration)
 
-    @cached_property
-    def nominal_edges_mm(self) -> Array:
-        """Edges where they nominally are, [E, 2, 3], mm in R."""
-        return place_points(self.motion, self.body.edges_mm, 0.0)
-
 
 def scene_motions(
     scene: Scene,

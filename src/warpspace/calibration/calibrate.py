@@ -1,6 +1,6 @@
 """Calibration: least squares of the errors of a machine to readings, and what is left."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -125,13 +125,8 @@ class Calibrate(Analysis):
         found = calibrate(scene, sets, self, held, watch)
         if self.next_count is None and not found.rank.confounded:
             return found
-        apart = separating(scene, sets, found, watch=watch)
-        steps = (
-            ()
-            if self.next_count is None
-            else next_best(scene, sets, found, self.next_count, watch=watch)
-        )
-        return replace(found, apart=apart, steps=steps)
+        steps = next_best(scene, sets, found, self.next_count or 0, watch=watch)
+        return replace(found, apart=separating(scene, sets, found, watch=watch), steps=steps)
 
 
 def calibrate(
@@ -258,7 +253,7 @@ def _fit(
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
     fitted_scene = replace(scene, title=title, errors=errors)
     outliers = _outliers(stack, after)
-    held, held_notes = _predict(scene, terms, part, predict, stack, begin, solved, request)
+    held, held_notes = _predict(stack, terms, part, predict, begin, solved, robust=request.robust)
     return Calibration(
         scene=fitted_scene,
         title=scene.title,
@@ -386,38 +381,32 @@ def _outliers(stack: Stack, after: Sequence[Array]) -> list[tuple[int, ...]]:
 
 
 def _predict(
-    scene: Scene,
+    stack: Stack,
     terms: Terms,
     part: Terms,
     predict: Sequence[Readings],
-    stack: Stack,
     begin: Solved,
     solved: Solved,
-    request: Calibrate,
+    *,
+    robust: bool,
 ) -> tuple[tuple[Residuals, ...], tuple[str, ...]]:
     """Predict readings that were not fitted; set-ups that were not fitted are placed by them."""
     if not predict:
         return (), ()
-    held = Stack.of(scene, predict, stack.watch)
+    held = Stack.of(stack.scene, predict, stack.watch)
     before = named(stack.unknowns, begin.unknown)
     after = named(stack.unknowns, solved.unknown)
     new = [name for name in held.unknowns if name not in after]
     notes: tuple[str, ...] = ()
     if new:
-        own_before = solve(held, terms.only(()), robust=request.robust).unknown
-        fixed = replace(
-            part, keys=(), start=np.zeros(0), errors=part.errors_with(solved.amplitudes)
-        )
-        own_after = solve(held, fixed, robust=request.robust).unknown
+        own_before = solve(held, terms.only(()), robust=robust).unknown
+        fixed = replace(part.only(()), errors=part.errors_with(solved.amplitudes))
+        own_after = solve(held, fixed, robust=robust).unknown
         before |= {k: v for k, v in named(held.unknowns, own_before).items() if k in new}
         after |= {k: v for k, v in named(held.unknowns, own_after).items() if k in new}
         notes = (f"predicted readings place their own set-up: {', '.join(new)}",)
-    rows_before = held.residuals(terms, terms.start, _values(held, before))
-    rows_after = held.residuals(part, solved.amplitudes, _values(held, after))
-    outliers = _outliers(held, rows_after)
-    rows = zip(held.sets, rows_before, rows_after, outliers, strict=True)
+    values = [np.array([known[name] for name in held.unknowns]) for known in (before, after)]
+    rows_before = held.residuals(terms, terms.start, values[0])
+    rows_after = held.residuals(part, solved.amplitudes, values[1])
+    rows = zip(held.sets, rows_before, rows_after, _outliers(held, rows_after), strict=True)
     return tuple(Residuals(*row) for row in rows), notes
-
-
-def _values(stack: Stack, known: Mapping[str, float]) -> Array:
-    return np.array([known[name] for name in stack.unknowns])

@@ -164,6 +164,8 @@ def next_best(
     there is none), plus that of the candidate; what a set-up leaves unknown is eliminated, and each
     candidate has one of its own. First order, at the errors found.
     """
+    if not count:
+        return ()
     keys = tuple(one.key for one in found.parameters)
     terms = build_terms(found.scene, keys)
     noise = max(found.sigma_mm, LEAST_NOISE_MM)

@@ -138,7 +138,6 @@ def _value(option: Option, text: str, given: str) -> Any:
 KINDS: Mapping[str, Kind] = {
     kind.name: kind for kind in (Points(), Tracker(), Sphere(), SphereTcp(), Lengths())
 }
-"""By name."""
 
 
 def find_kind(name: str) -> Kind:

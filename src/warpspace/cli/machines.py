@@ -218,4 +218,3 @@ MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
         sample,
     ),
 }
-"""Options beside those of the analysis, and what runs it with them."""

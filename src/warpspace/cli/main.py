@@ -102,7 +102,6 @@ def _build(name: str) -> click.Command:
 COMMANDS = Commands(
     lambda: (*" ".join(BUNDLED.values()).split(), *(entry.name for entry in entries())), _build
 )
-"""The commands of `warpspace`."""
 
 
 def register_command(command: click.Command) -> None:

@@ -222,8 +222,6 @@ def write_report(
         return target.read_bytes(), written.missing
 
 
-# --- The offline page, which the app writes: outputs know nothing of the app ----------------------
-
 BYTES_PER_RESPONSE = 48  # position and orientation error of one node to one parameter: six numbers
 
 

@@ -20,8 +20,7 @@ from warpspace.units import Array
 
 NODES = 32_768  # points that are evaluated at a time: a number of each of them takes 256 kB
 
-Piece: TypeAlias = tuple[slice, ...]
-"""One slice for each dimension of a batch."""
+Piece: TypeAlias = tuple[slice, ...]  # one slice for each dimension of a batch
 T = TypeVar("T")
 
 
@@ -224,7 +223,6 @@ def seen_from_workpiece(
 # errors come from the model and not from interpolation between the nodes of the volume.
 
 PLANES: Mapping[str, str] = {"X": "YZ", "Y": "XZ", "Z": "XY"}
-"""Axis that stands still, and the plane it leaves."""
 
 
 def slice_ranges(model: Model, workspace: Workspace) -> dict[str, tuple[float, float]]:

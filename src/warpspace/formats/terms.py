@@ -205,8 +205,6 @@ class Tables:
         return total
 
 
-# --- Errors behind the tables: what a controller corrects is taken for the error itself -----------
-
 SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
 """Squareness that an error of the first axis in proportion to the second one is, and its sign."""
 WAYS: tuple[int, ...] = (FORWARD, BACKWARD)

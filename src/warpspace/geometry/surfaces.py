@@ -114,7 +114,6 @@ def corners(shape: Shape) -> Index:
     return np.array([numbers[at] for at in product(*ends)])
 
 
-# --- A volume without area as a body that can be seen ---------------------------------------------
 # A line becomes a bar, a point a cube.
 #
 # The axes that stand still get two nodes instead of one, half a thickness to either side; a bar

@@ -112,7 +112,6 @@ def _nominal_step(axis: Axis, coordinates: Coordinates) -> Array:
     return place @ motion(axis, coordinates[axis.name])
 
 
-# --- What errors do to a loop ---------------------------------------------------------------------
 # Both branches are walked from their outer ends to the frame of the machine. A branch moves from
 # its nominal to its actual pose by I + D. Behind an axis whose step is nominally N and actually A
 # the motion is I + D' in front of it, with D' = (A · N⁻¹ − I) + A · D · N⁻¹. To first order A is N
@@ -301,7 +300,6 @@ def _between(start: Triple, end: Triple) -> Triple:
     return components.scale(ratio * URAD_PER_RAD, cross)
 
 
-# --- The first-order model: one geometric Jacobian column per parameter ---------------------------
 # A translation error moves a point along its direction; a rotation error about direction d at frame
 # origin p moves point P by d × (P − p). The lever P − p is the explanation of every gain.
 
@@ -416,7 +414,6 @@ def jacobian(
     return position, orientation
 
 
-# --- Where the bodies of a machine stand, and how each of them moves because of the errors --------
 # Every body takes the small motion of all errors between the frame and itself. To first order that
 # is one rotation vector and one displacement a body; drawn larger by a factor it is an affine map
 # that takes each point exactly where the deformed grid has it.

@@ -10,12 +10,9 @@ from typing import TypeAlias
 
 from warpspace.units import Array
 
-Number: TypeAlias = Array | float
-"""One component, [...]; a float where it is the same everywhere."""
-Triple: TypeAlias = tuple[Number, Number, Number]
-"""Components of a vector along x, y and z."""
-Rows: TypeAlias = tuple[Triple, Triple, Triple]
-"""Rows of a matrix of three by three."""
+Number: TypeAlias = Array | float  # one component, [...]; a float where it is the same everywhere.
+Triple: TypeAlias = tuple[Number, Number, Number]  # components of a vector along x, y and z
+Rows: TypeAlias = tuple[Triple, Triple, Triple]  # rows of a matrix of three by three
 
 ZERO: Triple = (0.0, 0.0, 0.0)
 ZERO_ROWS: Rows = (ZERO, ZERO, ZERO)

@@ -51,9 +51,6 @@ def _across(own: AxisErrors, *, forward: bool) -> Along:
     return along
 
 
-# --- A constant motion moved between the component errors of an axis and its constant errors ------
-
-
 def without(
     own: AxisErrors, taken: SmallMotion, position: Array, present: SmallMotion
 ) -> SmallMotion:
@@ -234,9 +231,6 @@ def line_positions(own: AxisErrors, key: str) -> Array:
     points = np.array(own.points(key))
     points = points[(points >= low) & (points <= high)]
     return points if len(points) > 1 else np.linspace(low, high, EVENLY)
-
-
-# --- Errors measured along a line beside the origin of the axis, moved to it with Abbe arms -------
 
 
 def move_measuring_line(

@@ -82,7 +82,6 @@ DIRECTION_WORDS = {
     TravelDirection.BACKWARD: "travelling backward",
     TravelDirection.DIFFERENCE: "reversal: forward − backward",
 }
-"""How each is called on figures and pages."""
 
 
 _GREEK = {"X": "δ_x", "Y": "δ_y", "Z": "δ_z", "A": "ε_x", "B": "ε_y", "C": "ε_z"}

@@ -4,7 +4,7 @@ import gc
 import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import matplotlib as mpl
 import numpy as np
@@ -14,15 +14,13 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from warpspace.outputs.drawing.settings import FIGURE_ENDINGS, SAVE_RC, FigureSettings
+from warpspace.outputs.drawing.sheet import Drawing
 from warpspace.outputs.figures.catalogue import draw_figure
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.scene.model import Scene
 
-if TYPE_CHECKING:
-    from warpspace.outputs.drawing.sheet import Drawing
 
-
-def figure_bytes(drawing: "Drawing", form: str) -> bytes:
+def figure_bytes(drawing: Drawing, form: str) -> bytes:
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
     said = {"Title": drawing.title}

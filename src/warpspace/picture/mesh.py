@@ -20,8 +20,7 @@ from warpspace.picture.model import Picture, Topology, topology
 from warpspace.units import Array
 
 LIFT = 0.0012  # how far grid lines are lifted off the surface, as a part of the longest edge
-EDGE_LIFT, ISOLINE_LIFT = 1.5, 1.25
-"""Edges and isolines, in multiples of that."""
+EDGE_LIFT, ISOLINE_LIFT = 1.5, 1.25  # edges and isolines, in multiples of that
 Pieces = NDArray[np.float32]
 
 
@@ -42,8 +41,7 @@ class Part:
     values: Array
     drawn_of: Topology
     lifts: tuple[float, ...]
-    ways: Array
-    """Direction of each axis of the grid, +1 or −1: an axis may run against its name."""
+    ways: Array  # direction of each axis of the grid, +1 or −1: an axis may run against its name
 
     def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
         """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""

@@ -26,8 +26,6 @@ from warpspace.scene.files import (
 from warpspace.scene.schema import Problems
 from warpspace.units import Array
 
-# --- The weighted sum of two curves of one axis: exact where a kind of curve can hold it ----------
-
 Weights = tuple[float, float]
 MOST_SAMPLES = 20_001
 CLOSE = 1e-5  # largest deviation of a sampled sum half way between its points, by its largest value
@@ -146,8 +144,7 @@ def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
 
 
 GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
-RUN, DIRECTION = "run", "direction"
-"""Columns that a file of runs may have."""
+RUN, DIRECTION = "run", "direction"  # columns that a file of runs may have
 T = TypeVar("T")
 
 

@@ -21,7 +21,6 @@ from warpspace.machine.limits import (
     MAX_NESTING,
 )
 
-# --- The outline of TOML text (keys, brackets, strings), bounded before the text is parsed --------
 # A TOML reader's memory grows with the square of the parts of one key, and each table costs far
 # more memory than its two brackets. One pass over the text counts what would be expensive; it takes
 # time in proportion to the length of the text and no memory.
@@ -197,7 +196,6 @@ def _spell(value: object, depth: int) -> str:
     return f"{{ {inside} }}" if isinstance(value, dict) else f"[{inside}]"
 
 
-# --- The one reader of tables that people measured: scenes, imports, tests and calibrations -------
 # A line ``sep=;`` names what parts the columns; without it the first of semicolon, tab and comma
 # that the header has. Lines that begin with # are remarks, rows without any text and separators
 # behind the last column count for nothing. A file has one decimal sign: the point, or where

@@ -51,7 +51,7 @@ def _check_xml(text: str, source: str) -> tuple[str, ...]:
     try:
         from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
     except ImportError:
-        raise _not_installed() from None
+        raise not_installed() from None
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise SceneError(source, ["defines a document type; expected a plain URDF file"])
     parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
@@ -84,7 +84,7 @@ def _parse(text: str, source: str) -> Any:
     try:
         from yourdfpy import URDF
     except ImportError:
-        raise _not_installed() from None
+        raise not_installed() from None
     try:
         # numbers that are not finite are refused by name later
         with np.errstate(all="ignore"):
@@ -101,7 +101,7 @@ def _parse(text: str, source: str) -> Any:
     return loaded.robot
 
 
-def _not_installed() -> OptionError:
+def not_installed() -> OptionError:
     return OptionError(
         "URDF files need the package yourdfpy; expected it installed"
         " (pip install 'warpspace[urdf]')"
@@ -482,8 +482,6 @@ def _ranges(machine: Machine) -> dict[str, Range]:
             found[name] = ends if ends[0] < ends[1] else found[name]
     return found
 
-
-# --- What of a robot has no place in a machine: named, so that nothing is lost unsaid -------------
 
 SHOWN = 6  # names that a remark lists
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch, plain
-from warpspace.analysis.options import Grammar, option
+from warpspace.analysis.options import PLACED_HELP, Grammar, option
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import find_placement, fit_placement
@@ -121,11 +121,7 @@ class Compensate(Analysis):
         unset="relative where a linear axis, or with --orientation all rotary axes, carry the"
         " workpiece",
     )
-    placed: bool = option(
-        False,
-        "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
-        " for the least RMS over the working volume. Looks at the relative loop",
-    )
+    placed: bool = option(False, PLACED_HELP)
     orientation: bool = option(
         False,
         "Correct the tool axis too, with the rotary axes, where the format has a place for it",

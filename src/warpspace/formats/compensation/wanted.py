@@ -18,8 +18,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 STEPS = 2  # newton steps: an error grows by a ten-thousandth of the correction at most
-SMALL_MM, SMALL_DEG = 1e-2, 1e-3
-"""Moves by which the response of the tool to an axis is measured."""
+SMALL_MM, SMALL_DEG = 1e-2, 1e-3  # moves by which the response of the tool to an axis is measured
 CUT = 1e-3  # moves that act less than this share of the best one are not used
 LOOPS = (Loop.TOOL, Loop.RELATIVE)
 

@@ -50,7 +50,6 @@ ASSUMED = (
     "values beyond the points are held",
 )
 OTHER = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
-"""Parameters of the kinematics, which are no errors."""
 FINE_DEG = 1.0  # steps of a table that a wave is added to
 
 

@@ -94,7 +94,6 @@ WINDOWS = (
     "vtkWin32OpenGLRenderWindow",
     "vtkCocoaRenderWindow",
 )
-"""What the variable may name."""
 
 
 @dataclass(frozen=True, slots=True)

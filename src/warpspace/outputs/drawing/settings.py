@@ -36,10 +36,8 @@ SMALLEST_FACTOR: Final = 0.5
 """Text never gets smaller than this share of its size in a 1600 × 1200 figure."""
 PRINT: Final = 1.3
 """What sizes are multiplied by, so that text can be read where a figure is printed 17 cm wide."""
-PRINTED_PX: Final = 685
-"""Width of a figure in a report: 174 mm."""
-PRINTED_FACTOR: Final = 0.7
-"""Factor on text and lines there: small text has 7 pt."""
+PRINTED_PX: Final = 685  # width of a figure in a report: 174 mm
+PRINTED_FACTOR: Final = 0.7  # factor on text and lines there: small text has 7 pt
 
 
 @dataclass(frozen=True, slots=True)

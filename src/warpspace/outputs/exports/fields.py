@@ -243,8 +243,7 @@ def build_vts(picture: ScenePicture) -> bytes:
     return str(writer.GetOutputString()).encode()
 
 
-Kind: TypeAlias = str
-"""What a column holds: "text", "integer" or "number"."""
+Kind: TypeAlias = str  # what a column holds: "text", "integer" or "number"
 Columns: TypeAlias = Mapping[str, Sequence[Any] | Any]
 """Values by column, all of one length; arrays are taken as they are."""
 Append: TypeAlias = Callable[[Columns], None]

@@ -7,18 +7,17 @@ from typing import Any
 import numpy as np
 
 from warpspace.bodies.placed import load_bodies
-from warpspace.exceptions import OptionError
 from warpspace.kinematics.transforms import placed
 from warpspace.machine.axes import direction_index
 from warpspace.machine.description import Axis, Machine
 from warpspace.outputs.files import mesh_files, write_atomically, write_meshes
 from warpspace.picture.model import ScenePicture
+from warpspace.scene.urdf import not_installed
 from warpspace.units import Array
 
 ROOT, LINKS = "frame", {"S": "spindle", "t": "tool", "w": "workpiece"}
 MM_PER_M = 1000.0
-EFFORT, VELOCITY = 1000.0, 1.0
-"""Of every joint: URDF asks for them, machines do not say."""
+EFFORT, VELOCITY = 1000.0, 1.0  # of every joint: URDF asks for them, machines do not say
 
 
 def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
@@ -26,10 +25,7 @@ def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = Tru
     try:
         from yourdfpy import URDF
     except ImportError:
-        raise OptionError(
-            "URDF files need the package yourdfpy; expected it installed (pip install"
-            " 'warpspace[urdf]')"
-        ) from None
+        raise not_installed() from None
     target, machine = Path(path), picture.scene.machine
     meshes = _meshes(picture)
     read = [Path(source.path) for source in machine.bodies.values() if source.path]

@@ -127,8 +127,8 @@ def draw_bodies(
 
     draw((edge for part in placed for edge in part.edges_mm), theme.grid, 0.75, 0.1)
     if nominal:
-        moving = [part for part in placed if part.body.frame != BASE]
-        draw((edge for part in moving for edge in part.nominal_edges_mm), theme.ghost, 0.8, 0.05)
+        still = [replace(part, exaggeration=0.0) for part in placed if part.body.frame != BASE]
+        draw((edge for part in still for edge in part.edges_mm), theme.ghost, 0.8, 0.05)
     return raster
 
 

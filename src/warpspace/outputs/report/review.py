@@ -22,7 +22,7 @@ from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.report.render import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
-from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r, spell_point
+from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MINUS, spell, spell_short
 
@@ -97,12 +97,6 @@ class Reviewed:
         """Spell where the axes stand at the worst point."""
         found = self.statistics
         return list_axes(own_axes(self.scene, found.max_at_axes)) or spell_in_r(found.max_at_mm)
-
-    @property
-    def worst_place(self) -> str:
-        """Spell the worst point: axis positions, and the point of R."""
-        found = self.statistics
-        return f"{spell_point(own_axes(self.scene, found.max_at_axes), found.max_at_mm)} mm"
 
     @property
     def volume(self) -> str:

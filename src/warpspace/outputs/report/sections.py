@@ -45,7 +45,14 @@ from warpspace.outputs.report.review import (
 from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.model import ScenePicture
 from warpspace.picture.traces import trace_lines
-from warpspace.picture.words import convention_sentences, list_axes, reference_words, spell_factor
+from warpspace.picture.words import (
+    convention_sentences,
+    list_axes,
+    own_axes,
+    reference_words,
+    spell_factor,
+    spell_point,
+)
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
@@ -53,7 +60,6 @@ from warpspace.units import spell, spell_short
 
 HEIGHT_PX = 400
 OTHER_PX = {"comparison": 490, "slices": 490, "error-curves": 490, "concepts": 490, "repair": 490}
-"""Heights of figures of several drawings."""
 CHART = "warpspace.outputs.charts.blocks:chart_figure"
 LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they are drawn
 Chart = Bars | Lines | Histogram
@@ -347,9 +353,11 @@ def explanation(reviewed: Reviewed) -> Table:
     remainder = (signed(value, 2) for value in found.remainder_um)
     rows.append(("remainder", "second order", "", *remainder, ""))
     rows.append(("total", "exact chain", "", *map(signed, found.error_um), ""))
+    worst = reviewed.statistics
+    place = spell_point(own_axes(reviewed.scene, worst.max_at_axes), worst.max_at_mm)
     title = (
         f"{reviewed.titled(reviewed.scene.title)}. What each error does to the worst point,"
-        f" {reviewed.worst_place}. The parts along E add up to the length of the first-order error."
+        f" {place} mm. The parts along E add up to the length of the first-order error."
         " The largest contribution is not always the one to adjust, since it may compensate other"
         " errors elsewhere; see Repair."
     )
