@@ -8,7 +8,6 @@ from warpspace.scene.model import Scene
 
 
 def scene_with(name: str = "dvf5000_nominal", **errors: object) -> Scene:
-    """Give a scene with errors: numbers are constants, ("ramp", v) a ramp over the axis range."""
     scene = load_scene(name)
     functions = {}
     for key, value in errors.items():

@@ -18,18 +18,15 @@ STEP = 50.0
 
 
 def lengths(limit: float = MAX_OFFSET_MM) -> st.SearchStrategy[float]:
-    """Lengths in mm within ± limit, in steps of a micrometre."""
     return st.integers(-int(limit * 1000), int(limit * 1000)).map(lambda um: um / 1000.0)
 
 
 def vectors(limit: float = MAX_OFFSET_MM) -> st.SearchStrategy[tuple[float, float, float]]:
-    """Vectors in mm."""
     return st.tuples(lengths(limit), lengths(limit), lengths(limit))
 
 
 @st.composite
 def chains(draw: st.DrawFn) -> Chain:
-    """Chains of one to eight axes, letters repeated, in any order, on either side."""
     plain = st.permutations("XYZABC")
     any_names = st.lists(st.sampled_from(AXIS_NAMES), min_size=1, max_size=MAX_AXES, unique=True)
     order = draw(plain | any_names)
@@ -40,7 +37,6 @@ def chains(draw: st.DrawFn) -> Chain:
 
 @st.composite
 def models(draw: st.DrawFn, component_errors: str | None = None) -> Model:
-    """Machines with any chain, offsets and directions, their points and a convention."""
     chain = draw(chains())
     frames = (*chain.axes, *FIXED_FRAMES)
     machine = build_machine(
@@ -59,7 +55,6 @@ def models(draw: st.DrawFn, component_errors: str | None = None) -> Model:
 def positions(
     model: Model, shape: tuple[int, ...] = ()
 ) -> st.SearchStrategy[dict[str, np.ndarray]]:
-    """Positions of all axes of a model, in a batch of a shape."""
     size = int(np.prod(shape))
 
     def one(axis: str) -> st.SearchStrategy[np.ndarray]:

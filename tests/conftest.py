@@ -74,7 +74,6 @@ def _filters_of_logs():
 
 @pytest.fixture(scope="session")
 def chromium_path() -> str:
-    """Path of the Chromium that the browser tests drive."""
     for name in CHROMIUM_NAMES:
         if path := shutil.which(name):
             return path
@@ -83,7 +82,6 @@ def chromium_path() -> str:
 
 @pytest.fixture(scope="session")
 def browser(chromium_path: str) -> "Iterator[Browser]":
-    """One headless Chromium for all browser tests of a run."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -154,7 +152,6 @@ def _skipped(config: pytest.Config) -> list[pytest.TestReport]:
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    """Fail a CI run that skipped a test."""
     on_worker = hasattr(session.config, "workerinput")
     if IN_CI and not on_worker and _skipped(session.config) and exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED

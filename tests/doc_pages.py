@@ -10,13 +10,11 @@ BUILT = ("_build", "gallery", "generated")
 
 
 def pages() -> list[Path]:
-    """List the pages: those of docs/ and those at the top."""
     below = [path for path in DOCS.rglob("*.md") if not set(BUILT) & set(path.parts)]
     return sorted([*below, *(ROOT / name for name in ("README.md", "CONVENTIONS.md"))])
 
 
 def blocks(text: str, language: str) -> list[str]:
-    """Give the fenced blocks of a language."""
     found = re.findall(
         rf"^```{re.escape(language)}[^\n]*\n(.*?)^```", text, re.DOTALL | re.MULTILINE
     )
@@ -24,24 +22,20 @@ def blocks(text: str, language: str) -> list[str]:
 
 
 def prose(text: str) -> str:
-    """Leave out what is fenced."""
     return re.sub(r"^(```|:::+).*?^\1", "", text, flags=re.DOTALL | re.MULTILINE)
 
 
 def slug(heading: str) -> str:
-    """Give the anchor of a heading, as code hosts and the site do."""
     plain = re.sub(r"[^\w\- ]", "", heading.strip().lower())
     return plain.replace(" ", "-")
 
 
 def anchors(page: Path) -> set[str]:
-    """List the anchors of a page."""
     headings = re.findall(r"^#+ (.+)$", prose(page.read_text("utf-8")), re.MULTILINE)
     return {slug(heading) for heading in headings}
 
 
 def links(page: Path) -> Iterator[tuple[str, str]]:
-    """Give the relative links of a page as file and anchor."""
     for target in re.findall(r"\]\(([^)\s]+)\)", prose(page.read_text("utf-8"))):
         if "://" not in target:
             file, _, anchor = target.partition("#")
@@ -58,7 +52,6 @@ def entries(page: Path) -> Iterator[str]:
 
 
 def section(page: Path, heading: str) -> str | None:
-    """Give the text below a heading up to the next one, or nothing."""
     found = re.search(
         rf"^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)",
         page.read_text("utf-8"),

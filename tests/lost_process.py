@@ -27,13 +27,11 @@ def die_while_answering(size: int) -> bytes:
 
 
 def sleep_after(path: str) -> None:
-    """Leave a mark, then take long."""
     Path(path).touch()
     time.sleep(60.0)
 
 
 def refuse(word: str) -> None:
-    """Raise something that cannot be sent from one process to another."""
     raise UntransferableError(word, word)
 
 

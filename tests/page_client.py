@@ -68,11 +68,9 @@ class Page:
 
     @property
     def sliders(self) -> list[str]:
-        """Events of the sliders of errors that are listed."""
         return [*dict.fromkeys(SLIDER.findall("".join(self.pieces.values())))]
 
     def take(self, message: dict[str, Any]) -> list[str]:
-        """Take note of a message; give the names of the functions that it calls."""
         source = message["source"] if message["type"] == "RunJavascriptMessage" else ""
         calls = [call for line in source.split("\n") if (call := CALL.fullmatch(line))]
         return [self._take(call[1], json.loads(f"[{call[2]}]")) for call in calls]
@@ -97,8 +95,6 @@ class Page:
 
 
 class App:
-    """The app in a process of its own, reached directly or through a proxy."""
-
     def __init__(
         self,
         url: str,
@@ -114,12 +110,10 @@ class App:
 
     @property
     def memory_mb(self) -> float:
-        """Memory that the process holds, MB."""
         return self.process.memory_info().rss / 1e6
 
     @property
     def log(self) -> list[str]:
-        """What it has said so far."""
         return [] if self.path is None else self.path.read_text("utf-8").splitlines()
 
 
@@ -131,7 +125,6 @@ def running_app(
     launcher: tuple[str, ...] = ("-m", "warpspace"),
     **how: Any,
 ) -> Generator[App]:
-    """Run `warpspace view` with further options; its log lies in a folder."""
     with sockets.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = port or free.getsockname()[1]
@@ -164,14 +157,12 @@ def running_app(
 
 
 async def dial(app: App, **how: Any) -> websockets.ClientConnection:
-    """Connect to an app, and say nothing yet."""
     if app.address is not None:
         how |= {"host": app.address[0], "port": app.address[1], "ssl": app.trust}
     return await websockets.connect(app.url, additional_headers=app.headers, **how, **HOW)
 
 
 async def until(fine: Callable[[], bool], seconds: float) -> None:
-    """Wait until something holds."""
     end = time.monotonic() + seconds
     while not fine():
         assert time.monotonic() < end, f"did not come true within {seconds:g} s"
@@ -196,7 +187,6 @@ class Tab(Page):
         await self.close()
 
     async def open(self, patience_s: float = 120.0) -> None:
-        """Connect and wait until all of the page is there."""
         patience = {"open_timeout": patience_s, "ping_interval": None}  # slow is not gone
         self.socket = await dial(self._app, **patience)
         self._reader = asyncio.create_task(self._read())
@@ -215,15 +205,12 @@ class Tab(Page):
         await self.socket.wait_closed()
 
     async def send(self, message: dict[str, Any]) -> None:
-        """Send a message."""
         await self.socket.send(pack(message))
 
     async def drag(self, key: str, value: float) -> None:
-        """Move the slider of an error."""
         await self.send(said((f"errors:set.{key}", f"{value:g}")))
 
     async def answer_s(self, value: float, key: str = "EAX") -> float:
-        """Move a slider; give how long it takes until the row of its error is another."""
         place, began = f"error.{key}", time.perf_counter()
         before = self.pieces.get(place)
         await self.drag(key, value)

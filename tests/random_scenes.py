@@ -21,7 +21,6 @@ SIZES = st.sampled_from([-8000.0, -12.5, -1e-6, 0.0, 3.0, 40.0])
 
 @st.composite
 def scenes(draw: st.DrawFn, *, everything: bool = False) -> Scene:
-    """Scenes that `check` accepts."""
     text = draw(scene_texts(everything=everything))
     try:
         return parse_scene(text, "random")
@@ -31,7 +30,6 @@ def scenes(draw: st.DrawFn, *, everything: bool = False) -> Scene:
 
 @st.composite
 def scene_texts(draw: st.DrawFn, *, everything: bool = False) -> str:
-    """Texts of scene files, nearly all valid; on request with gantries and curved volumes."""
     chain = draw(chains())
     offsets = {frame: draw(POINTS) for frame in chain.axes if draw(st.booleans())}
     directions = {axis: -1 for axis in chain.axes if draw(st.booleans())}
@@ -64,7 +62,6 @@ def scene_texts(draw: st.DrawFn, *, everything: bool = False) -> str:
 
 
 def curves(key: str, chain: Chain) -> st.SearchStrategy[str]:
-    """Spelt errors of all kinds; a constant where nothing else is possible."""
     if parameter(key).is_constant:
         return SIZES.map(str)
     plain = _plain_curves(key)
@@ -78,7 +75,6 @@ def curves(key: str, chain: Chain) -> st.SearchStrategy[str]:
 
 
 def _surface(own: str, other: str, low: float, high: float) -> str:
-    """Spell a table over two axes."""
     return (
         f'{{ table2 = {{ axes = ["{own}", "{other}"], {own} = [-100, 80], {other} = [-50, 0, 90],'
         f" values = [[0.0, {low}, 1.0], [{high}, 2.0, -3.0]] }} }}"
@@ -86,7 +82,6 @@ def _surface(own: str, other: str, low: float, high: float) -> str:
 
 
 def _plain_curves(key: str) -> st.SearchStrategy[str]:
-    """Spelt curves along the axis of an error."""
     constant = SIZES.map(str)
     forms = [
         SIZES.map(lambda value: f"{{ ramp = {value} }}"),
@@ -99,11 +94,9 @@ def _plain_curves(key: str) -> st.SearchStrategy[str]:
 
 
 def _some_keys(chain: Chain) -> st.SearchStrategy[list[str]]:
-    """Some of the errors that a chain can have."""
     keys = build_machine(chain).allowed_keys
     return st.lists(st.sampled_from(keys), max_size=5, unique=True)
 
 
 def _rows(table: dict[str, object]) -> list[str]:
-    """Spell the entries of a table."""
     return [f"{key} = {value}" for key, value in table.items()]

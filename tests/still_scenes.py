@@ -25,5 +25,4 @@ TEXTS = {
 
 
 def still_scene(name: str) -> Scene:
-    """Build one of the scenes."""
     return parse_scene(f'title = "{name}"\n{TEXTS[name]}', name)

@@ -13,8 +13,6 @@ Command = Callable[..., "Result"]
 
 @dataclass(frozen=True)
 class Result:
-    """What a run left: exit status, stdout, stderr."""
-
     status: int
     out: str
     err: str
@@ -32,7 +30,6 @@ class Result:
 
 @pytest.fixture
 def warpspace(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
-    """The command `warpspace`, as a function of its arguments."""
 
     def run(*arguments: object) -> Result:
         monkeypatch.setattr(sys, "argv", ["warpspace", *map(str, arguments)])

@@ -41,7 +41,6 @@ def test_malformed_scene_is_refused_with_file_key_value_and_expectation(case, tm
 
 
 def sparse(size):
-    """Make a file that is long and takes no room."""
 
     def make(path):
         with path.open("wb") as file:

@@ -36,7 +36,6 @@ if __name__ == "__main__":
 
 @contextmanager
 def dask_cluster(workers: int, folder: Path) -> Iterator[str]:
-    """Start a scheduler and workers; give the address. Their files lie in a folder."""
     path = folder / "serve.py"
     path.write_text(SERVE, encoding="utf-8")
     process = subprocess.Popen(
@@ -144,9 +143,6 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path):
     )
     assert found.probability == alone.probability
     assert found.histogram.counts.tolist() == alone.histogram.counts.tolist()
-
-
-# --- processes of this machine -------------------------------------------------------------------
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")

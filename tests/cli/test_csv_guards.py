@@ -27,7 +27,6 @@ EAW = 4.0
 
 
 def cells(content):
-    """Split a table that ends its lines with \\n."""
     assert content.endswith(b"\n")
     assert b"\r\n" not in content
     return list(csv.reader(io.StringIO(content.decode(), newline="")))
@@ -35,7 +34,6 @@ def cells(content):
 
 @pytest.fixture
 def scene(tmp_path):
-    """A machine with an axis W and a name that a spreadsheet would compute."""
     path = tmp_path / "=w.toml"
     path.write_text(SCENE, encoding="utf-8")
     return path

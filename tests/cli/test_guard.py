@@ -16,7 +16,6 @@ WORDS = ("FILE", "SCENE", "FOLDER", "PATH")
 
 
 def walk(command, *names):
-    """Go through a command and those below it."""
     yield " ".join(names), command
     if isinstance(command, click.Group):
         for name in command.commands:
@@ -56,7 +55,6 @@ TWICE = [
 
 
 def run(name, given):
-    """Run a command with files, and with something where it needs anything else."""
     command, before, after = COMMANDS[name], ["--force"], []
     for param in command.params:
         value = given.get(param.name or "")
@@ -73,7 +71,6 @@ def run(name, given):
 
 
 def ending(name, *params):
-    """Give an ending that outputs may have."""
     kinds = [p.type for p in COMMANDS[name].params if p.name in params]
     known = [set(kind.endings) for kind in kinds if isinstance(kind, OutputFile) and kind.endings]
     return min(set.intersection(*known)) if known else ".txt"

@@ -10,7 +10,6 @@ from warpspace.scene.library import load_scene
 
 
 def write(folder, name, text):
-    """Write a file."""
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path

@@ -135,7 +135,6 @@ POINT = ("--at", "X=0,Y=-225,Z=-480,B=0,C=0")
 
 
 def only_object(text):
-    """Read stdout that must be exactly one JSON object on one line."""
     assert text.count("\n") == 1
     found = json.loads(text)
     assert isinstance(found, dict)
@@ -160,7 +159,6 @@ def test_version_is_the_package_s(warpspace):
 
 
 def run_module(*arguments, **options):
-    """Run the command as a process of its own."""
     return subprocess.run(
         [sys.executable, "-m", "warpspace", *arguments],
         stderr=subprocess.PIPE,

@@ -44,7 +44,6 @@ def heed_signals():
 
 
 def start(folder, *arguments, code=MAIN):
-    """Start the command; its processes carry the folder in their environment."""
     with (folder / "log").open("wb") as log:
         return subprocess.Popen(
             [sys.executable, "-c", code, *arguments],
@@ -58,7 +57,6 @@ def start(folder, *arguments, code=MAIN):
 
 
 def processes(folder):
-    """List the processes of a run that live."""
     mark = f"{MARK}={folder}".encode()
     found: list[int] = []
     for path in Path("/proc").glob("[0-9]*"):
@@ -71,7 +69,6 @@ def processes(folder):
 
 
 def all_have_ended(folder, within_s=20.0):
-    """Wait until no process of a run lives."""
     until = time.monotonic() + within_s
     while processes(folder):
         if time.monotonic() > until:
@@ -81,33 +78,28 @@ def all_have_ended(folder, within_s=20.0):
 
 
 def wait_for(folder, pattern, process):
-    """Wait until a file is there."""
     while not list(folder.glob(pattern)):
         assert process.poll() is None, (folder / "log").read_text()
         time.sleep(0.005)
 
 
 def wait_for_workers(folder, process, count=3):
-    """Wait until the command has started a renderer beside itself and the tracker."""
     while len(processes(folder)) < count:
         assert process.poll() is None, (folder / "log").read_text()
         time.sleep(0.02)
 
 
 def wait_for_drawing(process):
-    """Wait until the command has loaded what it draws with, in its own process."""
     while "vtk" not in Path(f"/proc/{process.pid}/maps").read_text():
         assert process.poll() is None
         time.sleep(0.02)
 
 
 def hidden(folder):
-    """List the temporary files that are there."""
     return [path.name for path in folder.glob(".warpspace-*")]
 
 
 def run_again(folder):
-    """Let the next run write a small file into the folder."""
     again = start(folder, *FIELD[:2], "--grid", "2", *FIELD[4:])
     assert again.wait(60) == 0, (folder / "log").read_text()
 

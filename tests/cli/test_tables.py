@@ -87,7 +87,6 @@ def test_help_cuts_no_sentence(warpspace, monkeypatch):
 
 
 def printed(capsys, *arguments, **options):
-    """Print a table and give its lines."""
     print_table(*arguments, **options)
     return capsys.readouterr().out.splitlines()
 
@@ -155,7 +154,6 @@ def test_a_number_stays_with_its_unit_and_an_axis_with_its_position(capsys, monk
 
 
 def in_terminal(width, *arguments, **environment):
-    """Run the command in a pseudo-terminal of a width; its status and what the terminal gets."""
     fcntl, pty, struct, termios = map(pytest.importorskip, ("fcntl", "pty", "struct", "termios"))
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, width, 0, 0))
@@ -205,8 +203,6 @@ def test_columns_overrules_the_terminal():
 
 
 class Terminal(io.StringIO):
-    """Text that says it is a terminal."""
-
     def isatty(self):
         return True
 
@@ -222,7 +218,6 @@ def terminal(delay_s=0.05):
 
 
 def wait_for(terminal, text):
-    """Wait until a text is shown."""
     end = time.monotonic() + 20.0
     while text not in terminal.getvalue() and time.monotonic() < end:
         time.sleep(0.05)

@@ -39,7 +39,6 @@ WRITERS = {
 
 @pytest.fixture
 def scene(tmp_path):
-    """Give a scene that reads a CSV file."""
     (tmp_path / "measured.csv").write_text("X,error\n-275,0\n275,4\n", encoding="utf-8")
     path = tmp_path / "s.toml"
     path.write_text(SCENE, encoding="utf-8")
@@ -47,7 +46,6 @@ def scene(tmp_path):
 
 
 def command(writer, scene):
-    """Spell a command that writes a file, its target left out."""
     return [part.format(scene=scene) for part in WRITERS[writer][0]]
 
 

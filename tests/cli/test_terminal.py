@@ -16,7 +16,6 @@ MAIN = "from warpspace.cli import main; main()"
 
 
 def run(*arguments, cwd=None, **variables):
-    """Run the command in a process of its own."""
     return subprocess.run(
         [sys.executable, "-c", MAIN, *arguments],
         cwd=cwd,

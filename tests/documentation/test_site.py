@@ -27,13 +27,11 @@ EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
 def site_part(name):
-    """Give the names of a module of the site."""
     return runpy.run_path(str(DOCS / "_ext" / f"{name}.py"))
 
 
 @pytest.fixture
 def configuration(monkeypatch):
-    """Give the settings of the site."""
     monkeypatch.setattr(sys, "path", list(sys.path))
     return runpy.run_path(str(DOCS / "conf.py"))
 

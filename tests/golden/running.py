@@ -36,7 +36,6 @@ NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 
 
 def run_case(name: str, out: Path) -> str:
-    """Give the outcome of a case as text."""
     words = [word.replace("{out}", ".") for word in CASES[name].split()]
     with chdir(out):
         said = CliRunner(env={"COLUMNS": "80"}).invoke(cli, words)
@@ -52,13 +51,11 @@ def run_case(name: str, out: Path) -> str:
 
 
 def refusals() -> dict[str, str]:
-    """Give the kept messages by their command lines."""
     lines = REFUSALS.read_text("utf-8").splitlines()
     return {line[2:]: said for line, said in zip(lines[::2], lines[1::2], strict=True)}
 
 
 def run_refused(line: str, folder: Path) -> tuple[int, str, str]:
-    """Give status, stdout and the message of a command as installed, run in a folder."""
     out, err = io.StringIO(), io.StringIO()
     words = mock.patch.object(sys, "argv", ["warpspace", *shlex.split(line)])
     status = 0
@@ -72,7 +69,6 @@ def run_refused(line: str, folder: Path) -> tuple[int, str, str]:
 
 
 def input_cases(path: Path) -> Iterator[tuple[str, str, dict[str, str], str]]:
-    """Give name, command, files and outcome of each case of a text."""
     head, *cases = path.read_text("utf-8").split("\n=== ")
     command, *texts = head.split("\n--- ")
     files = {name: text for name, _, text in (one.partition("\n") for one in texts)}
@@ -83,14 +79,12 @@ def input_cases(path: Path) -> Iterator[tuple[str, str, dict[str, str], str]]:
 
 
 def run_input(command: str, files: dict[str, str], folder: Path) -> tuple[int, str, str]:
-    """Run a command in a folder with files."""
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
     return run_refused(command, folder)
 
 
 def run_read(command: str, files: dict[str, str], folder: Path) -> str:
-    """Run a command with files; give what is said, and the machine or errors of new.toml."""
     status, printed, said = run_input(command, files, folder)
     if status:
         raise ValueError(said)
@@ -101,7 +95,6 @@ def run_read(command: str, files: dict[str, str], folder: Path) -> str:
 
 
 def keep_inputs(path: Path) -> None:
-    """Write the messages of a text anew."""
     head = path.read_text("utf-8").split("\n=== ")[0]
     parts = [head]
     for name, command, files, _ in input_cases(path):
@@ -115,7 +108,6 @@ def keep_inputs(path: Path) -> None:
 
 
 def _spelled(text: str) -> list[str]:
-    """Lay JSON out in lines, one value each, so that a difference can be seen."""
     try:
         return list(_leaves(json.loads(text), ""))
     except ValueError:

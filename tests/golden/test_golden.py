@@ -33,7 +33,6 @@ def test_what_cannot_be_is_refused_with_its_message(line, kept, tmp_path):
 
 
 def cases_of(folder):
-    """Command, files and outcome of the cases of all texts of a folder."""
     return pytest.mark.parametrize(
         ("command", "files", "kept"),
         [

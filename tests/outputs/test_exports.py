@@ -28,7 +28,6 @@ def close(read, expected):
 
 
 def gltf_document(data):
-    """The JSON chunk of a GLB."""
     magic, version, total = struct.unpack_from("<III", data)
     assert (magic, version, total) == (0x46546C67, 2, len(data))
     length, _ = struct.unpack_from("<II", data, 12)

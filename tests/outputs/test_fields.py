@@ -38,7 +38,6 @@ MEGABYTES = 500
 
 
 def evaluated(name):
-    """A scene over its grid."""
     scene = load_scene(name)
     grid = build_grid(scene.model, scene.workspace, NODES)
     field = evaluate(scene, grid=NODES, loop="relative")

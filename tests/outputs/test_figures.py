@@ -56,7 +56,6 @@ def pair(name):
 
 
 def inside(drawing, size):
-    """Check that no text leaves the figure."""
     assert drawing.rects
     rects = np.array(drawing.rects)
     assert (rects[:, :2] >= -0.5).all(), drawing.title

@@ -19,7 +19,6 @@ SCENES = ("dvf5000_first", "teach_wobbling_table", "dvf5000_nominal")
 
 
 def nodes(mesh, values):
-    """Order point values by the axes of the machine, [nx, ny, nz, ...]."""
     return np.swapaxes(
         np.asarray(values).reshape(*reversed(mesh.dimensions), *values.shape[1:]), 0, 2
     )

@@ -32,12 +32,10 @@ EVIL = "</script><script>window.hacked=1</script><img src=x onerror='window.hack
 
 
 def plain(text):
-    """Text with ordinary blanks."""
     return text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def page_one(*scenes, **changes):
-    """What the first page says of scenes, and the share within the limit of each."""
     review = build_review(scenes, replace(FAST, **changes))
     blocks = first_page(review, Text("the map", "body"))
     words = [str(astuple(block)) for block in blocks]
@@ -137,7 +135,6 @@ def test_more_than_two_scenes_and_none():
 
 @pytest.fixture(scope="module")
 def both(renderer):
-    """The report of two scenes with figures for a page, and a stand-in for the interactive view."""
     scenes = [load_scene("dvf5000_first"), load_scene("dvf5000_second")]
     other = [load_scene("machine_printer_3d")]
     return build_report(
@@ -322,7 +319,6 @@ def test_page_opens_without_network_and_draws(browser, renderer, tmp_path):
 
 
 def coloured_pixels(png):
-    """Count pixels whose colour is one of the colour map's, within three levels."""
     from io import BytesIO
 
     from PIL import Image

@@ -27,7 +27,6 @@ VALUES = st.integers(1, 40).map(float)
 
 @st.composite
 def functions(draw, model, axis):
-    """Errors that depend on two axes, on the direction of travel, or on both."""
     others = [name for name in model.machine.axes if name != axis]
 
     def one():
@@ -44,7 +43,6 @@ def functions(draw, model, axis):
 
 @st.composite
 def cases(draw):
-    """A model looked at in some direction, and a set of such errors on one of its axes."""
     model = draw(models())
     axis = draw(st.sampled_from([*model.machine.axes]))
     keys = [row.key for row in axis_parameters(axis) if not row.is_constant]

@@ -54,7 +54,6 @@ def server():
 
 @st.composite
 def states(draw):
-    """Ways to look at a scene."""
     opened = replace(start_state(draw(scenes())), nodes=SIDE_NODES)
     look = replace(
         opened.look,
@@ -91,7 +90,6 @@ def test_every_state_has_a_finite_picture(server, state):
 
 
 def _check_finite(picture):
-    """Look at all numbers that are drawn."""
     assert math.isfinite(picture.exaggeration)
     assert picture.size_mm > 0.0
     for field in fields(picture.statistics):

@@ -58,12 +58,10 @@ def _shift(moved: Array, point: Array) -> Array:
 
 
 def _turned(moved: Array, direction: Array) -> Array:
-    """Turn directions by the rotation part of a transformation."""
     return transforms.rotate(moved[..., :3, :3], direction)
 
 
 def _between(start: Array, end: Array) -> Array:
-    """Rotation vector that takes one unit vector to another the short way, rad, [..., 3]."""
     cross = np.cross(start, end)
     sine = np.linalg.norm(cross, axis=-1, keepdims=True)
     cosine = np.sum(start * end, axis=-1, keepdims=True)
@@ -78,14 +76,12 @@ ROUNDING = 32 * np.finfo(float).eps
 
 
 def reach_mm(scene, point_mm):
-    """Longest length that the chain of a scene adds up, mm."""
     offsets = sum(float(np.abs(axis.offset_mm).sum()) for axis in scene.machine.axes.values())
     ends = float(np.abs([scene.model.tool_point_mm, scene.model.workpiece_point_mm]).sum())
     return offsets + ends + float(np.abs(point_mm).max())
 
 
 def check(scene, loop, frame):
-    """Hold both fields of a scene against the plain formulas."""
     grid = build_grid(scene.model, scene.workspace, NODES)
     view = choose_view(scene, loop, frame)
     basis = grid_basis(scene, grid, view)

@@ -15,7 +15,6 @@ ALONG = {"X": 0, "Y": 1, "Z": 2, "U": 0, "V": 1, "W": 2, "A": 0, "B": 1, "C": 2}
 
 
 def random_machine(rng):
-    """Give a machine with everything that a description can have."""
     names = [letter + digit for letter in LETTERS for digit in ("", "1", "2")]
     count = int(rng.integers(1, 9))
     chosen = [str(name) for name in rng.choice(names, count, replace=False)]
@@ -41,7 +40,6 @@ def random_machine(rng):
 
 
 def rigid(rotation, shift):
-    """Give a matrix of four rows."""
     matrix = np.eye(4)
     matrix[:3, :3] = rotation.as_matrix()
     matrix[:3, 3] = shift

@@ -30,7 +30,6 @@ TEXTS = {
 
 
 def likely(draw, leaf):
-    """Draw a text that the leaf takes."""
     low, high = (leaf.span.low, leaf.span.high) if leaf.span else (0.0, 50.0)
     numbers = st.floats(low, high).map(repr)
     if leaf.kind in ("number", "point", "numbers"):

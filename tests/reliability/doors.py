@@ -52,8 +52,6 @@ AWAY = ("ws://evil.example", "http://evil.example/x", "//evil.example")
 
 @dataclass
 class Tally:
-    """What came of the attempts."""
-
     done: Counter[str] = field(default_factory=Counter)
     faults: list[str] = field(default_factory=list)
     slowest_s: float = 0.0
@@ -61,7 +59,6 @@ class Tally:
 
 
 def attempts(port: int) -> Iterator[tuple[str, str, dict[str, str]]]:
-    """Give requests: of what kind, with which path, with which headers; `port` is the app's."""
     valid, own = f"/?token={TOKEN}", {"Host": f"127.0.0.1:{port}"}
     for host in HOSTS:
         yield "foreign host", valid, {"Host": host.format(port=port)}
@@ -82,7 +79,6 @@ def attempts(port: int) -> Iterator[tuple[str, str, dict[str, str]]]:
 
 
 def try_one(port: int, kind: str, path: str, headers: dict[str, str], tally: Tally) -> None:
-    """Make a request, and see that it is refused without a word of the page."""
     began = time.perf_counter()
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
     try:
@@ -139,7 +135,6 @@ async def _exhaust(app: App, count: int, tally: Tally) -> None:
 
 
 def run(count: int) -> Outcome:
-    """Make so many attempts, a hundredth of them uploads."""
     tally, uploads, before = Tally(), max(1, min(count // 100, 200)), 0.0
     options = ("--token", TOKEN)
     with tempfile.TemporaryDirectory() as folder, running_app(*options, folder=Path(folder)) as app:

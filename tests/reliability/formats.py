@@ -15,8 +15,6 @@ from warpspace.scene.library import load_scene, parse_scene, scene_names
 
 @dataclass(frozen=True)
 class Format:
-    """A format of files."""
-
     name: str
     seeds: Callable[[], list[bytes]]
     read: Callable[[bytes, Path], object]

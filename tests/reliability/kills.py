@@ -49,7 +49,6 @@ def _writers() -> dict[str, Callable[[int, Path], None]]:
 
 
 def run(count: int) -> Outcome:
-    """Kill so many writers."""
     with tempfile.TemporaryDirectory() as folder:
         process = subprocess.run(
             [sys.executable, "-m", "reliability.kills", str(count), folder],

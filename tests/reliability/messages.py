@@ -27,7 +27,6 @@ TABS = 4
 
 
 def run(count: int) -> Outcome:
-    """Send so many messages."""
     with tempfile.TemporaryDirectory() as folder, running_app(folder=Path(folder)) as app:
         lag = Lag()
         # within the first rounds libraries are loaded, tabs kept, and the heap has its size
@@ -91,7 +90,6 @@ async def _attack(app: App, count: int, lag: Lag) -> tuple[int, list[float], flo
 
 
 def cycle(kinds: list[bytes], count: int) -> list[bytes]:
-    """Take messages in turn."""
     return list(itertools.islice(itertools.cycle(kinds), count))
 
 

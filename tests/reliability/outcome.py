@@ -9,33 +9,26 @@ WORK = 200_000
 
 @dataclass
 class Outcome:
-    """What came of a row."""
-
     count: int
     result: str
     faults: list[str] = field(default_factory=list)
 
 
 class Lag:
-    """Measures now and then how long a computation takes by the clock and by the processor."""
-
     def __init__(self) -> None:
         self.most = 1.0
 
     def measure(self) -> None:
-        """Compute, and keep the largest ratio of clock to processor."""
         clock, own = time.perf_counter(), time.process_time()
         sum(range(WORK))
         clock, own = time.perf_counter() - clock, time.process_time() - own
         self.most = max(self.most, clock / max(own, 1e-4))
 
     def judge(self, slowest_s: float, longest_s: float) -> list[str]:
-        """Say whether an answer took too long, on a machine that had others to serve."""
         if slowest_s <= longest_s * self.most:
             return []
         return [f"an answer took {slowest_s:.2f} s; the machine was {self.most:.1f} × slowed down"]
 
     @property
     def words(self) -> str:
-        """Say it in a result."""
         return f"on a machine slowed down up to {self.most:.1f} × by other work"

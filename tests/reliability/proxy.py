@@ -35,8 +35,6 @@ http {{
 
 @dataclass(frozen=True)
 class Site:
-    """The proxy and what stands behind it."""
-
     https: int
     http: int
     trust: ssl.SSLContext
@@ -49,8 +47,6 @@ class Site:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the proxy says."""
-
     status: int
     cookies: SimpleCookie
     location: str | None
@@ -68,7 +64,6 @@ class Answer:
 
 @contextmanager
 def site() -> Iterator[Site]:
-    """Start two servers, and nginx with the example's configuration before them."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         https, plain = _free_port(), _free_port()
@@ -159,7 +154,6 @@ def ask(at: Site, path: str = "/", *, tls: bool = True, **headers: str) -> Answe
 
 
 async def drag(at: Site, cookies: str) -> float:
-    """Open a tab through the proxy and move a slider; give how long the answer takes."""
     through = App(
         f"wss://{NAME}:{at.https}", at.servers[0].process, at.servers[0].path,
         headers={"Cookie": cookies, "Origin": f"https://{at.host}"}, trust=at.trust,
@@ -170,7 +164,6 @@ async def drag(at: Site, cookies: str) -> float:
 
 
 def run(count: int) -> Outcome:
-    """Let so many visitors come, each of them three times; try the doors; lose a server."""
     if not nginx_is_there():
         return Outcome(0, "", ["nginx or openssl is not installed"])
     faults: list[str] = []

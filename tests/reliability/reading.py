@@ -35,7 +35,6 @@ LARGEST = 200_000
 
 
 def mutate(seeds: Sequence[bytes], words: Sequence[bytes], chance: random.Random) -> bytes:
-    """Change a good file in one to eight places."""
     content = bytearray(chance.choice(seeds))
     for _ in range(chance.choice((1, 1, 1, 2, 3, 5, 8))):
         _change(content, seeds, words, chance)
@@ -95,7 +94,6 @@ def _swap_lines(content: bytearray, chance: random.Random) -> None:
 
 
 def read_many(way: str, count: int, seed: int) -> Outcome:
-    """Read so many changed files, in processes of their own; give what came of it."""
     total, good = Counter[str](), Counter[str]()
     slowest, most_mb = 0.0, 0.0
     faults: list[str] = []
@@ -145,7 +143,6 @@ def _watch(given: list[str]) -> dict[str, Any]:
 
 
 def keep(name: str, content: bytes) -> Path:
-    """Keep a file that shows a fault."""
     handle, path = tempfile.mkstemp(prefix=f"warpspace-fault-{name.replace(' ', '-')}-")
     os.write(handle, content)
     os.close(handle)
@@ -153,8 +150,6 @@ def keep(name: str, content: bytes) -> Path:
 
 
 class Reader:
-    """Reads files and keeps count of what went wrong."""
-
     def __init__(self, folder: Path) -> None:
         from reliability.formats import FORMATS
 
@@ -166,7 +161,6 @@ class Reader:
         warnings.simplefilter("error")
 
     def read(self, name: str, content: bytes) -> None:
-        """Read one file."""
         from warpspace.exceptions import WarpspaceError
 
         (self._folder / "current").write_bytes(name.encode() + b"\n" + content)
@@ -193,12 +187,10 @@ class Reader:
 
     @property
     def most_mb(self) -> float:
-        """Memory the process has ever had, MB; of Linux."""
         status = Path("/proc/self/status").read_text()
         return float(status.partition("VmHWM:")[2].split()[0]) / 1024.0
 
     def say(self, *, ended: bool = False) -> None:
-        """Write down how far it is."""
         self._said = time.monotonic()
         said = NOTHING | {"by_format": self.by_format, "read": self.good, "ended": ended}
         said |= {"slowest_s": self.slowest_s, "most_mb": self.most_mb, "faults": self.faults[:20]}

@@ -19,7 +19,6 @@ TABS, RATE, PAUSE_S = 20, 10.0, 15.0
 
 
 def soak(count: int) -> Outcome:
-    """Let twenty tabs come, drag, drop out and come back, so many minutes."""
     script = ROOT / "benchmarks" / "soak_app.py"
     command = [sys.executable, str(script), "--minutes", str(count), "--tabs", str(TABS)]
     pace = ["--rate", str(RATE), "--pause", str(PAUSE_S)]
@@ -37,8 +36,6 @@ def soak(count: int) -> Outcome:
 
 @dataclass(frozen=True)
 class Row:
-    """Something that is tried so many times."""
-
     full: int
     unit: str
     run: Callable[[int], Outcome]

@@ -32,8 +32,6 @@ Start = Callable[[], None]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a command runs."""
-
     name: str
     environment: Mapping[str, str] = field(default_factory=dict)
     start: Start | None = None
@@ -77,7 +75,6 @@ PLACES: tuple[Place, ...] = (
 
 
 def run(count: int) -> Outcome:
-    """Run commands in places until so many are done; two instances at once each time."""
     pairs = [(place, command) for command in COMMANDS for place in PLACES]
     tried = [(number * 7) % len(pairs) for number in range(count)]
     faults = [fault for at in tried for fault in _try(pairs[at][0], *pairs[at][1])]

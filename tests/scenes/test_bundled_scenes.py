@@ -28,7 +28,6 @@ def table_errors(scene, point_mm, c_deg, b_deg=0.0):
 
 
 def harmonic(values, order):
-    """Amplitude of one harmonic of a closed curve sampled evenly."""
     return float(2.0 * np.abs(np.fft.rfft(values)[order]) / len(values))
 
 

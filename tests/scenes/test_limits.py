@@ -37,12 +37,10 @@ class Case:
 
 
 def above(value):
-    """The next number that a file can hold."""
     return math.nextafter(value, math.inf)
 
 
 def below(value):
-    """The number before."""
     return math.nextafter(value, -math.inf)
 
 

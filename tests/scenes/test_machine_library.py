@@ -21,20 +21,17 @@ POSES = 20
 
 
 def poses(machine, positions):
-    """Pose of every frame in R, from the model."""
     coordinates = {name: np.asarray(value) for name, value in positions.items()}
     found = body_motions(Model(machine), {}, complete_coordinates(machine, coordinates))
     return {name: motion.nominal for name, motion in found.items()}
 
 
 def tip(machine, **positions):
-    """Tool point as the frame w sees it, mm."""
     found = poses(machine, positions)
     return (np.linalg.inv(found["w"]) @ found["t"])[:3, 3]
 
 
 def random_positions(machine, rng):
-    """A position of every axis within its travel."""
     return {name: rng.uniform(*axis.travel) for name, axis in machine.axes.items()}
 
 
@@ -122,9 +119,6 @@ def test_nominal_poses_agree_with_pinocchio(name):
         for frame, (joint, behind) in ends.items():
             expected = (data.oMi[joint] * behind).homogeneous
             np.testing.assert_allclose(found[frame], expected, rtol=0, atol=1e-9)
-
-
-# --- LinuxCNC, equations as printed in its sources ------------------------------------------------
 
 
 @pytest.mark.parametrize("dy", [0.0, 23.0])
@@ -251,9 +245,6 @@ def test_scara_of_the_library_moves_like_scarakins():
 def _sin_cos(angle_deg):
     angle = np.deg2rad(angle_deg)
     return np.sin(angle), np.cos(angle)
-
-
-# --- errors and pictures --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", LIBRARY)

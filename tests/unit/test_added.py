@@ -140,8 +140,6 @@ class Split(Convention):
 
 @dataclass(frozen=True, kw_only=True)
 class Corner(BenchTest):
-    """A dial gauge along x in one place."""
-
     name: ClassVar[str] = "corner"
     title: ClassVar[str] = "Corner"
     standard: ClassVar[str] = "our own"
@@ -199,7 +197,6 @@ ADDED = {
 
 @pytest.fixture(autouse=True)
 def added():
-    """Add one of each, which can be added but once."""
     for register, _, what in ADDED.values():
         register(what)
     yield

@@ -30,9 +30,6 @@ def backlash(value):
     return Directional(span, Constant(span, value / 2.0), Constant(span, -value / 2.0))
 
 
-# --- positioning ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("axis", ["X", "Y", "Z"])
 def test_positioning_of_a_ramp(axis):
     found = run(scene_with(**{f"E{axis}{axis}": ("ramp", 11.0)}), Positioning(axis=axis)).outcome
@@ -65,9 +62,6 @@ def test_backlash_is_the_reversal(exact):
     assert found["B_um"] == found["R_um"] == found["A_um"] == pytest.approx(6.0, **EXACT)
     assert found["M_um"] == pytest.approx(0.0, abs=1e-9)
     assert found["B_mean_um"] == pytest.approx(6.0, **EXACT)
-
-
-# --- circular -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("plane", "key"), [("XY", "EC0Y"), ("XZ", "EB0Z"), ("YZ", "EA0Z")])
@@ -180,9 +174,6 @@ def test_circle_that_follows_a_rotary_axis():
     assert found.outcome["circular_deviation_um"] == pytest.approx(4.0, **EXACT)
 
 
-# --- diagonals ------------------------------------------------------------------------------------
-
-
 def test_body_diagonals_differ_by_squareness():
     # edges 550 × 450 × 400: γ·a·b/L each way
     length = np.linalg.norm([550.0, 450.0, 400.0])
@@ -221,9 +212,6 @@ def test_backlash_along_diagonals():
     assert found["B_um"] == pytest.approx(6.0 * 550.0 / length, **EXACT)
 
 
-# --- straightness ---------------------------------------------------------------------------------
-
-
 def test_parabola_has_the_same_straightness_by_every_line():
     scene = scene_with(EYX=Poly((-275.0, 275.0), (0.0, 0.0, 1e-4)))
     found = run(scene, Straightness(axis="X", across="y")).outcome
@@ -246,9 +234,6 @@ def test_reference_lines_of_a_kink():
 def test_squareness_is_no_straightness():
     found = run(scene_with(EC0Y=50.0), Straightness(axis="Y", across="x")).outcome
     assert max(quantity.value for quantity in found.quantities) < 1e-9
-
-
-# --- rotary axis ----------------------------------------------------------------------------------
 
 
 def test_error_motions_of_a_table():
@@ -282,9 +267,6 @@ def test_axis_average_line_of_a_table(axis, keys):
             assert found[name] == pytest.approx(0.0, abs=1e-9)
 
 
-# --- sphere ---------------------------------------------------------------------------------------
-
-
 def test_tilted_c_on_the_r_test():
     # the ball at radius 100, height 60 above the axis' origin: α·h along y, −α·R·sin θ along z
     found = run(scene_with(EA0C=25.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
@@ -315,9 +297,6 @@ def test_a_ball_that_stands_elsewhere_is_fitted_away():
     found = test.evaluate(plan, design @ np.array([3.0, -2.0, 5.0]))
     assert found["rms_fitted_um"] == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(found.details["ball_um"], [3.0, -2.0, 5.0])
-
-
-# --- ball plate and cone --------------------------------------------------------------------------
 
 
 def test_ball_plate_of_a_ramp_and_of_a_roll():

@@ -102,7 +102,6 @@ def test_poses_left_out_are_predicted(tmp_path):
 
 
 def planted(errors, kind, poses, noise=0.0, seed=0):
-    """Readings that the exact model gives with errors planted."""
     functions = {}
     for key, value in errors.items():
         axis = key[-1]
@@ -235,7 +234,6 @@ def test_robust_intervals_are_no_wider_than_the_scatter_of_the_fits():
 
 
 def in_part_hits(seeds):
-    """Share of intervals of combinations that hold the truth, all errors of linear axes there."""
     scene = load_scene("dvf5000_nominal")
     keys = tuple(key for key in scene.parameter_keys if key[-1] in "XYZ")
     corners = np.meshgrid(*[np.linspace(*scene.workspace.ranges[axis], 3) for axis in "XYZ"])

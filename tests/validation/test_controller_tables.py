@@ -16,12 +16,9 @@ PLAIN = ReadOptions()
 
 
 def sources(*texts, names=()):
-    """Give texts as files."""
     given = names or tuple(f"file{i}.txt" for i in range(len(texts)))
     return [source_of_text(text, name) for text, name in zip(texts, given, strict=True)]
 
-
-# --- SINUMERIK, K3, page 242: X1 from -200 to 600 mm in steps of 1 mm, 801 points ---------------
 
 PRINTED = {0: "0.003", 1: "0.01", 2: "0.012", 800: "-0.0"}
 
@@ -117,9 +114,6 @@ def test_sinumerik_cec_direction_acts_in_one_direction_of_travel():
     assert keys["EXY"].mean(BACKWARD)[-1] == pytest.approx(0.0)
 
 
-# --- FANUC: one cell by hand ---------------------------------------------------------------------
-
-
 def test_fanuc_trilinear_formula_for_one_cell():
     corners = np.array([3.0, 7.0, -2.0, 5.0, 11.0, -6.0, 4.0, 9.0])
     values = corners.reshape(2, 2, 2, 1)
@@ -158,8 +152,6 @@ def test_fanuc_counts_are_detection_units_times_the_magnification():
     found = tables.corrections(at)
     assert (found["X"], found["Z"]) == (pytest.approx(6e-4), pytest.approx(-6e-4))
 
-
-# --- LinuxCNC ------------------------------------------------------------------------------------
 
 TYPE_0 = "-1.000 -1.005 -0.995\n0.000 0.002 -0.003\n1.000 1.003 0.998\n"
 TYPE_1 = "-1.000 0.005 -0.005\n0.000 0.002 -0.003\n1.000 0.003 -0.004\n"
@@ -204,9 +196,6 @@ def test_matrixkins_shear_is_the_squareness_of_y():
     assert found.curves == {"EYY": {"poly": [0.0, pytest.approx(-0.1)]}}
 
 
-# --- Klipper and Marlin --------------------------------------------------------------------------
-
-
 def test_klipper_printed_lengths():
     # by hand: side² = (2·140.4² + 2·142.8² − 4·99.8²) / 4, then cot of the angle at A
     ac, bd, ad = 140.4, 142.8, 99.8
@@ -234,8 +223,6 @@ def test_marlin_corrects_x_over_z_by_both_factors():
     assert found["X"] == pytest.approx(-(10 * 0.01 + 100 * (0.02 - 0.01 * 0.03)))
     assert (found["Y"], found["Z"]) == (pytest.approx(-3.0), pytest.approx(0.0))
 
-
-# --- HEIDENHAIN ----------------------------------------------------------------------------------
 
 COM = """BEGIN TAB_Z.COM MM
 NR    AXISPOS     BACKLASH    Y
@@ -266,8 +253,6 @@ def test_heidenhain_y_over_z_of_the_manual_interpolates_lines_without_entry():
     found = read_errors(files, PLAIN).found
     assert [one.key for one in found.series] == ["EYZ"]
 
-
-# --- volumetric compensation ---------------------------------------------------------------------
 
 ETALON = """// Every parameter is specified in a block.
 [C0B]
@@ -311,9 +296,6 @@ def test_isg_example_of_two_arguments():
     assert first.values == ((20.0, 10.0), (0.0, 30.0))
     pitch = found.planes[4]
     assert np.array(pitch.values) == pytest.approx(np.array([[4200.0, 4000.0], [1100.0, 1500.0]]))
-
-
-# --- ISO 230-2: five targets, five runs, both directions -----------------------------------------
 
 
 def test_mean_reversal_and_repeatability_of_five_targets_and_five_runs(tmp_path):

@@ -12,7 +12,6 @@ TABLE = Model(build_machine("wCBFt"))
 
 
 def table_pose(b_deg, c_deg):
-    """Pose of the workpiece frame in R."""
     coordinates = complete_coordinates(TABLE.machine, {"B": b_deg, "C": c_deg})
     return branch_pose(TABLE, "workpiece", coordinates)
 

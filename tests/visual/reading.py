@@ -21,20 +21,16 @@ EDGE_PX = 3.0
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read at the nodes that can be seen."""
-
     read: Array
     known: Array
     depth_mm: Array
 
     @property
     def slope(self) -> float:
-        """Slope of what was read over what is known, through the centre of the points."""
         known = self.known - self.known.mean()
         return float((known @ (self.read - self.read.mean())) / (known @ known))
 
     def agrees(self) -> bool:
-        """Whether colours and shape are those of the model."""
         offset = abs(float((self.read - self.known).mean())) / float(np.ptp(self.known))
         return (
             abs(self.slope - 1.0) <= SLOPE_TOLERANCE
@@ -94,7 +90,6 @@ def read_map(
 
 
 def _normals(points: Array, surface: Surface) -> Array:
-    """Unit normals at the vertices of a surface, [M, 3]."""
     a, b, c = (points[surface.nodes[surface.triangles[:, k]]] for k in range(3))
     flat = np.cross(b - a, c - a)
     total = np.zeros((len(surface.nodes), 3))

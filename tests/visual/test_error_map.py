@@ -24,7 +24,6 @@ def truth():
 
 
 def expected(picture, exaggeration):
-    """Where the nodes should be drawn."""
     return picture.grid.nominal_mm + exaggeration * MM_PER_UM * picture.field.error_um
 
 

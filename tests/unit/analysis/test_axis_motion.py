@@ -12,7 +12,6 @@ OUT = CIRCLE * [1.0, 1.0, 0.0] / 200.0
 
 
 def taken_apart(shift_um, rotation_urad):
-    """Error motion of a body that is shifted and rotated about the centre of the circle."""
     above = shift_um + np.cross(rotation_urad, [0.0, 0.0, LEVER_MM]) * 1e-3
     return axis_motion(CIRCLE, ANGLE, shift_um, above, closed=True)
 

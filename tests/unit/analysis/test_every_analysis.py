@@ -44,13 +44,11 @@ class StoppedError(Exception):
 
 
 def small(kind):
-    """Ask with few nodes."""
     few = {one.name: 5 for one in options_of(kind) if one.name in ("nodes", "grid")}
     return kind(**few, **(NEEDED[kind.name][1] if kind.name in NEEDED else {}))
 
 
 def scene_of(name, scene="dvf5000_first"):
-    """Load a scene, or the one that an analysis needs."""
     return load_scene(NEEDED[name][0] if name in NEEDED else scene)
 
 

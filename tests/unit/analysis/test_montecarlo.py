@@ -117,8 +117,6 @@ def numbers(found):
 
 
 class Late(Executor):
-    """Threads whose results come in any order."""
-
     def __init__(self, workers, longest_s=0.005):
         self._threads, self._longest_s = ThreadPoolExecutor(workers), longest_s
         self._chance = random.Random(workers)
@@ -178,8 +176,6 @@ def test_a_bad_case_of_a_fleet_is_refused_by_its_number():
 
 
 class Broken(Executor):
-    """Gives up at the task, or while it works on it."""
-
     def __init__(self, *, at_once):
         self._at_once = at_once
 

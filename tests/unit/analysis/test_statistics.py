@@ -25,7 +25,6 @@ from warpspace.scene.library import load_scene, parse_scene
 
 
 def field_of(norms):
-    """A field along x whose errors point along y."""
     nominal = np.stack([np.arange(norms.size), *np.zeros((2, norms.size))], -1)
     error = norms.reshape(-1, 1) * np.array([0.0, -1.0, 0.0])
     shape = (*norms.shape, 3)

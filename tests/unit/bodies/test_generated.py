@@ -32,13 +32,11 @@ HEAD = ("S", "t")
 
 
 def components(body: Body, vertices_mm: np.ndarray) -> list[Trimesh]:
-    """Give the closed shapes that a body is joined from."""
     mesh = Trimesh(vertices_mm, body.triangles, process=False)
     return list(mesh.split(only_watertight=False))
 
 
 def assert_closed(body: Body) -> None:
-    """Every shape of a body is closed and right side out, and no triangle is lost."""
     found = components(body, body.vertices_mm)
     assert sum(len(shape.faces) for shape in found) == len(body.triangles), body.name
     for shape in found:
@@ -73,7 +71,6 @@ MAX_TRIANGLES = 20_000
 
 
 def random_machine(seed):
-    """One to eight axes of any letters on either side, with offsets and rotations now and then."""
     rng = np.random.default_rng(seed)
     names: list[str] = []
     for letter in rng.choice(list("XYZUVWABC"), rng.integers(1, 9)):
@@ -140,7 +137,6 @@ def test_nothing_reaches_below_the_bed(chain):
 
 
 def slant_lathe(degrees):
-    """A lathe whose carriage Z and slide X lie on a bed that slopes up to the rear."""
     tilt = {45.0: (90.0, -45.0, 90.0), 90.0: (90.0, 0.0, 90.0)}[degrees]
     return build_machine(
         "wC1FZXt",
@@ -195,7 +191,6 @@ def bodies(scene):
 
 
 def amplitudes(scene):
-    """One value for every parameter, so that each of them has to be right."""
     rng = np.random.default_rng(4)
     return {key: float(value) for key, value in zip(
         scene.parameter_keys, rng.normal(0, 20, len(scene.parameter_keys)), strict=True

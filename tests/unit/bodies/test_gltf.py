@@ -14,7 +14,6 @@ TRIANGLE = Part("surface", POINTS, np.array([[0, 1, 2]]), colours=COLOURS)
 
 
 def opened(data):
-    """Document and body of a GLB."""
     magic, version, length = struct.unpack_from("<4sII", data)
     assert (magic, version, length) == (b"glTF", 2, len(data))
     json_length = struct.unpack_from("<I", data, 12)[0]

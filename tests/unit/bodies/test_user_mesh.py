@@ -89,7 +89,6 @@ def test_missing_empty_and_damaged_files_are_named(ending, tmp_path):
 
 
 def corrupted(folder):
-    """Give the names of files with something wrong in them."""
     points = trimesh.PointCloud([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
     written(folder / "points.ply", points)
     written(folder / "points.glb", points.scene())
@@ -360,11 +359,7 @@ def test_triangles_of_a_binary_stl_are_counted(tmp_path):
         open_meshes(path, "STL file")
 
 
-# --- URDF -----------------------------------------------------------------------------------------
-
-
 def urdf(path, links, visual="", further=""):
-    """A chain of links of which the first joint moves."""
     text = "".join(f'<link name="l{i}">{visual if i == 1 else ""}</link>' for i in range(links))
     ends = '<parent link="l{0}"/><child link="l{1}"/>'
     moving = '<axis xyz="1 0 0"/><origin xyz="0 0 1"/><limit lower="0" upper="1"/>'

@@ -21,7 +21,6 @@ MACHINE = load_scene("dvf5000_nominal").machine
 
 
 def read(text, name="file.csv", **options):
-    """Read a text as a file."""
     return read_errors([source_of_text(text, name)], ReadOptions(**options)).found
 
 
@@ -61,7 +60,6 @@ def test_the_same_table_in_any_spelling(content):
 
 
 def com(rows):
-    """Spell a .COM table."""
     lines = [f"{i}  {q}  0.1\n" for i, q in enumerate(rows)]
     return "BEGIN T_X.COM MM\nNR AXISPOS X\n" + "".join(lines) + "[END]\n"
 
@@ -128,7 +126,6 @@ def test_what_has_no_public_structure_is_refused_by_name(name, content, fragment
 
 
 def circle(angles, tmp_path, **options):
-    """Give what a circular test says of readings at angles."""
     path = tmp_path / "c.csv"
     rows = [f"{angle:.9g},{5.0 * np.sin(angle)}" for angle in angles]
     path.write_text("angle_deg,radial_um\n" + "\n".join(rows), encoding="utf-8")

@@ -25,7 +25,6 @@ from warpspace.scene.model import evaluate
 
 
 def scene_with(errors):
-    """Give a scene of errors."""
     return parse_scene(
         'machine = "dvf5000"\n[workspace]\nX = [-275, 275]\nY = [-225, 225]\nZ = [-480, -80]\n'
         f"[errors]\n{errors}\n",
@@ -34,12 +33,10 @@ def scene_with(errors):
 
 
 def corrected(scene, name, points=None, nodes=9, **plan):
-    """Give the table of a format for a scene, with so many points an axis."""
     return compensate(scene, Compensate(formats=(name,), points=points, **plan), nodes)
 
 
 def sources_of(found):
-    """Give the files of a table as an import gets them."""
     ending = found.format.endings[0]
     return [
         source_of_text(text, f"compensation{add or ending}") for add, text in found.files.items()
@@ -47,7 +44,6 @@ def sources_of(found):
 
 
 def read_back(found, scene):
-    """Import what was written into the scene without its errors."""
     reading = read_errors(sources_of(found), ReadOptions(scene.machine))
     assert reading.recognised
     return into_scene(reading, replace(scene, errors=ErrorSet()), "", "written").scene
@@ -329,12 +325,10 @@ ONE_HELD = BOTH_HELD | {"linuxcnc-comp", "heidenhain"}
 
 
 def table(scene, name):
-    """Give a small table."""
     return corrected(scene, name, 5 if not WRITTEN[name].grid.startswith("none") else None)
 
 
 def looking(scene, direction):
-    """Give a scene that looks at a direction of travel."""
     return replace(scene, model=replace(scene.model, direction=direction))
 
 

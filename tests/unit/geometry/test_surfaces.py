@@ -37,7 +37,6 @@ def grid_points(shape):
 
 
 def volume_of_faces(faces, shape):
-    """Volume inside a closed surface; positive where it faces outwards."""
     surface = triangulate(faces)
     a, b, c = (grid_points(shape)[surface.nodes[surface.triangles[:, k]]] for k in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
@@ -98,7 +97,6 @@ def test_flat_volumes(shape, faces, creases):
 
 
 def plane(shape=SHAPE):
-    """Nodes of a unit-spaced grid and a value that rises linearly."""
     nodes = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), -1).astype(float)
     return nodes.reshape(-1, 3), nodes.reshape(-1, 3) @ (1.0, 0.5, 0.25)
 

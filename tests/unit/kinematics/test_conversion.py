@@ -87,7 +87,6 @@ def scene(request):
 
 
 def assert_same_field(one, model, errors, tolerance=SAME):
-    """The exact fields agree in every loop and direction, position and orientation."""
     random = np.random.default_rng(7)
     spans = covered_spans(one.model, one.workspace)
     at = {axis: random.uniform(*span, 150) for axis, span in spans.items()}

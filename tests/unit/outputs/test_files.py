@@ -41,14 +41,12 @@ def test_error_of_the_system_names_the_target(tmp_path):
 
 
 def write_half(target, failure):
-    """Fail in the middle of writing."""
     with write_atomically(target) as temporary:
         temporary.write_text("half", encoding="utf-8")
         raise failure
 
 
 def write_full(target):
-    """Run out of space while writing."""
     with write_atomically(target):
         raise OSError(28, "No space left on device")
 

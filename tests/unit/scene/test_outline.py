@@ -22,18 +22,15 @@ QUOTED = st.text(st.sampled_from(list("ab.=[]{}#'\"\\\n,")), max_size=12)
 
 
 def basic(text):
-    """Spell a text between double quotes."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return f'"{escaped}"'
 
 
 def multiline(text):
-    """Spell a text between three double quotes, with line breaks and some quotes as they are."""
     return '"""\n' + text.replace("\\", "\\\\").replace('""', '"\\"') + '"""'
 
 
 def literal(text):
-    """Spell a text between three single quotes."""
     return "'''" + text.replace("''", "'") + "'''" if not text.endswith("'") else basic(text)
 
 
@@ -154,7 +151,6 @@ def test_value_is_spelled_as_in_toml(value, spelling):
 
 
 def nested(depth, kind):
-    """A list in a list, or a table in a table."""
     value: object = 1
     for _ in range(depth):
         value = [value] if kind is list else {"a": value}

@@ -30,7 +30,6 @@ def tool_in_workpiece_mm(machine, at):
 
 
 def pose_by_yourdfpy_mm(robot, at, tool="tool", workpiece="workpiece"):
-    """The same by yourdfpy: joints in m and rad."""
     model = yourdfpy.URDF(robot, build_scene_graph=True, load_meshes=False)
     model.update_cfg(at)
     pose = np.array(model.get_transform(tool, workpiece))
@@ -80,7 +79,6 @@ JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child li
 
 @st.composite
 def robots(draw):
-    """URDF texts: two branches of joints in any direction, fixed ones between them."""
     kinds = st.sampled_from(("revolute", "prismatic", "continuous", "fixed"))
     parts, links = [], ["base"]
     for branch, end in (("s", "tool"), ("q", "workpiece")):
