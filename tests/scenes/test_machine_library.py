@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
 
 from warpspace import evaluate, load_scene
 from warpspace.bodies.placed import load_bodies
@@ -55,33 +54,6 @@ def test_positive_linear_axes_move_the_tool_with_their_name_over_the_workpiece(n
         way = (np.linalg.inv(found["w"]) @ found[axis.name])[:3, axis.index]
         moved = tip(machine, **{axis.name: 1.0}) - tip(machine, **{axis.name: 0.0})
         np.testing.assert_allclose(moved, way, atol=1e-12)
-
-
-@pytest.mark.parametrize("name", MACHINES)
-def test_nominal_poses_agree_with_a_product_of_scipy_rotations(name):
-    machine, rng = load_machine(name), np.random.default_rng(7)
-    for _ in range(POSES):
-        positions = random_positions(machine, rng)
-        found = poses(machine, positions)
-        for side, ends in ((machine.chain.tool, ("S", "t")), (machine.chain.workpiece, ("w",))):
-            turn, place = Rotation.identity(), np.zeros(3)
-            for frame in (*side, *ends):
-                axis = machine.axes.get(frame)
-                offset = machine.fixed_mm.get(frame) if axis is None else axis.offset_mm
-                fixed = (
-                    machine.fixed_deg.get(frame, (0, 0, 0)) if axis is None else axis.rotation_deg
-                )
-                place = place + turn.apply(offset)
-                turn = turn * Rotation.from_euler("xyz", fixed, degrees=True)
-                if axis is not None and axis.is_linear:
-                    unit = np.eye(3)["XYZ".index(axis.name[0])]
-                    place = place + turn.apply(unit * axis.direction * positions[frame])
-                elif axis is not None:
-                    unit = np.eye(3)["ABC".index(axis.name[0])]
-                    angle = np.deg2rad(axis.direction * positions[frame])
-                    turn = turn * Rotation.from_rotvec(unit * angle)
-                np.testing.assert_allclose(found[frame][:3, 3], place, rtol=0, atol=1e-9)
-                np.testing.assert_allclose(found[frame][:3, :3], turn.as_matrix(), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", MACHINES)

@@ -156,38 +156,48 @@ def fit_line(position: Array, value: Array, line: ReferenceLine | str) -> tuple[
     match ReferenceLine(line):
         case ReferenceLine.END_POINT:
             slope = float((value[-1] - value[0]) / (position[-1] - position[0]))
-            return float(value[0]) - slope * float(position[0]), slope
+            return float(value[0] - slope * position[0]), slope
         case ReferenceLine.LEAST_SQUARES:
             middle = position.mean()
             away = position - middle
             slope = float(away @ (value - value.mean()) / (away @ away))
             return float(value.mean() - slope * middle), slope
         case ReferenceLine.MINIMUM_ZONE:
-            return _minimum_zone(position, value)
-
-
-def _minimum_zone(position: Array, value: Array) -> tuple[float, float]:
-    found: list[tuple[float, float, float]] = []
-    for sign in (1.0, -1.0):
-        edge = _lower_hull(position, sign * value)
-        for first, last in pairwise(edge):
-            slope = (value[last] - value[first]) / (position[last] - position[first])
+            slope = _narrowest(position, value)
             rest = value - slope * position
-            found.append((float(np.ptp(rest)), (rest.max() + rest.min()) / 2.0, slope))
-    _, offset, slope = min(found)
-    return float(offset), float(slope)
+            return float(rest.max() + rest.min()) / 2.0, slope
 
 
-def _lower_hull(x: Array, y: Array) -> list[int]:
-    hull: list[int] = []
-    for new in range(len(x)):
+def _narrowest(x: Array, y: Array) -> float:
+    edges = sorted({*_hull_slopes(x, y), *_hull_slopes(x, -y, -1.0)})
+
+    def height(number: int) -> float:
+        return float(np.ptp(y - edges[number] * x))
+
+    low, high = 0, len(edges) - 1  # the height is a convex function of the slope
+    while low < high:
+        middle = (low + high) // 2
+        if height(middle) <= height(middle + 1):
+            high = middle
+        else:
+            low = middle + 1
+    return edges[low]
+
+
+def _hull_slopes(x: Array, y: Array, sign: float = 1.0) -> list[float]:
+    hull: list[tuple[float, float]] = []
+    for px, py in zip(x.tolist(), y.tolist(), strict=True):
+        if hull and hull[-1][0] == px:
+            if hull[-1][1] <= py:
+                continue
+            hull.pop()
         while len(hull) > 1:
-            a, b = hull[-2], hull[-1]
-            if (x[b] - x[a]) * (y[new] - y[a]) - (y[b] - y[a]) * (x[new] - x[a]) > 0.0:
+            (ax, ay), (bx, by) = hull[-2:]
+            if (by - ay) * (px - ax) < (py - ay) * (bx - ax):
                 break
             hull.pop()
-        hull.append(new)
-    return hull
+        hull.append((px, py))
+    return [sign * (by - ay) / (bx - ax) for (ax, ay), (bx, by) in pairwise(hull)]
 
 
 def convert_reference_line(

@@ -9,7 +9,6 @@ import warpspace
 from bench_scenes import scene_with
 from warpspace.bench.base import bench_names, find_test, run_test
 from warpspace.bench.data import parse_table, unit_notes
-from warpspace.bench.kinds.straightness import reference_lines
 from warpspace.machine.errors import Constant, Directional, ErrorSet
 
 HEADER = "run,direction,target_mm,deviation_um\n"
@@ -83,17 +82,6 @@ def test_thousandfold_readings_are_said():
     (text,) = unit_notes(model / 1000.0, model, "µm")
     assert "in mm?" in text
     assert unit_notes(model * 1000.0, model * 0.0, "µm") == ()
-
-
-def test_the_narrowest_band_is_found_among_all_slopes():
-    random = np.random.default_rng(7)
-    for _ in range(20):
-        x, y = np.sort(random.uniform(-9.0, 9.0, 30)), random.normal(size=30)
-        slopes = np.linspace(-5.0, 5.0, 20_001)
-        heights = np.ptp(y - slopes[:, None] * x, axis=-1)
-        found = reference_lines(x, y)["minimum_zone"].deviation_um
-        assert found <= heights.min() + 1e-12
-        assert found == pytest.approx(heights.min(), abs=0.01)
 
 
 def test_a_reversal_sets_the_runs_of_a_circle_apart():

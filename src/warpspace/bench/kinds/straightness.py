@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -22,10 +21,9 @@ from warpspace.bench.placing import (
 )
 from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.exceptions import OptionError
+from warpspace.kinematics.conversion import fit_line
 from warpspace.scene.model import Scene
 from warpspace.units import Array
-
-# End points, least squares, minimum zone.
 
 REFERENCES = ("end_points", "least_squares", "minimum_zone")  # ISO 230-1, 3.4.10 to 3.4.12
 WORDS = {
@@ -52,56 +50,11 @@ def reference_lines(position_mm: Array, deviation_um: Array) -> dict[str, Refere
     """Lay the three reference lines through deviations, [n], µm, at two positions or more."""
     order = np.argsort(position_mm, kind="stable")
     x, y = position_mm[order], deviation_um[order]
-    middle = x.mean()
-    spread = x - middle
-    slopes = {
-        "end_points": (y[-1] - y[0]) / (x[-1] - x[0]),
-        "least_squares": float(spread @ (y - y.mean()) / (spread @ spread)),
-        "minimum_zone": _narrowest(x, y),
-    }
     found: dict[str, ReferenceLine] = {}
-    for name, slope in slopes.items():
-        rest = y - slope * x
-        low, high = float(rest.min()), float(rest.max())
-        offset = {
-            "end_points": float(rest[0]),
-            "least_squares": float(y.mean() - slope * middle),
-            "minimum_zone": (low + high) / 2.0,
-        }[name]
-        found[name] = ReferenceLine(name, float(slope) * 1e3, offset, high - low)
+    for name in REFERENCES:
+        offset, slope = fit_line(x, y, name.replace("points", "point"))
+        found[name] = ReferenceLine(name, slope * 1e3, offset, float(np.ptp(y - slope * x)))
     return found
-
-
-def _narrowest(x: Array, y: Array) -> float:
-    edges = sorted({*_hull_slopes(x, y), *_hull_slopes(x, -y, -1.0)})
-
-    def height(number: int) -> float:
-        return float(np.ptp(y - edges[number] * x))
-
-    low, high = 0, len(edges) - 1  # the height is a convex function of the slope
-    while low < high:
-        middle = (low + high) // 2
-        if height(middle) <= height(middle + 1):
-            high = middle
-        else:
-            low = middle + 1
-    return edges[low]
-
-
-def _hull_slopes(x: Array, y: Array, sign: float = 1.0) -> list[float]:
-    hull: list[tuple[float, float]] = []
-    for px, py in zip(x.tolist(), y.tolist(), strict=True):
-        if hull and hull[-1][0] == px:
-            if hull[-1][1] <= py:
-                continue
-            hull.pop()
-        while len(hull) > 1:
-            (ax, ay), (bx, by) = hull[-2:]
-            if (by - ay) * (px - ax) < (py - ay) * (bx - ax):
-                break
-            hull.pop()
-        hull.append((px, py))
-    return [sign * (by - ay) / (bx - ax) for (ax, ay), (bx, by) in pairwise(hull)]
 
 
 def lay_lines(
