@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.frames import pixels_of_the_map
+from offline import EVIL, opened_offline, wait_for_the_map
 from warpspace.app.documents.files import exported_words, file_stem, shown_sides
 from warpspace.app.documents.legend import seen_words
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
@@ -161,9 +161,6 @@ def test_volumes_that_differ_export_the_side_that_is_drawn():
     assert "sheet" not in exported_words(picture)
 
 
-EVIL = "</script><script>window.hacked=1</script><img src=x onerror='window.hacked=2'>&\"'"
-
-
 def page_of(scene, **changes):
     choices = {"exaggeration": 1000.0, "nodes": 21, **changes}
     return build_offline_html(offline_picture(scene, **choices), {"title": scene.title, "n": 1})
@@ -190,29 +187,10 @@ def test_opens_without_network_and_draws(browser, tmp_path):
     scene = replace(load_scene("dvf5000_first"), title=EVIL)
     path = tmp_path / "scene.html"
     path.write_text(page_of(scene), encoding="utf-8")
-    context = browser.new_context(viewport={"width": 1200, "height": 800}, offline=True)
-    page = context.new_page()
-    requests: list[str] = []
-    problems: list[str] = []
-    page.on("request", lambda request: requests.append(request.url))
-    page.on("pageerror", lambda error: problems.append(str(error)))
-    page.on("console", lambda entry: problems.append(entry.text) if entry.type == "error" else None)
-    page.goto(path.as_uri())
-    assert "exaggeration ×1000" in page.inner_text("header")
-    canvas = page.frame_locator("iframe").locator("canvas").first
-    canvas.wait_for(state="visible", timeout=120_000)
-    for _ in range(240):  # software rendering beside other programs
-        if pixels_of_the_map(canvas.screenshot()) > 20_000:
-            break
-        page.wait_for_timeout(500)
-    else:
-        pytest.fail("the map is not drawn")
-    assert page.title() == f"{EVIL} · warpspace"
-    assert page.evaluate("window.hacked") is None
-    assert problems == []
-    tab = [url for url in requests if not url.startswith(("blob:", "data:", "about:"))]
-    assert tab == [path.as_uri()]
-    context.close()
+    with opened_offline(browser, path) as page:
+        assert "exaggeration ×1000" in page.inner_text("header")
+        wait_for_the_map(page, page.frame_locator("iframe").locator("canvas").first, 20_000)
+        assert page.title() == f"{EVIL} · warpspace"
 
 
 def test_a_picture_of_the_screen_says_what_it_shows_beside_its_pixels():

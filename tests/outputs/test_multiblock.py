@@ -9,7 +9,6 @@ import pyvista as pv
 
 import warpspace
 from warpspace.bodies.placed import load_bodies
-from warpspace.exceptions import OptionError
 from warpspace.geometry.surfaces import deform
 from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
@@ -100,14 +99,6 @@ def test_the_field_data_say_what_it_is():
     assert said["exaggeration"][0] == evaluate_picture(scene, exaggeration="auto").exaggeration
     assert said["scene"][0] == "dvf5000_first"
     assert said["program"][0] == f"warpspace {warpspace.__version__}"
-
-
-def test_impossible_choices_are_refused():
-    scene = warpspace.load_scene("dvf5000_first")
-    with pytest.raises(OptionError, match="loop 'tol'"):
-        warpspace.to_pyvista(scene, loop="tol")
-    with pytest.raises(OptionError, match="exaggeration -1"):
-        warpspace.to_pyvista(scene, exaggeration=-1.0)
 
 
 @pytest.mark.render

@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace import evaluate, load_scene, scene_names
+from warpspace import load_scene, scene_names
 from warpspace.machine.errors import (
     Constant,
     ErrorSet,
@@ -63,36 +62,6 @@ def test_any_numbers_and_any_title_survive(title, value, centre, half, rows, exa
         reference={"X": value, "Y": 0.5, "Z": -280.0, "B": 0.0, "C": 0.0},
     )
     assert parse_scene(scene_to_toml(changed), scene.name) == changed
-
-
-def test_an_inline_machine_is_written_inline():
-    text = """
-title = "three axes"
-[machine]
-chain = "wFXZYt"
-[machine.offset_mm]
-X = [1, 2, 3]
-t = [0, 0, -100]
-[machine.direction]
-Z = -1
-[machine.travel]
-X = [-100, 100]
-[errors]
-EB0Z = 12.5
-"""
-    scene = parse_scene(text, "three")
-    again = parse_scene(scene_to_toml(scene), "three")
-    assert again == scene
-    assert again.machine.axes["Z"].direction == -1
-
-
-def test_a_ramp_over_another_range_keeps_its_values():
-    scene = load_scene("dvf5000_nominal")
-    moved = replace(scene, errors=ErrorSet({"EAX": Ramp((-100.0, 300.0), 7.0)}))
-    again = parse_scene(scene_to_toml(moved), scene.name)
-    np.testing.assert_allclose(
-        evaluate(again, grid=3).error_um, evaluate(moved, grid=3).error_um, rtol=1e-12, atol=1e-12
-    )
 
 
 def test_errors_carry_symbol_name_and_unit_as_remarks():

@@ -67,10 +67,6 @@ def test_gain_of_the_workpiece_loop(workpiece_gains, key, column, printed):
     assert getattr(workpiece_gains[key], column) == pytest.approx(printed, abs=HALF_DIGIT)
 
 
-def test_both_tables_have_88_numbers():
-    assert len(cases(TABLE_4_3, "") + cases(TABLE_4_4, "")) == 88
-
-
 def test_figure_4_3_page_51_largest_gains_in_the_order_of_the_text(tool_gains):
     turning = [key for key, gain in tool_gains.items() if gain.parameter.is_rotation]
     assert turning[:6] == ["EA0Z", "EB0Z", "EC0Y", "EAY", "ECY", "EAX"]

@@ -53,17 +53,6 @@ def test_all_tables_are_there_and_no_row_is_twice(rows):
     assert len({(row.source, row.key) for row in rows}) == len(rows)
 
 
-@pytest.mark.parametrize(
-    ("machine", "marks"), [("first", "XXXXXXO"), ("second", "OOXOOOO")], ids=["first", "second"]
-)
-def test_table_5_5_page_74_marks_with_the_values_of_tables_5_3_and_5_4(machine, marks):
-    scene = warpspace.load_scene(f"dvf5000_{machine}")
-    proposed = warpspace.load_scene("dvf5000_proposed").tolerances
-    found = {c.key: c.mark for c in warpspace.measured(scene, tolerances=proposed).checks}
-    order = ["EAX", "EAY", "ECY", "EAZ", "EC0Y", "EA0Z", "EB0Z"]
-    assert "".join(found[key] for key in order) == marks
-
-
 def test_generated_page_is_up_to_date(rows):
     expected = thesis_markdown(rows)
     assert PAGE.read_text("utf-8") == expected, (
