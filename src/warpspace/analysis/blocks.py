@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from markupsafe import escape
 
-from warpspace.units import Array
+if TYPE_CHECKING:
+    from warpspace.units import Array
 
 Form: TypeAlias = str | Callable[[Any], str]
 Role: TypeAlias = Literal["plain", "key", "set", "none"]
@@ -140,8 +141,8 @@ class Curve:
     """One curve of a chart."""
 
     name: str  # in the legend; a curve without one is not in it
-    x: Array  # [n]; in polar charts the angle in degrees
-    y: Array  # [n]
+    x: "Array"  # [n]; in polar charts the angle in degrees
+    y: "Array"  # [n]
     colour: int = 0  # which colour of series; the same thing has the same, whoever measured it
     style: Style = "line"  # for the model; "dots" for data, "dashed" for fits, "thin" for nominal
 
@@ -151,9 +152,9 @@ class Band:
     """What lies between two curves: scatter."""
 
     name: str
-    x: Array  # [n]
-    low: Array
-    high: Array
+    x: "Array"  # [n]
+    low: "Array"
+    high: "Array"
     colour: int = 0
 
 
@@ -179,8 +180,8 @@ class Histogram:
     subtitle: str
     x_label: str  # with unit
     y_label: str
-    edges: Array  # [n + 1]
-    heights: Array  # [n]
+    edges: "Array"  # [n + 1]
+    heights: "Array"  # [n]
     marks: tuple[tuple[str, float], ...] = ()  # word and place
     limit: float | None = None
     told: tuple[str, ...] = ()  # in words, in the chart: the first of them large
