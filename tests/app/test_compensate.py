@@ -13,9 +13,10 @@ from app.parts import answer_of, part_of, section
 from still_scenes import still_scene
 from warpspace.app.documents.files import exported_words, file_stem, shown_sides
 from warpspace.app.documents.legend import picture_conditions, subject_words
-from warpspace.app.documents.offline_page import build_offline_html, point_words
+from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.documents.services import CancelledError
+from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation import budget
 from warpspace.app.evaluation.budget import pick_worst, with_picked
 from warpspace.app.evaluation.compare import with_pin
@@ -284,7 +285,8 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
     assert np.linalg.norm(plain.drawn_um) > 2.0 * np.linalg.norm(explained.drawn_um)
     assert explained.is_corrected
     assert not plain.is_corrected
-    assert f"{picture.statistics.max_um:.1f} µm" in point_words(LIVE.evaluate(asked))
+    said = [label.text for label in point_labels(LIVE.evaluate(asked)) if label.kind == "asked"]
+    assert f"{picture.statistics.max_um:.1f} µm" in said[0]
 
 
 @pytest.mark.parametrize("box", [LEFT, BOTH])

@@ -30,9 +30,8 @@ from warpspace.app.documents.legend import (
 from warpspace.app.drawing.around import around, words
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
-from warpspace.app.drawing.labels import axes_room_mm
+from warpspace.app.drawing.labels import axes_room_mm, point_labels
 from warpspace.app.drawing.shapes import Nodes, light_scene
-from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import start_state
@@ -41,7 +40,6 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction
 from warpspace.picture.model import choose_scale
-from warpspace.picture.words import own_axes, spell_point
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 
@@ -116,6 +114,7 @@ def build_offline_html(
         f"{numbers_words(picture)} {place_words(picture)}{kept} · {factor}",
         *(one for one in subject_words(picture) if one != picture.title),
     )
+    asked = [label for label in point_labels(picture) if label.kind == "asked"]
     remarks = (*looks, "drag to turn, wheel to zoom", f"warpspace {__version__}")
     return Template(template).substitute(
         title=escape(picture.title),
@@ -126,7 +125,7 @@ def build_offline_html(
         numbers=tag("b", lowered(f"{picture.length_words} over the volume"))
         + rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
         scene=inner,
-        point=tag("p", point_words(picture), class_="point"),
+        point=tag("p", " · ".join(one.text for one in asked)),
         errors=fill(
             "<details{open}><summary>{count} {counted}</summary><table>{rows}</table></details>",
             open=attributes(open=len(errors) <= FEW),
@@ -155,15 +154,3 @@ def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
 
 def _amplitude(function: ErrorFunction | None) -> str:
     return f"{function.amplitude:+g}" if function is not None and function.amplitude else "0"
-
-
-def point_words(picture: LivePicture) -> str:
-    """Say where the point is that was asked about, and its error; empty where there is none."""
-    picked = picture.state.picked
-    if picked is None or picture.is_difference:
-        return ""
-    found = answer(picture.drawn_state, picked, picture.exaggeration)
-    length = float(np.linalg.norm(found.drawn_um))
-    axes = own_axes(picture.drawn_state.scene, found.at)
-    place = spell_point(axes, found.explanation.nominal_mm)
-    return f"marked point: {place} mm, |E| {length:.1f} µm"
