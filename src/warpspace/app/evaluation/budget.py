@@ -132,15 +132,13 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
     loop = picked.loop or state.loop
     if picked.point_mm is None:
         point = nominal_point(model, Loop.TOOL, coordinates)
+        volume = state.scene.workspace.moved(state.positions)
+        shift = seen_from_workpiece(model, coordinates, volume, point) - point
     else:
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
-        point = transforms.apply(pose, np.asarray(picked.point_mm))
+        point, shift = transforms.apply(pose, np.asarray(picked.point_mm)), np.zeros(3)
     found = explain(model, scene.errors, coordinates, state.view(loop), point)
-    shift = np.zeros(3)
-    if picked.point_mm is None:
-        volume = state.scene.workspace.moved(state.positions)
-        shift = seen_from_workpiece(model, coordinates, volume, point) - point
     drawn_um = found.error_um
     if state.controller is not None:
         nominal = found.nominal_mm
@@ -152,12 +150,6 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
     """Ask about a point, or about none; the chosen contribution stays while there is a point."""
     return replace(state, picked=picked, lever=state.lever if picked else "")
-
-
-def with_lever(state: AppState, key: str) -> AppState:
-    """Choose the contribution whose axis and lever are drawn; the same one again ends it."""
-    known = key in state.amplitudes
-    return replace(state, lever="" if not known or key == state.lever else key)
 
 
 # --- Where a ray from the eye meets a surface or passes a line ------------------------------------

@@ -1,5 +1,7 @@
 """Why a point is off, and the volume in numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 from markupsafe import Markup
 
@@ -18,7 +20,7 @@ from warpspace.app.browser.html import (
     thousands,
 )
 from warpspace.app.drawing.camera import fit_camera
-from warpspace.app.evaluation.budget import Answer, answer, pick_worst, with_lever, with_picked
+from warpspace.app.evaluation.budget import Answer, answer, pick_worst, with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import EXAMPLE, put
@@ -81,7 +83,7 @@ class WorstPart(Section):
             shown = self.context.shown
             if state.picked is None and shown is not None:
                 state = with_picked(state, pick_worst(shown))
-            return with_lever(state, value)
+            return replace(state, lever="" if value == state.lever else value)
         if word == "back":
             self.context.act(self._stand_back)
         return state
