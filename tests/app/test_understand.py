@@ -101,18 +101,6 @@ def test_an_excluded_error_is_neither_adjusted_nor_lost():
     assert applied.amplitudes["EA0Z"] == STATE.amplitudes["EA0Z"]
 
 
-def test_cards_say_what_a_repair_changes():
-    entry = next(one for one in entries() if one.name == "repair")
-    part = AnalysisPart(context(), entry)
-    state = replace(STATE, page=replace(STATE.page, task="improve", open=frozenset({"repair"})))
-    part.take(state, "run", "")
-    wait(part)
-    html = html_of(part, state)
-    assert html.index("EC0Y 23.1 → 17.9 µrad") < html.index("51.7 → 50.2 µm")
-    assert "Applied" in html_of(part, part.take(state, "apply", "2"))
-    assert part.take(state, "apply", "9") is state
-
-
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     opened = replace(STATE, page=replace(STATE.page, open=frozenset({"volume", "gains"})))
     html = html_of(VolumePart(context()), opened)
