@@ -1,5 +1,6 @@
 """Parts of the page without a page."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -7,6 +8,8 @@ from warpspace.analysis.catalogue import entries
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.store import StateStore
+from warpspace.exceptions import WarpspaceError
 
 LIVE = LiveModel()
 
@@ -21,6 +24,44 @@ class Nobody(SimpleNamespace):
         if name == "state":
             return self.store.state
         raise AttributeError(name)
+
+
+class Alone:
+    """One part on a page that is not there, with what it has the page do."""
+
+    def __init__(self, kind: Any, state: AppState, *more: Any, **given: Any) -> None:
+        self.said, self.sent, self.saved, self.called = [], [], [], []
+        self.store = StateStore(state)
+        self.context = Nobody(
+            act=self._act, renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
+            notify=lambda *words: self.said.append(words), post=self.store.apply, reported=[],
+            send=lambda *event: self.sent.append(event), closed=lambda: None,
+            save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
+            page=SimpleNamespace(
+                report=None, tell=lambda **_: None, call=lambda *what: self.called.append(what)
+            ),
+            camera=SimpleNamespace(remember=lambda: None),
+            client=SimpleNamespace(flush=lambda: None), **given,
+        )  # fmt: skip
+        self.part = kind(self.context, *more)
+
+    def _act(self, action: Callable[[], None]) -> None:
+        try:
+            action()
+        except WarpspaceError as error:  # as the session says it
+            self.said.append(("", str(error)))
+
+    def do(self, word: str, value: str = "") -> Any:
+        """Do what an event says; give what is shown then."""
+        self.store.apply(lambda state: self.part.take(state, word, value))
+        self.context.shown = LIVE.evaluate(self.store.state)
+        return self.store.state
+
+    @property
+    def html(self) -> str:
+        """What it shows."""
+        (found,) = self.part.pieces(LIVE.evaluate(self.store.state)).values()
+        return str(found)
 
 
 def lone_part(kind: Any, said: list[Any] | None = None) -> Any:

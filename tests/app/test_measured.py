@@ -3,13 +3,12 @@
 import time
 from dataclasses import replace
 from html import unescape
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from app.hostile import upload
-from app.parts import Nobody
+from app.parts import Alone
 from warpspace.analysis.catalogue import entries
 from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation import cache
@@ -41,36 +40,25 @@ HOSTILE = "<img src=x onerror=alert(1)>\"'&"
 BUNDLED = find_data("tcp_on.csv").read_bytes()
 
 
-class Column:
-    """A section of the page without a page."""
+class Column(Alone):
+    """A section that is unfolded."""
 
-    def __init__(self, build, state):
-        self.said, self.state, self.reported = [], state, []
-        context = Nobody(
-            act=lambda do: do(), renew=lambda _: None, reported=self.reported,
-            notify=lambda *words: self.said.append(words), shown=None,
-            page=SimpleNamespace(is_open=True), store=self, post=self.post,
-        )  # fmt: skip
-        self.part = build(context)
+    def __init__(self, kind, state, *more):
+        super().__init__(kind, state, *more)
         page = replace(state.page, task="measure", open=frozenset({self.part.name}))
-        self.state = replace(state, page=page)
-        self.part.context.shown = LIVE.evaluate(self.state)
+        self.store.apply(lambda now: replace(now, page=page))
 
-    def post(self, update):
-        self.state = update(self.state)
+    @property
+    def state(self):
+        return self.store.state
 
     def do(self, word, value=""):
-        self.state = self.part.take(self.state, word, value)
-        self.part.context.shown = LIVE.evaluate(self.state)
-        return self.html()
+        super().do(word, value)
+        return self.html
 
     def give(self, name, content):
         """Send a file."""
         self.do(*(word.removeprefix("files:") for word in upload(name, content)))
-
-    def html(self):
-        (html,) = self.part.pieces(LIVE.evaluate(self.state)).values()
-        return html
 
     def run(self):
         self.do("run")
@@ -78,19 +66,17 @@ class Column:
 
     def settle(self):
         """Wait until what is asked now is answered."""
-        self.html()
-        question = self.part.question(self.state)
+        question, _ = self.part.question(self.state), self.html
         while self.part._jobs.busy or not any(
             found and found[0] == question for found in (self.part._answer, self.part._problem)
         ):
             time.sleep(0.01)
-            self.html()
-        return self.html()
+            _ = self.html
+        return self.html
 
 
 def calibrate(state=START):
-    entry = next(one for one in entries() if one.name == "calibrate")
-    return Column(lambda context: CalibratePart(context, entry), state)
+    return Column(CalibratePart, state, next(one for one in entries() if one.name == "calibrate"))
 
 
 def chosen(name, state=STATE, **options):
@@ -162,7 +148,7 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     assert "RMS of measured − model" in html
     assert "<img" not in html
     column.do("report")
-    ((_, result),) = column.reported
+    ((_, result),) = column.context.reported
     assert result.rms_difference > 0.1
     column.do("remove", "0")
     assert "RMS of measured" not in column.settle()
@@ -243,9 +229,9 @@ def test_a_page_gives_only_known_words_and_small_readable_files():
     column = calibrate()
     receive = column.give
     receive("../../<b>.csv", b"\xff\xfe")
-    assert "b.csv is not UTF-8" in column.html()
+    assert "b.csv is not UTF-8" in column.html
     receive("../../etc/passwd", b"x" * (2 * 2**20 + 1))
-    assert "2.0 MB" in column.html()
+    assert "2.0 MB" in column.html
     assert "9.5 MB" in column.do("file", f"10000000\n{HOSTILE}\n")
     receive("../../tcp<b>.csv", BUNDLED)
     assert [one.name for one in column.part._files] == ["tcp_b.csv"]
@@ -349,7 +335,7 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert after.mean_um != pytest.approx(before.mean_um)
     assert applied.amplitudes["EXX"] == pytest.approx(10.0)
     assert applied.comparison.a.title == "before import"
-    assert "Applied" in column.html()
+    assert "Applied" in column.html
     column.do("apply", "0")
     assert column.state is applied  # once
     column.part.received("y.csv", TABLE.replace(b"EXX", b"EYX"))
@@ -395,4 +381,4 @@ def test_a_format_that_is_not_recognised_or_does_not_fit_is_asked_for():
     column.do("set.format", "linuxcnc-comp")
     assert "It adds EXX." in column.settle()
     column.do("remove", "0")
-    assert "Files can also be dropped" in column.html()
+    assert "Files can also be dropped" in column.html

@@ -1,14 +1,11 @@
 """The bar at the top and its windows: scenes, files, report, commands and keys."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from app.parts import Nobody
+from app.parts import Alone
 from warpspace.app.documents.scene_file import SceneList, open_text
 from warpspace.app.documents.services import Services
-from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.files import FilesWindow, ReportWindow
 from warpspace.app.tasks.top import (
@@ -20,49 +17,19 @@ from warpspace.app.tasks.top import (
     TopPart,
     key_events,
 )
-from warpspace.exceptions import WarpspaceError
 from warpspace.scene.library import load_scene
 
-LIVE = LiveModel()
 FIRST, SECOND = load_scene("dvf5000_first"), load_scene("dvf5000_second")
 STATE = start_state(FIRST, nodes=5)
 HOSTILE = "<img src=x onerror=alert(1)>.csv"
 
 
-class Window:
-    """One part on a page that is not there, with what it has the page do."""
+class Window(Alone):
+    """A part on a page with two scenes."""
 
     def __init__(self, kind, state=STATE, services=None):
-        self.said, self.sent, self.saved, self.called = [], [], [], []
-        self.store = StateStore(state)
-        self.context = Nobody(
-            act=self._act, renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
-            notify=lambda *words: self.said.append(words), services=services or Services(),
-            send=lambda *event: self.sent.append(event), reported=[],
-            save_file=lambda *file: self.saved.append(file),
-            scenes=SceneList({FIRST.title: FIRST, SECOND.title: SECOND}),
-            page=SimpleNamespace(
-                report=None, tell=lambda **_: None, call=lambda *what: self.called.append(what)
-            ),
-            camera=SimpleNamespace(remember=lambda: None), fit_view=lambda: None,
-            client=SimpleNamespace(flush=lambda: None), closed=lambda: None,
-        )  # fmt: skip
-        self.part = kind(self.context)
-
-    def _act(self, action):
-        try:
-            action()
-        except WarpspaceError as error:  # as the session says it
-            self.said.append(("", str(error)))
-
-    def do(self, word, value=""):
-        self.store.apply(lambda state: self.part.take(state, word, value))
-        return self.store.state
-
-    @property
-    def html(self):
-        (found,) = self.part.pieces(LIVE.evaluate(self.store.state)).values()
-        return str(found)
+        scenes = SceneList({FIRST.title: FIRST, SECOND.title: SECOND})
+        super().__init__(kind, state, scenes=scenes, services=services or Services())
 
 
 def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
