@@ -29,6 +29,7 @@ from warpspace.exceptions import ChainError, WarpspaceError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.errors import Constant, Directional, Ramp
+from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.save import scene_to_toml
 
@@ -204,6 +205,9 @@ def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state
     turned = with_word(one, "across X")
     assert turned.scene.machine.gantries["X"].across == "z"
     assert with_word(one, "gantry X").scene.machine.gantries == {}
+    far = with_word(one, "guide X 0 1e9")
+    assert far.amplitudes["EXX"] == MAX_ERROR
+    assert "clamped" in far.notes[-1]
     opened, _ = open_text(state_to_toml(nearer), "own", "own.toml")
     assert opened.scene.machine.gantries == nearer.scene.machine.gantries
     assert guides(opened, "X") == pytest.approx((4.0, 13.0))

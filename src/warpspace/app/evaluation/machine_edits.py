@@ -16,6 +16,7 @@ import tomli_w
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import position_spans
+from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
 from warpspace.field.grid import find_volume_axes
@@ -282,15 +283,14 @@ def with_word(state: AppState, word: str) -> AppState:
     if what == "span" and gantry is not None:  # the errors of both guides stay
         now = scene.machine.gantries[gantry.axis]
         turned = changed.amplitudes[now.rotation_key] * now.rotation_weight
-        changed = changed.with_amplitude(now.rotation_key, turned / gantry.rotation_weight)
+        turned /= gantry.rotation_weight
+        changed = put(changed, f"amplitudes.{now.rotation_key}", repr(turned))
     return changed.noted(*notes)
 
 
 def with_changed_scene(state: AppState, scene: Scene) -> AppState:
     """Show a scene whose machine or working volume has been changed."""
-    own, before = state.origin, state.scene
-    same = scene == own
-    keys = scene.parameter_keys
+    before, keys = state.scene, scene.parameter_keys
     was, stands = before.workspace.positions, scene.workspace.positions
     # an axis whose position in the working volume was changed goes there
     kept = {axis: at for axis, at in state.positions.items() if was.get(axis) == stands.get(axis)}
@@ -301,9 +301,7 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
     tolerances = of_axes(state.tolerances.own, scene.machine.axes)
     fixed = state.specification.fixed & frozenset(keys)
     changed = replace(
-        state,
-        scene=own if same else scene,
-        loaded=None if same else own,
+        state.with_edited(scene),
         amplitudes={key: _amplitude(state, scene, key) for key in keys},
         positions=positions,
         exclusions=state.exclusions.within(keys),
@@ -382,7 +380,7 @@ def with_guide_error(state: AppState, gantry: Gantry, guide: int, value_um: floa
     shape = next((curve for curve in curves if curve.amplitude != 0.0), curves[0])
     values = {gantry.positioning_key: (value_um + other) / 2.0, gantry.rotation_key: rotation}
     for key, amplitude in values.items():
-        state = edits.with_curve(state, key, shape).with_amplitude(key, amplitude)
+        state = put(edits.with_curve(state, key, shape), f"amplitudes.{key}", repr(amplitude))
     return state
 
 

@@ -389,13 +389,15 @@ class AppState:
             **{name: getattr(self, name) for name in KEPT},
         )
 
+    def with_edited(self, scene: Scene) -> "AppState":
+        """Show the scene with something edited; the same object where it is the same scene."""
+        same = next((one for one in (self.origin, self.scene) if one == scene), scene)
+        return replace(self, scene=same, loaded=None if same is self.origin else self.origin)
+
     def reset(self) -> "AppState":
         """Give all errors the scene's values and curves again."""
         changed = replace(self.scene, errors=ErrorSet(self.own_curves))
-        # the same object where it is the same scene
-        scene = next((one for one in (self.origin, self.scene) if one == changed), changed)
-        loaded = None if scene is self.origin else self.loaded
-        return replace(self, amplitudes=self.start, scene=scene, loaded=loaded)
+        return replace(self.with_edited(changed), amplitudes=self.start)
 
     def zeroed(self) -> "AppState":
         return replace(self, amplitudes=dict.fromkeys(self.amplitudes, 0.0))

@@ -71,13 +71,8 @@ def with_reference(state: AppState, at: Mapping[str, float] | None) -> AppState:
 
 
 def _with_scene(state: AppState, model: Model, *reference: Mapping[str, float] | None) -> AppState:
-    scene, own = replace(state.scene, model=model), state.origin
-    if reference:
-        scene = replace(scene, reference=reference[0])
-    if scene == state.scene:
-        return state
-    same = scene == own
-    return replace(state, scene=own if same else scene, loaded=None if same else own)
+    scene = replace(state.scene, model=model)
+    return state.with_edited(replace(scene, reference=reference[0]) if reference else scene)
 
 
 def choices_of(scene: Scene) -> dict[tuple[str, str], dict[str, str]]:
