@@ -65,7 +65,6 @@ def open_text(text: str, name: str, source: str, *, alone: bool = False) -> Open
 
 
 def is_looked_at(text: str) -> bool:
-    """Tell whether a scene file says how it was looked at."""
     return bool(_lines(text))
 
 
@@ -153,7 +152,6 @@ def _unpack(packed: str) -> str:
 
 
 def settings_line(state: AppState, camera: CameraMemory | None = None, known: Known = None) -> str:
-    """Spell how a state is looked at, its amplitudes, and what it is compared with."""
     opened = start_state(state.scene)
     pairs = [
         (leaf.linked, spell_value(leaf, now))
@@ -299,5 +297,4 @@ class SceneList(dict[str, Scene]):
 
 
 def dropped_words(title: str) -> str:
-    """Say that a scene has left the list."""
     return f"The newest {MOST_OPENED} opened scenes are kept; {title} left the list."

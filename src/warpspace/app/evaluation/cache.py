@@ -18,7 +18,6 @@ class Cache(Generic[T]):
         self._lock = threading.Lock()
 
     def get(self, key: Hashable, build: Callable[[], T], size: Callable[[T], int]) -> T:
-        """Give what belongs to a key, built when it is not there."""
         with self._lock:
             found = self._items.get(key)
             if found is not None:

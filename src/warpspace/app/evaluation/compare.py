@@ -65,7 +65,6 @@ def plain_state(state: AppState) -> AppState:
 
 
 def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState) -> LivePicture:
-    """Evaluate a state that compares two."""
     chosen = state.comparison
     other_side = chosen.b or Side()
     sides = [single(side_state(state, side)) for side in (chosen.a, other_side)]
@@ -144,7 +143,6 @@ def with_before(state: AppState, side: Side) -> AppState:
 
 
 def applied(state: AppState, scene: Scene) -> AppState:
-    """Give the state with the errors, tolerances and machine of a scene; the view stays."""
     own = state.scene
     if (
         scene.machine.axes != own.machine.axes
@@ -170,7 +168,6 @@ def applied(state: AppState, scene: Scene) -> AppState:
 
 
 def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:
-    """Compare what is steered with a proposal, and draw the latter."""
     after = Side(title, applied(plain_state(state), scene))
     return replace(
         state, comparison=replace(state.comparison, a=Side(), b=after, pinned=after, shown="b")

@@ -121,7 +121,6 @@ class LiveModel:
 
 
 def _place(state: AppState) -> tuple[object, ...]:
-    """Give what the response of a grid depends on."""
     return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.seen
 
 
@@ -150,19 +149,11 @@ class PassFail(ColourScale):
 
     limit: float = 0.0
 
-    @classmethod
-    def of(cls, scale: ColourScale, limit: float) -> "PassFail":
-        """Tell apart what a limit tells apart, within the ends of a scale."""
-        top = max(scale.high, limit)
-        return cls(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
-
     def fraction(self, values: Array) -> Array:
-        """Place values on the scale: near its low end, or near its high one."""
         return np.where(np.asarray(values) > self.limit, 1.0 - KEPT, KEPT)
 
     @property
     def ticks(self) -> tuple[float, ...]:
-        """The limit: where its isoline runs."""
         return (self.low, self.limit, self.high)
 
 
@@ -171,7 +162,9 @@ def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> Co
     quantity, component, look = state.look.quantity, state.component, state.look
     values = coloured_values(field, component, quantity)
     if look.pass_fail and not look.tilts and component == "norm":
-        return PassFail.of(choose_scale([values], component), state.specification.limit_um)
+        scale, limit = choose_scale([values], component), state.specification.limit_um
+        top = max(scale.high, limit)
+        return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
     if look.range_mode == "shared":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
         both = (coloured_error(one, quantity) for one in (field, opened))

@@ -16,8 +16,6 @@ from warpspace.units import Array
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """What is known of a comparison beside the picture drawn."""
-
     shown: str  # what is drawn: "a", "b" or "difference"
     titles: tuple[str, str]  # names of the two sides
     sides: tuple[AppState, AppState]  # what they are, looked at as now
@@ -45,8 +43,6 @@ class Compared:
 
 @dataclass(frozen=True, kw_only=True)
 class LivePicture(Picture):
-    """The picture of a state."""
-
     state: AppState  # what is steered
     traces: tuple[TraceLines, ...]
     # what is drawn, where that is another state than the one steered; else None
@@ -70,7 +66,6 @@ class LivePicture(Picture):
 
     @cached_property
     def moved_traces(self) -> Mapping[str, TraceLine]:
-        """The traces that an error moves, by name."""
         if not self.state.shown.traces:
             return {}
         return {name_trace(one.trace): one for one in trace_lines(self.traces) if is_moved(one)}

@@ -63,8 +63,6 @@ PRESENT, NOBODY = "present errors", "nothing"
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What is drawn beside the bent box."""
-
     traces: bool = described(
         True, "Rotary traces", hint="Circles and arcs of the table: nominal light, actual dark."
     )
@@ -103,14 +101,7 @@ class Exclusions:
         """Tell whether a parameter takes part."""
         return key not in self.excluded and (not self.only or key in self.only)
 
-    def effective(self, amplitudes: Mapping[str, float]) -> Mapping[str, float]:
-        """Give the amplitudes that count, µm or µrad: zero for what does not take part."""
-        if not self:
-            return amplitudes
-        return {key: value if self.active(key) else 0.0 for key, value in amplitudes.items()}
-
     def within(self, keys: Collection[str]) -> "Exclusions":
-        """Keep what concerns the parameters of a machine."""
         return Exclusions(self.excluded & frozenset(keys), self.only & frozenset(keys))
 
 
@@ -162,8 +153,6 @@ class Picked:
 
 @dataclass(frozen=True, slots=True)
 class PageLook:
-    """What of the page is open. It is no part of the picture: neither linked nor undone."""
-
     task: str = described("understand", "Task", choices=TASKS, linked="")
     open: frozenset[str] = described(
         frozenset({"worst", "compensate", "repair", "concepts", "allocate", "import"}),
@@ -181,8 +170,6 @@ class PageLook:
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a comparison."""
-
     title: str = PRESENT  # what it is called on the page
     state: "AppState | None" = None  # what it is; None for what is steered
     # whether it is a scene as opened, which is looked at as what is steered (rotary positions,
@@ -192,8 +179,6 @@ class Side:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What is compared."""
-
     a: Side = field(default_factory=Side)
     b: Side | None = None  # none while nothing is compared
     shown: str = described("a", "Side that is drawn", choices=SHOWN, linked="compare.shown")
@@ -320,11 +305,13 @@ class AppState:
     @property
     def active(self) -> Mapping[str, float]:
         """Amplitudes that count, µm or µrad: those that are excluded are zero."""
-        return self.exclusions.effective(self.amplitudes)
+        if not self.exclusions:
+            return self.amplitudes
+        takes_part = self.exclusions.active
+        return {key: at if takes_part(key) else 0.0 for key, at in self.amplitudes.items()}
 
     @property
     def changed_keys(self) -> tuple[str, ...]:
-        """Parameters that differ from the scene's values."""
         return tuple(key for key, value in self.amplitudes.items() if value != self.start[key])
 
     @property
@@ -333,11 +320,9 @@ class AppState:
         return self.loop, self.placed and self.loop is Loop.RELATIVE
 
     def axis_span(self, key: str) -> tuple[float, float]:
-        """Give the range over which the curve of a parameter runs, mm or degrees."""
         return self.scene.axis_span(parameter(key).axis)
 
     def curve(self, key: str) -> ErrorFunction:
-        """Give the curve of a parameter with its present amplitude."""
         function = self.scene.errors.functions.get(key) or Constant(self.axis_span(key))
         return function.with_amplitude(self.amplitudes[key])
 
@@ -404,7 +389,6 @@ class AppState:
 
 
 def start_state(scene: Scene, **changes: Any) -> AppState:
-    """Build the state a scene is first shown in."""
     start = {key: scene.errors.amplitude(key) for key in scene.parameter_keys}
     at = scene.workspace.positions
     positions = {axis: at.get(axis, 0.0) for axis in position_spans(scene)}

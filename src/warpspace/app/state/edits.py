@@ -26,7 +26,6 @@ def _span(low: float, reach: float) -> Span:
 
 
 def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
-    """Choose the slider range of a parameter."""
     least = LEAST_ROTATION_URAD if parameter(key).is_rotation else LEAST_TRANSLATION_UM
     if tolerance is not None:
         reach = abs(tolerance.centre) + tolerance.half_width
@@ -35,7 +34,6 @@ def amplitude_span(key: str, value: float, tolerance: Tolerance | None) -> Span:
 
 
 def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
-    """Give a parameter another curve and its amplitude."""
     if key not in state.amplitudes:
         return state.noted(f"{key}: no parameter of this machine")
     if parameter(key).is_constant and not isinstance(function, Constant):
@@ -64,7 +62,6 @@ def half_width_span(state: AppState, key: str) -> Span:
 
 
 def with_scene_tolerances(state: AppState) -> AppState:
-    """Go back to the tolerances of the scene."""
     own = state.origin.tolerances
     # an edited machine may not have all axes of the scene's
     kept = {key: own.own[key] for key in own.own if key in state.amplitudes}

@@ -36,8 +36,6 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Range of a control."""
-
     low: float  # ends, in the unit of the control
     high: float
     step: float  # distance between two positions of a slider
@@ -50,7 +48,6 @@ class Span:
         return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
 
     def clamped_words(self, value: float, kept: float, what: str, unit: str) -> str:
-        """Say that a number was brought into the range."""
         allowed = f"{self.low:g} to {self.high:g} {unit}".rstrip()
         shown = f"{kept:g} {unit}".rstrip()
         return f"{what} = {value:g} is outside {allowed}; clamped to {shown}"
@@ -104,19 +101,16 @@ def described(default: T, label: str, **words: Any) -> T:
 
 
 def description(entry: "Field[Any]") -> Leaf | None:
-    """Give what a field says of itself."""
     return entry.metadata.get(DESCRIBED)
 
 
 def default_of(entry: "Field[Any]") -> Any:
-    """Give the default of a field; None where it has none."""
     if entry.default_factory is not MISSING:
         return entry.default_factory()
     return None if entry.default is MISSING else entry.default
 
 
 def error_names(state: Any) -> dict[str, str]:
-    """Give the plain names of the errors of a state, by key."""
     return {key: parameter(key).name for key in state.amplitudes}
 
 
@@ -127,5 +121,4 @@ def name_of(key: str) -> str:
 
 
 def lowered(label: str) -> str:
-    """Spell a label within a sentence."""
     return label[0].lower() + label[1:] if label[1:2].islower() else label

@@ -30,8 +30,6 @@ POINT_MM = Span(-2000.0, 2000.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is shown of the field, and how."""
-
     surface: str = described("surface", "Surface", choices=SURFACES)
     quantity: str = described("position", "Quantity", choices=QUANTITIES)
     # round ends for what is shown; those of `range_top`; or one range for all components, for now
@@ -156,7 +154,6 @@ def position_spans(scene: Scene) -> dict[str, Span]:
 
 
 def slice_spans(scene: Scene) -> dict[str, Span]:
-    """Give the ranges of the slices of a scene, mm, by axis."""
     ranges = slice_ranges(scene.model, scene.workspace)
     return {axis: Span(low, high, 1.0) for axis, (low, high) in ranges.items()}
 
@@ -183,7 +180,6 @@ def linear_positions(scene: Scene, look: MachineLook) -> dict[str, float]:
 
 
 def slice_positions(scene: Scene, look: Look, machine: MachineLook) -> dict[str, float]:
-    """Give where the slices of a scene lie, mm."""
     chosen = linear_positions(scene, machine) if look.follow else look.slices_mm
     return {
         axis: span.clamp(chosen.get(axis, (span.low + span.high) / 2.0), span.low)

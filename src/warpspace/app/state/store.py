@@ -67,8 +67,6 @@ SAME_STEP_S = 0.8  # changes of one thing that follow each other faster than thi
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A state that can be gone back to, and what was changed after it, as `changes` says it."""
-
     state: AppState
     what: Mapping[str, str]
 
@@ -82,7 +80,6 @@ class Step:
 
 
 def _on_page(state: AppState, other: AppState) -> AppState:
-    """Give a state page and forms of another one, which undo leaves as they are."""
     if (state.page, state.forms) == (other.page, other.forms):
         return state
     return replace(state, page=other.page, forms=other.forms)
@@ -98,7 +95,6 @@ class History:
     changed_at: float = float("-inf")  # when the present was last changed, s
 
     def push(self, state: AppState, at: float) -> "History":
-        """Take in a new present state."""
         what = changes(self.present, state)
         if not what:
             present = _on_page(self.present, state)
@@ -151,7 +147,6 @@ class StateStore:
 
     @property
     def state(self) -> AppState:
-        """What is shown, or about to be."""
         return self.history.present
 
     def apply(

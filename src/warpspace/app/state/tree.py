@@ -109,7 +109,6 @@ def stored(state: AppState, path: str) -> Any:
 
 
 def spell(state: AppState, path: str) -> str:
-    """Spell the value of a leaf so that `put` reads it back."""
     return spell_value(leaves(state)[path], value(state, path))
 
 
@@ -133,7 +132,6 @@ def _spell_numbers(numbers: Sequence[float]) -> str:
 
 
 def words_of(leaf: Leaf) -> str:
-    """Name a leaf within a sentence: an error by its key."""
     group, _, key = leaf.path.rpartition(".")
     return key if group == "amplitudes" else lowered(leaf.label)
 
@@ -155,7 +153,6 @@ def put(state: AppState, path: str, text: str) -> AppState:
 
 
 def toggled(state: AppState, path: str, word: str) -> AppState:
-    """Put a word into the set that a leaf is, or take it out again."""
     return put(state, path, f"{'-' if word in value(state, path) else '+'}{word}")
 
 
@@ -214,7 +211,6 @@ EXAMPLE = "X 275 Y -225 Z -480"
 
 
 def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
-    """Ask about a point of the surface by the positions of the axes; empty for none."""
     if not text.strip():
         return replace(state, picked=None, lever="")
     typed, spans = read_positions(text), linear_spans(state.scene)
@@ -233,7 +229,6 @@ def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
 
 
 def _with_trace(state: AppState, _leaf: Leaf, text: str) -> AppState:
-    """Ask about a point of a trace: its loop and its place; where the axes stand is to come."""
     loop, _, rest = text.partition(",")
     point = [read_typed(word) for word in rest.split(",")]
     near = [at for at in point if at is not None and abs(at) <= FARTHEST_MM]
@@ -244,7 +239,6 @@ def _with_trace(state: AppState, _leaf: Leaf, text: str) -> AppState:
 
 
 def _with_asked(state: AppState, leaf: Leaf, text: str) -> AppState:
-    """Ask about a point, one axis position at a time, mm or degrees."""
     picked, axis = state.picked or Picked({}), leaf.path.rpartition(".")[2]
     if axis in state.positions and picked.point_mm is None:
         raise Unreadable("expected a point of a trace")

@@ -16,7 +16,6 @@ _SHOWN = 40  # characters of a line that a message shows
 
 
 def read_typed(text: str, unit: str = "") -> float | None:
-    """Read one number as it was typed."""
     if len(text) > MAX_TYPED_NUMBER:
         return None
     plain = text.translate(_SIGNS).strip()
@@ -34,7 +33,6 @@ def spell_typed(value: float) -> str:
 
 
 def read_rows(text: str) -> tuple[list[tuple[float, ...]], tuple[str, ...]]:
-    """Read lines of numbers, typed or pasted from a spreadsheet."""
     lines = [line.split("#", 1)[0].translate(_SIGNS).strip(" \r") for line in text.splitlines()]
     numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     remarks: tuple[str, ...] = ()
@@ -57,7 +55,6 @@ def comma_rows(text: str) -> str | None:
 
 
 def _is_heading(line: str) -> bool:
-    """Tell whether a line has letters, and none of its cells is a number."""
     if re.search(r"[^\W\d_]", line) is None:
         return False
     cells = re.split(r"[\t;|]", line) if re.search(r"[\t;|]", line) else _cells(line)
