@@ -6,7 +6,7 @@ import pytest
 from warpspace import load_scene
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Exclusions, start_state
-from warpspace.app.state.store import History
+from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import toggled
 from warpspace.app.state.typed_numbers import read_typed, spell_typed
 from warpspace.app.tasks.error_curve import edit_curve, kind_titles, read_curve, spell_rows
@@ -163,14 +163,15 @@ def test_long_tables_are_thinned_out_for_editing():
 
 
 def test_each_switch_is_a_step_however_fast_they_follow_each_other():
-    history = History(START)
+    store = StateStore(START)
     steps = (("excluded", "EAX"), ("excluded", "EBX"), ("excluded", "EBX"), ("only", "EBX"))
     for number, (name, key) in enumerate(steps):
-        now = toggled(history.present, f"exclusions.{name}", key)
-        history = history.push(now, 0.01 * number)
-    assert history.undoes == "only pitch of X"
-    history = history.undo()
-    assert history.present.exclusions == Exclusions(frozenset({"EAX"}))
-    history = history.undo()
-    assert history.present.exclusions == Exclusions(frozenset({"EAX", "EBX"}))
-    assert history.undo().undo().present == START
+        path = f"exclusions.{name}"
+        store.apply(lambda now, path=path, key=key: toggled(now, path, key), at=0.01 * number)
+    assert store.undo() == "only pitch of X"
+    assert store.state.exclusions == Exclusions(frozenset({"EAX"}))
+    store.undo()
+    assert store.state.exclusions == Exclusions(frozenset({"EAX", "EBX"}))
+    store.undo()
+    store.undo()
+    assert store.state == START

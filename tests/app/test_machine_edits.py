@@ -21,7 +21,7 @@ from warpspace.app.evaluation.machine_edits import (
 )
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve, with_scene_tolerances
-from warpspace.app.state.store import History
+from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.bodies.placed import load_bodies
@@ -109,12 +109,12 @@ def test_an_axis_that_returns_brings_all_that_went_with_it(axis):
 
 
 def test_undo_takes_each_change_back(state):
-    history = History(state)
+    store = StateStore(state)
     for number, word in enumerate(("left Y", "side X", "turn C", "chain wXFYt", "type scara")):
-        history = history.push(with_word(history.present, word).without_notes(), 10.0 * number)
-    while history.past:
-        history = history.undo()
-    assert history.present == state
+        store.apply(lambda state, word=word: with_word(state, word), at=10.0 * number)
+    while store.past:
+        store.undo()
+    assert store.state == state
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine_edits import with_word
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Exclusions, start_state
-from warpspace.app.state.store import SAME_STEP_S, STEPS, History, StateStore, changes
+from warpspace.app.state.store import SAME_STEP_S, STEPS, StateStore, changes
 from warpspace.app.state.tree import put, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Constant, Ramp, Table
@@ -127,7 +127,9 @@ def test_what_follows_a_leaf_follows_it_and_members_come_and_go():
     ],
 )
 def test_undo_says_what_it_takes_back(state, words):
-    assert History(FIRST).push(state.without_notes(), 0.0).undoes == words
+    store = StateStore(FIRST)
+    store.apply(lambda _: state)
+    assert store.undo() == words
 
 
 def test_reset_and_zero():
@@ -202,7 +204,7 @@ def test_many_steer_one_store_and_nothing_is_lost():
     for thread in threads:
         thread.join()
     assert all(store.state.amplitudes[key] == 5.9 for key in keys)
-    assert len(store.history.past) <= STEPS
+    assert len(store.past) <= STEPS
 
 
 def test_a_copy_goes_its_own_way():
@@ -215,34 +217,45 @@ def test_a_copy_goes_its_own_way():
     assert copy.state == FIRST
 
 
+def pushed(store, key, value, at):
+    store.apply(lambda _: store.state.with_amplitude(key, value), at=at)
+
+
 def test_a_drag_is_one_step_and_a_pause_or_another_slider_begins_another():
-    history = History(FIRST)
+    store = StateStore(FIRST)
     for tick in range(40):
-        history = history.push(FIRST.with_amplitude("EAX", 0.1 * (tick + 1)), at=tick * 0.05)
-    assert len(history.past) == 1
-    assert history.undo().present == FIRST
-    assert history.undo().redo().present == FIRST.with_amplitude("EAX", 4.0)
-    later = history.push(FIRST.with_amplitude("EAX", 2.0), 2.0 + SAME_STEP_S)
-    assert len(later.past) == 2
-    other = history.push(history.present.with_amplitude("EBX", 1.0), 2.0)
-    assert (other.undoes, other.undo().undoes) == ("pitch of X", "roll of X")
+        pushed(store, "EAX", 0.1 * (tick + 1), tick * 0.05)
+    dragged = store.state
+    assert len(store.past) == 1
+    assert store.undo() == "roll of X"
+    assert store.state == FIRST
+    assert store.redo() == "roll of X"
+    assert store.state == dragged
+    pushed(store, "EAX", 2.0, 2.0)
+    pushed(store, "EAX", 3.0, 2.1 + SAME_STEP_S)
+    pushed(store, "EBX", 1.0, 2.1 + SAME_STEP_S)
+    assert [step.words for step in store.past] == [*["roll of X"] * 3, "pitch of X"]
 
 
 def test_a_change_after_undo_forgets_the_future_and_none_is_no_step():
-    history = History(FIRST)
-    assert history.push(FIRST, 1.0) is history.undo() is history.redo() is history
-    history = history.push(FIRST.with_amplitude("EAX", 1.0), 0.0).undo()
-    assert history.redoes == "roll of X"
-    history = history.push(FIRST.with_amplitude("EAX", 3.0), 0.1)
-    assert history.redo() is history
-    assert history.undo().present == FIRST
+    store = StateStore(FIRST)
+    store.apply(replace, at=1.0)
+    assert store.state is FIRST
+    assert (store.past, store.undo(), store.redo()) == ((), "", "")
+    pushed(store, "EAX", 1.0, 1.0)
+    store.undo()
+    assert store.redoes == "roll of X"
+    pushed(store, "EAX", 3.0, 1.1)
+    assert store.redo() == ""
+    store.undo()
+    assert store.state == FIRST
 
 
 def test_the_past_is_bounded():
-    history = History(FIRST)
+    store = StateStore(FIRST)
     for tick in range(STEPS + 20):
-        history = history.push(FIRST.with_amplitude("EAX", 0.1 * (tick + 1)), at=10.0 * tick)
-    assert len(history.past) == STEPS
+        pushed(store, "EAX", 0.1 * (tick + 1), 10.0 * tick)
+    assert len(store.past) == STEPS
 
 
 def test_what_is_excluded_is_zero_and_only_takes_part_alone():

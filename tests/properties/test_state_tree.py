@@ -14,7 +14,7 @@ from warpspace.app.documents.scene_file import (
 )
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import default_of, description
-from warpspace.app.state.store import History
+from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import leaves, put, spell, stored, value
 from warpspace.scene.library import load_scene
 
@@ -61,10 +61,10 @@ def events(draw):
 
 def survives(scene, sent):
     state = start = STARTS[SCENES.index(scene)]
-    steps = History(start)
+    steps = StateStore(start)
     for number, (path, text) in enumerate(sent):
         state = put(state, path, text).without_notes()
-        steps = steps.push(state, 10.0 * number)
+        steps.apply(lambda _, state=state: state, at=10.0 * number)
     linked = with_settings(start_state(state.scene), settings_line(state))
     opened, _ = open_text(state_to_toml(state), scene, "x.toml")
     assert linked.notes == opened.notes == ()
@@ -79,12 +79,12 @@ def survives(scene, sent):
             assert value(put(state, path, spell(state, path)), path) == found, path
     while steps.past:
         assert steps.undoes
-        steps = steps.undo()
-    assert steps.present == start
-    assert steps.present.page == state.page
+        steps.undo()
+    assert steps.state == start
+    assert steps.state.page == state.page
     while steps.future:
-        steps = steps.redo()
-    assert steps.present == state
+        steps.redo()
+    assert steps.state == state
 
 
 @settings(max_examples=300)

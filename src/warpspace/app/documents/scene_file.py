@@ -294,7 +294,3 @@ class SceneList(dict[str, Scene]):
         dropped = list(self)[len(self.fixed)]
         del self[dropped]
         return title, dropped
-
-
-def dropped_words(title: str) -> str:
-    return f"The newest {MOST_OPENED} opened scenes are kept; {title} left the list."

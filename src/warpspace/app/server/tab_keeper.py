@@ -202,7 +202,7 @@ class TabKeeper(Part):
 
     def _restore(self, text: str) -> None:
         context, say = self.context, partial(self.context.page.call, "server.say")
-        if self._shared and context.store.history.past:
+        if self._shared and context.store.past:
             say(JOINED_TITLE, [JOINED])
             return
         try:

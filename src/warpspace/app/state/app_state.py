@@ -29,8 +29,6 @@ EXAGGERATION = Span(*FACTORS, 1.0)
 LIMIT_UM = Span(1.0, 300.0, 0.5)
 PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
 START_NODES, START_UM = 21, 50.0
-MOST_COSTS_TEXT = 2000  # characters of a list of costs
-LONGEST_QUERY = 80
 TASKS = {
     "understand": "Understand",
     "measure": "Measure",
@@ -133,7 +131,6 @@ class Specification:
     costs: str = described(
         "",
         "Costs of tolerances",
-        longest=MOST_COSTS_TEXT,
         hint="Cost of a tolerance where it is not 1, for instance EA0Z=4, EXX=0.5.",
     )
 
@@ -163,9 +160,9 @@ class PageLook:
     row: str = described(
         "", "Unfolded error", choices=lambda state: {"": "none", **error_names(state)}, linked=""
     )
-    query: str = described("", "Search of errors", longest=LONGEST_QUERY, linked="")
-    command: str = described("", "Search of commands", longest=LONGEST_QUERY, linked="")
-    window: str = described("", "Open window", longest=LONGEST_QUERY, linked="")
+    query: str = described("", "Search of errors", linked="")
+    command: str = described("", "Search of commands", linked="")
+    window: str = described("", "Open window", linked="")
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,6 @@ class Leaf:
     unit: str = ""
     hint: str = ""
     linked: str = ""  # name in links and files; empty where it stands in none
-    longest: int = MOST_TYPED  # characters of a text
     one: str = "{}"  # label of one entry or member; ``{}`` is its name
     # of a field whose choices, or whose entries with their ranges, depend on the state
     choose: Callable[[Any], Choices] | None = None

@@ -7,7 +7,6 @@ from warpspace.app.state.leaf import Span, described
 from warpspace.field.grid import slice_ranges
 from warpspace.geometry.traces import TILT_STEP_DEG
 from warpspace.machine import limits
-from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Vector
 from warpspace.scene.model import Scene
 from warpspace.units import spell_short
@@ -141,16 +140,9 @@ class RotaryLook:
 def position_spans(scene: Scene) -> dict[str, Span]:
     """Give the ranges of the rotary axes that the volume is drawn at, degrees, by axis.
 
-    They are the travels, widened where the scene itself stands beyond. Rotary axes that span the
-    volume are not among them.
+    Rotary axes that span the volume are not among them.
     """
-    found: dict[str, Span] = {}
-    for name, axis in scene.machine.axes.items():
-        if not axis.is_linear and name not in scene.workspace.volume_axes:
-            low, high = axis.travel
-            at = scene.workspace.positions.get(name, low)
-            found[name] = Span(min(low, at), max(high, at), 1.0)
-    return found
+    return _spans(scene, within=False)
 
 
 def slice_spans(scene: Scene) -> dict[str, Span]:
@@ -161,12 +153,16 @@ def slice_spans(scene: Scene) -> dict[str, Span]:
 def linear_spans(scene: Scene) -> dict[str, Span]:
     """Give the ranges of the axes that move within the volume, mm or degrees.
 
-    These are the linear axes, and rotary ones that span the volume; travels, widened by the
-    workspace.
+    These are the linear axes, and rotary ones that span the volume.
     """
+    return _spans(scene, within=True)
+
+
+def _spans(scene: Scene, *, within: bool) -> dict[str, Span]:
+    """Give the travels of axes, widened where the workspace reaches beyond."""
     found: dict[str, Span] = {}
     for name, axis in scene.machine.axes.items():
-        if is_linear(name) or name in scene.workspace.volume_axes:
+        if (axis.is_linear or name in scene.workspace.volume_axes) is within:
             low, high = axis.travel
             first, last = scene.workspace.ranges.get(name, (low, high))
             found[name] = Span(min(low, first), max(high, last), 1.0)

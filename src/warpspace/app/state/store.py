@@ -57,7 +57,7 @@ def _equal(old: object, new: object) -> bool:
         return False
 
 
-# --- Undo and redo, as one frozen value -----------------------------------------------------------
+# --- Undo and redo --------------------------------------------------------------------------------
 # What a slider drag sends in quick succession becomes one step. The number of steps kept is
 # bounded.
 
@@ -79,49 +79,29 @@ class Step:
         return found[0] if len(found) == 1 else f"{found[0]} and {len(found) - 1} more"
 
 
+Steps: TypeAlias = tuple[Step, ...]
+
+
 def _on_page(state: AppState, other: AppState) -> AppState:
     if (state.page, state.forms) == (other.page, other.forms):
         return state
     return replace(state, page=other.page, forms=other.forms)
 
 
-@dataclass(frozen=True, slots=True)
-class History:
-    """A present state with its past and, after undoing, its future."""
+Update: TypeAlias = Callable[[AppState], AppState]
+Listener: TypeAlias = Callable[[], None]
 
-    present: AppState
-    past: tuple[Step, ...] = ()  # latest last
-    future: tuple[Step, ...] = ()
-    changed_at: float = float("-inf")  # when the present was last changed, s
 
-    def push(self, state: AppState, at: float) -> "History":
-        what = changes(self.present, state)
-        if not what:
-            present = _on_page(self.present, state)
-            return self if present is self.present else replace(self, present=present)
-        same = (
-            bool(self.past)
-            and not self.future
-            and self.past[-1].what == what
-            and "scene" not in what
-            and at - self.changed_at < SAME_STEP_S
-        )
-        past = self.past if same else (*self.past, Step(self.present, what))[-STEPS:]
-        return replace(self, present=state, past=past, future=(), changed_at=at)
+class StateStore:
+    """A state with its past and its future, that any number of sessions share."""
 
-    def undo(self) -> "History":
-        if not self.past:
-            return self
-        *past, last = self.past
-        future = (*self.future, Step(self.present, last.what))
-        return History(_on_page(last.state, self.present), tuple(past), future)
-
-    def redo(self) -> "History":
-        if not self.future:
-            return self
-        *future, coming = self.future
-        past = (*self.past, Step(self.present, coming.what))
-        return History(_on_page(coming.state, self.present), past, tuple(future))
+    def __init__(self, state: AppState) -> None:
+        self.state = state  # what is shown, or about to be
+        self.past: Steps = ()  # latest last
+        self.future: Steps = ()
+        self._changed_at = float("-inf")
+        self._listeners: list[Listener] = []
+        self._lock = threading.Lock()
 
     @property
     def undoes(self) -> str:
@@ -132,47 +112,48 @@ class History:
     def redoes(self) -> str:
         return self.future[-1].words if self.future else ""
 
-
-Update: TypeAlias = Callable[[AppState], AppState]
-Listener: TypeAlias = Callable[[], None]
-
-
-class StateStore:
-    """A state with its history that any number of sessions share."""
-
-    def __init__(self, state: AppState) -> None:
-        self.history = History(state)
-        self._listeners: list[Listener] = []
-        self._lock = threading.Lock()
-
-    @property
-    def state(self) -> AppState:
-        return self.history.present
-
     def apply(
         self, update: Update, by: Listener | None = None, at: float | None = None
     ) -> tuple[str, ...]:
         """Apply a pure update to the present state; give what it had to clamp."""
         with self._lock:
-            before = self.history
-            state = update(before.present)
-            now = time.monotonic() if at is None else at
-            self.history = before.push(state.without_notes(), now)
-        if self.history is not before:
+            before, found = self.state, update(self.state)
+            self._push(found.without_notes(), time.monotonic() if at is None else at)
+            changed = self.state is not before
+        if changed:
             self._notify(by)
-        return state.notes
+        return found.notes
+
+    def _push(self, state: AppState, at: float) -> None:
+        what = changes(self.state, state)
+        if not what:
+            self.state = _on_page(self.state, state)
+            return
+        same = self.past and not self.future and self.past[-1].what == what and "scene" not in what
+        if not same or at - self._changed_at >= SAME_STEP_S:
+            self.past = (*self.past, Step(self.state, what))[-STEPS:]
+        self.state, self.future, self._changed_at = state, (), at
 
     def undo(self) -> str:
         """Take the latest change back; give what it was."""
         with self._lock:
-            what, self.history = self.history.undoes, self.history.undo()
+            self.past, self.future, what = self._travel(self.past, self.future)
         return self._told(what)
 
     def redo(self) -> str:
         """Do again what was undone; give what it was."""
         with self._lock:
-            what, self.history = self.history.redoes, self.history.redo()
+            self.future, self.past, what = self._travel(self.future, self.past)
         return self._told(what)
+
+    def _travel(self, steps: Steps, others: Steps) -> tuple[Steps, Steps, str]:
+        self._changed_at = float("-inf")
+        if not steps:
+            return steps, others, ""
+        *rest, step = steps
+        others = (*others, Step(self.state, step.what))
+        self.state = _on_page(step.state, self.state)
+        return tuple(rest), others, step.words
 
     def _told(self, what: str) -> str:
         if what:
@@ -182,7 +163,7 @@ class StateStore:
     def copy(self) -> "StateStore":
         """Give a store of its own with the same state and history."""
         store = StateStore(self.state)
-        store.history = self.history
+        store.past, store.future = self.past, self.future
         return store
 
     def subscribe(self, listener: Listener) -> None:

@@ -15,6 +15,7 @@ from warpspace.analysis.options import read_numbers
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, Picked, start_state
 from warpspace.app.state.leaf import (
+    MOST_TYPED,
     Identity,
     Leaf,
     Span,
@@ -292,7 +293,7 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
         case "keys" | "names":
             return _read_keys(leaf, text, old)
         case _:
-            return text[: leaf.longest], ""
+            return text[:MOST_TYPED], ""
 
 
 def _number(leaf: Leaf, text: str) -> tuple[float, str]:

@@ -38,6 +38,7 @@ LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
 AS_COLOURED = "as the drawing is coloured"
+DROPPED = "The newest {} opened scenes are kept; {} left the list."
 PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
 
@@ -167,7 +168,7 @@ class FilesWindow(JobWindow):
     def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
         """Show an opened state from its camera; beside a plain scene the comparison stays."""
         if dropped := self.context.show_opened(opened, camera, whole=whole):
-            self.context.notify("Scenes", scene_file.dropped_words(dropped))
+            self.context.notify("Scenes", DROPPED.format(scene_file.MOST_OPENED, dropped))
 
     # --- what is saved ---------------------------------------------------------------------------
 

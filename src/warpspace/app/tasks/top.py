@@ -35,12 +35,12 @@ class TopPart(Part):
     name = "top"
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        history = self.context.store.history
+        store = self.context.store
         travel = (
             button(sign, f"page:{word.lower()}", kind="quiet", aria_label=word, data_key=word,
                    hint=f"{word}: {what} ({keys})")
-            for word, sign, what, keys in (("Undo", "↶", history.undoes, "Ctrl+Z"),
-                                           ("Redo", "↷", history.redoes, "Ctrl+Shift+Z")) if what
+            for word, sign, what, keys in (("Undo", "↶", store.undoes, "Ctrl+Z"),
+                                           ("Redo", "↷", store.redoes, "Ctrl+Shift+Z")) if what
         )  # fmt: skip
         hint = "Open a scene, measured errors, or a controller's table (Ctrl+O)"
         title = picture.state.origin.title or picture.state.origin.name
