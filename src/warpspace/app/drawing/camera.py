@@ -139,8 +139,8 @@ class TabCamera:
 
     def take_room(self, room: Room, picture: LivePicture | None) -> None:
         """Take note of the drawing's room; a camera that nobody has moved fills it again."""
-        self._told = room
-        if picture is not None and self._put is not None and self._put.is_near(self.remember()):
+        first, self._told, put = self._told is None, room, self._put
+        if picture is not None and put is not None and (first or put.is_near(self.remember())):
             self.fit(picture)
 
     def place(self, picture: LivePicture) -> None:
