@@ -22,12 +22,7 @@ from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.evaluation.cache import taken_turn
-from warpspace.app.evaluation.compare import (
-    applied,
-    plain_state,
-    with_applied,
-    with_proposal,
-)
+from warpspace.app.evaluation.compare import applied, plain_state, with_applied, with_proposal
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import LONGEST, read_form
@@ -334,18 +329,9 @@ def _endings(found: Result) -> tuple[str, ...]:
     return ("JSON",) if found.file_table() is None else ("CSV", "JSON")
 
 
-def effect_html(before: AppState, after: AppState) -> Markup:
-    """Set the error of the volume in two states beside each other, without any table."""
-    try:
-        was, then = (PLAIN.evaluate(without_table(one)).statistics for one in (before, after))
-    except WarpspaceError:
-        return EMPTY
-    pairs = (("max", was.max_um, then.max_um), ("mean", was.mean_um, then.mean_um))
-    return rows((name, f"{number(a)} → {number(b)} µm") for name, a, b in pairs)
-
-
 def _change_html(state: AppState, change: Change) -> Markup:
-    now = plain_state(state)
+    """Set a proposed scene beside the present one: errors, max and mean from and to."""
+    now = without_table(plain_state(state))
     then = applied(now, change.scene)
     moved: list[tuple[float, str]] = []
     for key in {**now.amplitudes, **then.amplitudes}:
@@ -357,4 +343,9 @@ def _change_html(state: AppState, change: Change) -> Markup:
     lines = [tag("div", tag("b", said)) for said in steps[:MOST_STEPS]]
     if (more := len(steps) - MOST_STEPS) > 0:
         lines.append(tag("div", f"and {more} more", class_="ws-quiet"))
-    return join((*lines, effect_html(now, then)))
+    try:
+        before, after = (PLAIN.evaluate(one).statistics for one in (now, then))
+    except WarpspaceError:
+        return join(lines)
+    pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))
+    return join(lines) + rows((name, f"{number(a)} → {number(b)} µm") for name, a, b in pairs)

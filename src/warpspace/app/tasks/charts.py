@@ -158,24 +158,17 @@ def lines_html(chart: Lines) -> Markup:
     frame = Frame(_ends(xs), _ends(ys))
     frame = frame.to_scale() if chart.kind == "plane" else frame
     curves = join(_curve(one, frame.place(one.x, one.y)) for one in chart.curves)
-    areas = [
-        np.concatenate([frame.place(band.x, band.low), frame.place(band.x, band.high)[::-1]])
-        for band in chart.bands
-    ]
-    bands = join(
-        _line(_path(area), f"ws-band ws-s{band.colour % SERIES}")
-        for band, area in zip(chart.bands, areas, strict=True)
-    )
-    return _figure(chart, frame.axes(chart.x_label, chart.y_label) + bands + curves)
+    for one in chart.bands:
+        edges = frame.place(one.x, one.low), frame.place(one.x, one.high)[::-1]
+        curves += _line(_path(np.concatenate(edges)), f"ws-band ws-s{one.colour % SERIES}")
+    return _figure(chart, frame.axes(chart.x_label, chart.y_label) + curves)
 
 
 def histogram_html(chart: Histogram) -> Markup:
     """Draw a distribution with its marks and its limit."""
     limit = math.inf if chart.limit is None else chart.limit
-    last = max(float(chart.edges[-1]), chart.limit or 0.0)
-    frame = Frame(
-        (float(chart.edges[0]), last), (0.0, max(float(chart.heights.max()), 1e-9) * 1.05)
-    )
+    ends = float(chart.edges[0]), max(float(chart.edges[-1]), chart.limit or 0.0)
+    frame = Frame(ends, (0.0, max(float(chart.heights.max()), 1e-9) * 1.05))
     bars: list[Markup] = []
     for low, high, height in zip(chart.edges[:-1], chart.edges[1:], chart.heights, strict=True):
         (x0, y0), (x1, y1) = frame.place(np.array([low, high]), np.array([height, 0.0]))
