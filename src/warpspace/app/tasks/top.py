@@ -187,7 +187,7 @@ class HelpWindow(Window):
         )  # fmt: skip
         about = " ".join(scene.description.split())
         return join((
-            tag("div", box + tag("div", found, class_="ws-list"), data_list=True),
+            tag("div", box + tag("div", found, class_="ws-list ws-columns"), data_list=True),
             tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
             tag("h3", "What is drawn"), rows(MEANINGS, "ws-keys"),
             tag("p", "Keys act everywhere except in a text box. After a dropped connection the tab"
