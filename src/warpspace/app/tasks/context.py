@@ -16,7 +16,7 @@ from viser import ClientHandle, ViserServer
 
 from warpspace.app.browser.incoming import LONGEST_VALUE, Event, Events, event_of
 from warpspace.app.browser.page import Page
-from warpspace.app.documents.scene_file import SceneList
+from warpspace.app.documents.scene_file import MOST_OPENED, SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.drawing.camera import CameraMemory, TabCamera
 from warpspace.app.drawing.moving import MovingLayer
@@ -146,10 +146,13 @@ class Context:
 
     def show_opened(
         self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True
-    ) -> str:
-        """Show an opened state from its camera."""
+    ) -> None:
+        """Show an opened state from its camera; beside a plain scene the comparison stays."""
         # here, since not every opened scene is drawn where many follow each other
         _, dropped = self.scenes.add(opened.origin)
+        if dropped:
+            kept = f"The newest {MOST_OPENED} opened scenes are kept"
+            self.notify("Scenes", f"{kept}; {dropped} left the list.")
 
         def update(now: AppState) -> AppState:
             if camera is not None:
@@ -158,7 +161,6 @@ class Context:
             return opened if whole else replace(opened, comparison=now.comparison)
 
         self.post(update)
-        return dropped
 
     def fit_view(self, view: str | None = None, lens: bool | None = None) -> None:
         """Put the camera to a named view (the last one by default), or change its lens."""

@@ -23,7 +23,6 @@ from warpspace.app.documents.files import (
     unpack,
     upload_text,
 )
-from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
@@ -38,7 +37,6 @@ LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
 AS_COLOURED = "as the drawing is coloured"
-DROPPED = "The newest {} opened scenes are kept; {} left the list."
 PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
 
@@ -147,28 +145,22 @@ class FilesWindow(JobWindow):
     def _open(self, value: str) -> None:
         """Open a scene or a machine, or show what a file of measured data would bring."""
         name, content = read_upload(value)
-        if b"<robot" in content[:4096]:
+        notes, is_robot = list[str](), b"<robot" in content[:4096]
+        if is_robot:
             text, notes = robot_text(name, content)
-            opened, camera = scene_file.open_text(text, safe_name(name), name)
-            self._show(opened, camera)
-            self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
-            return
-        if not name.lower().endswith(".toml"):
+        elif name.lower().endswith(".toml"):
+            text = upload_text(content, name)
+        else:
             self.context.offer_import(name, content)
             return
-        title = safe_name(name)
-        text = upload_text(content, f"{title}.toml")
-        opened, camera = scene_file.open_text(text, title, f"{title}.toml")
-        self._show(opened, camera, whole=scene_file.is_looked_at(text))
-        self.context.notify("Opened", f"{title}.toml")
+        opened, camera = scene_file.open_text(text, safe_name(name), name)
+        whole = is_robot or scene_file.is_looked_at(text)
+        self.context.show_opened(opened, camera, whole=whole)
+        self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, word: str) -> None:
-        self._show(*scene_file.open_link(unpack(word), self.context.scenes.fixed))
-
-    def _show(self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True) -> None:
-        """Show an opened state from its camera; beside a plain scene the comparison stays."""
-        if dropped := self.context.show_opened(opened, camera, whole=whole):
-            self.context.notify("Scenes", DROPPED.format(scene_file.MOST_OPENED, dropped))
+        opened = scene_file.open_link(unpack(word), self.context.scenes.fixed)
+        self.context.show_opened(*opened)
 
     # --- what is saved ---------------------------------------------------------------------------
 
