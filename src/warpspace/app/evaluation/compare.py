@@ -81,7 +81,7 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     alike = other is not None and other.drawn_mm.shape == drawn.drawn_mm.shape
     compared = Compared(
         shown,
-        (_title(state, chosen.a, other_side), _title(state, other_side, chosen.a)),
+        (_title(state, chosen.a), _title(state, other_side, chosen.a)),
         (a.state, b.state),
         a.statistics,
         b.statistics,
@@ -90,15 +90,15 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
         refused,
     )
     colours = drawn.scale if drawn.is_difference else scale
-    return replace(drawn, state=state, subject=drawn.state, colours=colours, compared=compared)
+    return replace(drawn, state=state, colours=colours, compared=compared)
 
 
-def _title(state: AppState, side: Side, beside: Side) -> str:
+def _title(state: AppState, side: Side, before: Side | None = None) -> str:
     if side.state:
         return side.title
-    pinned = beside.state is not None and not beside.is_scene
+    name = AFTER if before and before.state and not before.is_scene else PRESENT
     words = (state.scene.title or state.scene.name, table_words(state))
-    return f"{AFTER if pinned else PRESENT}: {' · '.join(filter(None, words))}"
+    return f"{name}: {' · '.join(filter(None, words))}"
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:

@@ -45,8 +45,6 @@ class Compared:
 class LivePicture(Picture):
     state: AppState  # what is steered
     traces: tuple[TraceLines, ...]
-    # what is drawn, where that is another state than the one steered; else None
-    subject: AppState | None = None
     compared: Compared | None = None  # the comparison it belongs to
 
     @cached_property
@@ -73,7 +71,8 @@ class LivePicture(Picture):
     @property
     def drawn_state(self) -> AppState:
         """The state that is drawn: the one steered, or a side of a comparison."""
-        return self.subject or self.state
+        found = self.compared
+        return self.state if found is None else found.sides[found.shown != "a"]
 
     @property
     def title(self) -> str:
