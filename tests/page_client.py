@@ -59,7 +59,6 @@ class Page:
     """What a page knows: each function of its scripts that is called leaves its values here."""
 
     def __init__(self) -> None:
-        self.facts: dict[str, Any] = {}  # keys
         self.pieces: dict[str, str] = {}  # HTML by the name of its place
         self.toasts: list[list[str]] = []
         self.stage = ""
@@ -77,8 +76,6 @@ class Page:
 
     def _take(self, name: str, values: list[Any]) -> str:
         match name:
-            case "Page.tell":
-                self.facts |= values[0]
             case "Page.show":
                 self.pieces |= values[0]
             case "Page.toast":

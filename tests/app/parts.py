@@ -38,7 +38,7 @@ class Alone:
             send=lambda *event: self.sent.append(event), closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
             page=SimpleNamespace(
-                report=None, tell=lambda **_: None, call=lambda *what: self.called.append(what)
+                report=None, call=lambda *what: self.called.append(what)
             ),
             camera=SimpleNamespace(remember=lambda: None),
             client=SimpleNamespace(flush=lambda: None), **given,

@@ -116,7 +116,7 @@ def test_what_comes_just_as_a_wait_ends_is_not_lost(wire, viewer, monkeypatch):
     assert wire.read_until(lambda: "GlbMessage" in wire.kinds)  # its worker runs
     own.stop()
     own._worker.join(20.0)
-    own.context._actions.clear()
+    own.context.actions.clear()
     done: list[str] = []
 
     class Late(threading.Event):
@@ -129,9 +129,7 @@ def test_what_comes_just_as_a_wait_ends_is_not_lost(wire, viewer, monkeypatch):
     own.context._wake, own._stopped = Late(), threading.Event()
 
     def follow():
-        action = own.context.take_action()
-        assert action is not None
-        action()
+        own.context.actions.popleft()()
 
     monkeypatch.setattr(own, "_follow", follow)
     own._turn()

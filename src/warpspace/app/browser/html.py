@@ -122,31 +122,28 @@ def field(label: object, control: Markup, name: str, unit: str = "", hint: str =
     )  # fmt: skip
 
 
+def _input(**values: object) -> Markup:
+    return Markup(f"<input{attributes(**values)}>")  # noqa: S704 - escaped there
+
+
 def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False,
              label: str = "", size: str = "", **more: object) -> Markup:  # fmt: skip
     """Give a box that sends what was typed on Enter or when it is left; `live` with each letter."""
-    return fill(
-        "<input{rest}>",
-        rest=attributes(
-            type="text", id=more.pop("id", ident(name)), class_=f"ws-box {size}".strip(),
-            value=value,
-            data_set=name, data_live=name if live else None, placeholder=placeholder or None,
-            aria_label=label or None, autocomplete="off", spellcheck="false", **more,
-        ),
+    return _input(
+        type="text", id=more.pop("id", ident(name)), class_=f"ws-box {size}".strip(), value=value,
+        data_set=name, data_live=name if live else None, placeholder=placeholder or None,
+        aria_label=label or None, autocomplete="off", spellcheck="false", **more,
     )  # fmt: skip
 
 
 def slider(name: str, value: float, low: float, high: float, step: float, *,
            label: str = "", twin: str = "", text: str = "") -> Markup:  # fmt: skip
     """Give a slider; `twin` is the name of the number box that digits typed on it go into."""
-    return fill(
-        "<input{rest}>",
-        rest=attributes(
-            type="range", id=None if not label else ident(name) + "-slider", class_="ws-slider",
-            min=f"{low:g}", max=f"{high:g}", step=f"{step:g}", value=f"{value:.10g}",
-            data_set=name, data_twin=ident(twin) if twin else None, aria_label=label or None,
-            aria_valuetext=text or None,
-        ),
+    return _input(
+        type="range", id=None if not label else ident(name) + "-slider", class_="ws-slider",
+        min=f"{low:g}", max=f"{high:g}", step=f"{step:g}", value=f"{value:.10g}", data_set=name,
+        data_twin=ident(twin) if twin else None, aria_label=label or None,
+        aria_valuetext=text or None,
     )  # fmt: skip
 
 
@@ -162,14 +159,8 @@ def choice(name: str, value: str, words: Mapping[str, str], *, label: str = "") 
 
 def switch(name: str, label: object, *, on: bool, hint: str = "") -> Markup:
     """Give a check box with its words."""
-    box = fill(
-        "<input{rest}>",
-        rest=attributes(type="checkbox", id=ident(name), checked=on, data_set=name),
-    )
-    return fill(
-        '<label class="ws-switch"{title}>{box} {label}</label>',
-        title=attributes(title=hint or None), box=box, label=label,
-    )  # fmt: skip
+    box = _input(type="checkbox", id=ident(name), checked=on, data_set=name)
+    return tag("label", join((box, " ", label)), class_="ws-switch", title=hint or None)
 
 
 def fold(

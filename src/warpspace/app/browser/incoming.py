@@ -34,13 +34,17 @@ EventValue = Annotated[str, Meta(max_length=6_000_000)]
 Vector = tuple[Number, Number, Number]
 
 
-class Events(Struct, tag_field="type", tag="WarpspaceEvents", forbid_unknown_fields=True):
+class _Said(Struct, tag_field="type", forbid_unknown_fields=True):
+    pass
+
+
+class Events(_Said, tag="WarpspaceEvents"):
     """What a user has done, in order."""
 
     events: Annotated[list[tuple[EventName, EventValue]], Meta(max_length=MOST_EVENTS)]
 
 
-class CameraMoved(Struct, tag_field="type", tag="ViewerCameraMessage", forbid_unknown_fields=True):
+class CameraMoved(_Said, tag="ViewerCameraMessage"):
     """The page's camera; the first one opens the session."""
 
     wxyz: tuple[Number, Number, Number, Number]
@@ -54,9 +58,7 @@ class CameraMoved(Struct, tag_field="type", tag="ViewerCameraMessage", forbid_un
     up_direction: Vector
 
 
-class DrawingClicked(
-    Struct, tag_field="type", tag="ScenePointerMessage", forbid_unknown_fields=True
-):
+class DrawingClicked(_Said, tag="ScenePointerMessage"):
     """A click in the drawing."""
 
     event_type: Annotated[str, Meta(pattern="^click$")]
@@ -66,9 +68,7 @@ class DrawingClicked(
     modifier: Annotated[str, Meta(max_length=40)] | None
 
 
-class PictureRendered(
-    Struct, tag_field="type", tag="GetRenderResponseMessage", forbid_unknown_fields=True
-):
+class PictureRendered(_Said, tag="GetRenderResponseMessage"):
     """The picture that the app has asked for, a PNG."""
 
     payload: bytes
@@ -113,7 +113,6 @@ class Event:
 
 
 def event_of(name: str, value: str) -> Event:
-    """Give the event of a name, ``part:word``."""
     part, _, word = name.partition(":")
     return Event(part, word, value)
 

@@ -379,8 +379,7 @@
       if (token) address.searchParams.set("token", token);
       copyText(address.href, "Link copied", words);
     },
-    // the keys
-    tell(facts) { Object.assign(known, facts); },
+    keys(events) { known.keys = events; },
     show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },
     title(words) { document.title = `${words} · warpspace`; },
     dark(on) { document.documentElement.classList.toggle("ws-dark", on); },

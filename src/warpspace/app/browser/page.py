@@ -38,10 +38,6 @@ class Page:
                 if held:
                     send_script(self._client, "\n".join(held))
 
-    def tell(self, **facts: object) -> None:
-        """Tell the page its uploads and keys."""
-        self.call("tell", facts)
-
     def put(self, pieces: Mapping[str, str]) -> None:
         """Write pieces of HTML by the name of their place; what stands there is not sent again."""
         changed = {name: text for name, text in pieces.items() if self._sent.get(name) != text}
@@ -77,13 +73,11 @@ class Page:
 
     def report(self, error: Exception) -> None:
         """Tell the user of this tab what went wrong."""
-        title = "Not done" if isinstance(error, WarpspaceError) else "That did not work"
-        self.notify(title, error_words(error), "problem")
+        self.notify("That did not work", error_words(error), "problem")
 
 
 @cache
 def script_source(name: str) -> str:
-    """Give the text of a script or a style sheet of the page."""
     return files("warpspace.app.browser").joinpath(name).read_text("utf-8")
 
 

@@ -34,7 +34,6 @@ class Access:
     no_token: bool = False  # whether nothing is asked for, whoever can reach the app
 
     def choose_token(self, *, local: bool) -> str | None:
-        """Choose what is asked for."""
         if self.token is None:
             return None if local or self.no_token else secrets.token_urlsafe(TOKEN_BYTES)
         if self.no_token:

@@ -139,7 +139,6 @@ class TabConnection(ServerConnection):
     """
 
     def start(self, guard: Guard) -> None:
-        """Begin to count."""
         self._guard = guard
         self._rate = Rate(guard.limits.messages_per_second, guard.limits.burst)
         self._closing: asyncio.Task[None] | None = None

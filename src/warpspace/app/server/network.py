@@ -91,7 +91,6 @@ def reachable_address(address: str) -> str:
 
 
 def draw_code(link: str) -> str:
-    """Draw a link as a QR code for a terminal."""
     import segno
 
     drawn = io.StringIO()
@@ -100,7 +99,6 @@ def draw_code(link: str) -> str:
 
 
 def free_port(address: str, port: int | None) -> int:
-    """Choose the port to serve on."""
     if port is not None and not 1 <= port <= MAX_PORT:
         raise OptionError(f"--port {port}: expected 1 to {MAX_PORT}")
     first = DEFAULT_PORT if port is None else port
@@ -137,7 +135,6 @@ def _bind_error(address: str, port: int) -> int | None:
 
 
 def page_url(address: str, port: int) -> str:
-    """Spell the address to open in a browser."""
     wildcard = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(address)  # noqa: S104
     host = wildcard or (f"[{address}]" if ":" in address else address)
     return f"http://{host}:{port}"

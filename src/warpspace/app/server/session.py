@@ -119,15 +119,12 @@ class Session:
 
     @property
     def state(self) -> AppState:
-        """What is shown, or about to be."""
         return self.context.state
 
     def start(self) -> None:
-        """Build page and drawing, then follow the widgets."""
         self._worker.start()
 
     def stop(self) -> None:
-        """End the worker; nothing is sent any more."""
         self._stopped.set()
         for job in tuple(self.context.jobs):
             job.set()
@@ -135,16 +132,13 @@ class Session:
         self.context.store.unsubscribe(self.context.changed)
 
     def rename(self, token: str) -> None:
-        """Give page and session another token, since two tabs came with one."""
         self.token = token
         self.context.page.call("rename", token)
 
     def record(self) -> TabRecord:
-        """Give what is worth keeping of the tab."""
         return TabRecord(self.context.store, self.context.camera.remember())
 
     def use(self, store: StateStore) -> None:
-        """Steer another state from now on."""
         self.context.store.unsubscribe(self.context.changed)
         self.context.store, self.context.unfolded = store, store.state.page
         store.subscribe(self.context.changed)
@@ -247,8 +241,8 @@ class Session:
             elif (part := self.display.parts.get(event.part)) is not None:
                 take = partial(part.take, word=event.word, value=event.value)
                 self._guarded(partial(context.apply, take))
-        while action := context.take_action():
-            self._guarded(action)
+        while context.actions:
+            self._guarded(context.actions.popleft())
         notes, context.notes = context.notes, []
         state, shown = self.state, context.shown
         if shown is None:  # it could not be built

@@ -45,12 +45,10 @@ _TOKEN = re.compile(r"[0-9a-f]{32}")
 
 
 def new_token() -> str:
-    """Make a token that nobody guesses."""
     return secrets.token_hex(16)
 
 
 def is_token(text: str) -> bool:
-    """Tell whether a text that a browser has sent may be a token."""
     return _TOKEN.fullmatch(text) is not None
 
 

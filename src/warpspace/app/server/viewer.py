@@ -96,7 +96,6 @@ class Viewer:
 
     @property
     def url(self) -> str:
-        """Address of the page, without the token."""
         return page_url(self.address, self.port)
 
     @property
@@ -114,12 +113,10 @@ class Viewer:
 
     @property
     def is_local(self) -> bool:
-        """Whether only this machine can reach it."""
         return is_local(self.address)
 
     @property
     def sessions(self) -> tuple[Session, ...]:
-        """Sessions of the tabs that are open."""
         with self._lock:
             return tuple(self._sessions.values())
 
@@ -175,7 +172,6 @@ class Viewer:
                 session.stop()
 
     def stop(self) -> None:
-        """End all sessions and the server."""
         for session in self.sessions:
             session.stop()
         cut = threading.Timer(FAREWELL_S, self._guard.cut)

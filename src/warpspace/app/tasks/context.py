@@ -44,6 +44,7 @@ class Context:
         services: Services,
     ) -> None:
         self.client, self.page, self.camera = client, Page(server, client), TabCamera(client)
+        self.notify = self.page.notify
         self.events: deque[Event] = deque()
         self.store, self.scenes, self.services = store, scenes, services
         self.shown: LivePicture | None = None
@@ -61,7 +62,7 @@ class Context:
         self.notes: list[str] = []  # what updates of the state had to clamp
         self._own: tuple[object, AppState] = (None, store.state)
         self._wake = threading.Event()
-        self._actions: deque[Callable[[], None]] = deque()
+        self.actions: deque[Callable[[], None]] = deque()
 
     @property
     def state(self) -> AppState:
@@ -103,7 +104,6 @@ class Context:
         self._wake.set()
 
     def send(self, event: str, value: str = "") -> None:
-        """Do what an event of the page does; returns at once."""
         self.take(Events([(event, value)]))
 
     def post(self, update: Update) -> None:
@@ -112,11 +112,8 @@ class Context:
         self.changed()
 
     def act(self, action: Callable[[], None]) -> None:
-        """Queue something to be done beside the state (undo, a modal); returns at once.
-
-        The session does it, and shows and logs what it raises.
-        """
-        self._actions.append(action)
+        """Queue something that the session does; it shows what that raises; returns at once."""
+        self.actions.append(action)
         self._wake.set()
 
     def wait(self, seconds: float | None) -> bool:
@@ -126,16 +123,7 @@ class Context:
             self._wake.clear()
         return woken
 
-    def take_action(self) -> Callable[[], None] | None:
-        """Take the next action that was queued; None where there is none. For the session."""
-        return self._actions.popleft() if self._actions else None
-
-    def notify(self, title: str, text: str = "", kind: str = "done") -> None:
-        """Show a message in this tab: "done", "warning", "problem", or one that "stays"."""
-        self.page.notify(title, text, kind)
-
     def save_file(self, name: str, content: str | bytes) -> None:
-        """Have the browser save a file."""
         data = content.encode() if isinstance(content, str) else content
         self.client.send_file_download(name, data, save_immediately=True)
 

@@ -213,7 +213,7 @@ class PagePart(Part):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        context.page.tell(keys=key_events())
+        context.page.call("keys", key_events())
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         # the part of a window that is open fills it
