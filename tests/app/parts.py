@@ -69,7 +69,7 @@ def lone_part(kind: Any, said: list[Any] | None = None) -> Any:
     told = [] if said is None else said
     return kind(Nobody(
         act=lambda do: do(), renew=lambda _: None, notify=lambda *words: told.append(words),
-        stage=None, scenes=SimpleNamespace(add=told.append),
+        shown=None, stage=None, scenes=SimpleNamespace(add=told.append),
     ))  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from app.parts import answer_of, part_of, section
 from still_scenes import still_scene
-from warpspace.app.documents.files import exported_words, file_stem, shown_sides
+from warpspace.app.documents.files import exported_words
 from warpspace.app.documents.legend import picture_conditions, subject_words
 from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.scene_file import state_to_toml
@@ -29,14 +29,12 @@ from warpspace.app.state.table import without_table, without_words
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.analysis import Answer
 from warpspace.app.tasks.conventions import with_reference
-from warpspace.app.tasks.files import without_tables
 from warpspace.app.tasks.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
 from warpspace.cli.services import draw_compensation
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import Compensate, compensate, read_points
 from warpspace.kinematics.model import Loop
-from warpspace.machine.axes import TravelDirection
 from warpspace.outputs.charts.results import compensation_maps
 from warpspace.scene.library import load_scene
 
@@ -142,19 +140,6 @@ def test_slices_traces_and_the_tool_point_have_the_table_too(controller):
     assert np.linalg.norm(tool_point(picture)[1]) < np.linalg.norm(tool_point(bare)[1])
 
 
-def test_other_loops_and_directions_of_travel_are_evaluated_as_they_are(left):
-    tool, workpiece, relative = (
-        LIVE.evaluate(replace(left, loop=loop)).field.error_um
-        for loop in (Loop.TOOL, Loop.WORKPIECE, Loop.RELATIVE)
-    )
-    assert np.abs(relative - (tool - workpiece)).max() < 1e-3
-    plain = LIVE.evaluate(replace(START, loop=Loop.WORKPIECE)).field.error_um
-    assert np.abs(workpiece - plain).max() < 0.01  # no axis on that side is corrected
-    model = replace(SCENE.model, direction=TravelDirection.DIFFERENCE)
-    turned = replace(left, scene=replace(SCENE, model=model))
-    assert LIVE.evaluate(turned).field.norm_um.max() < 1e-9  # nothing depends on the direction
-
-
 def test_an_empty_table_leaves_what_is_drawn_without_one(controller):
     held = with_reference(START, {"X": 100.0, "Y": -50.0, "Z": -280.0})
     held = put(held, "positions.B", "20")
@@ -177,6 +162,8 @@ def test_what_changes_the_machine_ends_the_table(left, controller):
     machine = replace(SCENE.model.machine, title="another")
     other = replace(SCENE, model=replace(SCENE.model, machine=machine))
     assert with_changed_scene(left, other).controller is None
+    assert holds_for(START, controller)
+    assert not holds_for(start_state(load_scene("fork_head_bc")), controller)
     assert left.reset().controller is controller
     assert left.with_amplitude("EXX", 3.0).controller is controller
 
@@ -287,21 +274,6 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
     assert not plain.is_corrected
     said = [label.text for label in point_labels(LIVE.evaluate(asked)) if label.kind == "asked"]
     assert f"{picture.statistics.max_um:.1f} µm" in said[0]
-
-
-@pytest.mark.parametrize("box", [LEFT, BOTH])
-def test_figures_and_exports_are_those_of_the_machine_without_it(controller, box):
-    state = with_box(START, box, controller)
-    bare = without_tables(LIVE.evaluate(state))
-    (shown,) = shown_sides(bare, sheet=True)
-    assert shown.active_scene() == START.active_scene()
-    assert file_stem(LIVE.evaluate(state)) == "dvf5000_first_with_table"
-    assert file_stem(LIVE.evaluate(START)) == "dvf5000_first"
-
-
-def test_the_table_of_another_machine_is_none_of_this_one(controller):
-    assert holds_for(START, controller)
-    assert not holds_for(start_state(load_scene("fork_head_bc")), controller)
 
 
 def test_maps_are_drawn_beside_the_page_and_can_be_cancelled(found):

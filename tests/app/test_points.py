@@ -131,17 +131,6 @@ def test_any_text_is_read_or_refused(text):
     assert state.picked is None or all(map(np.isfinite, state.picked.at.values()))
 
 
-@given(
-    st.fixed_dictionaries(
-        {axis: st.floats(-400.0, 400.0) for axis in "XYZ"} | {"B": st.floats(-90.0, 90.0)}
-    )
-)
-def test_what_is_copied_is_read_back(at):
-    found = read_positions(spell_at(at))
-    assert found is not None
-    assert found == pytest.approx(at, abs=1e-6)
-
-
 def test_a_typed_point_is_clamped_to_the_travel_and_said():
     travel = FIRST.machine.axes["X"].travel
     state = put(START, "picked", "X 1e5 B 500")

@@ -3,14 +3,12 @@
 import re
 import time
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from warpspace.analysis.catalogue import entries
+from app.parts import LIVE, lone_part, part_of
 from warpspace.app.evaluation.budget import pick_worst, with_picked
-from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.analysis import AnalysisPart
@@ -18,16 +16,8 @@ from warpspace.app.tasks.improve import BestPart
 from warpspace.app.tasks.understand import VolumePart, WorstPart
 from warpspace.scene.library import load_scene, scene_names
 
-LIVE = LiveModel()
 STATE = start_state(load_scene("dvf5000_first"))
 NUMBER = r"[+−]?\d+\.\d"
-
-
-def context():
-    return SimpleNamespace(
-        act=lambda do: do(), renew=lambda _: None, notify=lambda *_: None, shown=None,
-        jobs=set(), store=SimpleNamespace(state=STATE),
-    )  # fmt: skip
 
 
 def html_of(part, state=STATE):
@@ -46,7 +36,7 @@ def value(text):
 @pytest.mark.parametrize("name", scene_names())
 def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
     state = start_state(load_scene(name), nodes=5)
-    html = html_of(WorstPart(context()), state)
+    html = html_of(lone_part(WorstPart), state)
     if "No error acts" in html:
         return
     shown = value(re.search(rf"why ({NUMBER}) µm", html)[1])
@@ -56,7 +46,7 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
 
 
 def test_the_worst_point_of_the_thesis_and_another_one():
-    part = WorstPart(context())
+    part = lone_part(WorstPart)
     assert "why 51.7 µm" in html_of(part)
     assert re.search(r'title="squareness of Z to Y[^"]*">EA0Z</b></th><td>\+49.1', html_of(part))
     typed = part.take(STATE, "set.at", "X 0 Y 0 Z −280")
@@ -72,7 +62,7 @@ def test_the_worst_point_of_the_thesis_and_another_one():
 
 
 def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_holds():
-    part = BestPart(context())
+    part = lone_part(BestPart)
     assert "Searching" in html_of(part)
     wait(part)
     html = html_of(part)
@@ -93,7 +83,7 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
 
 def test_an_excluded_error_is_neither_adjusted_nor_lost():
     state = put(STATE, "exclusions.excluded", "+EA0Z")
-    part = BestPart(context())
+    part = lone_part(BestPart)
     html_of(part, state)
     wait(part)
     assert "EA0Z" not in html_of(part, state)
@@ -103,11 +93,10 @@ def test_an_excluded_error_is_neither_adjusted_nor_lost():
 
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     opened = replace(STATE, page=replace(STATE.page, open=frozenset({"volume", "gains"})))
-    html = html_of(VolumePart(context()), opened)
+    html = html_of(lone_part(VolumePart), opened)
     for words in ("30.89 µm", "51.72 µm", "550 × 450 × 400 mm"):
         assert words in html
-    entry = next(one for one in entries() if one.name == "gains")
-    part = AnalysisPart(context(), entry)
+    part = part_of(AnalysisPart, "gains")
     html_of(part, opened)
     wait(part)
     middle = html_of(part, opened)
