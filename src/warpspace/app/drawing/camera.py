@@ -100,7 +100,7 @@ class TabCamera:
         self.wanted: CameraMemory | None = None
         self.view, self.orthographic = "iso", False  # chosen last: a key of `VIEWS`, the telephoto
         self._told: Room | None = None
-        self._put: CameraMemory | None = None
+        self._puts: tuple[CameraMemory, ...] = ()  # of late: a page may still tell the one before
 
     def choose(
         self, picture: LivePicture, view: str | None = None, lens: bool | None = None
@@ -139,8 +139,8 @@ class TabCamera:
 
     def take_room(self, room: Room, picture: LivePicture | None) -> None:
         """Take note of the drawing's room; a camera that nobody has moved fills it again."""
-        first, self._told, put = self._told is None, room, self._put
-        if picture is not None and put is not None and (first or put.is_near(self.remember())):
+        self._told, now = room, self.remember()
+        if picture is not None and any(put.is_near(now) for put in self._puts):
             self.fit(picture)
 
     def place(self, picture: LivePicture) -> None:
@@ -150,7 +150,7 @@ class TabCamera:
             self.fit(picture)
             return
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
-        self.orthographic, self._put = bool(telephoto), None
+        self.orthographic, self._puts = bool(telephoto), ()
         self._stand_at(memory, np.array([memory.look_at]) / SCENE_PER_MM)
 
     def fit(self, picture: LivePicture) -> None:
@@ -159,8 +159,9 @@ class TabCamera:
         found = fit_camera(
             points, room.aspect, VIEWS[self.view], self._fov_deg, margins=room.margins
         )
+        before = self.remember()
         self._stand_at(found, points)
-        self._put = self.remember()
+        self._puts = (*self._puts[-1:], before, self.remember())
 
     def remember(self) -> CameraMemory:
         camera = self._camera
