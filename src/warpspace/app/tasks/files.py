@@ -11,18 +11,7 @@ from markupsafe import Markup
 from warpspace.analysis.description import Result
 from warpspace.app.browser.html import button, choice, field, join, tag, text_box
 from warpspace.app.browser.incoming import index_of
-from warpspace.app.documents import scene_file
-from warpspace.app.documents.files import (
-    exported_words,
-    file_stem,
-    has_sheet,
-    pack,
-    read_upload,
-    robot_text,
-    safe_name,
-    unpack,
-    upload_text,
-)
+from warpspace.app.documents import files, scene_file
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
@@ -37,6 +26,7 @@ LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
 AS_COLOURED = "as the drawing is coloured"
+Write = Callable[[LivePicture, Job], bytes]
 PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
 
@@ -54,14 +44,7 @@ class JobWindow(Window):
         self._jobs = Jobs(self, partial(context.renew, self), context.page.report)
         self.said: dict[str, str] = dict.fromkeys(("figure", "author", "questions"), "")
 
-    def make(
-        self,
-        name: str,
-        ending: str,
-        write: Callable[[LivePicture, Job], bytes],
-        *,
-        as_drawn: bool = False,
-    ) -> None:
+    def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
         """Make a file of what is drawn beside the session, and have the browser save it."""
         drawn = self.context.shown
         if drawn is None:
@@ -71,7 +54,7 @@ class JobWindow(Window):
             picture = drawn if as_drawn else without_tables(drawn)
             content = write(picture, job)
             if not job.is_set():
-                self.context.save_file(f"{file_stem(picture)}{ending}", content)
+                self.context.save_file(f"{files.file_stem(picture)}{ending}", content)
 
         if not self._jobs.start(name, work):
             self.context.notify(
@@ -112,7 +95,7 @@ class FilesWindow(JobWindow):
             tag("p", "Errors, tolerances and machine as they are now, with view and camera."),
             actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
             *(link if services.token else ()),
-            tag("h3", "Picture"), tag("p", exported_words(picture), class_="ws-quiet"),
+            tag("h3", "Picture"), tag("p", files.exported_words(picture), class_="ws-quiet"),
             actions(button("Save what is on the screen (PNG)", "files:view")),
             field("Figure", kinds, "files:set.figure"),
             actions(button("Save figure (PNG)", "files:figure")),
@@ -144,22 +127,22 @@ class FilesWindow(JobWindow):
 
     def _open(self, value: str) -> None:
         """Open a scene or a machine, or show what a file of measured data would bring."""
-        name, content = read_upload(value)
+        name, content = files.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
-            text, notes = robot_text(name, content)
+            text, notes = files.robot_text(name, content)
         elif name.lower().endswith(".toml"):
-            text = upload_text(content, name)
+            text = files.upload_text(content, name)
         else:
             self.context.offer_import(name, content)
             return
-        opened, camera = scene_file.open_text(text, safe_name(name), name)
+        opened, camera = scene_file.open_text(text, files.safe_name(name), name)
         whole = is_robot or scene_file.is_looked_at(text)
         self.context.show_opened(opened, camera, whole=whole)
         self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, word: str) -> None:
-        opened = scene_file.open_link(unpack(word), self.context.scenes.fixed)
+        opened = scene_file.open_link(files.unpack(word), self.context.scenes.fixed)
         self.context.show_opened(*opened)
 
     # --- what is saved ---------------------------------------------------------------------------
@@ -167,7 +150,7 @@ class FilesWindow(JobWindow):
     def _save(self) -> None:
         state, camera = self.context.state, self.context.camera.remember()
         text = self._alone_if_large(lambda one: scene_file.state_to_toml(one, camera))
-        self.context.save_file(f"{safe_name(state.scene.name)}.toml", text)
+        self.context.save_file(f"{files.safe_name(state.scene.name)}.toml", text)
 
     def _share(self, *, with_token: bool) -> None:
         context = self.context
@@ -179,7 +162,7 @@ class FilesWindow(JobWindow):
         compared = " the comparison," if context.state.comparison.b is not None else ""
         held = f"the scene {context.state.scene.title},{edits}{compared} view and camera"
         warned = " Whoever has it can use this app." if token else ""
-        context.page.call("share", pack(link), token, f"It holds {held}.{warned}")
+        context.page.call("share", files.pack(link), token, f"It holds {held}.{warned}")
         context.client.flush()
 
     def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
@@ -258,7 +241,7 @@ class ReportWindow(JobWindow):
         found = picture.compared
         subject = (
             f"It compares A, {found.titles[0]}, with B, {found.titles[1]}."
-            if found is not None and has_sheet(picture)
+            if found is not None and files.has_sheet(picture)
             else f"It is about {picture.title}, as drawn now."
         )
         limit = f"{picture.state.specification.limit_um:g} µm"

@@ -96,7 +96,7 @@ class ScenesWindow(Window):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """Something that a key or the palette does: an event of the page, with its value."""
+    """Something that a key or the help does: an event of the page, with its value."""
 
     label: str
     event: str
@@ -234,8 +234,7 @@ class PagePart(Part):
             "task": partial(put, state, "page.task", value),
             "fold": partial(toggled, state, "page.open", value),
             "open": partial(put, put(state, "page.command", ""), "page.window", value),
-            "close": partial(put, state, "page.window", ""),
-            "tour": partial(put, state, "page.window", ""),
+            **dict.fromkeys(("close", "tour"), partial(put, state, "page.window", "")),
             "include": partial(replace, state, exclusions=Exclusions()),
             "zero": state.zeroed,
             "reset": state.reset,
