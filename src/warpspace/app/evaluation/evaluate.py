@@ -16,7 +16,7 @@ from warpspace.app.evaluation.compare import compare_pictures
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.look import default_held, slice_positions
+from warpspace.app.state.look import slice_positions
 from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid, build_slice
 from warpspace.geometry.colour import ColourScale
@@ -132,9 +132,8 @@ def _build(state: AppState) -> Response:
     scene = state.scene
     grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.nodes)
     positions = {**scene.workspace.positions, **state.positions}
-    held = default_held(scene, state.rotary, positions)
     points = state.rotary.points_mm(scene)
-    groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, held)
+    groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)
     given = scene.model, scene.errors, scene.parameter_keys
     traces = tuple(
         (one, build_basis(*given, one.coordinates, state.view(one.loop), one.nominal_mm))

@@ -29,13 +29,7 @@ EXAGGERATION = Span(*FACTORS, 1.0)
 LIMIT_UM = Span(1.0, 300.0, 0.5)
 PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
 START_NODES, START_UM = 21, 50.0
-TASKS = {
-    "understand": "Understand",
-    "measure": "Measure",
-    "improve": "Improve",
-    "design": "Design",
-    "machine": "Machine",
-}
+TASKS = {word.lower(): word for word in ("Understand", "Measure", "Improve", "Design", "Machine")}
 COMPONENT_NAMES = {
     "position": {"norm": "|E| length", "x": "E_x", "y": "E_y", "z": "E_z"},
     "orientation": {

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from warpspace.app.state.leaf import Span, described
 from warpspace.field.grid import slice_ranges
-from warpspace.geometry.traces import TILT_STEP_DEG
 from warpspace.machine import limits
 from warpspace.machine.description import Vector
 from warpspace.scene.model import Scene
@@ -115,7 +114,7 @@ class RotaryLook:
         linked="rotary.own",
         hint="x, y and z in the workpiece frame; empty for none.",
     )
-    # degrees; an axis not given where `default_held` puts it
+    # degrees; an axis not given where `warpspace.geometry.traces` puts it
     held: Mapping[str, tuple[float, ...]] = described(
         dict[str, tuple[float, ...]](),
         "Positions that rotary axes are held at",
@@ -181,24 +180,3 @@ def slice_positions(scene: Scene, look: Look, machine: MachineLook) -> dict[str,
         axis: span.clamp(chosen.get(axis, (span.low + span.high) / 2.0), span.low)
         for axis, span in slice_spans(scene).items()
     }
-
-
-def default_held(
-    scene: Scene, rotary: RotaryLook, positions: Mapping[str, float]
-) -> dict[str, tuple[float, ...]]:
-    """Give the positions that axes are held at, degrees, where the user has chosen none.
-
-    The axis next to the point stands where it is, the one before it where it is and 30 degrees to
-    either side.
-    """
-    found: dict[str, tuple[float, ...]] = {}
-    for side in ("workpiece", "tool"):
-        turning = [axis for axis in scene.machine.branch(side) if not axis.is_linear]
-        if len(turning) > 1:
-            *_, tilting, last = turning
-            found[last.name] = (positions.get(last.name, 0.0),)
-            low, high = tilting.travel
-            middle = positions.get(tilting.name, 0.0)
-            beside = {middle - TILT_STEP_DEG, middle + TILT_STEP_DEG}
-            found[tilting.name] = (*sorted({middle, *(at for at in beside if low <= at <= high)}),)
-    return {**found, **rotary.held}
