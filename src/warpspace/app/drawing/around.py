@@ -37,10 +37,7 @@ RESIDUALS = {True: (138, 143, 152), False: (47, 116, 192)}
 """Before the calibration, and after; those of the chart."""
 MOST_RESIDUALS = 400
 HEAD_PART = 0.7  # longest head, as a part of its arrow
-STROKES, SLANT = (
-    12,
-    0.3,
-)  # of a head: how many, and how far they stand away, as a part of its length
+STROKES, SLANT = 12, 0.3  # lines of a head, and how far they slant, as a part of its length
 
 
 def around(picture: LivePicture) -> Shapes:
