@@ -119,7 +119,6 @@ class ErrorBasis:
         return amplitudes[:, None] * chosen.reshape(len(self.keys), 3)
 
 
-# --- Where the workpiece lies: six numbers that a relative error contains and nobody sees on a part
 # They are a shift along the axes of the workpiece frame and a small rotation about them, so that
 # they stay the same wherever the axes stand.
 
