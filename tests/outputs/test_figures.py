@@ -140,11 +140,6 @@ def test_different_volumes_cannot_be_compared():
         draw_figure("comparison", [load_scene("dvf5000_first"), scene_of("six")])
 
 
-def test_traces_need_a_rotary_axis():
-    with pytest.raises(OptionError, match="no traces"):
-        draw_figure("traces", [scene_of("two")])
-
-
 def test_auto_overrides_the_exaggeration_of_a_scene():
     text = f"title='s'\n{MACHINES['tiny']}\n[view]\nexaggeration = 500\n"
     scene = parse_scene(text.replace("0.00012", "12"), "s")

@@ -281,14 +281,6 @@ def test_a_volume_along_one_axis_tells_fewer_numbers():
     assert np.abs(placement).max() < 1000.0
 
 
-def test_only_the_relative_loop_has_a_placement():
-    with pytest.raises(
-        OptionError,
-        match="tool loop does not show where the workpiece lies; expected loop relative",
-    ):
-        evaluate(_scene("EC0Y = 40.0\n"), placed=True)
-
-
 @pytest.fixture(scope="module")
 def scene():
     return warpspace.load_scene("dvf5000_first")

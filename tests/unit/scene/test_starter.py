@@ -8,7 +8,6 @@ from chains import chains
 from warpspace import evaluate
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.schematic import build_layout
-from warpspace.exceptions import SceneError
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.scene.library import parse_scene
@@ -84,8 +83,3 @@ def test_the_text_explains_itself():
     assert len(explained) > 0.5 * len(text.splitlines())
     switched_on = text.replace("# EYX = ", "EYX = ")
     assert parse_scene(switched_on, "mine").errors.amplitude("EYX") == 5.0
-
-
-def test_what_is_no_title_is_said():
-    with pytest.raises(SceneError, match="4000 characters"):
-        starter_scene("wFXt", title="x" * 5000)
