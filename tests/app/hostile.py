@@ -25,7 +25,7 @@ PATHS = (
 WORDS = (
     "open", "close", "fold", "task", "undo", "redo", "toggle", "run", "cancel", "apply", "preview",
     "save", "report", "share", "link", "export", "view", "row", "only", "exclude", "find",
-    "refused", "set.value", "set.EXX", "set.QQQ", "set.__class__", "set.", "", ":", TAG,
+    "file", "set.value", "set.EXX", "set.QQQ", "set.__class__", "set.", "", ":", TAG,
 )  # fmt: skip
 
 
