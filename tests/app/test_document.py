@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from app.hostile import upload
 from warpspace.app.documents.files import (
+    file_stem,
     pack,
     read_upload,
     safe_file_name,
@@ -101,6 +102,7 @@ def test_a_proposal_that_is_looked_at_comes_back():
     assert back.comparison.b.state.scene.reference == state.comparison.b.state.scene.reference
     titles = LiveModel().evaluate(replace(back, nodes=5)).compared.titles
     assert titles == (f"present errors: {FIRST.title}", "Repaired")
+    assert file_stem(LiveModel().evaluate(replace(back, nodes=5))) == "B_after"
 
 
 def test_every_part_of_a_comparison_is_written():

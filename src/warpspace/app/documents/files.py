@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 from warpspace.app.evaluation.compare import AFTER, BEFORE
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState
+from warpspace.app.state.app_state import AppState, Side
 from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_SCENE_BYTES
@@ -131,11 +131,12 @@ def file_stem(picture: LivePicture) -> str:
     if found is None or drawn_tables(picture.state):
         tail = "_with_table" if drawn_tables(picture.state) else ""
         return safe_name(picture.state.scene.name) + tail
+    before = chosen.a.state is not None and not chosen.a.is_scene
     a, b = (
-        (AFTER if chosen.pinned else "present") if side is None or side.state is None
-        else side.state.scene.name if side.is_scene
-        else BEFORE
-        for side in (chosen.a, chosen.b)
+        side.state.scene.name if side.state and side.is_scene
+        else word if side.state or (before and word == AFTER)
+        else "present"
+        for side, word in ((chosen.a, BEFORE), (chosen.b or Side(), AFTER))
     )  # fmt: skip
     return safe_name({"a": f"A_{a}", "b": f"B_{b}"}.get(found.shown, f"{b}_minus_{a}"))
 

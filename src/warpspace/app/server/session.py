@@ -253,7 +253,7 @@ class Session:
             with TURNS.take(self):
                 self._show(self._live.evaluate(state), shown, anew=bool(notes))
         if notes:
-            context.notify("Clamped", "\n".join(notes), "warning")
+            context.notify("Not taken as typed", "\n".join(notes), "warning")
 
     def _show(self, picture: LivePicture, before: LivePicture, *, anew: bool) -> None:
         context = self.context

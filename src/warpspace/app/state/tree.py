@@ -220,9 +220,8 @@ def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
         expected = f"expected positions of the axes {', '.join(sorted(known, key=axis_order))}"
         raise Unreadable(f"{expected}, for instance {EXAMPLE}")
     before = {} if state.picked is None else state.picked.at
-    middle = state.scene.workspace.positions
-    at = {axis: before.get(axis, middle.get(axis, 0.0)) for axis in spans}
-    state = replace(state, picked=Picked(at))
+    stands = {**state.scene.workspace.positions, **before}
+    state = replace(state, picked=Picked({axis: stands.get(axis, 0.0) for axis in spans}))
     for axis, position in typed.items():
         group = "picked.at" if axis in spans else "positions"
         state = set_leaf(state, leaves(state)[f"{group}.{axis}"], repr(position))
