@@ -189,7 +189,7 @@ class AnalysisPart(Section):
             parts.append(tag("div", said, class_="ws-result" + (" stale" if faded else "")))
             parts += [tag("p", words, class_="ws-doubt") for words in found.doubts()]
             parts.append(self.actions(found, stale=stale))
-        bar = EMPTY if answer is not None and is_quick else self._jobs.html()
+        bar = EMPTY if stale and is_quick else self._jobs.html()
         wanted = answer is None or problem or (stale and not is_quick)
         if wanted and is_ready and not bar:
             words = f"{self.run_words} again" if answer else self.run_words
