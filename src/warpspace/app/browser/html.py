@@ -11,7 +11,7 @@ from html import escape
 
 from markupsafe import Markup
 
-from warpspace.units import MINUS, THIN_SPACE
+from warpspace.units import MINUS
 
 EMPTY = Markup("")
 
@@ -93,11 +93,6 @@ def signed(value: float, digits: int = 1) -> str:
     """Spell a number with its sign; zero has none."""
     text = number(value, digits)
     return text if text.startswith(MINUS) or not float(text.replace(MINUS, "-")) else f"+{text}"
-
-
-def thousands(count: int) -> str:
-    """Spell a large count with thin spaces: ``20 000``."""
-    return f"{count:,}".replace(",", THIN_SPACE)
 
 
 def lowered(text: str) -> Markup:

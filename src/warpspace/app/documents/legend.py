@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.statistics import share_below, volume_statistics
-from warpspace.app.browser.html import fill, join, lowered, number, tag, thousands
+from warpspace.app.browser.html import fill, join, lowered, number, tag
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import axis_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
@@ -26,7 +26,7 @@ from warpspace.picture.words import (
     spell_factor,
 )
 from warpspace.scene.model import second_order
-from warpspace.units import Array, spell_short
+from warpspace.units import Array, spell_count, spell_short
 
 # --- The colour bar -------------------------------------------------------------------------------
 
@@ -202,7 +202,7 @@ def look_words(picture: LivePicture) -> list[str]:
     """Say what is looked at, and how; of a difference for both sides."""
     machine, both = picture.drawn_state.scene.machine, picture.both_words
     size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
-    nodes = thousands(picture.field.norm_um.size)
+    nodes = spell_count(picture.field.norm_um.size)
     return [
         f"exaggeration {spell_factor(picture.exaggeration)}",
         f"{both(lambda state: state.loop.value)} loop",

@@ -26,7 +26,6 @@ from warpspace.app.browser.html import (
     slider,
     tag,
     text_box,
-    thousands,
 )
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
@@ -43,7 +42,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Tolerance, ToleranceSet
 from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import Array, spell_count
 
 SAMPLES = 20_000  # machines of a probability on the page
 ENSEMBLES: Cache[Ensemble] = Cache(100_000_000)
@@ -148,7 +147,7 @@ class TolerancesPart(AnalysisPart):
         )  # fmt: skip
         numbers = (
             f"mean {number(stream.mean_um)} · P95 {number(stream.quantile(0.95))} ·"
-            f" largest {number(stream.max_um)} µm; {thousands(stream.count)} machines,"
+            f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines,"
             f" 95 % confidence {percent(kept.low)} … {percent(kept.high)} %"
         )
         return told + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")

@@ -1,5 +1,6 @@
 """Controls with unit, range and help: of the options of an analysis, of leaves of the state."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 from markupsafe import Markup
@@ -28,9 +29,7 @@ def _control(name: str, one: Option, given: str | None, scene: Scene) -> Markup:
         return switch(name, one.label, hint=hint, on=(given or str(int(one.default))) == "1")
     if one.choices or typed == "AXIS":
         known = one.choices or tuple(scene.machine.axes)
-        words = {
-            one_: one.words.get(one_, one_.replace("_", " ").replace("-", " ")) for one_ in known
-        }
+        words = {key: one.words.get(key, re.sub("[_-]", " ", key)) for key in known}
         if not one.default:
             words = {OWN: default or "automatic", **words}
         control = choice(name, str(one.default or OWN) if given is None else given, words)

@@ -17,7 +17,6 @@ from warpspace.app.browser.html import (
     signed,
     tag,
     text_box,
-    thousands,
 )
 from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation.budget import Answer, answer, pick_worst, with_picked
@@ -30,6 +29,7 @@ from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
 from warpspace.picture.words import LOOP_WORDS, spell_axes, spell_in_r
 from warpspace.scene.model import evaluate_grid
+from warpspace.units import spell_count
 
 FIRST = 3  # contributions in sight at once; all of them stand under Details
 DIFFERENCE = "B − A is a difference: show A or B to see what the error of a point consists of."
@@ -183,7 +183,7 @@ class VolumePart(Section):
                       ("tilt, max", f"{number(float(tilt.max()))} µrad")]  # fmt: skip
         size = " × ".join(number(float(edge), 0) for edge in picture.grid.extent_mm)
         lines += [
-            ("nodes", thousands(picture.field.norm_um.size)),
+            ("nodes", spell_count(picture.field.norm_um.size)),
             ("volume", f"{size} mm"),
             ("loop", ", ".join((LOOP_WORDS[state.loop], *placed_words(state.view())))),
         ]
