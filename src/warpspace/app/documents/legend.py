@@ -15,16 +15,8 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import table_words
 from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
 from warpspace.geometry.colour import ColourScale
+from warpspace.picture import words
 from warpspace.picture.comparison import conditions_of_both
-from warpspace.picture.words import (
-    convention_words,
-    direction_words,
-    list_axes,
-    own_axes,
-    range_words,
-    reference_words,
-    spell_factor,
-)
 from warpspace.scene.model import second_order
 from warpspace.units import Array, spell_count, spell_short
 
@@ -123,8 +115,8 @@ def numbers_words(picture: LivePicture) -> str:
 
 def place_words(picture: LivePicture) -> str:
     """Say where the max is: ``at X 275 Y −225 Z −480``."""
-    axes = own_axes(picture.drawn_state.scene, picture.statistics.max_at_axes)
-    return f"at {list_axes(axes)}" if axes else ""
+    axes = words.own_axes(picture.drawn_state.scene, picture.statistics.max_at_axes)
+    return f"at {words.list_axes(axes)}" if axes else ""
 
 
 def kept_words(picture: LivePicture) -> tuple[str, bool]:
@@ -142,15 +134,15 @@ def kept_words(picture: LivePicture) -> tuple[str, bool]:
 def subject_words(picture: LivePicture) -> list[str]:
     """Say what is drawn beside the scene: side of a comparison, table, changes, exclusions."""
     state = picture.drawn_state
-    words = [] if picture.compared is None else [picture.compared.title]
+    found = [] if picture.compared is None else [picture.compared.title]
     table = "" if picture.is_difference else table_words(state)
-    if table and not (words and table in words[0]):
-        words.append(table)
+    if table and not (found and table in found[0]):
+        found.append(table)
     if edited := len(state.changed_keys):
-        words.append(f"{edited} error{'s' if edited > 1 else ''} changed")
+        found.append(f"{edited} error{'s' if edited > 1 else ''} changed")
     if excluded := len(_left_out(state)):
-        words.append(f"{excluded} excluded")
-    return [*words, *direction_words(state.scene)]
+        found.append(f"{excluded} excluded")
+    return [*found, *words.direction_words(state.scene)]
 
 
 # --- Conditions: what a reader must know who takes a picture for all of its scene -----------------
@@ -181,7 +173,7 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Say all that a file of a picture must say; of a difference for both sides."""
 
     def of(state: AppState) -> tuple[str, ...]:
-        view = (*direction_words(state.scene), *placed_words(state.view()))
+        view = (*words.direction_words(state.scene), *placed_words(state.view()))
         return (*view, *state_conditions(state), *filter(None, [table_words(state)]))
 
     if picture.is_difference and picture.compared is not None:
@@ -195,7 +187,7 @@ def range_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Say where a user has fixed the range of the colours."""
     scale = picture.scale
     fixed = picture.state.look.range_mode == "fixed"
-    return (range_words(scale.low, scale.high, scale.unit),) if fixed else ()
+    return (words.range_words(scale.low, scale.high, scale.unit),) if fixed else ()
 
 
 def look_words(picture: LivePicture) -> list[str]:
@@ -204,13 +196,13 @@ def look_words(picture: LivePicture) -> list[str]:
     size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
     nodes = spell_count(picture.field.norm_um.size)
     return [
-        f"exaggeration {spell_factor(picture.exaggeration)}",
+        f"exaggeration {words.spell_factor(picture.exaggeration)}",
         f"{both(lambda state: state.loop.value)} loop",
-        both(lambda state: reference_words(state.scene)),
+        both(lambda state: words.reference_words(state.scene)),
         *picture_conditions(picture),
         f"{machine.title}, chain {machine.chain}",
         f"{size} mm, {nodes} nodes",
-        both(lambda state: convention_words(state.scene)),
+        both(lambda state: words.convention_words(state.scene)),
         both(lambda state: "exact chain" if state.controller else "first-order model"),
         "error = actual − nominal",
     ]
@@ -235,8 +227,6 @@ def seen_words(
     px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
     spots = np.stack([width / 2.0 + across * px, height / 2.0 + up * px], axis=-1)
     inside = (away > 0.0) & (spots > 0.0).all(axis=-1) & (spots < (width, height)).all(axis=-1)
-    words = [
-        (one.text, spot) for one, spot, here in zip(labels, spots, inside, strict=False) if here
-    ]
+    seen = [(label.text, spots[k]) for k, label in enumerate(labels) if inside[k]]
     has_bars = picture.state.look.bars and away[-1] > 0.0
-    return words, float(px[-1]) * SCENE_PER_MM if has_bars else None
+    return seen, float(px[-1]) * SCENE_PER_MM if has_bars else None

@@ -18,15 +18,7 @@ import viser
 from markupsafe import escape
 
 from warpspace.app.browser.html import attributes, fill, join, lowered, number, rows, tag
-from warpspace.app.documents.legend import (
-    kept_words,
-    legend_html,
-    look_words,
-    numbers_words,
-    picture_conditions,
-    place_words,
-    subject_words,
-)
+from warpspace.app.documents import legend
 from warpspace.app.drawing.around import around, words
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
@@ -38,7 +30,6 @@ from warpspace.app.state.app_state import start_state
 from warpspace.field.grid import MIN_NODES
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import ErrorFunction
 from warpspace.picture.model import choose_scale
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
@@ -100,7 +91,7 @@ def build_offline_html(
     """Build the page: the interactive scene with its colour bar, numbers and factor."""
     # a page in an attribute: only these two characters would end or change it
     inner = build_scene_html(picture, camera=camera).replace("&", "&amp;").replace('"', "&quot;")
-    conditions = list(picture_conditions(picture))
+    conditions = list(legend.picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
     stored = json.dumps(about, ensure_ascii=False, allow_nan=False)
     template = files("warpspace.app.documents").joinpath("offline.html").read_text("utf-8")
@@ -108,11 +99,11 @@ def build_offline_html(
     counted = "unlike in A and B" if picture.is_difference else "not zero"
     found = picture.statistics
     numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um, "max": found.max_um}
-    kept = "" if picture.is_difference else f" · {kept_words(picture)[0]}"
-    factor, *looks = look_words(picture)
+    kept = "" if picture.is_difference else f" · {legend.kept_words(picture)[0]}"
+    factor, *looks = legend.look_words(picture)
     heading = (
-        f"{numbers_words(picture)} {place_words(picture)}{kept} · {factor}",
-        *(one for one in subject_words(picture) if one != picture.title),
+        f"{legend.numbers_words(picture)} {legend.place_words(picture)}{kept} · {factor}",
+        *(one for one in legend.subject_words(picture) if one != picture.title),
     )
     asked = [label for label in point_labels(picture) if label.kind == "asked"]
     remarks = (*looks, "drag to turn, wheel to zoom", f"warpspace {__version__}")
@@ -121,7 +112,7 @@ def build_offline_html(
         program=f"warpspace {__version__}",
         policy=POLICY,
         heading=join(tag("p", words) for words in heading),
-        legend=legend_html(picture),
+        legend=legend.legend_html(picture),
         numbers=tag("b", lowered(f"{picture.length_words} over the volume"))
         + rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
         scene=inner,
@@ -139,18 +130,13 @@ def build_offline_html(
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
     """Spell the errors that are not zero, or unlike in A and B: key, plain name, value and unit."""
-    if picture.compared is not None and picture.is_difference:
-        a, b = (side.active_scene().errors.functions for side in picture.compared.sides)
-        values = {
-            key: f"A {_amplitude(a.get(key))}, B {_amplitude(b.get(key))}"
-            for key in {**a, **b}
-            if a.get(key) != b.get(key)
-        }
-    else:
-        values = {key: f"{v:+g}" for key, v in picture.drawn_state.active.items() if v != 0.0}
-    named = ((parameter(key), value) for key, value in values.items())
-    return [(row.key, row.name, f"{v} {row.unit}".replace("-", "−")) for row, v in named]
-
-
-def _amplitude(function: ErrorFunction | None) -> str:
-    return f"{function.amplitude:+g}" if function is not None and function.amplitude else "0"
+    both = picture.compared.sides if picture.compared and picture.is_difference else ()
+    sides = [one.active_scene().errors.functions for one in both or (picture.drawn_state,)]
+    found: list[tuple[str, str, str]] = []
+    for row in map(parameter, dict.fromkeys(key for side in sides for key in side)):
+        given = [side.get(row.key) for side in sides]
+        spelt = [f"{one.amplitude:+g}" if one and one.amplitude else "0" for one in given]
+        value = f"A {spelt[0]}, B {spelt[1]}" if both else spelt[0]
+        if (given[0] != given[1]) if both else value != "0":
+            found.append((row.key, row.name, f"{value} {row.unit}".replace("-", "−")))
+    return found

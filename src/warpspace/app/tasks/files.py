@@ -25,7 +25,6 @@ from warpspace.formats.registry import formats
 LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
-AS_COLOURED = "as the drawing is coloured"
 Write = Callable[[LivePicture, Job], bytes]
 PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
@@ -77,7 +76,8 @@ class FilesWindow(JobWindow):
 
     def body(self, picture: LivePicture) -> Markup:
         services = self.context.services
-        figures = {"": AS_COLOURED, **{one: one.replace("-", " ") for one, _ in services.figures}}
+        figures = {"": "as the drawing is coloured"}
+        figures |= {one: one.replace("-", " ") for one, _ in services.figures}
         kinds = choice("files:set.figure", self.said["figure"], figures)
         exports = (
             button(f"{end[1:].upper()}", "files:export", end, hint=words)
@@ -198,13 +198,9 @@ class FilesWindow(JobWindow):
     def _page(self) -> None:
         from warpspace.app.documents.offline_page import build_offline_html
 
-        camera = self.context.camera.remember()
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
-
-        def write(picture: LivePicture, _: Job) -> bytes:
-            return build_offline_html(picture, toml, camera).encode()
-
-        self.make("Page", ".html", write, as_drawn=True)
+        build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
+        self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
 
     def _export(self, ending: str) -> None:
         services = self.context.services
