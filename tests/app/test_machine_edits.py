@@ -177,6 +177,34 @@ def test_every_machine_of_the_library_starts_with_its_own_scene(state):
         assert state.scene.title in changed.notes[0]
 
 
+def test_a_broken_scene_beside_the_bundled_ones_hides_no_machine(tmp_path, monkeypatch):
+    monkeypatch.setattr("warpspace.scene.library.scenes_dir", lambda: tmp_path)
+    (tmp_path / "a_broken.toml").write_text("errors = 7")
+    (tmp_path / "whole.toml").write_text(scene_to_toml(PLAIN))
+    assert {*library.__wrapped__()} == {"whole"}
+
+
+def test_what_stands_somewhere_stays_within_the_ranges_of_another_machine(state):
+    for path, text in (
+        ("rotary.held.C", "0,200"),
+        ("rotary.held.B", "-30"),
+        ("look.slices_mm.Z", "-100"),
+        ("machine.linear_mm.X", "250"),
+    ):
+        state = put(state, path, text)
+    changed = with_word(state, "travel C 1 180")
+    for word in ("volume Z 1 -200", "volume X 1 100", "travel X 1 100", "remove B"):
+        changed = with_word(changed, word)
+    assert changed.rotary.held == {"C": (0.0,)}
+    assert changed.look.slices_mm == {"Z": -200.0}
+    assert changed.machine.linear_mm == {"X": 100.0}
+    opened, _ = open_text(state_to_toml(changed), "own", "own.toml")
+    assert opened.notes == ()
+    assert opened.rotary == changed.rotary
+    assert LIVE.evaluate(changed).traces
+    assert changed.with_scene(load_scene("machine_c_frame_mill")).rotary.held == {}
+
+
 def test_a_chain_that_is_refused_stays_in_its_box_with_the_reason(state):
     editor = lone_part(EditorSection)
     assert editor.take(state, "set.chain", "wC<script>") is state

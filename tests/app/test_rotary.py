@@ -8,7 +8,7 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
-from warpspace.machine.errors import Ramp
+from warpspace.machine.errors import Constant, Ramp
 from warpspace.scene.library import load_scene
 
 STATE = start_state(load_scene("dvf5000_first"), nodes=5)
@@ -29,6 +29,13 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     text = body_of(RotarySection, state)
     assert text.count("<svg") == 3
     assert "8.00 µm" in text
+    located = with_curve(STATE, "EX0C", Constant(rising.span, 6.0))
+    text = body_of(RotarySection, located.with_amplitude("EA0C", 20.0))
+    for head, unit in (("axis displaced", "µm"), ("axis inclined", "µrad"), ("radial", "µm")):
+        assert f"<th>{head} <small>{unit}</small></th>" in text
+    # by hand: 450 mm above the table, 20 µrad add 9 µm across to 6 µm
+    row = ("275.0", "10.82", "20.00", "21.63 / 0.00", "0.00 / 0.00", "40.00 / 0.00")
+    assert f"C at B 0°, point (0, 275, 450) mm</td><td>{'</td><td>'.join(row)}</td>" in text
     hidden = body_of(RotarySection, replace(state, shown=replace(state.shown, traces=False)))
     assert "Draw the traces" in hidden
     assert "<svg" not in hidden

@@ -21,6 +21,9 @@ class Motion:
     unit: str  # µm or µrad
     values: Array  # [n], µm or µrad; actual − nominal at every position
     about_line: Array  # [n], µm or µrad; what remains about the axis average line
+    # size of that line's part once a turn, µm or µrad: how far the axis is displaced at the height
+    # of the point, or how much it is inclined
+    once_a_turn: float
     # strongest harmonic of the deviation; None where it does not vary, or the axis does not go
     # round
     times_a_turn: int | None
@@ -83,21 +86,22 @@ def assemble_motion(
     """Give the motions of radial, axial and tilt deviations, [n] each."""
     theta = np.deg2rad(angle_deg)
     kept = slice(None, -1 if closed else None)  # the last place of a turn is the first one
-    once = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
+    turn = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
 
     def motion(name: str, unit: str, values: Array, line: Array) -> Motion:
         strongest = times_a_turn(values) if closed else None
-        fitted = line @ np.linalg.lstsq(line[kept], values[kept], rcond=None)[0]
-        return Motion(name, f"{name} error motion", unit, values, values - fitted, strongest)
+        coefficients = np.linalg.lstsq(line[kept], values[kept], rcond=None)[0]
+        rest, once = values - line @ coefficients, float(np.linalg.norm(coefficients[1:]))
+        return Motion(name, f"{name} error motion", unit, values, rest, once, strongest)
 
     radial, axial, tilt = deviations
     return AxisMotion(
         angle_deg,
         closed,
         radius_mm,
-        motion("radial", "µm", radial, once),
-        motion("axial", "µm", axial, once[:, :1]),
-        motion("tilt", "µrad", tilt, once),
+        motion("radial", "µm", radial, turn),
+        motion("axial", "µm", axial, turn[:, :1]),
+        motion("tilt", "µrad", tilt, turn),
     )
 
 

@@ -22,6 +22,7 @@ def test_shift_of_the_axis_is_runout_once_a_turn_that_the_average_line_takes_out
     assert found.radial.values == pytest.approx(3.0 * np.cos(THETA) + 4.0 * np.sin(THETA))
     assert found.radial.peak_to_valley == pytest.approx(10.0, rel=2e-3)  # twice hypot(3, 4)
     assert found.radial.motion_value == pytest.approx(0.0, abs=1e-9)
+    assert (found.radial.once_a_turn, found.axial.once_a_turn) == pytest.approx((5.0, 0.0))
     assert found.radial.times_a_turn == 1
     assert (found.axial.peak_to_valley, found.tilt.peak_to_valley) == pytest.approx((0.0, 0.0))
     assert found.axial.times_a_turn is None

@@ -71,6 +71,25 @@ def test_wobbling_table_tilts_once_and_runs_out_twice_a_turn():
     assert motion.tilt.motion_value == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("error", "displaced_um", "inclined_urad"),
+    # by hand: an inclination of 20 µrad displaces the centre of a circle 450 mm up by 9 µm
+    [("EX0C = 6", 6.0, 0.0), ("EY0C = -4", 4.0, 0.0), ("EA0C = 20", 9.0, 20.0), ("EZC = 5", 0, 0)],
+)
+def test_location_errors_displace_and_incline_the_axis(error, displaced_um, inclined_urad):
+    scene = parse_scene(
+        '[machine]\nchain="wCFt"\n[machine.travel]\nC=[0, 360]\n[workspace]\nC=0\n[points_mm]\n'
+        f"traces=[[275,0,450]]\n[errors]\n{error}\n",
+        "table",
+    )
+    (line,) = lines_of(scene).values()
+    motion = evaluate_axis_motion(scene, line)
+    found = motion.radial.once_a_turn, motion.tilt.once_a_turn
+    assert found == pytest.approx((displaced_um, inclined_urad), abs=1e-9)
+    values = [one.motion_value for one in motion.motions]
+    assert values == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
 def test_point_on_the_axis_has_no_motion():
     scene = parse_scene(
         '[machine]\nchain="wCFt"\n[workspace]\nC=0\n[points_mm]\ntraces=[[0,0,50]]\n'

@@ -40,12 +40,13 @@ def side_state(now: AppState, side: Side) -> AppState:
         base = replace(base, loop=now.loop, placed=now.placed, positions=at)
     points = base.scene.trace_points_mm == now.scene.trace_points_mm
     turns_alike = points and base.positions.keys() == now.positions.keys()
-    return replace(
+    found = replace(
         base,
         rotary=now.rotary if turns_alike else RotaryLook(),
         comparison=Comparison(),
         **{name: getattr(now, name) for name in LOOKED_AT},
     )
+    return found.within_reach()
 
 
 def scene_side(scene: Scene) -> Side:

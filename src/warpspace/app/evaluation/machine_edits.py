@@ -6,6 +6,7 @@ belongs to axes that stay is kept.
 
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from typing import Any, TypeVar
@@ -313,7 +314,8 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         controller=state.controller if scene.model == before.model else None,
     )
     curves = changed.own_curves
-    return replace(changed, start={k: curves[k].amplitude if k in curves else 0.0 for k in keys})
+    start = {key: curves[key].amplitude if key in curves else 0.0 for key in keys}
+    return replace(changed.within_reach(), start=start)
 
 
 def _amplitude(state: AppState, scene: Scene, key: str) -> float:
@@ -406,8 +408,10 @@ def _alike(*curves: ErrorFunction) -> bool:
 def library() -> Mapping[str, Scene]:
     """Give a scene of each machine, by the machine's name: it brings its volume and points."""
     found: dict[str, Scene] = {}
-    for scene in map(load_scene, scene_names()):
-        found.setdefault(scene.machine.name, scene)
+    for name in scene_names():
+        with suppress(WarpspaceError):  # a broken scene beside the others hides none of them
+            scene = load_scene(name)
+            found.setdefault(scene.machine.name, scene)
     return found
 
 

@@ -10,7 +10,15 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from warpspace.app.state.leaf import Span, described, error_names, said
-from warpspace.app.state.look import Look, MachineLook, RotaryLook, position_spans
+from warpspace.app.state.look import (
+    Look,
+    MachineLook,
+    RotaryLook,
+    clamped,
+    linear_spans,
+    position_spans,
+    slice_spans,
+)
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -358,11 +366,26 @@ class AppState:
     def with_scene(self, scene: Scene) -> "AppState":
         """Show another scene, in its own loop; component, density and switches stay."""
         fresh = start_state(scene)
-        return replace(
+        shown = replace(
             fresh,
             specification=self.specification if scene.limit_um is None else fresh.specification,
             rotary=replace(self.rotary, off=frozenset()),
             **{name: getattr(self, name) for name in KEPT},
+        )
+        return shown.within_reach()
+
+    def within_reach(self) -> "AppState":
+        """Bring slices, axes and held angles into the scene's ranges; those without axis go."""
+        spans, slices = linear_spans(self.scene), slice_spans(self.scene)
+        held = {
+            axis: tuple(at for at in self.rotary.held.get(axis, ()) if span.low <= at <= span.high)
+            for axis, span in self.position_spans.items()
+        }
+        return replace(
+            self,
+            look=replace(self.look, slices_mm=clamped(slices, self.look.slices_mm)),
+            machine=replace(self.machine, linear_mm=clamped(spans, self.machine.linear_mm)),
+            rotary=replace(self.rotary, held={axis: at for axis, at in held.items() if at}),
         )
 
     def with_edited(self, scene: Scene) -> "AppState":

@@ -168,6 +168,10 @@ def _spans(scene: Scene, *, within: bool) -> dict[str, Span]:
     return found
 
 
+def clamped(spans: Mapping[str, Span], positions: Mapping[str, float]) -> dict[str, float]:
+    return {axis: spans[axis].clamp(at, at) for axis, at in positions.items() if axis in spans}
+
+
 def linear_positions(scene: Scene, look: MachineLook) -> dict[str, float]:
     """Give where the linear axes of a scene stand, mm, always within their ranges."""
     at = {**scene.workspace.positions, **look.linear_mm}

@@ -245,8 +245,8 @@ COSTS = {
     "zero_at": "curves: zero in the middle of each axis",
 }
 NOTE = (
-    "Change of the error vector over the nodes of the grid: each choice alone, against the"
-    " conventions of the scene."
+    "Change of the error vector over the nodes of the grid, through the loop that is drawn: each"
+    " choice alone, against the conventions of the scene."
 )
 RADIO = (
     '<label><input type="radio" name="{}" value="{}"{} data-set="conventions:choose"> {}</label>'

@@ -59,6 +59,16 @@ KEY = (
     '<p class="ws-key ws-tiny"><span class="ws-s0">actual − nominal</span>'
     '<span class="ws-s1">dashed: about the axis average line</span></p>'
 )
+HEADS = {
+    "trace": "",
+    "radius": "mm",
+    "axis displaced": "µm",
+    "axis inclined": "µrad",
+    "radial": "µm",
+    "axial": "µm",
+    "tilt": "µrad",
+}
+"""Columns of the traces in numbers, with their units; the axis is where it runs on average."""
 MOST_ROWS = 24  # traces in the table
 
 
@@ -119,8 +129,7 @@ def _trace(picture: LivePicture) -> Markup:
     motions = {one: motion_of(picture, moved[one]) for one in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
     shown = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
-    heads = {"trace": "", "radius": "mm", "radial": "µm", "axial": "µm", "tilt": "µrad"}
-    columns = tuple(Column(head, unit=unit) for head, unit in heads.items())
+    columns = tuple(Column(head, unit=unit) for head, unit in HEADS.items())
     rows = [(one, *_numbers(found)) for one, found in motions.items()]
     table = tag("summary", "All traces in numbers") + block_html(Table(columns, rows))
     return chosen + shown + tag("details", table, class_="ws-options")
@@ -128,9 +137,10 @@ def _trace(picture: LivePicture) -> Markup:
 
 def _numbers(motion: AxisMotion | None) -> Sequence[str]:
     if motion is None:
-        return "on the axis", "", "", ""
+        return "on the axis", *[""] * (len(HEADS) - 2)
+    axis = (f"{one.once_a_turn:.2f}" for one in (motion.radial, motion.tilt))
     pairs = (f"{one.peak_to_valley:.2f} / {one.motion_value:.2f}" for one in motion.motions)
-    return f"{motion.radius_mm:.1f}", *pairs
+    return f"{motion.radius_mm:.1f}", *axis, *pairs
 
 
 def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
