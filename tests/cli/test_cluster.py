@@ -5,12 +5,10 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import psutil
 import pytest
 
 import warpspace as package
@@ -176,26 +174,3 @@ def test_processes_give_the_same_numbers(warpspace, monkeypatch):
     here, there = warpspace(*run, "--workers", "1"), warpspace(*run, "--workers", "2")
     assert there.status == 0, there.err
     assert here.out == there.out
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif(sys.platform != "linux", reason="signals")
-def test_a_run_that_is_interrupted_leaves_no_process_and_no_file(tmp_path):
-    target = tmp_path / "x.parquet"
-    run = ("-m", "warpspace", "montecarlo", "dvf5000_general", "--samples", "50000000")
-    process = subprocess.Popen(
-        [sys.executable, *run, "--workers", "2", "-o", str(target)], stderr=subprocess.PIPE
-    )
-    parent = psutil.Process(process.pid)
-    until = time.monotonic() + 60.0
-    while not list(tmp_path.glob(".warpspace-*")) or len(parent.children()) < 3:
-        assert time.monotonic() < until
-        time.sleep(0.05)
-    time.sleep(5.0)
-    children = parent.children(recursive=True)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=20)
-    assert process.returncode == 130
-    assert said.decode().strip() == "warpspace: interrupted"
-    assert psutil.wait_procs(children, 10)[1] == []
-    assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 
 import pytest
 
-from products import first
 from warpspace.analysis import thesis
 from warpspace.analysis.blocks import Column, number_columns
 from warpspace.cli import tables as module
@@ -159,13 +158,10 @@ def in_terminal(width, *arguments, **environment):
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, width, 0, 0))
     unset = {"COLUMNS", "LINES", "NO_COLOR", "FORCE_COLOR", "TERM"}
     kept = {key: value for key, value in os.environ.items() if key not in unset}
-    process = subprocess.Popen(
-        [sys.executable, "-m", "warpspace", *arguments],
-        stdin=theirs,
-        stdout=theirs,
-        stderr=theirs,
-        env={**kept, "TERM": "xterm-256color", **environment},
-    )
+    command = [sys.executable, "-m", "warpspace", *arguments]
+    streams = dict.fromkeys(("stdin", "stdout", "stderr"), theirs)
+    shown = {**kept, "TERM": "xterm-256color", **environment}
+    process = subprocess.Popen(command, env=shown, **streams)
     os.close(theirs)
     found = b""
     try:
@@ -182,12 +178,14 @@ def in_terminal(width, *arguments, **environment):
 SHADES = r"\x1b\[[\d;]*m"
 
 
-@pytest.mark.parametrize("width", first(60, 80, 120))
-def test_a_table_fits_a_real_terminal(width):
-    status, out = in_terminal(width, "gains", "dvf5000_first")
+@pytest.mark.parametrize(
+    ("width", "columns", "most"), [*((n, {}, n) for n in (60, 120)), (120, {"COLUMNS": "70"}, 70)]
+)
+def test_a_table_fits_a_real_terminal_or_the_columns_that_are_wanted(width, columns, most):
+    status, out = in_terminal(width, "gains", "dvf5000_first", **columns)
     assert status == 0
     plain = re.sub(SHADES, "", out)
-    assert max(len(line) for line in plain.replace("\r", "").split("\n")) <= width
+    assert max(len(line) for line in plain.replace("\r", "").split("\n")) <= most
     assert "\x1b" not in plain
 
 
@@ -195,11 +193,6 @@ def test_no_color_means_no_colour():
     status, out = in_terminal(80, "measured", "dvf5000_first", "--grid", "3", NO_COLOR="1")
     assert status == 0
     assert not re.search(r"\x1b\[[\d;]*(3|4|9|10)\d", out)
-
-
-def test_columns_overrules_the_terminal():
-    _, out = in_terminal(120, "gains", "dvf5000_first", COLUMNS="70")
-    assert max(len(line) for line in re.sub(SHADES, "", out).splitlines()) <= 70
 
 
 class Terminal(io.StringIO):
@@ -238,14 +231,9 @@ def test_work_without_steps_shows_that_it_goes_on():
         assert wait_for(shown, "drawing [/b]")
 
 
-def test_short_work_shows_nothing():
-    with terminal(delay_s=60.0) as shown, progress("sampling", 3) as bar:
-        bar.advance(3)
-    assert shown.getvalue() == ""
-
-
-def test_silent_work_shows_nothing():
-    with terminal() as shown, progress("sampling", silent=True):
+@pytest.mark.parametrize(("delay_s", "silent"), [(60.0, False), (0.05, True)])
+def test_short_and_silent_work_show_nothing(delay_s, silent):
+    with terminal(delay_s) as shown, progress("sampling", silent=silent):
         time.sleep(0.3)
     assert shown.getvalue() == ""
 

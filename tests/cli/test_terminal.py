@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from products import pairwise
 from warpspace.cli.tables import escape_json, plain
 
 EVIL = "red\x1b[31m\x9b2J\x07 \u202egpj.exe\u2066 end"
@@ -15,19 +16,13 @@ STEERING = ("\x1b", "\x9b", "\x07", "\u202e", "\u2066")
 MAIN = "from warpspace.cli import main; main()"
 
 
-def run(*arguments, cwd=None, **variables):
-    return subprocess.run(
-        [sys.executable, "-c", MAIN, *arguments],
-        cwd=cwd,
-        env={**os.environ, **variables},
-        capture_output=True,
-        check=False,
-        timeout=120,
-    )
+def run(*arguments, code=MAIN, start=None, cwd=None, **variables):
+    command = [sys.executable, "-c", code, *arguments]
+    how = {"cwd": cwd, "env": {**os.environ, **variables}, "preexec_fn": start}
+    return subprocess.run(command, capture_output=True, check=False, timeout=120, **how)
 
 
 def is_refusal(result, *fragments):
-    """Check for exit 2 and one message."""
     text = result.stderr.decode()
     assert result.returncode == 2, text
     assert "Traceback" not in text
@@ -96,13 +91,39 @@ def test_a_working_folder_that_is_gone(tmp_path):
     folder = tmp_path / "gone"
     folder.mkdir()
     code = f"import os; os.rmdir({str(folder)!r}); {MAIN}"
-    done = subprocess.run(
-        [sys.executable, "-c", code, "check", "dvf5000_first"],
-        cwd=folder,
-        capture_output=True,
-        check=False,
-    )
+    done = run("check", "dvf5000_first", code=code, cwd=folder)
     is_refusal(done, "the working folder does not exist any more")
+
+
+def limit_addresses():
+    """Limit the address space as `ulimit -v 400000` does."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (400_000 * 1024, 400_000 * 1024))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="others do not keep the limit")
+@pytest.mark.parametrize(
+    ("arguments", "threads"),
+    pairwise(
+        [
+            ("field", "dvf5000_first", "--grid", "41", "--csv", "x.csv"),
+            ("gains", "dvf5000_first", "--plot", "x.svg"),
+            ("draw", "dvf5000_first", "-o", "x.png"),
+            ("report", "dvf5000_first", "-o", "x.html"),
+            ("test", "circular", "dvf5000_first", "--plot", "x.svg"),
+            ("view", "--no-browser"),
+        ],
+        ["1", ""],
+    ),
+)
+def test_a_small_address_space_gives_one_message(arguments, threads, tmp_path):
+    few = {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
+    found = run(*arguments, cwd=tmp_path, start=limit_addresses, **few)
+    is_refusal(found, "warpspace: not enough memory: the address space is limited to")
+    assert found.stdout == b""
+    assert found.stderr.count(b"\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.nightly

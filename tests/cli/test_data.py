@@ -1,12 +1,132 @@
-"""Commands that take in and convert: measured errors, robots, conventions."""
+"""Measured data on the command line: the commands test, calibrate and import."""
 
+import itertools
 import json
+import re
 
 import numpy as np
 import pytest
 import trimesh
 
 from warpspace.scene.library import load_scene
+
+RUNS = "run,direction,target_mm,deviation_um\n" + "".join(
+    f"{run},{sign},{target},{target / 100 + (0.5 if sign == '-' else 0.0) + 0.1 * run}\n"
+    for run in (1, 2, 3) for sign in "+-" for target in (-200, -100, 0, 100, 200)
+)  # fmt: skip
+
+
+def test_json_of_positioning_data_has_the_keys_of_the_contract(warpspace, tmp_path):
+    data = tmp_path / "runs.csv"
+    data.write_text(RUNS, encoding="utf-8")
+    found = json.loads(
+        warpspace("test", "positioning", "dvf5000_first", "--data", data, "--json").out
+    )
+    for key in ("A_um", "E_um", "M_um", "R_um", "B_um"):
+        assert isinstance(found[key], float)
+    for way in ("forward", "backward"):
+        assert {f"A_{way}_um", f"E_{way}_um", f"R_{way}_um"} <= found.keys()
+    assert found["of"] == "measured"
+    assert found["B_um"] == pytest.approx(0.5)
+    assert found["M_um"] == pytest.approx(4.0)
+    assert found["model"]["E_um"] == pytest.approx(0.0, abs=1e-6)
+    assert 1.0 < found["rms_difference"] < 1.5  # a slope of 1 µm in 100 mm; the zero is free
+
+
+def test_figure_with_data_over_the_model(warpspace, tmp_path):
+    data, plot = tmp_path / "runs.csv", tmp_path / "plot.svg"
+    data.write_text(RUNS, encoding="utf-8")
+    arguments = ("test", "positioning", "dvf5000_first", "--data", data, "--plot", plot)
+    out = warpspace(*arguments).out
+    assert "measured" in out
+    text = plot.read_text("utf-8")
+    assert "forward, measured" in text
+    warpspace(*arguments).refused("exists already")
+    plot.unlink()
+    data.write_text(RUNS.replace("0.6", "nan"), encoding="utf-8")
+    warpspace(*arguments).refused(str(data), "expected a finite number")
+    assert not plot.exists()
+    warpspace("test", "positioning", "dvf5000_first", "--data", plot).refused("no such file")
+
+
+def test_readings_in_another_unit_are_said(warpspace, tmp_path):
+    data = tmp_path / "circle.csv"
+    rows = "".join(f"{angle},{(angle % 7) * 1000.0}\n" for angle in range(0, 360, 5))
+    data.write_text("angle_deg,radial_um\n" + rows, encoding="utf-8")
+    run = warpspace("test", "circular", "dvf5000_first", "--data", data, "--json")
+    assert run.status == 0
+    assert "are they in nm?" in run.err
+    assert json.loads(run.out)["notes"]
+
+
+TCP = ("calibrate", "fork_head_bc", "--data", "tcp_on.csv", "--kind", "sphere-tcp")
+
+
+def test_calibrated_scene_opens_and_leaves_what_was_promised(warpspace, tmp_path):
+    target = tmp_path / "fitted.toml"
+    found = json.loads(warpspace(*TCP, "-o", target, "--json").out)
+    scene = load_scene(str(target))
+    assert scene.title == "Fork head B-C, a real machine, calibrated"
+    for one in found["parameters"]:
+        assert scene.errors.amplitude(one["key"]) == pytest.approx(one["value"])
+    again = json.loads(warpspace("calibrate", target, "--data", "tcp_on.csv", "--json").out)
+    assert again["rms_before_mm"] == pytest.approx(found["rms_after_mm"])
+    warpspace(*TCP, "-o", target).refused("fitted.toml", "exists")
+
+
+AT = tuple(
+    word
+    for a, c, x in itertools.product((-90, -30, 30), (0, 100, 260), (-200, 200))
+    for word in ("--at", f"X={x},Y={x / 2 + a},Z={-200 + a - c / 4},A={a},C={c}")
+)
+
+
+def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
+    """Trunnion A-C: the same errors out of R, out of the workpiece frame, out of JSON."""
+    nominal, found = tmp_path / "nominal.toml", []
+    nominal.write_text('machine = "trunnion_ac"\n', encoding="utf-8")
+    errors = "EC0Y = 25\nEB0A = -30\nEX0C = 12\n"
+    scene = tmp_path / "scene.toml"
+    scene.write_text(f'machine = "trunnion_ac"\n[errors]\n{errors}', encoding="utf-8")
+    relative = ("field", scene, *AT, "--loop", "relative", "--exact")
+    fit = ("calibrate", nominal, "--fit", "EC0Y,EB0A,EX0C", "--json", "--data")
+    for frame in ("machine", "workpiece"):
+        table, printed = tmp_path / f"{frame}.csv", tmp_path / f"{frame}.json"
+        out = warpspace(*relative, "--frame", frame, "--csv", table, "--json").out
+        printed.write_text(out, encoding="utf-8")
+        found += [json.loads(warpspace(*fit, path).out) for path in (table, printed)]
+    for one in found:
+        values = [row["value"] for row in one["parameters"]]
+        assert values == pytest.approx([25.0, -30.0, 12.0], rel=1e-6)
+        assert not any("frame" in note for note in one["notes"])
+    # a table that does not say its frame
+    bare, text = tmp_path / "bare.csv", (tmp_path / "machine.csv").read_text(encoding="utf-8")
+    bare.write_text(re.sub("error_relative_R_(.)_um", r"e\1_um", text), encoding="utf-8")
+    wrong = json.loads(warpspace(*fit, bare).out)
+    assert wrong["rms_after_mm"] > 5e-3
+    (note,) = (note for note in wrong["notes"] if "likely wrong" in note)
+    assert f"{1e3 * wrong['rms_after_mm']:.3g} µm" in note
+    assert "--frame machine" in note
+    right = json.loads(warpspace(*fit, bare, "--frame", "machine").out)
+    assert right["rms_after_mm"] < 1e-8
+    assert not any("frame" in note for note in right["notes"])
+    # what contradicts itself, and what is no relative error
+    warpspace(*fit, tmp_path / "machine.csv", "--frame", "workpiece").refused("machine frame")
+    warpspace("field", scene, *AT, "--csv", tmp_path / "tool.csv")
+    warpspace(*fit, tmp_path / "tool.csv").refused("error_tool_r_x_um", "--loop relative")
+    placed = warpspace(*relative, "--placed", "--csv", tmp_path / "placed.csv", "--json").out
+    (tmp_path / "placed.json").write_text(placed, encoding="utf-8")
+    for name in ("placed.csv", "placed.json"):
+        warpspace(*fit, tmp_path / name).refused("error_relative_placed_r", "--kind tracker")
+        read = json.loads(warpspace(*fit, tmp_path / name, "--kind", "tracker").out)
+        assert [row["value"] for row in read["parameters"] if row["told"] == "yes"] == (
+            pytest.approx([25.0, -30.0, 12.0], rel=1e-3)
+        )
+    held = scene.read_text(encoding="utf-8") + "[view]\nreference = { X = 0, Y = 0, Z = -100 }\n"
+    scene.write_text(held, encoding="utf-8")
+    warpspace(*relative, "--csv", tmp_path / "held.csv")
+    warpspace(*fit, tmp_path / "held.csv").refused("error_relative_referenced_r")
+    warpspace(*TCP, "--frame", "machine").refused("--frame", "no file holds error vectors")
 
 
 def write(folder, name, text):

@@ -1,0 +1,235 @@
+"""What commands write: files of every kind, nothing unasked over what is there, and no formulas."""
+
+import csv
+import io
+import stat
+
+import pytest
+
+from products import first, pairwise
+from warpspace.calibration.readings import parse_table
+from warpspace.outputs.exports.fields import write_rows
+from warpspace.outputs.figures import catalogue
+from warpspace.scene.library import load_scene
+
+SCENE = """
+title = "small"
+machine = "dvf5000"
+[errors]
+EXX = { csv = "measured.csv", column = "error" }
+"""
+WRITERS = {
+    "field": (("field", "{scene}", "--grid", "3", "--csv"), "x.csv"),
+    "field parquet": (("field", "{scene}", "--grid", "3", "-o"), "x.parquet"),
+    "field npz": (("field", "{scene}", "--grid", "3", "-o"), "x.npz"),
+    "field vts": (("field", "{scene}", "--grid", "3", "-o"), "x.vts"),
+    "gains csv": (("gains", "{scene}", "--csv"), "x.csv"),
+    "gains plot": (("gains", "{scene}", "--plot"), "x.svg"),
+    "montecarlo": (("montecarlo", "{scene}", "--samples", "200", "--plot"), "x.svg"),
+    "machines sampled": (("montecarlo", "{scene}", "--samples", "200", "-o"), "x.csv"),
+    "sweep": (("sweep", "{scene}", "--samples", "200", "-o"), "x.parquet"),
+    "contributions": (("contributions", "{scene}", "--plot"), "x.svg"),
+    "ballbar": (("ballbar", "{scene}", "--plane", "XY", "--radius", "100", "--plot"), "x.svg"),
+    "test": (("test", "straightness", "{scene}", "--plot"), "x.svg"),
+    "draw": (("draw", "{scene}", "-o"), "x.svg"),
+    "compare": (("compare", "{scene}", "{scene}", "-o"), "x.svg"),
+    "report": (("report", "{scene}", "-o"), "x.html"),
+    "draw moving": (("draw", "{scene}", "-o"), "x.gif"),
+    "export": (("export", "{scene}", "-o"), "x.csv"),
+    "thesis": (("thesis", "--markdown"), "x.md"),
+    "new machine": (("new-machine", "wFXt", "-o"), "x.toml"),
+    "repair": (("repair", "{scene}", "--grid", "3", "-o"), "x.toml"),
+    "concepts": (("concepts", "{scene}", "{scene}", "--samples", "200", "--csv"), "x.csv"),
+    "convert": (("convert", "{scene}", "--to", "squareness=over_90", "-o"), "x.toml"),
+    "template": (("import", "--template", "X", "-o"), "x.csv"),
+}
+
+
+@pytest.fixture
+def scene(tmp_path):
+    (tmp_path / "measured.csv").write_text("X,error\n-275,0\n275,4\n", encoding="utf-8")
+    path = tmp_path / "s.toml"
+    path.write_text(SCENE, encoding="utf-8")
+    return path
+
+
+def command(writer, scene):
+    return [part.format(scene=scene) for part in WRITERS[writer][0]]
+
+
+@pytest.mark.parametrize("writer", WRITERS)
+def test_an_existing_file_stays_unless_forced(writer, scene, tmp_path, warpspace):
+    target = tmp_path / WRITERS[writer][1]
+    target.write_text("mine", encoding="utf-8")
+    warpspace(*command(writer, scene), target).refused("exists already; --force replaces it")
+    assert target.read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o664])
+@pytest.mark.parametrize("writer", ["field", "gains plot"])
+def test_a_replaced_file_keeps_its_mode(writer, mode, scene, tmp_path, warpspace):
+    target = tmp_path / WRITERS[writer][1]
+    target.write_text("old", encoding="utf-8")
+    target.chmod(mode)
+    assert warpspace(*command(writer, scene), target, "--force").status == 0
+    assert stat.S_IMODE(target.stat().st_mode) == mode
+    assert target.read_text(encoding="utf-8") != "old"
+
+
+def test_a_loop_of_links_is_refused(scene, tmp_path, warpspace):
+    target = tmp_path / "x.csv"
+    target.symlink_to(target)
+    warpspace(*command("field", scene), target).refused("x.csv", "symbolic links")
+    warpspace("check", target).refused("x.csv")
+
+
+TEXTS = ("=1+1", "+1", "-run1", "run1", "@x", "\t=1", "\r=1", "'=1", "'x", "plain")
+FIVE_AXES = """title = "W"
+[machine]
+chain = "wCbWXYZt"
+[machine.offset_mm]
+Z = [0, 0, 300]
+[machine.travel]
+W = [0, 100]
+X = [-100, 100]
+Y = [-100, 100]
+Z = [-100, 0]
+C = [-180, 180]
+[errors]
+EXX = 3.0
+EAW = 4.0
+"""
+
+
+def cells(content):
+    assert content.endswith(b"\n")
+    assert b"\r\n" not in content
+    return list(csv.reader(io.StringIO(content.decode(), newline="")))
+
+
+@pytest.fixture
+def machine(tmp_path):
+    path = tmp_path / "=w.toml"
+    path.write_text(FIVE_AXES, encoding="utf-8")
+    return path
+
+
+def test_gains_have_the_unit_of_every_axis(machine, warpspace, tmp_path):
+    target = tmp_path / "gains.csv"
+    assert warpspace("gains", machine, "--csv", target).status == 0
+    head = cells(target.read_bytes())[0]
+    assert {"W_mm", "X_mm", "C_deg"} <= set(head)
+    assert "W_deg" not in head
+
+
+def test_the_name_of_a_scene_is_no_formula(machine, warpspace, tmp_path):
+    target = tmp_path / "field.csv"
+    result = warpspace("export", machine, "-o", target, "--grid", "2")
+    assert result.status == 0, result.err
+    for row in cells(target.read_bytes())[1:]:
+        assert "'=w" in row
+        assert not any(cell.startswith(("=", "+", "@", "\t", "\r")) for cell in row)
+
+
+def test_texts_of_a_table_stay_apart(tmp_path):
+    target = tmp_path / "t.csv"
+    with write_rows(target, {"session": "text", "x_mm": "number"}) as append:
+        append({"session": TEXTS, "x_mm": range(len(TEXTS))})
+    written = [row[0] for row in cells(target.read_bytes())[1:]]
+    assert not any(text.startswith(("=", "+", "-", "@", "\t", "\r")) for text in written)
+    table = parse_table(target.read_bytes().decode(), "t.csv")
+    assert table.session == TEXTS
+
+
+def test_sessions_that_differ_in_their_sign_stay_apart(warpspace, tmp_path):
+    """`-run1` was written as `run1`."""
+    data, target = tmp_path / "=data.csv", tmp_path / "residuals.csv"
+    rows = [f"{x},{y},{x / 50},{y / 90},1,{name}" for x in (-100, 0, 100) for y in (-100, 100)
+            for name in ("-run1", "run1")]  # fmt: skip
+    data.write_text("x_mm,y_mm,ex_um,ey_um,ez_um,session\n" + "\n".join(rows), encoding="utf-8")
+    result = warpspace("calibrate", "dvf5000_nominal", "--data", data, "--csv", target)
+    assert result.status == 0, result.err
+    head, *written = cells(target.read_bytes())
+    assert {row[head.index("session")] for row in written} == {"'-run1", "run1"}
+    assert {row[head.index("file")] for row in written} == {"'=data.csv"}
+
+
+FORMATS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
+PLOTS = {
+    "gains": ("gains", "dvf5000_general", "--at", "Y=-225,Z=-480"),
+    "gains over the travel": ("gains", "dvf5000_general", "--loop", "workpiece", "--max"),
+    "montecarlo": ("montecarlo", "dvf5000_general", "--samples", "2000", "--spec-um", "50"),
+    "contributions": ("contributions", "dvf5000_general"),
+    "sobol": ("contributions", "dvf5000_proposed", "--sobol", "64"),
+    "ballbar": ("ballbar", "dvf5000_first", "--plane", "YZ", "--radius", "150"),
+    "ballbar without errors": ("ballbar", "dvf5000_nominal", "--plane", "XY", "--radius", "50"),
+}
+
+
+@pytest.mark.parametrize(("plot", "ending"), pairwise([*PLOTS], [*FORMATS]))
+def test_plots_are_written_twice_alike(warpspace, tmp_path, plot, ending):
+    files = [tmp_path / f"{run}{ending}" for run in "ab"]
+    for file in files:
+        result = warpspace(*PLOTS[plot], "--plot", file)
+        assert (result.status, result.err) == (0, "")
+    first, second = (file.read_bytes() for file in files)
+    assert first.startswith(FORMATS[ending])
+    assert first == second
+    assert len(first) > 3000
+    assert {file.name for file in tmp_path.iterdir()} == {file.name for file in files}
+
+
+SMALL = ("--size", "400x300", "--grid", "3")
+
+
+def test_the_command_names_every_figure_of_one_scene(warpspace):
+    words = warpspace("draw", "--help").out.replace(",", " ").replace(".", " ").split()
+    assert set(catalogue.figure_names()) <= set(words)
+
+
+@pytest.mark.render
+@pytest.mark.usefixtures("renderer")
+@pytest.mark.parametrize("ending", first("png", "svg", "pdf"))
+def test_a_snapshot_is_written(warpspace, tmp_path, ending):
+    target = tmp_path / f"map.{ending}"
+    result = warpspace("draw", "dvf5000_first", "-o", target, *SMALL)
+    assert result.status == 0, result.err
+    assert target.stat().st_size > 5000
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_the_table_that_was_written_is_imported_again(tmp_path, warpspace):
+    target = tmp_path / "m.cma"
+    arguments = ("compensate", "dvf5000_first", "--format", "heidenhain", "--grid", "X=3,Y=9")
+    assert warpspace(*arguments, "-o", target).status == 0
+    files = sorted(tmp_path.iterdir())
+    assert [file.name for file in files] == ["m.cma", "m_X.COM", "m_Y.COM", "m_Z.COM"]
+    scene = tmp_path / "back.toml"
+    result = warpspace("import", *files, "--machine", "dvf5000_nominal", "-o", scene)
+    assert result.status == 0, result.err
+    assert {"EXX", "EYX", "EZX", "EYY"} <= set(load_scene(scene).errors)
+
+
+@pytest.mark.parametrize("ending", first("svg", "png"))
+def test_charts_are_drawn(ending, tmp_path, warpspace):
+    chart = tmp_path / f"c.{ending}"
+    arguments = ("compensate", "dvf5000_first")
+    table = ("--format", "linuxcnc-matrix", "-o", tmp_path / "m.hal")
+    assert warpspace(*arguments, *table, "--plot", chart).status == 0
+    assert chart.stat().st_size > 5000
+    other = tmp_path / f"s.{ending}"
+    formats = ("--format", "sinumerik-enc", "--format", "marlin")
+    result = warpspace(*arguments, "--sweep", "3,5", *formats, "--plot", other)
+    assert result.status == 0, result.err
+    assert "sinumerik-enc" in result.out
+    assert other.stat().st_size > 5000
+
+
+def test_existing_files_and_the_scene_itself_stay(tmp_path, warpspace):
+    table = tmp_path / "t_X.COM"
+    table.write_text("mine", encoding="utf-8")
+    target = tmp_path / "t.cma"
+    arguments = ("compensate", "dvf5000_first", "--format", "heidenhain", "-o", target)
+    warpspace(*arguments).refused("t_X.COM", "exists already")
+    assert table.read_text(encoding="utf-8") == "mine"
+    assert not target.exists()
