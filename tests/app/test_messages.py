@@ -21,9 +21,10 @@ from reliability.outcome import Lag
 from warpspace.app.browser.incoming import MOST_EVENTS, Event, event_of, read_message
 from warpspace.app.browser.page import Page
 from warpspace.app.browser.viser_private import connection_of, send_at_once, serve_with
+from warpspace.app.server import session
 from warpspace.app.server.guard import TabConnection
 from warpspace.app.server.network import RepeatedLines
-from warpspace.app.server.session import Turns
+from warpspace.app.server.session import turn
 from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
@@ -188,25 +189,22 @@ def test_texts_stay_texts_within_a_script():
         assert "\u2028" not in script
 
 
-def test_who_has_kept_the_server_busy_stands_back():
-    turns, order = Turns(), []
-    busy, other, idle = (threading.Event() for _ in range(3))
+def test_tabs_that_wait_get_their_picture_in_turn():
+    order: list[int] = []
 
     def work(who):
-        with turns.take(who):
+        with turn():
             order.append(who)
 
-    with turns.take(busy):
-        time.sleep(0.05)
-    with turns.take(other):
-        waiting = [threading.Thread(target=work, args=(who,)) for who in (busy, idle)]
-        for thread in waiting:
+    with turn():
+        waiting = [threading.Thread(target=work, args=(who,)) for who in range(3)]
+        for at, thread in enumerate(waiting, start=2):
             thread.start()
-        while len(turns._waiting) < 2:
-            time.sleep(0.01)
+            while len(session._TURNS) < at:
+                time.sleep(0.01)
     for thread in waiting:
         thread.join()
-    assert order == [idle, busy]
+    assert order == [0, 1, 2]
 
 
 def test_lines_of_one_kind_are_counted():

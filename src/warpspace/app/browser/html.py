@@ -28,7 +28,6 @@ def fill(template: str, /, *values: object, **named: object) -> Markup:
 
 
 def join(parts: Iterable[object]) -> Markup:
-    """Put pieces one behind the other."""
     return Markup("".join(map(text, parts)))  # noqa: S704 - escaped there
 
 
@@ -48,7 +47,6 @@ def _spelt(name: str) -> str:
 
 
 def tag(name: str, body: object = "", **values: object) -> Markup:
-    """Give an element with its attributes."""
     return Markup(f"<{name}{attributes(**values)}>{text(body)}</{name}>")  # noqa: S704
 
 
@@ -143,7 +141,6 @@ def slider(name: str, value: float, low: float, high: float, step: float, *,
 
 
 def choice(name: str, value: str, words: Mapping[str, str], *, label: str = "") -> Markup:
-    """Give a list to choose from."""
     options = join(
         tag("option", said, value=key, selected=key == value) for key, said in words.items()
     )
@@ -153,7 +150,6 @@ def choice(name: str, value: str, words: Mapping[str, str], *, label: str = "") 
 
 
 def switch(name: str, label: object, *, on: bool, hint: str = "") -> Markup:
-    """Give a check box with its words."""
     box = _input(type="checkbox", id=ident(name), checked=on, data_set=name)
     return tag("label", join((box, " ", label)), class_="ws-switch", title=hint or None)
 

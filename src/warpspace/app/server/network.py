@@ -36,12 +36,10 @@ def resolve_host(host: str) -> str:
 
 
 def is_local(address: str) -> bool:
-    """Tell whether an address can be reached from this machine only."""
     return ipaddress.ip_address(address.partition("%")[0]).is_loopback
 
 
 def is_everywhere(address: str) -> bool:
-    """Tell whether an address stands for all those of this machine."""
     return ipaddress.ip_address(address.partition("%")[0]).is_unspecified
 
 

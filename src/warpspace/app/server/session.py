@@ -14,21 +14,17 @@ however fast the slider was moved.
 """
 
 import logging
-import math
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
-from viser import ClientHandle, ViserServer
 
 from warpspace.app.browser.incoming import Event
-from warpspace.app.documents.scene_file import SceneList
-from warpspace.app.documents.services import Services
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
@@ -48,46 +44,25 @@ logger = logging.getLogger(__name__)
 TAB = "tab"  # events of the page itself begin with it
 TOKEN_WAIT_S = 0.25  # how long the first picture waits for a tab that may have been here before
 ANSWER_S = 1.0  # how long a page may take to draw the map; one that does not say gets the rest
-USE_FADES_S = 2.0  # how long a tab that has kept the server busy stands back behind the others
 
 
-class Turns:
-    """Pictures of all tabs are made one after the other: made at once, all of them would be late.
-
-    Of the tabs that wait, the one goes first that has lately kept the server busy the least.
-    """
-
-    def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._used = WeakKeyDictionary[object, tuple[float, float]]()  # s of work, and until when
-        self._waiting: list[object] = []
-        self._busy = False
-
-    @contextmanager
-    def take(self, who: object) -> Generator[None]:
-        """Wait for the turn of a tab, and end it."""
-        with self._changed:
-            self._waiting.append(who)
-            self._changed.wait_for(
-                lambda: not self._busy and who is min(self._waiting, key=self._lately)
-            )
-            self._waiting.remove(who)
-            self._busy, began = True, time.monotonic()
-        try:
-            yield
-        finally:
-            with self._changed:
-                ended = time.monotonic()
-                self._used[who] = self._lately(who) + ended - began, ended
-                self._busy = False
-                self._changed.notify_all()
-
-    def _lately(self, who: object) -> float:
-        seconds, at = self._used.get(who, (0.0, 0.0))
-        return seconds * math.exp((at - time.monotonic()) / USE_FADES_S)
+_TURNS: deque[object] = deque()  # of tabs whose picture is made or waits to be made
+_CHANGED = threading.Condition()
 
 
-TURNS = Turns()
+@contextmanager
+def turn() -> Generator[None]:
+    """Make pictures of all tabs one after the other: made at once, all of them would be late."""
+    own = object()
+    with _CHANGED:
+        _TURNS.append(own)
+        _CHANGED.wait_for(lambda: _TURNS[0] is own)
+    try:
+        yield
+    finally:
+        with _CHANGED:
+            _TURNS.popleft()
+            _CHANGED.notify_all()
 
 
 class Session:
@@ -95,26 +70,22 @@ class Session:
 
     def __init__(
         self,
-        server: ViserServer,
-        client: ClientHandle,
+        context: Context,
         live: LiveModel,
-        scenes: SceneList,
-        store: StateStore,
         claim: "Callable[[Session, str], TabRecord | None]",
-        services: Services,
         *,
         shared: bool = False,
     ) -> None:
-        self._client, self._live, self._claim = client, live, claim
-        self.context = Context(server, client, store, scenes, services)
+        self.context, self._live, self._claim = context, live, claim
+        self._client = context.client
         self.token = new_token()
-        self._keeper = TabKeeper(self.context, shared=shared)
-        self.display = Display(self.context)
+        self._keeper = TabKeeper(context, shared=shared)
+        self.display = Display(context)
         self._is_known = False  # whether the page has said which tab it is
         self._around_at: float | None = None  # when what lies around the map is drawn at the latest
         self._stopped = threading.Event()
         self._worker = threading.Thread(
-            target=self._run, name=f"warpspace-session-{client.client_id}", daemon=True
+            target=self._run, name=f"warpspace-session-{self._client.client_id}", daemon=True
         )
 
     @property
@@ -250,7 +221,7 @@ class Session:
         if context.camera.wanted and focus(shown.state) == focus(state):
             context.camera.place(shown)
         if notes or state is not shown.state:
-            with TURNS.take(self):
+            with turn():
                 self._show(self._live.evaluate(state), shown, anew=bool(notes))
         if notes:
             context.notify("Not taken as typed", "\n".join(notes), "warning")
@@ -271,5 +242,5 @@ class Session:
         self.context.page.call("dark", dark)
 
     def _settle(self, picture: LivePicture) -> None:
-        with TURNS.take(self), self.context.page.as_one():
+        with turn(), self.context.page.as_one():
             self.display.settle(picture, self._guarded)

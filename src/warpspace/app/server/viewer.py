@@ -37,6 +37,7 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
+from warpspace.app.tasks.context import Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
@@ -128,19 +129,12 @@ class Viewer:
         connection = connection_of(self._server, client)
         if not isinstance(connection, TabConnection):
             return  # it has gone meanwhile
-        session = Session(
-            self._server,
-            client,
-            self._live,
-            SceneList(self._scenes),
-            self._shared or StateStore(self._start),
-            self._claim,
-            self._services,
-            shared=self._shared is not None,
-        )
+        store, scenes = self._shared or StateStore(self._start), SceneList(self._scenes)
+        context = Context(self._server, client, store, scenes, self._services)
+        session = Session(context, self._live, self._claim, shared=self._shared is not None)
         with self._lock:
             self._sessions[client.client_id] = session
-        connection.listen(session.context.take)
+        connection.listen(context.take)
         session.start()
 
     def _claim(self, session: Session, token: str) -> TabRecord | None:
@@ -217,7 +211,6 @@ def _serve(address: str, port: int, guard: Guard) -> viser.ViserServer:
 
 
 def open_browser(url: str) -> bool:
-    """Open a page in a graphical browser."""
     try:
         browser = webbrowser.get()
     except webbrowser.Error:
