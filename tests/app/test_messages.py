@@ -63,6 +63,7 @@ def test_viser_has_what_is_used_of_it(client):
             look_up(owner, path)
     buffer = client[1]._websock_connection.get_message_buffer()
     look_up(buffer, "message_event.set")
+    look_up(buffer, "message_from_id")
     assert look_up(buffer, "window_duration_sec") == 0.0
     assert "source" in look_up(messages, "RunJavascriptMessage").__annotations__
     assert isinstance(connection_of(*client), TabConnection)

@@ -91,3 +91,12 @@ def send_at_once(client: ClientHandle) -> None:
         original()
 
     event.set = set_on_loop
+
+
+def queued(client: ClientHandle) -> int:
+    """Count what waits to be sent to a client, since it reads slowly, or nothing any more.
+
+    viser keeps all of it. A limit of viser's own would replace this.
+    """
+    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+    return len(connection.get_message_buffer().message_from_id)

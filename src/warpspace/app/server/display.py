@@ -103,7 +103,8 @@ class Display:
             if self._changed_at is None:
                 self._is_to_rest = False
                 for layer in self.layers:
-                    guarded(partial(getattr(layer, "rest", _nothing), picture))
+                    if rest := getattr(layer, "rest", None):
+                        guarded(partial(rest, picture))
             self._changed_at = None
         while self._waiting:
             part = self._waiting.popleft()
@@ -114,7 +115,3 @@ class Display:
 
 def _key(part: Part, picture: LivePicture) -> object:
     return part.depends(picture) if part.is_seen(picture.state) else None
-
-
-def _nothing(_picture: LivePicture) -> None:
-    """Most layers have nothing to do at rest."""

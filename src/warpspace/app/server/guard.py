@@ -1,10 +1,8 @@
 """Puts the app's checks and limits around viser's server: each request, connection and message."""
 
 import asyncio
-import contextlib
 import logging
 import time
-import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -45,6 +43,7 @@ class Limits:
 
 
 LIMITS = Limits()
+FAREWELL_S = 0.5  # how long a page may take to close its connection; some read nothing any more
 MOST_EARLY = 4  # messages of a page that are kept until its session is there
 
 
@@ -74,19 +73,12 @@ class Guard:
     def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
         self.limits, self._doors = limits, doors
         self._logged: set[str] = set()
-        self._connections = weakref.WeakSet[TabConnection]()
 
     def warn(self, kind: str, text: str, who: object) -> None:
         """Log a refusal, if it is the first of its kind: nobody can fill the log."""
         if kind not in self._logged:
             self._logged.add(kind)
             logger.warning("refused %s: %s (further ones are not logged)", who, text)
-
-    def cut(self) -> None:
-        """Cut the connections that there are; to be called from another thread than theirs."""
-        for connection in tuple(self._connections):
-            with contextlib.suppress(RuntimeError):  # the event loop has ended with all of them
-                connection.loop.call_soon_threadsafe(connection.abort)
 
     def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
         """Give the options that a server of `websockets` starts with, from those viser has."""
@@ -108,7 +100,6 @@ class Guard:
         def create_connection(*args: Any, **kwargs: Any) -> TabConnection:
             connection = TabConnection(*args, **kwargs)
             connection.start(self)
-            self._connections.add(connection)
             return connection
 
         return {
@@ -117,6 +108,7 @@ class Guard:
             "process_response": process_response,
             "create_connection": create_connection,
             "max_size": self.limits.message_bytes,
+            "close_timeout": FAREWELL_S,
         }
 
     def _check(self, connection: ServerConnection, request: Request) -> Refusal | None:
@@ -150,11 +142,6 @@ class TabConnection(ServerConnection):
         self._take = take
         for said in self._early:
             take(said)
-
-    def abort(self) -> None:
-        """Cut the connection: nothing more is sent, and nothing is waited for."""
-        if hasattr(self, "transport"):  # it is there from the first byte on
-            self.transport.abort()
 
     async def recv(self, decode: bool | None = None) -> Any:
         """Receive the next message for viser."""

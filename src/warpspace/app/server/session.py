@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from warpspace.app.browser.incoming import Event
+from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
@@ -43,6 +44,7 @@ from warpspace.exceptions import WarpspaceError
 logger = logging.getLogger(__name__)
 TAB = "tab"  # events of the page itself begin with it
 TOKEN_WAIT_S = 0.25  # how long the first picture waits for a tab that may have been here before
+MOST_QUEUED, BEHIND_S = 4, 0.02  # messages that wait to be sent, and how long to wait for them
 ANSWER_S = 1.0  # how long a page may take to draw the map; one that does not say gets the rest
 
 
@@ -126,7 +128,10 @@ class Session:
     def _turn(self) -> None:
         left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
         waits = [wait for wait in (self.display.due_in_s, left) if wait is not None]
-        if self.context.wait(min(waits, default=None)) and not self._stopped.is_set():
+        changed = self.context.wait(min(waits, default=None))
+        while queued(self._client) > MOST_QUEUED and not self._stopped.wait(BEHIND_S):
+            pass  # pictures that a page does not take would fill the memory
+        if changed and not self._stopped.is_set():
             self._guarded(self._follow)
         picture = self.context.shown
         if picture is None:

@@ -100,21 +100,20 @@ class Kept(msgspec.Struct, omit_defaults=True):
     file: str = ""
     name: str = ""
     link: str = ""  # where there is one: it knows what Reset goes back to
-    alone: str = ""  # whether it is without its comparison
-    table: str = ""  # whether it was drawn with a table of compensation
+    missing: tuple[str, ...] = ()  # what was left out, in words
 
 
 def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
     """Spell a state for its page to keep."""
     bare = without_table(state)
-    table = "yes" if bare is not state else ""
+    missing = () if bare is state else (NO_TABLE,)
     alone = replace(bare, comparison=Comparison())
     for whole in (bare,) if alone == bare else (bare, alone):
         with suppress(OptionError):
             file, link = state_to_toml(whole, camera), named_link(whole, camera, known)
-            if not link or len(link) > MAX_LINK:
-                link = ""
-            kept = Kept(file, whole.scene.name, link, "" if whole is bare else "yes", table)
+            left_out = missing if whole is bare else (*missing, COMPARISON)
+            short = link if link and len(link) <= MAX_LINK else ""
+            kept = Kept(file, whole.scene.name, short, left_out)
             text = msgspec.json.encode(kept).decode()
             if len(text) <= MAX_KEPT_TEXT:
                 return text
@@ -129,7 +128,7 @@ def read_kept(
         kept = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=Kept)
     except (ValueError, RecursionError):
         raise OptionError("what this tab has kept cannot be read") from None
-    missing = (*NEVER_KEPT, *[COMPARISON] * bool(kept.alone), *[NO_TABLE] * bool(kept.table))
+    missing = (*NEVER_KEPT, *kept.missing)
     with suppress(WarpspaceError):
         state, camera = open_link(kept.link, known)
         if state_to_toml(state, camera) == kept.file:

@@ -41,8 +41,6 @@ from warpspace.app.tasks.context import Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
-FAREWELL_S = 0.5
-"""How long the end waits for pages to close their connection; some read nothing any more."""
 NO_AUTHENTICATION = (
     "WARNING: {host} can be reached from other machines, and with --no-token the app asks nobody"
     " for a token or a password: whoever reaches it sees its scenes, and can use it"
@@ -85,8 +83,7 @@ class Viewer:
         self._lock = threading.Lock()
         self._memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
-        self._guard = Guard(doors)
-        self._server = _serve(self.address, self.port, self._guard)
+        self._server = _serve(self.address, self.port, Guard(doors))
         light_scene(self._server.scene)
         send_script_to_all(self._server, f"{page_script()}\nwarpspacePage.arrive();")
         self._server.on_client_connect(self._connect)
@@ -168,12 +165,8 @@ class Viewer:
     def stop(self) -> None:
         for session in self.sessions:
             session.stop()
-        cut = threading.Timer(FAREWELL_S, self._guard.cut)
-        cut.daemon = True
-        cut.start()
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
-        cut.cancel()
 
     def __enter__(self) -> Self:
         return self
