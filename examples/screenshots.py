@@ -133,11 +133,11 @@ def improved(page: Page) -> None:
 def designed(page: Page) -> None:
     """Hold the tolerances against 40 µm."""
     open_task(page, "Design")
-    box = page.get_by_label("|E| at most").first
+    box = page.locator("#ws-right").get_by_label("|E| allowed")
     box.fill("40")
     box.press("Enter")
     press(page, "Allocate tolerances")
-    page.get_by_text("Allocated:").wait_for()
+    page.locator("#ws-right progress").wait_for(state="detached")
 
 
 def turned(page: Page) -> None:
