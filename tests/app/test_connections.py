@@ -28,45 +28,32 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
 
-@pytest.fixture
-def busy_port():
+def test_a_busy_port_is_an_error_where_it_was_asked_for_else_the_next_is_taken(monkeypatch):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        yield taken.getsockname()[1]
+        busy = taken.getsockname()[1]
+        with pytest.raises(OptionError, match=f"--port {busy} is in use"):
+            free_port("127.0.0.1", busy)
+        monkeypatch.setattr(network, "DEFAULT_PORT", busy)
+        assert free_port("127.0.0.1", None) > busy
 
 
-def test_busy_port_that_was_asked_for_is_an_error(busy_port):
-    with pytest.raises(OptionError, match=f"--port {busy_port} is in use"):
-        free_port("127.0.0.1", busy_port)
-
-
-def test_without_a_port_the_next_free_one_is_taken(busy_port, monkeypatch):
-    monkeypatch.setattr(network, "DEFAULT_PORT", busy_port)
-    assert free_port("127.0.0.1", None) > busy_port
-
-
-@pytest.mark.parametrize("port", [-1, 0, 65536, 10**9])
-def test_port_out_of_range(port):
-    with pytest.raises(OptionError, match="expected 1 to 65535"):
-        free_port("127.0.0.1", port)
-
-
-def test_privileged_port(monkeypatch):
-    monkeypatch.setattr(network, "_bind_error", lambda *_: errno.EACCES)
-    with pytest.raises(OptionError, match="above 1023"):
-        free_port("127.0.0.1", 80)
-
-
-@pytest.mark.parametrize("host", ["no such host", "256.1.1.1", "", "a" * 300, "host\0"])
-def test_host_that_is_none(host):
-    with pytest.raises(OptionError, match="cannot be resolved"):
-        resolve_host(host)
-
-
-def test_host_of_another_machine():
-    with pytest.raises(OptionError, match="not an address of this machine"):
-        free_port("192.0.2.1", None)
+@pytest.mark.parametrize(
+    ("host", "port", "problem"),
+    [
+        *(("127.0.0.1", port, "expected 1 to 65535") for port in (-1, 0, 65536, 10**9)),
+        ("127.0.0.1", 80, "above 1023"),
+        ("192.0.2.1", None, "not an address of this machine"),
+        *((host, None, "cannot be resolved")
+          for host in ("no such host", "256.1.1.1", "", "a" * 300, "host\0")),
+    ],
+)  # fmt: skip
+def test_host_and_port_that_cannot_be(monkeypatch, host, port, problem):
+    if port == 80:
+        monkeypatch.setattr(network, "_bind_error", lambda *_: errno.EACCES)
+    with pytest.raises(OptionError, match=problem):
+        free_port(resolve_host(host), port)
 
 
 def test_local_addresses():

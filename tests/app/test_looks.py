@@ -54,12 +54,11 @@ def test_field_is_that_of_the_scene_and_of_a_changed_set(picture):
     np.testing.assert_allclose(moved.field.error_um, wanted.error_um, atol=1e-9)
 
 
-def test_exaggeration_auto_number_and_true_scale(picture):
-    assert picture.exaggeration == 1000.0
-    for factor in (1.0, 250.0):
-        drawn = LIVE.evaluate(replace(START, exaggeration=factor))
-        shift = drawn.drawn_mm - drawn.grid.nominal_mm
-        np.testing.assert_allclose(shift, factor * 1e-3 * picture.field.error_um, atol=1e-9)
+@pytest.mark.parametrize("factor", [1.0, 250.0])
+def test_errors_are_drawn_with_the_factor_that_is_set(picture, factor):
+    drawn = LIVE.evaluate(replace(START, exaggeration=factor))
+    shift = drawn.drawn_mm - drawn.grid.nominal_mm
+    np.testing.assert_allclose(shift, factor * 1e-3 * picture.field.error_um, atol=1e-9)
 
 
 def test_traces_that_no_error_moves_are_not_drawn():
@@ -105,11 +104,9 @@ def test_cut_octant_opens_the_corner_towards_the_operator():
 
 
 def test_slices_lie_where_they_are_put_and_have_the_models_errors():
-    state = looking(surface="slices", slices_mm={"X": 100.0, "Y": -50.5, "Z": -100.0})
-    picture = LIVE.evaluate(state)
-    assert {part.axis: part.position_mm for part in picture.slices} == {
-        "X": 100.0, "Y": -50.5, "Z": -100.0,
-    }  # fmt: skip
+    places = {"X": 100.0, "Y": -50.5, "Z": -100.0}
+    picture = LIVE.evaluate(looking(surface="slices", slices_mm=places))
+    assert {part.axis: part.position_mm for part in picture.slices} == places
     for part in picture.slices:
         at = {k: np.broadcast_to(v, part.grid.shape) for k, v in part.grid.coordinates.items()}
         direct = evaluate(SCENE, at=at)
@@ -185,24 +182,18 @@ def test_positions_are_read_as_people_type_them(text, kept, noted):
 
 
 def test_played_points_stay_on_their_circles():
-    picture = LIVE.evaluate(START)
     assert played_axis(START) == "C"
     assert played_position(START, 90.0) == {"C": 90.0}
     assert played_position(put(START, "positions.C", "350.0"), 20.0) == {"C": 10.0}
-    nominal, actual = points_on_traces(picture, {"C": 90.0})
-    traces = [t for t in picture.traces[0].group.traces if t.axis == "C"]
-    assert nominal.shape == actual.shape == (len(traces), 3)
-    for trace, point in zip(traces, nominal, strict=True):
-        # on the table a point is turned against the machine: Ry(B)·Rz(90°)
-        x, y, z = trace.point_mm
-        tilt = np.deg2rad(trace.at["B"])
-        about = np.array([-y, x, z - 50.0])
-        turned = [
-            about[0] * np.cos(tilt) + about[2] * np.sin(tilt),
-            about[1],
-            50.0 - about[0] * np.sin(tilt) + about[2] * np.cos(tilt),
-        ]
-        assert point == pytest.approx(turned, abs=1e-6)
+    (lines, *_) = LIVE.evaluate(START).traces
+    turned = [number for number, trace in enumerate(lines.group.traces) if trace.axis == "C"]
+    for points, of_lines in zip(
+        points_on_traces(LIVE.evaluate(START), {"C": 90.0}),
+        (lines.nominal_mm, lines.actual_mm),
+        strict=True,
+    ):
+        quarter = (of_lines.shape[1] - 1) // 4  # of the turn
+        np.testing.assert_allclose(points, of_lines[turned, quarter], atol=1e-9)
 
 
 @pytest.mark.parametrize("diverging", [False, True])
@@ -257,18 +248,12 @@ def test_arrows_run_from_foot_to_tip_and_shrink_to_a_point():
 COARSE = replace(START, nodes=9)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "1,2,3,4,5",
-        "1,900,700,80,50,-5",
-        "1,nan,700,80,50,90",
-        "1,50,700,80,50,90",
-        "1,9e9,7,8,5,90",
-        "²,9,9,9,9,9",
-    ],
+ROOMS = (
+    " 1,2,3,4,5 1,900,700,80,50,-5 1,nan,700,80,50,90 1,50,700,80,50,90 1,9e9,7,8,5,90 ²,9,9,9,9,9"
 )
+
+
+@pytest.mark.parametrize("text", ROOMS.split(" "))
 def test_a_room_that_cannot_be_is_none(text):
     assert read_room(text) is None
 

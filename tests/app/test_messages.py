@@ -5,12 +5,11 @@ import logging
 import re
 import threading
 import time
+from operator import attrgetter
 from types import SimpleNamespace
-from typing import Any
 
 import psutil
 import pytest
-import viser
 from viser import _messages as messages
 
 from app.hostile import camera, events, nonsense, upload
@@ -20,7 +19,7 @@ from page_client import CAMERA, App, dial, pack, said, until
 from reliability.outcome import Lag
 from warpspace.app.browser.incoming import MOST_EVENTS, Event, event_of, read_message
 from warpspace.app.browser.page import Page
-from warpspace.app.browser.viser_private import connection_of, send_at_once, serve_with
+from warpspace.app.browser.viser_private import connection_of, send_at_once
 from warpspace.app.server import session
 from warpspace.app.server.guard import TabConnection
 from warpspace.app.server.network import RepeatedLines
@@ -28,18 +27,6 @@ from warpspace.app.server.session import turn
 from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
-
-
-def look_up(owner, path):
-    """Follow a dotted name; say what is missing and what to do about it."""
-    found = owner
-    for name in path.split("."):
-        assert hasattr(found, name), (
-            f"viser {viser.__version__} lacks {type(owner).__name__}.{path}, which"
-            f" warpspace.app.browser.viser_private uses: read there what it is for, and replace it"
-        )
-        found = getattr(found, name)
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -51,41 +38,24 @@ def client():
         yield server, handle
 
 
-USED = {
-    "server": "_websock_server.queue_message _websock_server._live_connections",
-    "client": "_websock_connection.queue_message _websock_connection.get_message_buffer",
-}
+@pytest.mark.parametrize(
+    ("which", "path"),
+    [
+        *((0, f"_websock_server.{name}") for name in ("queue_message", "_live_connections")),
+        *((1, f"_websock_connection.{name}") for name in ("queue_message", "get_message_buffer")),
+    ],
+)
+def test_viser_has_what_viser_private_uses_of_it(client, which, path):
+    assert attrgetter(path)(client[which])
 
 
-def test_viser_has_what_is_used_of_it(client):
-    for owner, paths in zip(client, USED.values(), strict=True):
-        for path in paths.split():
-            look_up(owner, path)
+def test_its_connections_are_ours_and_send_at_once(client):
     buffer = client[1]._websock_connection.get_message_buffer()
-    look_up(buffer, "message_event.set")
-    look_up(buffer, "message_from_id")
-    assert look_up(buffer, "window_duration_sec") == 0.0
-    assert "source" in look_up(messages, "RunJavascriptMessage").__annotations__
+    assert callable(buffer.message_event.set)
+    assert buffer.message_from_id is not None
+    assert buffer.window_duration_sec == 0.0
+    assert "source" in messages.RunJavascriptMessage.__annotations__
     assert isinstance(connection_of(*client), TabConnection)
-
-
-def test_a_server_starts_with_the_options_that_are_changed():
-    """test_doors.py asks a running app with foreign names and pages, and is refused."""
-    seen: list[dict[str, Any]] = []
-
-    def change(options):
-        seen.append(options)
-        return options
-
-    with serve_with(change) as used:
-        server = viser.ViserServer(host="127.0.0.1", verbose=False)
-    server.stop()
-    assert used, (
-        f"viser {viser.__version__} does not start its server by websockets.asyncio.server.serve,"
-        " which warpspace.app.browser.viser_private.serve_with relies on"
-    )
-    assert callable(seen[0]["process_request"])
-    assert seen[0].keys().isdisjoint({"process_response", "create_connection", "origins"})
 
 
 def test_only_its_own_thread_wakes_a_sender():
@@ -138,6 +108,11 @@ def test_what_a_page_really_says_passes():
         said(upload("x.csv", b"1" * 100_000)),
     ):  # fmt: skip
         assert read_message(pack(message)) is not None, message
+    found = read_message(pack(said(("state:set.a:1", "x"), ("page:undo", ""))))
+    assert [event_of(*one) for one in found.events] == [
+        Event("state", "set.a:1", "x"),
+        Event("page", "undo", ""),
+    ]
 
 
 def test_what_makes_no_sense_does_not_pass():
@@ -156,12 +131,6 @@ def test_only_what_viser_is_to_know_reaches_it(monkeypatch):
         assert wire.read_until(lambda: session.state.amplitudes["EXX"] == 7.0)
         assert wire.read_until(lambda: bool(seen))
     assert seen == [camera(fov=0.5)]
-
-
-def test_events_are_read_in_order():
-    found = read_message(pack(said(("state:set.a:1", "x"), ("page:undo", ""))))
-    assert found.events == [("state:set.a:1", "x"), ("page:undo", "")]
-    assert event_of(*found.events[0]) == Event("state", "set.a:1", "x")
 
 
 def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(caplog):

@@ -20,6 +20,7 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.app.tasks import jobs
+from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.errors import used_keys
 from warpspace.app.tasks.jobs import Jobs
 from warpspace.app.tasks.parts import Part
@@ -110,32 +111,16 @@ def test_a_page_that_leaves_while_it_is_built_ends_its_session(viewer, monkeypat
     assert not own._worker.is_alive()
 
 
-def test_what_comes_just_as_a_wait_ends_is_not_lost(wire, viewer, monkeypatch):
-    assert wire.read_until(lambda: bool(viewer.sessions))
-    own = viewer.sessions[-1]
-    assert wire.read_until(lambda: "GlbMessage" in wire.kinds)  # its worker runs
-    own.stop()
-    own._worker.join(20.0)
-    own.context.actions.clear()
-    done: list[str] = []
-
+def test_what_comes_just_as_a_wait_ends_is_not_lost():
     class Late(threading.Event):
         def wait(self, timeout=None):
-            if super().wait(0.0):
-                return True
-            own.context.act(lambda: done.append("upload"))
-            return False
+            woken = super().wait(0.0)
+            self.set()
+            return woken
 
-    own.context._wake, own._stopped = Late(), threading.Event()
-
-    def follow():
-        own.context.actions.popleft()()
-
-    monkeypatch.setattr(own, "_follow", follow)
-    own._turn()
-    assert done == []
-    own._turn()
-    assert done == ["upload"]
+    context = object.__new__(Context)
+    context._wake = Late()
+    assert [context.wait(0.0), context.wait(0.0)] == [False, True]
 
 
 def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch, caplog):
@@ -162,40 +147,39 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
     assert not caplog.records
 
 
-class Watcher:
-    """Collects what jobs show and report."""
-
-    def __init__(self):
-        self.bars, self.failures, self.ended = [], [], threading.Event()
-        self.jobs = Jobs(Part(Nobody(act=lambda do: do())), self._again, self.failures.append)
-
-    def _again(self):
-        self.bars.append(str(self.jobs.html()))
-        if not self.jobs.busy:
-            self.ended.set()
-
-
-def test_one_job_at_a_time_says_how_far_it_is(monkeypatch):
+@pytest.fixture
+def watched(monkeypatch):
+    """Jobs, with what they show and report."""
     monkeypatch.setattr(jobs, "TICK_S", -1.0)
-    watcher, go = Watcher(), threading.Event()
+    bars, failures = list[str](), list[Exception]()
+    found = Jobs(
+        Part(Nobody(act=lambda do: do())), lambda: bars.append(str(found.html())), failures.append
+    )
+    return found, bars, failures
+
+
+def test_one_job_at_a_time_says_how_far_it_is_and_hands_over_what_it_raises(watched):
+    (found, bars, failures), go = watched, threading.Event()
 
     def work(job):
         for share in (0.25, 0.5):
             job.tell(share)
         go.wait(10)
+        raise WarpspaceError("broken")
 
-    assert watcher.jobs.start("one", work)
-    assert not watcher.jobs.start("two", work)
+    assert found.start("one", work)
+    assert not found.start("two", work)
     go.set()
-    assert watcher.ended.wait(20)
-    assert not watcher.failures
-    said = [found[1] for bar in watcher.bars if (found := re.search("<span>(.*?)</span>", bar))]
+    while not failures or bars[-1]:
+        time.sleep(0.01)
+    said = [text[1] for bar in bars if (text := re.search("<span>(.*?)</span>", bar))]
     assert {"one: 25 %", "one: 50 %"} <= set(said)
-    assert watcher.bars[-1] == ""
+    assert not found.busy
+    assert [str(error) for error in failures] == ["broken"]
 
 
-def test_cancelling_frees_the_place_at_once_and_what_a_job_raises_is_handed_over():
-    watcher, told, go = Watcher(), threading.Event(), threading.Event()
+def test_cancelling_frees_the_place_at_once(watched):
+    (found, _, failures), told, go = watched, threading.Event(), threading.Event()
 
     def slow(job):
         go.wait(10)
@@ -204,21 +188,12 @@ def test_cancelling_frees_the_place_at_once_and_what_a_job_raises_is_handed_over
         told.set()
         raise RuntimeError("too late")
 
-    watcher.jobs.start("slow", slow)
-    watcher.jobs.cancel()
-    assert not watcher.jobs.busy
+    found.start("slow", slow)
+    found.cancel()
+    assert not found.busy
     go.set()
     assert told.wait(20)
-
-    def work(_):
-        raise WarpspaceError("broken")
-
-    watcher.ended.clear()
-    watcher.jobs.start("bad", work)
-    assert watcher.ended.wait(20)
-    while not watcher.failures:
-        time.sleep(0.01)
-    assert [str(error) for error in watcher.failures] == ["broken"]
+    assert failures == []
 
 
 def test_what_is_made_for_a_page_that_has_gone_is_given_up():
@@ -266,15 +241,11 @@ def test_an_added_analysis_is_a_section_of_its_task_and_runs_there():
         unregister("notes")
 
 
-class GoneError(Exception):
-    """Nobody waits any more."""
-
-
 def test_one_piece_of_work_waits_for_another_and_may_be_given_up():
     def give_up():
-        raise GoneError
+        raise CancelledError
 
-    with cache.taken_turn(lambda: None), pytest.raises(GoneError), cache.taken_turn(give_up):
+    with cache.taken_turn(lambda: None), pytest.raises(CancelledError), cache.taken_turn(give_up):
         raise AssertionError
     with cache.taken_turn(give_up):  # free again
         pass
