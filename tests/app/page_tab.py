@@ -11,8 +11,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.state.app_state import AppState, start_state
-from warpspace.app.state.store import StateStore
+from warpspace.app.state.app_state import AppState
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
@@ -100,7 +99,6 @@ class Tab:
         page.goto(f"{viewer.url}/?fixedDpr=1{query}")
         wait_until_open(page)
         self.until(lambda: self.vertices() is not None)
-        self._camera = self.session.context.camera.remember()
 
     def _listen(self, message: Any) -> None:
         if message.type == "error" and not any(word in message.text for word in HARMLESS):
@@ -116,24 +114,6 @@ class Tab:
     def state(self) -> AppState:
         """What the session shows, or is about to."""
         return self.session.state
-
-    def begin_anew(self) -> None:
-        """Make the page again what it was when it was opened, in a tenth of the time."""
-        start, session = start_state(SCENES[0]), self.session
-
-        def forget() -> None:
-            session.use(StateStore(start))
-            session.context.camera.view, session.context.camera.orthographic = "iso", False
-
-        self.actions = 0
-        self.page.keyboard.press("Escape")
-        session.context.act(forget)
-        session.context.look_from(self._camera)
-        self.page.evaluate(
-            "() => { history.replaceState(null, '', location.pathname + '?fixedDpr=1');"
-            " document.querySelectorAll('.ws-toast button').forEach(b => b.click()); }"
-        )
-        self.until(lambda: session.state == start and self.shows_state(start))
 
     # --- what a user does ----------------------------------------------------------------------
 

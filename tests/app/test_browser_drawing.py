@@ -4,7 +4,6 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from app.page_tab import SCENES
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -101,8 +100,8 @@ def test_the_machine_moves_bends_and_carries_the_tool_point(tab):
     tab.until(lambda: tab.drawn("/ghost_machine/R_bed") is None)
 
 
-@pytest.mark.own_page
-def test_the_table_turns_until_the_page_is_left(tab):
+def test_the_table_turns_until_the_page_is_left(open_tab):
+    tab = open_tab()
     tab.send("controls:machine", "solid")
     tab.until(lambda: tab.drawn("/machine/C_table") is not None)
     still, stage = tab.still(lambda: tab.drawn("/machine/C_table")), tab.session.context.stage

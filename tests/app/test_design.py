@@ -38,7 +38,6 @@ SCENE = replace(PROPOSED, reference=None)
 OTHER = load_scene("machine_trunnion_ac")
 HOSTILE = "<script>alert(1)</script>"
 KEYS = ("EXX", "EYX", "EA0Z")
-LIMIT_UM = 50.0
 
 
 def ran(part, state):
@@ -73,15 +72,6 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
 
 # --- Tolerances -----------------------------------------------------------------------------------
 
-CASES = [
-    (Loop.TOOL, "sampled", "uniform"),
-    (Loop.TOOL, "sampled", "normal"),
-    (Loop.TOOL, "max", "uniform"),
-    (Loop.WORKPIECE, "sampled", "uniform"),
-    (Loop.RELATIVE, "sampled", "uniform"),
-    (Loop.RELATIVE, "max", "uniform"),
-]
-
 
 def state_of(scene, loop=Loop.TOOL, limit_um=60.0, **wanted):
     return replace(
@@ -89,7 +79,14 @@ def state_of(scene, loop=Loop.TOOL, limit_um=60.0, **wanted):
     )
 
 
-@pytest.mark.parametrize(("loop", "over", "distribution"), CASES)
+@pytest.mark.parametrize(
+    ("loop", "over", "distribution"),
+    [
+        *((loop, "sampled", "uniform") for loop in Loop),
+        (Loop.TOOL, "sampled", "normal"),
+        *((loop, "max", "uniform") for loop in (Loop.TOOL, Loop.RELATIVE)),
+    ],
+)
 def test_a_probability_is_that_of_the_command(loop, over, distribution):
     ensemble = sample_machines(state_of(SCENE, loop, over=over, distribution=distribution))
     live, kept = estimate(ensemble, SCENE.tolerances, 60.0)
@@ -221,26 +218,14 @@ def test_titles_of_machines_are_escaped_and_there_is_a_most():
 
 # --- One question, one figure ---------------------------------------------------------------------
 
-ASKED = state_of(SCENE, limit_um=LIMIT_UM)
 
-
-def of_the_concepts():
+def test_page_report_and_command_have_one_figure_for_one_question():
+    wanted = warpspace.montecarlo(SCENE, samples=SAMPLES, over="max", limit_um=50.0).probability
+    settings = ReportSettings(grid=3, spec_um=50.0, samples=SAMPLES)
+    (reviewed,) = build_review((SCENE,), settings).scenes
+    assert reviewed.results["worst"].points[0].sampled.probability == wanted
+    asked = state_of(SCENE, limit_um=50.0)
+    assert answer_of(part_of(TolerancesPart, "allocate"), asked).before == wanted
     forms = {"concepts.loop": "tool", "concepts.own_tolerances": "1"}
-    (found,) = answer_of(concepts_part(), replace(ASKED, forms=forms)).concepts
-    return found.sampled.probability
-
-
-def of_the_report():
-    review = build_review((SCENE,), ReportSettings(grid=3, spec_um=LIMIT_UM, samples=SAMPLES))
-    (reviewed,) = review.scenes
-    return reviewed.results["worst"].points[0].sampled.probability
-
-
-def of_the_allocation():
-    return answer_of(part_of(TolerancesPart, "allocate"), ASKED).before
-
-
-@pytest.mark.parametrize("figure", [of_the_concepts, of_the_report, of_the_allocation])
-def test_the_same_question_has_the_same_figure(figure):
-    wanted = warpspace.montecarlo(SCENE, samples=SAMPLES, over="max", limit_um=LIMIT_UM)
-    assert figure() == wanted.probability
+    (found,) = answer_of(concepts_part(), replace(asked, forms=forms)).concepts
+    assert found.sampled.probability == wanted

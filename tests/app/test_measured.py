@@ -11,7 +11,6 @@ from app.hostile import upload
 from app.parts import Alone
 from warpspace.analysis.catalogue import entries
 from warpspace.app.documents.scene_file import settings_line, with_settings
-from warpspace.app.evaluation import cache
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
@@ -75,13 +74,19 @@ class Column(Alone):
         return self.html
 
 
-def calibrate(state=START):
-    return Column(CalibratePart, state, next(one for one in entries() if one.name == "calibrate"))
+def calibrate():
+    return Column(CalibratePart, START, next(one for one in entries() if one.name == "calibrate"))
 
 
-def chosen(name, state=STATE, **options):
-    forms = {"test": name, **{f"test.{option}": text for option, text in options.items()}}
-    return replace(state, forms=forms)
+def positioned(targets):
+    """Readings of a positioning test, whose error grows by 20 µm in a metre."""
+    rows = (
+        f"{run},{way},{at},{0.02 * (at - targets[0])}\n"
+        for run in (1, 2)
+        for way in "+-"
+        for at in targets
+    )
+    return f"run,direction,target_mm,deviation_um\n{''.join(rows)}".encode()
 
 
 @pytest.mark.parametrize("name", bench_names())
@@ -128,7 +133,11 @@ def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
     assert LIVE.evaluate(column.state).bench is None
 
 
-def test_a_test_that_the_machine_cannot_do_says_why():
+def test_a_test_runs_where_the_tables_stand_or_says_why_it_cannot():
+    turned = put(replace(STATE, forms={"test": "sphere"}), "positions.B", "-20.0")
+    column = Column(TestsPart, turned)
+    column.settle()
+    assert column.part._answer.found.model.plan.coordinates["B"][0] == -20.0
     column = Column(TestsPart, start_state(load_scene("machine_c_frame_mill"), nodes=3))
     column.do("choose", "sphere")
     assert "no rotary axis" in column.settle()
@@ -140,10 +149,7 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     column.do("choose", HOSTILE)
     column.do("set.nothing", HOSTILE)
     assert column.state.forms == {"test": "positioning"}
-    rows = [f"{run},{way},{at},{0.02 * at}" for run in (1, 2) for way in "+-"
-            for at in range(-250, 251, 50)]  # fmt: skip
-    text = "run,direction,target_mm,deviation_um\n" + "\n".join(rows) + "\n"
-    column.give(f"../{HOSTILE}.csv", text.encode())
+    column.give(f"../{HOSTILE}.csv", positioned(range(-250, 251, 50)))
     html = column.settle()
     assert "RMS of measured − model" in html
     assert "<img" not in html
@@ -156,37 +162,21 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     assert "ws-problem" in column.settle()
 
 
-def test_tables_turn_where_the_axes_stand():
-    column = Column(TestsPart, chosen("sphere", put(STATE, "positions.B", "-20.0")))
-    column.settle()
-    assert column.part._answer.found.model.plan.coordinates["B"][0] == -20.0
-
-
-def test_link_refuses_what_is_no_test_and_no_option():
+def test_what_forms_were_told_is_linked_and_kept_and_what_is_compared_runs_the_same_test():
+    told = replace(STATE, forms={"test": "circular", "test.radius_mm": "120"})
+    assert with_settings(STATE, settings_line(told)).forms == told.forms
+    assert told.with_scene(SCENE).forms == told.forms
+    assert settings_line(replace(STATE, forms={"import.axes": "X"})) == settings_line(STATE)
     line = "test=nothing&test.radius_mm=" + "9" * 5000 + "&test.F=1&nobody.x=1&gains.loop=tool"
     hostile = with_settings(STATE, line)
     assert hostile.forms == {"test.radius_mm": "9" * 1000, "gains.loop": "tool"}
     for name in ("test=nothing", "test.F", "nobody.x"):
         assert any(name in note for note in hostile.notes)
-    many = with_settings(STATE, "&".join(f"test.{'a' * (n % 40)}_{'b' * (n // 40)}=1"
-                                         for n in range(1, 390)))  # fmt: skip
-    assert len(many.forms) <= 100
-
-
-def test_what_forms_were_told_is_linked_and_kept_with_another_scene():
-    told = chosen("circular", radius_mm="120")
-    assert with_settings(STATE, settings_line(told)).forms == told.forms
-    assert told.with_scene(SCENE).forms == told.forms
-    assert settings_line(replace(STATE, forms={"import.axes": "X"})) == settings_line(STATE)
-
-
-def test_compared_states_run_the_same_test():
-    pinned = with_pin(chosen("circular"))
-    changed = pinned.with_amplitude("EC0Y", 100.0)
-    shown = {}
+    many = "&".join(f"test.{'a' * (n % 40)}_{'b' * (n // 40)}=1" for n in range(1, 390))
+    assert len(with_settings(STATE, many).forms) <= 100
+    changed, shown = with_pin(told).with_amplitude("EC0Y", 100.0), {}
     for side in ("a", "b", "difference"):
-        state = replace(changed, comparison=replace(changed.comparison, shown=side))
-        shown[side] = LIVE.evaluate(state).bench
+        shown[side] = LIVE.evaluate(put(changed, "comparison.shown", side)).bench
     assert shown["difference"] is None
     assert np.abs(shown["a"].error_um - shown["b"].error_um).max() > 1.0
 
@@ -284,30 +274,11 @@ def test_bad_parameters_and_hostile_sessions_are_said_escaped(keys):
     assert "<img" not in html
 
 
-def test_a_cancelled_fit_ends_and_leaves_room_for_the_next():
-    column = calibrate()
-    column.do("bundled", "tcp_on.csv")
-    column.do("run")
-    column.do("cancel")
-    while column.part._jobs.busy:
-        time.sleep(0.01)
-    assert column.part._answer is None
-    assert cache._TURN.acquire(timeout=60.0)
-    cache._TURN.release()
-
-
 def test_readings_of_a_standard_test_come_with_its_options():
-    rows = [
-        f"{run},{way},{target},{0.02 * (target - 350)}"
-        for run in (1, 2)
-        for way in "+-"
-        for target in range(150, 551, 50)
-    ]
-    text = "run,direction,target_mm,deviation_um\n" + "\n".join(rows) + "\n"
     column = calibrate()
     column.do("kind", "positioning")
     column.do("test-options", "axis=X")
-    column.give("x.csv", text.encode())
+    column.give("x.csv", positioned(range(150, 551, 50)))
     column.do("set.fit", "EXX")
     column.run()
     found = column.part._answer.found
@@ -315,7 +286,6 @@ def test_readings_of_a_standard_test_come_with_its_options():
     assert arrows_of(found, before=True)[0].shape == (0, 3)
 
 
-NOMINAL = load_scene("dvf5000_nominal")
 COMP = "-20 0.001 0.003\n0 0.002 0.004\n20 0.005 0.006\n"
 TABLE = b"X [mm],EXX [um]\n-275,0\n0,5\n275,10\n"
 
@@ -348,7 +318,7 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert [one.name for one in column.part._files] == ["y.csv", "x.csv"]
 
 
-def test_a_file_that_does_not_say_its_axis_asks_in_the_words_of_the_page():
+def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_page():
     column = Column(ImportPart, STATE)
     column.part.received("unnamed.comp", COMP.encode())
     html = column.settle()
@@ -360,25 +330,18 @@ def test_a_file_that_does_not_say_its_axis_asks_in_the_words_of_the_page():
     column.do("set.axis", HOSTILE * 100_000)
     assert "<img" not in column.settle()
     assert len(column.part._problem[1]) <= 1500
-    column.do("set.axis", "X")
-    assert "It adds EXX." in column.settle()
-    with pytest.raises(SceneError):
-        column.part.received("nothing.bin", b"\0\1\2")
-
-
-def test_a_format_that_is_not_recognised_or_does_not_fit_is_asked_for():
-    column = Column(ImportPart, STATE)
+    column.do("remove", "0")
     column.part.received("data.dat", b"0\t0.001\t0.002\n")
     assert "no format that is known" in column.settle()
-    column.do("set.format", "linuxcnc-comp")
-    assert "which axis" in column.settle()
-    column.do("set.axis", "X")
-    assert "It adds EXX." in column.settle()
-    column.do("set.format", "heidenhain")
-    assert "data.dat: " in column.settle()
-    column.do("set.format", HOSTILE)
-    assert "expected one of" in column.settle()
-    column.do("set.format", "linuxcnc-comp")
-    assert "It adds EXX." in column.settle()
+    for word, value, said in (
+        ("set.format", "linuxcnc-comp", "which axis"),
+        ("set.axis", "X", "It adds EXX."),
+        ("set.format", "heidenhain", "data.dat: "),
+        ("set.format", HOSTILE, "expected one of"),
+    ):
+        column.do(word, value)
+        assert said in column.settle()
     column.do("remove", "0")
     assert "Files can also be dropped" in column.html
+    with pytest.raises(SceneError):
+        column.part.received("nothing.bin", b"\0\1\2")
