@@ -20,7 +20,7 @@ START = start_state(FIRST, nodes=9)
 
 
 def picture_of(state, shown):
-    return LIVE.evaluate(replace(state, comparison=replace(state.comparison, shown=shown)))
+    return LIVE.evaluate(put(state, "comparison.shown", shown))
 
 
 def test_a_and_b_share_colours_and_all_three_factor_and_numbers():
@@ -50,10 +50,7 @@ def test_a_change_has_colours_of_its_own(component, label):
     assert change.scale.label == label
     assert largest <= change.scale.high + 1e-9
     assert change.scale.high <= 2.5 * largest < 0.1 * picture_of(state, "b").scale.high
-    fixed = replace(
-        state,
-        look=replace(replace(state.look, range_mode="fixed"), range_top=7.5, range_mode="fixed"),
-    )
+    fixed = put(state, "look.range_top", "7.5")
     assert picture_of(fixed, "difference").scale.high == 7.5
 
 
@@ -77,12 +74,10 @@ def test_a_pinned_state_holds_no_comparison_and_unknown_words_draw_nothing_else(
 
 
 def test_the_difference_is_cut_into_slices_evaluated_where_they_lie():
-    look = replace(replace(START.look, surface="slices"), slices_mm={"X": 31.0})
+    look = replace(START.look, surface="slices", slices_mm={"X": 31.0})
     for component, quantity in (("norm", "position"), ("y", "position"), ("norm", "orientation")):
-        state = replace(
-            START, look=replace(look, quantity=quantity), component=component
-        ).with_amplitude("EAX", 9.0)
-        state = with_sides(state, Side(), scene_side(SECOND))
+        state = replace(START, look=replace(look, quantity=quantity), component=component)
+        state = with_sides(state.with_amplitude("EAX", 9.0), Side(), scene_side(SECOND))
         a, b, difference = (picture_of(state, shown) for shown in ("a", "b", "difference"))
         assert [part.axis for part in difference.slices] == [part.axis for part in a.slices]
         assert difference.slices[0].position_mm == 31.0
@@ -92,12 +87,9 @@ def test_the_difference_is_cut_into_slices_evaluated_where_they_lie():
             np.testing.assert_allclose(part.field.error_um, error, atol=1e-12)
             drawn = deform(one.grid.nominal_mm, error, difference.exaggeration)
             np.testing.assert_allclose(part.drawn_mm, drawn, atol=1e-9)
-            coloured = error
-            if quantity == "orientation":
-                coloured = two.field.orientation_urad - one.field.orientation_urad
-            np.testing.assert_allclose(
-                part.values, component_values(coloured, component), atol=1e-12
-            )
+            tilts = two.field.orientation_urad - one.field.orientation_urad
+            values = component_values(error if quantity == "position" else tilts, component)
+            np.testing.assert_allclose(part.values, values, atol=1e-12)
         # what is drawn are the slices, on the shared scale
         mesh = map_mesh(difference)
         assert len(mesh.values) == sum(part.values.size for part in difference.slices)

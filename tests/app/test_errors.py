@@ -1,5 +1,7 @@
 """The column of errors: rows by effect, what a row says and sets, what stays while a hand moves."""
 
+import re
+
 import pytest
 
 from app.parts import LIVE, lone_part
@@ -26,11 +28,7 @@ class Column:
 
 
 def places(pieces):
-    return [
-        name.split(".")[1]
-        for name in pieces["errors"].split('data-piece="')[1:]
-        for name in [name.split('"')[0]]
-    ]
+    return re.findall(r'data-piece="error\.(\w+)"', pieces["errors"])
 
 
 def test_the_largest_effect_comes_first_and_a_move_renders_one_row_in_its_place():

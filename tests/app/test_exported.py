@@ -21,6 +21,7 @@ from warpspace.app.drawing.camera import fit_camera
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import Side, start_state
+from warpspace.app.state.tree import put
 from warpspace.cli.services import draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
@@ -40,7 +41,7 @@ WORDS = {
 
 
 def picture_of(shown, state=BOTH):
-    return LIVE.evaluate(replace(state, comparison=replace(state.comparison, shown=shown)))
+    return LIVE.evaluate(put(state, "comparison.shown", shown))
 
 
 def read_glb(data):
@@ -102,12 +103,8 @@ def test_the_figure_is_a_sheet_of_both_and_the_difference_as_the_app_takes_it(re
 
 
 def tilted(top=None):
-    look = replace(START.look, quantity="orientation")
-    return LIVE.evaluate(
-        replace(
-            START, look=look if top is None else replace(look, range_top=top, range_mode="fixed")
-        )
-    )
+    state = put(START, "look.quantity", "orientation")
+    return LIVE.evaluate(state if top is None else put(state, "look.range_top", str(top)))
 
 
 @pytest.mark.parametrize("top", [None, 7.0])
@@ -184,9 +181,8 @@ def test_stored_provenance_can_be_read_back():
 
 
 def test_opens_without_network_and_draws(browser, tmp_path):
-    scene = replace(load_scene("dvf5000_first"), title=EVIL)
     path = tmp_path / "scene.html"
-    path.write_text(page_of(scene), encoding="utf-8")
+    path.write_text(page_of(replace(FIRST, title=EVIL)), encoding="utf-8")
     with opened_offline(browser, path) as page:
         assert "exaggeration ×1000" in page.inner_text("header")
         wait_for_the_map(page, page.frame_locator("iframe").locator("canvas").first, 20_000)

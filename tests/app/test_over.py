@@ -26,7 +26,7 @@ START = start_state(SCENE, nodes=9)
 
 
 def limited(limit_um):
-    return replace(START, specification=replace(START.specification, limit_um=limit_um))
+    return put(START, "specification.limit_um", str(limit_um))
 
 
 def pieces(kind, state):
@@ -52,7 +52,7 @@ def test_the_limit_is_kept_only_where_the_largest_error_keeps_it(limit, kept):
 
 def test_pass_and_fail_are_two_colours_told_apart_by_the_limit():
     state = limited(40.0)
-    picture = LIVE.evaluate(replace(state, look=replace(state.look, pass_fail=True)))
+    picture = LIVE.evaluate(put(state, "look.pass_fail", "1"))
     levels = colour_levels(picture.scale, picture.values)
     assert len(np.unique(levels)) == 2
     assert ((levels == levels.max()) == (picture.values > 40.0)).all()
@@ -62,9 +62,8 @@ def test_pass_and_fail_are_two_colours_told_apart_by_the_limit():
 
 def test_names_beside_the_colour_bar_keep_apart():
     for component, limit in (("norm", 51.5), ("norm", 500.0), ("x", 40.0)):
-        placed = [
-            m.name_at for m in marks(LIVE.evaluate(replace(limited(limit), component=component)))
-        ]
+        picture = LIVE.evaluate(replace(limited(limit), component=component))
+        placed = [mark.name_at for mark in marks(picture)]
         assert min(np.diff(placed)) > 0.06
         assert placed[-1] <= (1.07 if limit == 500.0 else 1.0)  # above the bar
 
@@ -95,8 +94,8 @@ def test_axes_are_numbered_in_positions_of_the_machine():
 
 
 def test_the_worst_corner_is_labelled_once():
-    state = replace(START, look=replace(START.look, arrows=True))
-    kinds = [label.kind for label in point_labels(LIVE.evaluate(state))]
+    picture = LIVE.evaluate(put(START, "look.arrows", "1"))
+    kinds = [label.kind for label in point_labels(picture)]
     assert kinds.count("worst") == 1
     assert kinds.count("corner") == 7
 

@@ -36,12 +36,11 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     # by hand: 450 mm above the table, 20 µrad add 9 µm across to 6 µm
     row = ("275.0", "10.82", "20.00", "21.63 / 0.00", "0.00 / 0.00", "40.00 / 0.00")
     assert f"C at B 0°, point (0, 275, 450) mm</td><td>{'</td><td>'.join(row)}</td>" in text
-    hidden = body_of(RotarySection, replace(state, shown=replace(state.shown, traces=False)))
+    hidden = body_of(RotarySection, put(state, "shown.traces", "0"))
     assert "Draw the traces" in hidden
     assert "<svg" not in hidden
-    assert "no rotary axis" in body_of(
-        RotarySection, start_state(load_scene("machine_c_frame_mill"))
-    )
+    mill = start_state(load_scene("machine_c_frame_mill"))
+    assert "no rotary axis" in body_of(RotarySection, mill)
 
 
 def test_a_table_that_is_paused_can_stand_there_and_axes_be_held_at_quarters():

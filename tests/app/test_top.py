@@ -110,13 +110,9 @@ def test_a_saved_scene_opens_to_the_same_errors():
 
 
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():
-    asked = []
-
-    def write(_picture, *about):
-        asked.append(about)
-        return b"%PDF", ()
-
-    window = Window(ReportWindow, services=Services(write_report=write))
+    asked, done = [], (b"%PDF", ())
+    write = Services(write_report=lambda _, *about: asked.append(about) or done)
+    window = Window(ReportWindow, services=write)
     window.context.reported[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
     window.do("set.author", HOSTILE)
     window.do("set.questions", "one\n\n two ")

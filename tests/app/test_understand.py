@@ -1,4 +1,4 @@
-"""Why a point is off, the best single adjustment, cards of proposals, gains."""
+"""Why, and where: a point that is clicked or typed, its causes, the best adjustment, gains."""
 
 import re
 import time
@@ -8,19 +8,152 @@ import numpy as np
 import pytest
 
 from app.parts import LIVE, lone_part, part_of
-from warpspace.app.evaluation.budget import pick_worst, with_picked
-from warpspace.app.state.app_state import start_state
+from warpspace.app.evaluation.budget import answer, pick, pick_worst, with_picked
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
+from warpspace.app.state.typed_numbers import read_positions
 from warpspace.app.tasks.analysis import AnalysisPart
 from warpspace.app.tasks.improve import BestPart
 from warpspace.app.tasks.understand import VolumePart, WorstPart
+from warpspace.kinematics.model import Loop
+from warpspace.picture.words import spell_at, spell_axes, spell_point
 from warpspace.scene.library import load_scene, scene_names
+from warpspace.scene.model import evaluate
 
-STATE = start_state(load_scene("dvf5000_first"))
+FIRST = load_scene("dvf5000_first")
+START = start_state(FIRST)
+
+
+def look_at(picture, target):
+    eye = picture.drawn_mm.reshape(-1, 3).mean(axis=0) + np.array([1500.0, -4000.0, 2500.0])
+    return eye, target - eye
+
+
+@pytest.mark.parametrize("surface", ["surface", "cut", "slices"])
+def test_a_ray_through_a_drawn_node_finds_its_axis_positions(surface):
+    state = replace(START, look=replace(START.look, surface=surface), nodes=11)
+    picture = LIVE.evaluate(replace(state, shown=replace(state.shown, traces=False)))
+    drawn = picture.slices[0].drawn_mm.reshape(11, 11, 3) if picture.slices else picture.drawn_mm
+    picked = pick(picture, *look_at(picture, drawn[4, 2] if picture.slices else drawn[2, 0, 3]))
+    assert picked.point_mm is None
+    if not picture.slices:
+        for axis, index in (("X", 2), ("Y", 0), ("Z", 3)):
+            there = picture.grid.coordinates[axis].reshape(-1)[index]
+            assert picked.at[axis] == pytest.approx(there, abs=0.01)
+
+
+def test_a_ray_past_everything_and_hostile_rays_find_nothing():
+    picture = LIVE.evaluate(START)
+    eye, towards = look_at(picture, picture.drawn_mm[0, 0, 0])
+    assert pick(picture, eye, -towards) is None
+    for bad in (np.nan, np.inf, 1e300):
+        assert pick(picture, np.full(3, bad), towards) is None
+    assert pick(picture, eye, np.zeros(3)) is None
+    assert pick(picture, np.zeros(2), towards) is None
+
+
+def test_a_trace_in_front_of_the_box_is_what_a_click_on_it_means():
+    picture = LIVE.evaluate(START.with_amplitude("EXC", 1.0))
+    lines = picture.traces[0]
+    hits = [
+        (picked, trace.point_mm)
+        for trace, points in zip(lines.group.traces, lines.actual_mm, strict=True)
+        for target in points[::6]
+        if (picked := pick(picture, *look_at(picture, target))) is not None
+    ]
+    assert sum(picked.point_mm == point for picked, point in hits) > 20
+    assert all(p.loop is Loop.WORKPIECE for p, _ in hits if p.point_mm is not None)
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_a_node_is_asked_about_where_it_is_drawn(name):
+    picture = LiveModel().evaluate(replace(start_state(load_scene(name)), nodes=3))
+    grid = picture.grid
+    for node in np.ndindex(grid.shape):
+        at = {
+            axis: float(np.broadcast_to(v, grid.shape)[node])
+            for axis, v in grid.coordinates.items()
+        }
+        found = answer(picture.state, Picked(at), picture.exaggeration)
+        shown = found.explanation.nominal_mm + found.shift_mm
+        assert shown == pytest.approx(grid.nominal_mm[node], abs=1e-9)
+
+
+WORST = {"X": 275.0, "Y": -225.0, "Z": -480.0}
+PLACE = "axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51"
+AT = "X=275,Y=-225,Z=-480,B=0,C=0"
+
+
+def test_a_point_is_spelt_in_both_coordinates():
+    axes = {**WORST, "B": 0.0, "C": 0.0}
+    assert spell_point(axes, (275.0, -225.0, -51.0)) == PLACE
+    assert spell_at(axes) == AT
+    assert spell_axes({**axes, "B": -30.0}) == "axes X 275 Y −225 Z −480 B −30°"
+    assert spell_axes({"B": 0.0, "C": 12.34}) == "axes B 0° C 12.3°"
+    assert spell_point({}, (0.0, -0.04, 2.5)) == "in R x 0 y 0 z 2.5"
+    assert spell_at({"C": -1e-9, "X": 1.25, "Y": 1.0 / 3.0}) == "X=1.25,Y=0.333333,C=0"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "X 275 Y -225 Z -480",
+        "X=275,Y=-225,Z=-480",
+        "x275y-225z-480",
+        "X: 275 mm; Y: −225 mm; Z: −480 mm",
+        "X 2.75e2, Y -225,0, Z -480.",
+        PLACE,
+        f"--at {AT}",
+        "  axes X +275   Y −225 Z −480 B 0° C 0° ",
+    ],
+)
+def test_a_point_is_read_in_every_way_it_is_spelt(text):
+    found = read_positions(text)
+    assert {axis: found[axis] for axis in "XYZ"} == WORST
+    assert put(START, "picked", text).picked == Picked(WORST)
+    assert put(START, "picked", text).notes == ()
+
+
+@pytest.mark.parametrize(
+    "text", ["X", "275", "X 1 X 2", "X nan", "X 1e999", "X 1 2", "<b>", "X=1,Q=2", "A 5", "X - 5"]
+)
+def test_what_is_no_point_changes_nothing_and_is_said(text):
+    asked = put(START, "picked", "X 1")
+    state = put(asked, "picked", text)
+    assert state.without_notes() == asked
+    (note,) = state.notes
+    assert "expected positions of the axes X, Y, Z, B, C, for instance X 275" in note
+
+
+def test_a_typed_point_is_clamped_to_the_travel_and_said():
+    travel = FIRST.machine.axes["X"].travel
+    state = put(START, "picked", "X 1e5 B 500")
+    assert state.picked.at["X"] == travel[1]
+    assert state.positions["B"] == START.position_spans["B"].high
+    assert len(state.notes) == 2
+    assert "X of the point = 100000 is outside -275 to 275 mm" in " ".join(state.notes)
+    middle = FIRST.workspace.positions
+    assert (state.picked.at["Y"], state.picked.at["Z"]) == (middle["Y"], middle["Z"])
+    moved = put(state.without_notes(), "picked", "Z -300")
+    assert moved.picked.at == {**state.picked.at, "Z": -300.0}
+    assert put(moved, "picked", "  ").picked is None
+
+
+@pytest.mark.parametrize("at", [AT, "X=0,Y=0,Z=-280,B=-30,C=45", "X=-275,Y=225,Z=-80"])
+def test_a_typed_point_has_the_error_of_the_exact_chain(at):
+    state = put(START, "picked", at)
+    shown = answer(state, state.picked, 1.0)
+    wanted = evaluate(FIRST, at=read_positions(at), exact=True)
+    np.testing.assert_allclose(shown.explanation.error_um, wanted.error_um, atol=1e-9)
+    np.testing.assert_allclose(shown.explanation.nominal_mm, wanted.nominal_mm, atol=1e-9)
+    assert dict(shown.at).keys() == FIRST.machine.axes.keys()
+
+
 NUMBER = r"[+−]?\d+\.\d"
 
 
-def html_of(part, state=STATE):
+def html_of(part, state=START):
     return "".join(part.pieces(LIVE.evaluate(state)).values())
 
 
@@ -49,16 +182,16 @@ def test_the_worst_point_of_the_thesis_and_another_one():
     part = lone_part(WorstPart)
     assert "why 51.7 µm" in html_of(part)
     assert re.search(r'title="squareness of Z to Y[^"]*">EA0Z</b></th><td>\+49.1', html_of(part))
-    typed = part.take(STATE, "set.at", "X 0 Y 0 Z −280")
+    typed = part.take(START, "set.at", "X 0 Y 0 Z −280")
     assert "This point" in html_of(part, typed)
     assert part.take(typed, "forget", "").picked is None
-    part.context.shown = LIVE.evaluate(STATE)
-    asked = part.take(STATE, "lever", "EA0Z")
+    part.context.shown = LIVE.evaluate(START)
+    asked = part.take(START, "lever", "EA0Z")
     assert (asked.lever, asked.picked) == ("EA0Z", pick_worst(part.context.shown))
     assert "mm across the axis" in html_of(part, asked)
     for word in ("<img>", "", "x" * 500):
-        assert part.take(STATE, "lever", word).lever == ""
-        assert "<img" not in html_of(part, part.take(STATE, "set.at", word))
+        assert part.take(START, "lever", word).lever == ""
+        assert "<img" not in html_of(part, part.take(START, "set.at", word))
 
 
 def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_holds():
@@ -68,31 +201,31 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     html = html_of(part)
     for words in ("EA0Z 33.9 → 30.0 µrad", "51.7 → 46.1 µm", "30.9 → 28.3 µm"):
         assert words in html
-    applied = part.take(STATE, "apply", "0")
+    applied = part.take(START, "apply", "0")
     assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(46.09, abs=0.01)
     assert applied.comparison.b is not None
-    previewed = part.take(STATE, "preview", "0")
-    assert previewed.amplitudes == STATE.amplitudes
+    previewed = part.take(START, "preview", "0")
+    assert previewed.amplitudes == START.amplitudes
     assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(46.09, abs=0.01)
-    moved = STATE.with_amplitude("EAX", 9.0)
+    moved = START.with_amplitude("EAX", 9.0)
     assert "disabled" in html_of(part, moved)
     wait(part)
-    for state, word, number in ((STATE, "apply", "0"), (moved, "apply", "7"), (moved, "x", "0")):
+    for state, word, number in ((START, "apply", "0"), (moved, "apply", "7"), (moved, "x", "0")):
         assert part.take(state, word, number) is state
 
 
 def test_an_excluded_error_is_neither_adjusted_nor_lost():
-    state = put(STATE, "exclusions.excluded", "+EA0Z")
+    state = put(START, "exclusions.excluded", "+EA0Z")
     part = lone_part(BestPart)
     html_of(part, state)
     wait(part)
     assert "EA0Z" not in html_of(part, state)
     applied = part.take(state, "apply", "0")
-    assert applied.amplitudes["EA0Z"] == STATE.amplitudes["EA0Z"]
+    assert applied.amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
 
 
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
-    opened = replace(STATE, page=replace(STATE.page, open=frozenset({"volume", "gains"})))
+    opened = replace(START, page=replace(START.page, open=frozenset({"volume", "gains"})))
     html = html_of(lone_part(VolumePart), opened)
     for words in ("30.89 µm", "51.72 µm", "550 × 450 × 400 mm"):
         assert words in html

@@ -14,7 +14,7 @@ from products import pairwise
 pytestmark = [pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")]
 MARK = "WARPSPACE_TEST_RUN"
 MAIN = "from warpspace.cli import main; main()"
-FIELD = ("field", "dvf5000_first", "--grid", "41", "--force", "--csv", "x.csv")
+FIELD = ("field", "dvf5000_first", "--grid", "2", "--force", "--csv", "x.csv")
 PICTURE = ("draw", "dvf5000_first", "--force", "-o", "x.png")
 MOVIE = ("draw", "dvf5000_first", "--frames", "30", "--force", "-o", "x.gif")
 REPORT = ("report", "dvf5000_first", "--force", "-o", "x.html")
@@ -68,40 +68,25 @@ def processes(folder):
     return found
 
 
-def all_have_ended(folder, within_s=20.0):
-    until = time.monotonic() + within_s
-    while processes(folder):
-        if time.monotonic() > until:
-            return False
+def all_have_ended(folder):
+    until = time.monotonic() + 20.0
+    while (left := processes(folder)) and time.monotonic() < until:
         time.sleep(0.05)
-    return True
+    return not left
 
 
-def wait_for(folder, pattern, process):
-    while not list(folder.glob(pattern)):
-        assert process.poll() is None, (folder / "log").read_text()
+def wait_until(fine, process):
+    while not fine():
+        assert process.poll() is None, process.args
         time.sleep(0.005)
 
 
-def wait_for_workers(folder, process, count=3):
-    while len(processes(folder)) < count:
-        assert process.poll() is None, (folder / "log").read_text()
-        time.sleep(0.02)
-
-
-def wait_for_drawing(process):
-    while "vtk" not in Path(f"/proc/{process.pid}/maps").read_text():
-        assert process.poll() is None
-        time.sleep(0.02)
+def said(folder):
+    return (folder / "log").read_text()
 
 
 def hidden(folder):
     return [path.name for path in folder.glob(".warpspace-*")]
-
-
-def run_again(folder):
-    again = start(folder, *FIELD[:2], "--grid", "2", *FIELD[4:])
-    assert again.wait(60) == 0, (folder / "log").read_text()
 
 
 @pytest.mark.parametrize(
@@ -113,10 +98,9 @@ def run_again(folder):
 )
 def test_processes_end_with_their_command(command, how, tmp_path):
     process = start(tmp_path, *command)
-    if command is PICTURE:
-        wait_for_drawing(process)
-    else:
-        wait_for_workers(tmp_path, process)
+    maps = Path(f"/proc/{process.pid}/maps")
+    drawing, working = (lambda: "vtk" in maps.read_text()), lambda: len(processes(tmp_path)) >= 3
+    wait_until(drawing if command is PICTURE else working, process)
     time.sleep(0.3)
     if how == signal.SIGINT:
         os.killpg(process.pid, how)  # as a terminal does
@@ -124,19 +108,18 @@ def test_processes_end_with_their_command(command, how, tmp_path):
         process.send_signal(how)
     status = process.wait(10)
     assert all_have_ended(tmp_path)
-    said = (tmp_path / "log").read_text()
-    assert "Traceback" not in said
+    assert "Traceback" not in said(tmp_path)
     if how != signal.SIGKILL:
         assert status == 128 + how
         word = "interrupted" if how == signal.SIGINT else "terminated"
-        assert said.split() == ["warpspace:", word]
+        assert said(tmp_path).split() == ["warpspace:", word]
         assert hidden(tmp_path) == []
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_removes_the_temporary_file(how, tmp_path):
     process = start(tmp_path, code=WRITER)
-    wait_for(tmp_path, ".warpspace-*", process)
+    wait_until(lambda: hidden(tmp_path), process)
     process.send_signal(how)
     process.send_signal(how)  # some programs send it twice
     assert process.wait(10) == 128 + how
@@ -145,13 +128,14 @@ def test_a_signal_removes_the_temporary_file(how, tmp_path):
 
 def test_the_next_run_clears_what_a_killed_one_left(tmp_path):
     process = start(tmp_path, code=WRITER)
-    wait_for(tmp_path, ".warpspace-*", process)
+    wait_until(lambda: hidden(tmp_path), process)
     alive = start(tmp_path, code=WRITER)
-    wait_for(tmp_path, f".warpspace-*-{alive.pid}-*", alive)
+    wait_until(lambda: list(tmp_path.glob(f".warpspace-*-{alive.pid}-*")), alive)
     process.kill()
     process.wait()
     (tmp_path / ".warpspace-notes.csv").write_text("a user's own", "utf-8")
-    run_again(tmp_path)
+    again = start(tmp_path, *FIELD)
+    assert again.wait(60) == 0, said(tmp_path)
     left = hidden(tmp_path)
     alive.kill()
     alive.wait()
@@ -173,9 +157,7 @@ main()
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
 def test_the_status_says_which_signal_it_was(how, tmp_path):
     process = start(tmp_path, code=IN_EXEC)
-    while "here" not in (tmp_path / "log").read_text():
-        assert process.poll() is None
-        time.sleep(0.05)
+    wait_until(lambda: "here" in said(tmp_path), process)
     process.send_signal(how)
     assert process.wait(20) == 128 + how
 
@@ -200,7 +182,7 @@ main()
 def test_a_signal_that_comes_within_a_finalizer_is_heeded_without_a_traceback(tmp_path):
     process = start(tmp_path, code=IN_FINALIZER)
     assert process.wait(15) == 128 + signal.SIGTERM
-    assert (tmp_path / "log").read_text().split() == ["warpspace:", "terminated"]
+    assert said(tmp_path).split() == ["warpspace:", "terminated"]
 
 
 DRAWING_VIEW = """
@@ -229,18 +211,14 @@ main()
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
 def test_view_ends_at_once_while_a_figure_is_drawn(how, tmp_path):
     process = start(tmp_path, "view", "--no-browser", code=DRAWING_VIEW)
-    wait_for_workers(tmp_path, process)
-    while "is shown at" not in (tmp_path / "log").read_text():
-        assert process.poll() is None
-        time.sleep(0.05)
+    wait_until(lambda: len(processes(tmp_path)) >= 3 and "is shown at" in said(tmp_path), process)
     begin = time.monotonic()
     os.killpg(process.pid, how)
     assert process.wait(20) in (0, 128 + how)
     assert time.monotonic() - begin < 5.0
     assert all_have_ended(tmp_path)
-    said = (tmp_path / "log").read_text()
-    assert "Traceback" not in said, said
-    assert "ended" in said
+    assert "Traceback" not in said(tmp_path)
+    assert "ended" in said(tmp_path)
 
 
 SIGNALLED_THREAD = """
@@ -261,4 +239,4 @@ main()
 def test_view_heeds_a_signal_that_the_system_gives_to_another_thread(tmp_path):
     process = start(tmp_path, "view", "--no-browser", code=SIGNALLED_THREAD)
     assert process.wait(30) in (0, 128 + signal.SIGTERM)
-    assert "ended" in (tmp_path / "log").read_text()
+    assert "ended" in said(tmp_path)

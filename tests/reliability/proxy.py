@@ -49,7 +49,6 @@ class Site:
 class Answer:
     status: int
     cookies: SimpleCookie
-    location: str | None
 
     @property
     def pairs(self) -> str:
@@ -85,7 +84,8 @@ def site() -> Iterator[Site]:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        stack.callback(_end, nginx)
+        stack.callback(nginx.wait, 10)
+        stack.callback(nginx.terminate)
         until = time.monotonic() + 15.0
         while True:
             with contextlib.suppress(OSError):
@@ -103,11 +103,6 @@ def nginx_is_there() -> bool:
 
 def _nginx() -> str:
     return shutil.which("nginx", path="/usr/local/bin:/usr/bin:/usr/sbin:/usr/local/sbin") or ""
-
-
-def _end(process: "subprocess.Popen[bytes]") -> None:
-    process.terminate()
-    process.wait(10)
 
 
 def _free_port() -> int:
@@ -128,29 +123,27 @@ def _certificate(folder: Path) -> ssl.SSLContext:
 
 def ask(at: Site, path: str = "/", *, tls: bool = True, **headers: str) -> Answer:
     """Ask the proxy for a page; status 0 where it closes without an answer."""
-    plain = sockets.create_connection(("127.0.0.1", at.https if tls else at.http), 20)
+    port, trust = at.https if tls else at.http, at.trust
     name = headers.get("Host", NAME).partition(":")[0]
+    if name != NAME:  # a scanner does not look at the certificate
+        trust = ssl.create_default_context()
+        trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
+    asking = http.client.HTTPConnection(f"{NAME}:{port}")
     try:
-        trust = at.trust
-        if tls and name != NAME:  # a scanner does not look at the certificate
-            trust = ssl.create_default_context()
-            trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
-        wire = trust.wrap_socket(plain, server_hostname=name) if tls else plain
-        lines = {"Host": at.host if tls else f"{NAME}:{at.http}", **headers, "Connection": "close"}
-        head = "".join(f"{key.replace('_', '-')}: {value}\r\n" for key, value in lines.items())
-        wire.sendall(f"GET {path} HTTP/1.1\r\n{head}\r\n".encode())
-        found = http.client.HTTPResponse(wire)
-        found.begin()
+        plain = sockets.create_connection(("127.0.0.1", port), 20)
+        asking.sock = trust.wrap_socket(plain, server_hostname=name) if tls else plain
+        lines = {key.replace("_", "-"): value for key, value in headers.items()}
+        asking.request("GET", path, headers={**lines, "Connection": "close"})
+        found = asking.getresponse()
         found.read()
         cookies: SimpleCookie = SimpleCookie()
         for line in found.headers.get_all("Set-Cookie") or []:
             cookies.load(line)
-        wire.close()
-        return Answer(found.status, cookies, found.getheader("Location"))
+        return Answer(found.status, cookies)
     except (http.client.HTTPException, OSError):
-        return Answer(0, SimpleCookie(), None)
+        return Answer(0, SimpleCookie())
     finally:
-        plain.close()
+        asking.close()
 
 
 async def drag(at: Site, cookies: str) -> float:
@@ -195,11 +188,8 @@ def run(count: int) -> Outcome:
 
 
 def _try_doors(at: Site, faults: list[str]) -> None:
-    upgrade = {
-        "Upgrade": "websocket",
-        "Sec_WebSocket_Key": "AAAAAAAAAAAAAAAAAAAAAA==",
-        "Sec_WebSocket_Version": "13",
-    }
+    key = "AAAAAAAAAAAAAAAAAAAAAA=="
+    upgrade = {"Upgrade": "websocket", "Sec_WebSocket_Key": key, "Sec_WebSocket_Version": "13"}
     valid = f"/?token={TOKEN}"
     expected = {
         "no token": (ask(at), 403),

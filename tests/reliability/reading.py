@@ -25,12 +25,10 @@ PORTION = 5000
 """Files that one process reads, so that what it keeps is not counted for ever."""
 WAYS = ("bytes", "hypothesis", "atheris")
 
-
 NOTHING = {"by_format": {}, "read": {}, "slowest_s": 0.0, "most_mb": 0.0, "faults": []}
-
-
 _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
-_INTERESTING = [0, 1, 0x7F, 0x80, 0xFF, 0x0A, 0x22, 0x5B, 0x7B]
+_INTERESTING = b'\0\1\x7f\x80\xff\n"[{'
+_RUNS = (b"\xff" * 4, b"\0" * 4, b"\x7f\xff\xff\xff", b"\0\0\x80\x7f")
 LARGEST = 200_000
 
 
@@ -45,52 +43,37 @@ def _change(
     content: bytearray, seeds: Sequence[bytes], words: Sequence[bytes], chance: random.Random
 ) -> None:
     at, length = chance.randrange(len(content) + 1), chance.choice((1, 2, 4, 16, 64, 512))
-    kind = chance.randrange(9 if words else 6)
-    if kind == 0 and content:
-        content[at % len(content)] ^= 1 << chance.randrange(8)
-    elif kind == 1 and content:
-        content[at % len(content)] = chance.choice(_INTERESTING)
-    elif kind == 2:
-        del content[at : at + length]
-    elif kind == 3:
-        content[at:at] = content[at : at + length] * chance.choice((1, 2, 50))
-    elif kind == 4:
-        other = chance.choice(seeds)
-        begin = chance.randrange(len(other) + 1)
-        content[at : at + length] = other[begin : begin + length]
-    elif kind == 5:
-        content[at : at + 4] = chance.choice(
-            (b"\xff" * 4, b"\0" * 4, b"\x7f\xff\xff\xff", b"\0\0\x80\x7f", chance.randbytes(4))
-        )
-    elif kind == 6:
-        content[at:at] = chance.choice(words)
-    elif kind == 7:
-        _replace_number(content, words, chance)
-    else:
-        _swap_lines(content, chance)
-
-
-def _replace_number(content: bytearray, words: Sequence[bytes], chance: random.Random) -> None:
-    found = list(_NUMBER.finditer(bytes(content)))
-    if not found:
-        return
-    place = chance.choice(found)
-    value = chance.choice(
-        (
-            str(chance.uniform(-1e6, 1e6)).encode(),
-            f"{10.0 ** chance.uniform(-330, 308):e}".encode(),
-            str(chance.randrange(-(10**20), 10**20)).encode(),
-            chance.choice(words),
-        )
-    )
-    content[place.start() : place.end()] = value
-
-
-def _swap_lines(content: bytearray, chance: random.Random) -> None:
-    lines = bytes(content).split(b"\n")
-    line = lines[chance.randrange(len(lines))]
-    lines.insert(chance.randrange(len(lines) + 1), line)
-    content[:] = b"\n".join(lines)
+    match chance.randrange(9 if words else 6):
+        case 0 if content:
+            content[at % len(content)] ^= 1 << chance.randrange(8)
+        case 1 if content:
+            content[at % len(content)] = chance.choice(_INTERESTING)
+        case 2:
+            del content[at : at + length]
+        case 3:
+            content[at:at] = content[at : at + length] * chance.choice((1, 2, 50))
+        case 4:
+            other = chance.choice(seeds)
+            begin = chance.randrange(len(other) + 1)
+            content[at : at + length] = other[begin : begin + length]
+        case 5:
+            content[at : at + 4] = chance.choice((*_RUNS, chance.randbytes(4)))
+        case 6:
+            content[at:at] = chance.choice(words)
+        case 7 if found := list(_NUMBER.finditer(bytes(content))):
+            number = chance.choice(found)
+            content[number.start() : number.end()] = chance.choice(
+                (
+                    f"{chance.uniform(-1e6, 1e6)}".encode(),
+                    f"{10.0 ** chance.uniform(-330, 308):e}".encode(),
+                    f"{chance.randrange(-(10**20), 10**20)}".encode(),
+                    chance.choice(words),
+                )
+            )
+        case _:
+            lines = bytes(content).split(b"\n")
+            lines.insert(chance.randrange(len(lines) + 1), chance.choice(lines))
+            content[:] = b"\n".join(lines)
 
 
 def read_many(way: str, count: int, seed: int) -> Outcome:

@@ -8,57 +8,41 @@ from pathlib import Path
 
 import pytest
 
-from reliability import doors, kills, messages, proxy, reading, rows, surroundings
+from reliability import reading, rows
 from reliability.formats import FORMATS, WORDS, Format
+from reliability.proxy import nginx_is_there
 from warpspace.exceptions import OptionError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, limits and signals")
 
 
-def holds(outcome, count):
+def needs(what, there):
+    return pytest.mark.skipif(not there, reason=f"needs {what}")
+
+
+NIGHTLY = pytest.mark.nightly
+ATHERIS = needs("atheris", importlib.util.find_spec("atheris"))
+NGINX = needs("nginx and openssl", nginx_is_there())
+
+
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("files", 200),
+        ("scenes", 200),
+        ("kills", 15),
+        pytest.param("coverage", 2000, marks=[NIGHTLY, ATHERIS]),
+        pytest.param("messages", 3000, marks=NIGHTLY),
+        pytest.param("surroundings", 8, marks=NIGHTLY),
+        pytest.param("soak", 1, marks=NIGHTLY),
+        pytest.param("doors", 1200, marks=NIGHTLY),  # every file that is built to exhaust
+        pytest.param("proxy", 20, marks=[NIGHTLY, NGINX]),
+    ],
+)
+def test_a_small_count_of_a_row_holds(name, count):
+    outcome = rows.ROWS[name].run(count)
     assert outcome.faults == []
     assert outcome.count == count
-
-
-@pytest.mark.parametrize("way", ["bytes", "hypothesis"])
-def test_changed_files_are_read_or_refused(way):
-    holds(reading.read_many(way, 200, 5), 200)
-
-
-def test_killed_writers_leave_whole_files():
-    holds(kills.run(15), 15)
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif(importlib.util.find_spec("atheris") is None, reason="needs atheris")
-def test_a_fuzzer_that_sees_what_is_reached():
-    holds(reading.read_many("atheris", 2000, 5), 2000)
-
-
-@pytest.mark.nightly
-def test_an_honest_tab_works_on_while_others_attack():
-    holds(messages.run(3000), 3000)
-
-
-@pytest.mark.nightly
-def test_commands_in_odd_surroundings():
-    holds(surroundings.run(8), 8)
-
-
-@pytest.mark.nightly
-def test_tabs_for_a_minute():
-    holds(rows.soak(1), 1)
-
-
-@pytest.mark.nightly
-def test_the_doors_stay_shut():
-    holds(doors.run(1200), 1200)  # every file that is built to exhaust
-
-
-@pytest.mark.nightly
-@pytest.mark.skipif(not proxy.nginx_is_there(), reason="needs nginx and openssl")
-def test_the_example_of_a_proxy():
-    holds(proxy.run(20), 20)
 
 
 def fail(content, folder):
