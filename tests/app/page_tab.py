@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from app.frames import draw, new_visitor
+from app.frames import new_visitor
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.session import Session
@@ -132,11 +132,6 @@ class Tab:
         self.actions += 1
         self.page.locator(f"#ws-right .ws-fold:has-text({name!r})").first.click()
 
-    def choose(self, label: str, option: str) -> None:
-        """Choose from a list."""
-        self.actions += 1
-        self.page.get_by_label(label, exact=True).first.select_option(label=option)
-
     def type(self, label: str, text: str) -> None:
         """Type into a box and press Enter."""
         self.actions += 1
@@ -183,11 +178,6 @@ class Tab:
         size = self.page.viewport_size or {"width": 0, "height": 0}
         return box is not None and box["y"] >= 0 and box["y"] + box["height"] <= size["height"]
 
-    def screenshot(self) -> bytes:
-        """Draw the page as it is now, and give its picture."""
-        draw(self.page)
-        return self.page.screenshot()
-
     def until(self, fine: Callable[[], bool], seconds: float = 60.0) -> None:
         """Wait until something holds."""
         for _ in range(int(seconds / 0.05)):
@@ -208,10 +198,6 @@ class Tab:
                 return now
             last = now
         pytest.fail("does not come to rest")
-
-    def eye(self) -> list[float]:
-        """Where the page's camera stands."""
-        return self.page.evaluate("() => window.__viserMutable.camera.position.toArray()")
 
     def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Vertices (mm) and colours of the drawn surface, read back from the browser's scene."""

@@ -88,16 +88,6 @@ def test_no_command_shows_the_help_on_stderr(warpspace):
     assert "Understand:" in result.err
 
 
-def test_failed_write_keeps_the_file_that_was_there(tmp_path, warpspace):
-    target = tmp_path / "points.csv"
-    target.write_text("mine", encoding="utf-8")
-    warpspace("field", "dvf5000_first", "--at", "Q=1", "--csv", target, "--force").refused(
-        "unknown axis Q"
-    )
-    assert target.read_text(encoding="utf-8") == "mine"
-    assert list(tmp_path.iterdir()) == [target]
-
-
 LONG = {
     "short rows": ("q,pitch\n" + "0,1\n" * 1_000_000, "more than 100,000 rows"),
     "blank rows": ("q,pitch\n" + "\n" * 600_000, "has more than 500,000 lines"),

@@ -7,8 +7,6 @@ import stat
 import pytest
 
 from products import first, pairwise
-from warpspace.calibration.readings import parse_table
-from warpspace.outputs.exports.fields import write_rows
 from warpspace.outputs.figures import catalogue
 from warpspace.scene.library import load_scene
 
@@ -83,7 +81,6 @@ def test_a_loop_of_links_is_refused(scene, tmp_path, warpspace):
     warpspace("check", target).refused("x.csv")
 
 
-TEXTS = ("=1+1", "+1", "-run1", "run1", "@x", "\t=1", "\r=1", "'=1", "'x", "plain")
 FIVE_AXES = """title = "W"
 [machine]
 chain = "wCbWXYZt"
@@ -129,16 +126,6 @@ def test_the_name_of_a_scene_is_no_formula(machine, warpspace, tmp_path):
     for row in cells(target.read_bytes())[1:]:
         assert "'=w" in row
         assert not any(cell.startswith(("=", "+", "@", "\t", "\r")) for cell in row)
-
-
-def test_texts_of_a_table_stay_apart(tmp_path):
-    target = tmp_path / "t.csv"
-    with write_rows(target, {"session": "text", "x_mm": "number"}) as append:
-        append({"session": TEXTS, "x_mm": range(len(TEXTS))})
-    written = [row[0] for row in cells(target.read_bytes())[1:]]
-    assert not any(text.startswith(("=", "+", "-", "@", "\t", "\r")) for text in written)
-    table = parse_table(target.read_bytes().decode(), "t.csv")
-    assert table.session == TEXTS
 
 
 def test_sessions_that_differ_in_their_sign_stay_apart(warpspace, tmp_path):
