@@ -5,6 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from warpspace.analysis.catalogue import entries
+from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import AppState
@@ -30,6 +31,7 @@ class Alone:
     """One part on a page that is not there, with what it has the page do."""
 
     def __init__(self, kind: Any, state: AppState, *more: Any, **given: Any) -> None:
+        given = {"scenes": SceneList({}), "services": Services()} | given
         self.said, self.sent, self.saved, self.called = [], [], [], []
         self.store = StateStore(state)
         self.context = Nobody(
@@ -64,29 +66,20 @@ class Alone:
         return str(found)
 
 
-def lone_part(kind: Any, said: list[Any] | None = None) -> Any:
-    """Build a part for nobody; what it would tell a user goes into a list."""
-    told = [] if said is None else said
-    return kind(Nobody(
-        act=lambda do: do(), renew=lambda _: None, notify=lambda *words: told.append(words),
-        shown=None, stage=None, scenes=SimpleNamespace(add=told.append),
-    ))  # fmt: skip
+def lone_part(kind: Any, name: str = "") -> Any:
+    """Build a part for nobody; what it posts and tells a user goes into lists of its context."""
+    posted, told = [], []
+    context = Nobody(
+        act=lambda do: do(), renew=lambda _: None, post=posted.append, posted=posted, told=told,
+        notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
+        scenes=SceneList({}), services=Services(), shown=None, stage=None,
+    )  # fmt: skip
+    return kind(context, *(one for one in entries() if one.name == name))
 
 
 def body_of(kind: Any, state: AppState) -> str:
     """Give what a section or a window shows of a state."""
     return str(lone_part(kind).body(LIVE.evaluate(state)))
-
-
-def part_of(kind: Any, name: str) -> Any:
-    """Build a part for nobody."""
-    (entry,) = [one for one in entries() if one.name == name]
-    posted, told = [], []
-    return kind(Nobody(
-        act=lambda do: do(), renew=lambda _: None, post=posted.append, posted=posted, told=told,
-        notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
-        scenes={}, services=Services(),
-    ), entry)  # fmt: skip
 
 
 def answer_of(part: Any, state: AppState) -> Any:

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from app.parts import answer_of, part_of, section
+from app.parts import answer_of, lone_part, section
 from still_scenes import still_scene
 from warpspace.app.documents.files import exported_words
 from warpspace.app.documents.legend import picture_conditions, subject_words
@@ -47,7 +47,7 @@ CHOICE = {"formats": "heidenhain", "points": "9"}
 
 def asking(state=START, choice=CHOICE):
     """Give the part, and the state with what was chosen."""
-    part = part_of(CompensatePart, "compensate")
+    part = lone_part(CompensatePart, "compensate")
     part.context.store = SimpleNamespace(state=state)
     return part, replace(state, forms={f"compensate.{key}": one for key, one in choice.items()})
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import warpspace
-from app.parts import answer_of, part_of, section
+from app.parts import answer_of, lone_part, section
 from warpspace import load_scene
 from warpspace.analysis.concepts import Concepts, compare_concepts
 from warpspace.analysis.repair import Repair
@@ -52,7 +52,7 @@ def ran(part, state):
 
 
 def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
-    part = part_of(RepairPart, "repair")
+    part = lone_part(RepairPart, "repair")
     state = replace(START, forms={"repair.objective": "rms", "repair.grid": "9"})
     ran(part, state)
     found = part._answer.found
@@ -110,14 +110,14 @@ def test_a_tolerance_change_takes_less_than_50_ms():
 
 
 def test_the_worst_point_of_the_workpiece_loop_is_refused_with_a_way_out():
-    part = part_of(TolerancesPart, "allocate")
+    part = lone_part(TolerancesPart, "allocate")
     shown = section(part, state_of(PROPOSED, Loop.WORKPIECE))
     assert "montecarlo --over max" in shown
     assert "Evaluated at" in shown
 
 
 def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
-    part = part_of(TolerancesPart, "allocate")
+    part = lone_part(TolerancesPart, "allocate")
     fixed = frozenset({"EA0Z", "EXA"})  # the latter of another machine
     state = state_of(FIRST, limit_um=40.0, percent=98.0, fixed=fixed, costs="EB0Z=9,EYA=3")
     ran(part, state)
@@ -141,13 +141,13 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
 
 
 def test_without_tolerances_there_is_nothing_to_allocate():
-    part = part_of(TolerancesPart, "allocate")
+    part = lone_part(TolerancesPart, "allocate")
     with pytest.raises(SceneError, match="has no tolerances"):
         answer_of(part, start_state(load_scene("dvf5000_nominal")))
 
 
 def test_tolerances_are_typed_fixed_scaled_and_reset():
-    part = part_of(TolerancesPart, "allocate")
+    part = lone_part(TolerancesPart, "allocate")
     section(part, START)  # lays out the rows
     state = put(START, "specification.fixed", "+EXX")
     assert 'data-value="-EXX"' in section(part, state)
@@ -178,7 +178,7 @@ def test_costs_that_mean_nothing_are_refused_with_their_text(text):
 
 
 def concepts_part():
-    part = part_of(ConceptsPart, "concepts")
+    part = lone_part(ConceptsPart, "concepts")
     part.context.scenes = {"other": OTHER, HOSTILE: replace(OTHER, title=HOSTILE)}
     return part
 
@@ -225,7 +225,7 @@ def test_page_report_and_command_have_one_figure_for_one_question():
     (reviewed,) = build_review((SCENE,), settings).scenes
     assert reviewed.results["worst"].points[0].sampled.probability == wanted
     asked = state_of(SCENE, limit_um=50.0)
-    assert answer_of(part_of(TolerancesPart, "allocate"), asked).before == wanted
+    assert answer_of(lone_part(TolerancesPart, "allocate"), asked).before == wanted
     forms = {"concepts.loop": "tool", "concepts.own_tolerances": "1"}
     (found,) = answer_of(concepts_part(), replace(asked, forms=forms)).concepts
     assert found.sampled.probability == wanted

@@ -24,16 +24,8 @@ STATE = start_state(FIRST, nodes=5)
 HOSTILE = "<img src=x onerror=alert(1)>.csv"
 
 
-class Window(Alone):
-    """A part on a page with two scenes."""
-
-    def __init__(self, kind, state=STATE, services=None):
-        scenes = SceneList({FIRST.title: FIRST, SECOND.title: SECOND})
-        super().__init__(kind, state, scenes=scenes, services=services or Services())
-
-
 def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
-    bar = Window(TopPart)
+    bar = Alone(TopPart, STATE)
     assert 'data-do="page:undo"' not in bar.html
     bar.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
     assert "Undo: roll of X (Ctrl+Z)" in bar.html
@@ -43,8 +35,9 @@ def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
 
 
 def test_scenes_are_chosen_by_title_and_escaped():
-    window = Window(ScenesWindow)
-    window.context.scenes.add(replace(FIRST, name="other", title=HOSTILE, description=HOSTILE))
+    hostile = replace(FIRST, name="other", title=HOSTILE, description=HOSTILE)
+    scenes = SceneList({scene.title: scene for scene in (FIRST, SECOND, hostile)})
+    window = Alone(ScenesWindow, STATE, scenes=scenes)
     assert "<img" not in window.html
     assert window.html.count('aria-current="true"') == 1
     assert window.do("choose", "nothing of that name").scene is FIRST
@@ -57,7 +50,7 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
     for command in COMMANDS:
         part, _, word = command.event.partition(":")
         if part in ("state", "page") and command.keys and "ctrl" not in command.keys[0]:
-            window = Window({"state": StatePart, "page": PagePart}[part])
+            window = Alone({"state": StatePart, "page": PagePart}[part], STATE)
             window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
             before = replace(window.store.state, exaggeration=None).resulting_scene()
             after = window.do(word, command.value)
@@ -65,7 +58,7 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
 
 
 def test_commands_are_found_by_words_and_enter_runs_the_first():
-    window = Window(HelpWindow)
+    window = Alone(HelpWindow, STATE)
     window.store.apply(lambda state: put(state, "page.command", "zero err"))
     assert window.html.count('data-do="help:run"') == 1
     window.do("first", "whatever")
@@ -75,12 +68,12 @@ def test_commands_are_found_by_words_and_enter_runs_the_first():
 
 
 def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
-    window = Window(FilesWindow, STATE.with_amplitude("EAX", 7.0))
+    window = Alone(FilesWindow, STATE.with_amplitude("EAX", 7.0))
     window.do("share")
     (name, _, token, words) = window.called[-1]
     assert (name, token) == ("share", None)
     assert "1 changed error" in words
-    asking = Window(FilesWindow, services=Services(token="secret"))
+    asking = Alone(FilesWindow, STATE, services=Services(token="secret"))
     assert asking.do("share").page.window == "files"
     assert asking.called == []
     asking.do("share", "token")
@@ -90,7 +83,7 @@ def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
 
 
 def test_files_that_a_page_refuses_or_invents_are_said_or_left():
-    window = Window(FilesWindow)
+    window = Alone(FilesWindow, STATE)
     window.do("file", f"²\n{HOSTILE}\n")
     assert "has not arrived whole" in window.said[-1][1]
     window.do("file", f"{10**9}\n{HOSTILE}\n")
@@ -102,7 +95,7 @@ def test_files_that_a_page_refuses_or_invents_are_said_or_left():
 
 
 def test_a_saved_scene_opens_to_the_same_errors():
-    window = Window(FilesWindow, STATE.with_amplitude("EAX", 7.0))
+    window = Alone(FilesWindow, STATE.with_amplitude("EAX", 7.0))
     window.do("save")
     ((name, text),) = window.saved
     assert name == "dvf5000_first.toml"
@@ -112,7 +105,7 @@ def test_a_saved_scene_opens_to_the_same_errors():
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():
     asked, done = [], (b"%PDF", ())
     write = Services(write_report=lambda _, *about: asked.append(about) or done)
-    window = Window(ReportWindow, services=write)
+    window = Alone(ReportWindow, STATE, services=write)
     window.context.reported[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
     window.do("set.author", HOSTILE)
     window.do("set.questions", "one\n\n two ")

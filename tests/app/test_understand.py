@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.parts import LIVE, lone_part, part_of
+from app.parts import LIVE, lone_part
 from warpspace.app.evaluation.budget import answer, pick, pick_worst, with_picked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import Picked, start_state
@@ -229,7 +229,7 @@ def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     html = html_of(lone_part(VolumePart), opened)
     for words in ("30.89 µm", "51.72 µm", "550 × 450 × 400 mm"):
         assert words in html
-    part = part_of(AnalysisPart, "gains")
+    part = lone_part(AnalysisPart, "gains")
     html_of(part, opened)
     wait(part)
     middle = html_of(part, opened)
