@@ -92,11 +92,6 @@ def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
     assert len(json.loads(there.out)["rows"]) == 6
 
 
-def test_a_mistake_is_said_as_at_home(warpspace, scheduler):
-    run = ("montecarlo", "dvf5000_nominal", "--scheduler", scheduler)
-    warpspace(*run).refused("dvf5000_nominal: has no tolerances")
-
-
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "gopher://x:1", ""])
 def test_a_scheduler_that_is_none_is_refused(warpspace, monkeypatch, address):
     monkeypatch.setattr(machines, "CONNECT_S", 0.3)

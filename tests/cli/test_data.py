@@ -126,19 +126,6 @@ def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
     scene.write_text(held, encoding="utf-8")
     warpspace(*relative, "--csv", tmp_path / "held.csv")
     warpspace(*fit, tmp_path / "held.csv").refused("error_relative_referenced_r")
-    warpspace(*TCP, "--frame", "machine").refused("--frame", "no file holds error vectors")
-
-
-def write(folder, name, text):
-    path = folder / name
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def test_what_is_read_is_never_written_over(tmp_path, warpspace):
-    file = write(tmp_path, "x.toml", "X [mm],EXX [um]\n-250,0\n250,3\n")
-    warpspace("import", file, "-o", file, "--force").refused("is read for")
-    warpspace("import", tmp_path, "-o", tmp_path / "s.toml").refused("is a folder")
 
 
 SCENE = """machine = "dvf5000"
@@ -252,13 +239,6 @@ def test_an_export_never_replaces_a_mesh_of_its_scene(warpspace, tmp_path):
     assert mesh.read_bytes() == before
     assert {file.name for file in tmp_path.iterdir()} == {"own.toml", "mill_Z.stl"}
     assert warpspace("export", scene, "-o", tmp_path / "other.urdf", "--grid", "3").status == 0
-
-
-def test_bytes_that_are_no_text_are_refused(warpspace, tmp_path):
-    robot = tmp_path / "bad.urdf"
-    robot.write_bytes(b"\xff\xfe")
-    warpspace("import", robot, "-o", tmp_path / "new.toml").refused("UTF-8")
-    assert not (tmp_path / "new.toml").exists()
 
 
 def test_meshes_stay_within_the_folder_of_the_robot_or_that_of_the_option(warpspace, tmp_path):

@@ -147,6 +147,7 @@ PLOTS = {
     "gains over the travel": ("gains", "dvf5000_general", "--loop", "workpiece", "--max"),
     "montecarlo": ("montecarlo", "dvf5000_general", "--samples", "2000", "--spec-um", "50"),
     "contributions": ("contributions", "dvf5000_general"),
+    "tables": ("compensate", "dvf5000_first", "--sweep", "3,5", "--format", "sinumerik-enc"),
     "sobol": ("contributions", "dvf5000_proposed", "--sobol", "64"),
     "ballbar": ("ballbar", "dvf5000_first", "--plane", "YZ", "--radius", "150"),
     "ballbar without errors": ("ballbar", "dvf5000_nominal", "--plane", "XY", "--radius", "50"),
@@ -197,19 +198,11 @@ def test_the_table_that_was_written_is_imported_again(tmp_path, warpspace):
     assert {"EXX", "EYX", "EZX", "EYY"} <= set(load_scene(scene).errors)
 
 
-@pytest.mark.parametrize("ending", first("svg", "png"))
-def test_charts_are_drawn(ending, tmp_path, warpspace):
-    chart = tmp_path / f"c.{ending}"
-    arguments = ("compensate", "dvf5000_first")
+def test_what_a_table_leaves_is_drawn(tmp_path, warpspace):
+    chart = tmp_path / "c.svg"
     table = ("--format", "linuxcnc-matrix", "-o", tmp_path / "m.hal")
-    assert warpspace(*arguments, *table, "--plot", chart).status == 0
+    assert warpspace("compensate", "dvf5000_first", *table, "--plot", chart).status == 0
     assert chart.stat().st_size > 5000
-    other = tmp_path / f"s.{ending}"
-    formats = ("--format", "sinumerik-enc", "--format", "marlin")
-    result = warpspace(*arguments, "--sweep", "3,5", *formats, "--plot", other)
-    assert result.status == 0, result.err
-    assert "sinumerik-enc" in result.out
-    assert other.stat().st_size > 5000
 
 
 def test_existing_files_and_the_scene_itself_stay(tmp_path, warpspace):

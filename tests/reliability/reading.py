@@ -1,6 +1,5 @@
 """Reads files in a watched process: no traceback, no hang, no more memory than there may be."""
 
-import argparse
 import json
 import os
 import random
@@ -23,7 +22,6 @@ SILENT_S = 180.0
 HERE = Path(__file__).resolve().parents[1]
 PORTION = 5000
 """Files that one process reads, so that what it keeps is not counted for ever."""
-WAYS = ("bytes", "hypothesis", "atheris")
 
 NOTHING = {"by_format": {}, "read": {}, "slowest_s": 0.0, "most_mb": 0.0, "faults": []}
 _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -255,20 +253,9 @@ def _read_atheris(reader: Reader, count: int, seed: int) -> None:
     atheris.Fuzz()
 
 
-def main() -> None:
-    """Read so many files in this process; the folder is for them, and for what is said."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("way", choices=WAYS)
-    parser.add_argument("count", type=int)
-    parser.add_argument("seed", type=int)
-    parser.add_argument("folder", type=Path)
-    options = parser.parse_args()
-    reader = Reader(options.folder)
+if __name__ == "__main__":  # way, count, seed, and the folder for files and for what is said
+    reader = Reader(Path(sys.argv[4]))
     reader.say()
     run = {"bytes": _read_bytes, "hypothesis": _read_hypothesis, "atheris": _read_atheris}
-    run[options.way](reader, options.count, options.seed)
+    run[sys.argv[1]](reader, int(sys.argv[2]), int(sys.argv[3]))
     reader.say(ended=True)
-
-
-if __name__ == "__main__":
-    main()
