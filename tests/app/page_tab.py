@@ -8,10 +8,10 @@ import pytest
 
 from app.frames import new_visitor
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState
+from warpspace.picture.mesh import map_mesh
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:
@@ -21,17 +21,6 @@ if TYPE_CHECKING:
 HARMLESS = (
     "THREE.Clock", "GL Driver Message", "SwiftShader", "Software WebGL", "favicon",
 )  # fmt: skip
-VERTICES = """() => {
-  const node = window.__viserMutable.nodeRefFromName['/box/surface'];
-  let found = null;
-  if (node) node.traverse(o => {
-    if (o.isMesh && o.geometry.attributes.color) {
-      const { position, color } = o.geometry.attributes;
-      found = [Array.from(position.array), Array.from(color.array)];
-    }
-  });
-  return found;
-}"""
 DRAWN = """name => {
   const node = window.__viserMutable.nodeRefFromName[name];
   let found = null;
@@ -199,15 +188,9 @@ class Tab:
             last = now
         pytest.fail("does not come to rest")
 
-    def surface(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Vertices (mm) and colours of the drawn surface, read back from the browser's scene."""
-        found = self.page.evaluate(VERTICES)
-        return None if found is None else tuple(np.reshape(part, (-1, 3)) for part in found)
-
     def vertices(self) -> np.ndarray | None:
         """Vertices of the drawn surface, [M, 3], mm."""
-        found = self.surface()
-        return None if found is None else found[0]
+        return self.drawn("/box/surface")
 
     def drawn(self, name: str) -> np.ndarray | None:
         """Points of a node that is shown, [n, 3]; None where it is hidden or absent."""
@@ -216,7 +199,7 @@ class Tab:
 
     def shows_state(self, state: AppState) -> bool:
         """Whether the surface drawn is that of a state."""
-        wanted, drawn = drawn_nodes(LIVE.evaluate(state)), self.vertices()
+        wanted, drawn = map_mesh(LIVE.evaluate(state)).vertices_mm, self.vertices()
         fine = drawn is not None and drawn.shape == wanted.shape
         return fine and np.allclose(drawn, wanted, atol=1e-3)
 
@@ -224,11 +207,6 @@ class Tab:
         """Where a node that is shown stands, in the drawing's axes, mm."""
         found = self.page.evaluate(PLACE, name)
         return None if found is None else 100.0 * np.array(found)
-
-
-def drawn_nodes(picture: LivePicture) -> np.ndarray:
-    """Where a picture draws the nodes of its surface, [M, 3], mm."""
-    return picture.drawn_mm.reshape(-1, 3)[picture.topology.surface.nodes]
 
 
 def open_page(

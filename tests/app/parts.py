@@ -1,5 +1,6 @@
 """Parts of the page without a page."""
 
+import time
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -75,6 +76,12 @@ def lone_part(kind: Any, name: str = "") -> Any:
         scenes=SceneList({}), services=Services(), shown=None, stage=None,
     )  # fmt: skip
     return kind(context, *(one for one in entries() if one.name == name))
+
+
+def wait(part: Any) -> None:
+    """Wait until nothing is computed for a part."""
+    while part._jobs.busy:
+        time.sleep(0.01)
 
 
 def body_of(kind: Any, state: AppState) -> str:

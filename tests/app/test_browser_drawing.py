@@ -10,7 +10,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import drawn_bodies, tool_point
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
-from warpspace.picture.mesh import isoline_pieces, map_mesh
+from warpspace.picture.mesh import isoline_pieces
 
 LIVE = LiveModel()
 START = start_state(SCENES[0])
@@ -20,19 +20,9 @@ def looking(**changes):
     return replace(START, look=replace(START.look, **changes))
 
 
-def shows(tab, vertices):
-    drawn = tab.vertices()
-    return (
-        drawn is not None
-        and drawn.shape == vertices.shape
-        and np.allclose(drawn, vertices, atol=1e-3)
-    )
-
-
 def test_surfaces_slices_isolines_and_marks(tab):
     def draws(state):
-        wanted = map_mesh(LIVE.evaluate(state)).vertices_mm
-        tab.until(lambda: shows(tab, wanted))
+        tab.until(lambda: tab.shows_state(state))
 
     tab.send("state:set.look.surface", "cut")
     draws(looking(surface="cut"))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import warpspace
-from app.parts import answer_of, lone_part, section
+from app.parts import answer_of, lone_part, section, wait
 from warpspace import load_scene
 from warpspace.analysis.concepts import Concepts, compare_concepts
 from warpspace.analysis.repair import Repair
@@ -41,10 +41,8 @@ KEYS = ("EXX", "EYX", "EA0Z")
 
 
 def ran(part, state):
-    """Run it, and wait for the end."""
     part.take(state, "run", "")
-    while part._jobs.busy:
-        time.sleep(0.01)
+    wait(part)
     return part
 
 
@@ -198,8 +196,7 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     assert [one.said for one in found.concepts] == [one.said for one in expected]
     assert "matter most share of the variance" in section(part, chosen)
     part.take(chosen, "sheet", "")
-    while part._jobs.busy:
-        time.sleep(0.01)
+    wait(part)
     assert [one.title for one in asked[0]] == [FIRST.title, OTHER.title]
     assert ("concepts.png", b"") in part.context.told
     assert part.chosen(part.take(chosen, "remove", PRESENT)) == [key]

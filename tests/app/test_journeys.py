@@ -3,15 +3,13 @@
 from dataclasses import replace
 from io import BytesIO
 
-import numpy as np
 import pytest
 from PIL import Image
 
 from app.frames import draw
-from app.page_tab import SCENES, drawn_nodes
+from app.page_tab import SCENES
 from warpspace.analysis.adjusting import Objective
 from warpspace.analysis.repair import Repair
-from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import parse_scene
 
@@ -121,8 +119,7 @@ def test_a_drag_ends_where_the_hand_stopped_and_digits_set_a_number(tab):
     )
     wanted = replace(tab.state, amplitudes={**tab.state.amplitudes, "EA0Z": -5.1})
     tab.until(lambda: tab.state.amplitudes["EA0Z"] == pytest.approx(-5.1))
-    points = drawn_nodes(LiveModel().evaluate(wanted))
-    tab.until(lambda: np.allclose(tab.vertices(), points, atol=1e-3))
+    tab.until(lambda: tab.shows_state(wanted))
     slider.focus()
     for key in "12,5":
         tab.page.keyboard.press(key)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from app.parts import Alone
+from app.parts import Alone, wait
 from warpspace.app.documents.scene_file import SceneList, open_text
 from warpspace.app.documents.services import Services
 from warpspace.app.state.app_state import start_state
@@ -115,8 +115,7 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
     window.do("write", ".exe")
     assert asked == []
     window.do("write", ".pdf")
-    while window.part._jobs.busy:
-        pass
+    wait(window.part)
     ((author, questions, results, *_),) = asked
     assert (author, questions) == (HOSTILE, ("one", "two"))
     assert list(results) == ["Gains", "Gains (2)"]

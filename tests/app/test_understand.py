@@ -1,13 +1,12 @@
 """Why, and where: a point that is clicked or typed, its causes, the best adjustment, gains."""
 
 import re
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from app.parts import LIVE, lone_part
+from app.parts import LIVE, lone_part, wait
 from warpspace.app.evaluation.budget import answer, pick, pick_worst, with_picked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import Picked, start_state
@@ -150,20 +149,11 @@ def test_a_typed_point_has_the_error_of_the_exact_chain(at):
     assert dict(shown.at).keys() == FIRST.machine.axes.keys()
 
 
-NUMBER = r"[+−]?\d+\.\d"
+NUMBER = r"[+-]?\d+\.\d"
 
 
 def html_of(part, state=START):
     return "".join(part.pieces(LIVE.evaluate(state)).values())
-
-
-def wait(part):
-    while part._jobs.busy:
-        time.sleep(0.01)
-
-
-def value(text):
-    return float(text.replace("−", "-"))
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -172,9 +162,10 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
     html = html_of(lone_part(WorstPart), state)
     if "No error acts" in html:
         return
-    shown = value(re.search(rf"why ({NUMBER}) µm", html)[1])
+    html = html.replace("−", "-")
+    (shown,) = map(float, re.findall(rf"why ({NUMBER}) µm", html))
     causes = html[html.index("ws-causes") : html.index('data-piece="best"')]
-    parts = [value(one) for one in re.findall(rf"<td>({NUMBER})</td>", causes)]
+    parts = [*map(float, re.findall(rf"<td>({NUMBER})</td>", causes))]
     assert sum(parts) == pytest.approx(shown, abs=0.05 * (len(parts) + 1) + 1e-9)
 
 
