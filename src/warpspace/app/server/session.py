@@ -127,7 +127,9 @@ class Session:
 
     def _turn(self) -> None:
         left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
-        waits = [wait for wait in (self.display.due_in_s, left) if wait is not None]
+        stage = self.context.stage
+        turns = None if stage is None else stage.wait_s
+        waits = [wait for wait in (self.display.due_in_s, left, turns) if wait is not None]
         changed = self.context.wait(min(waits, default=None))
         while queued(self._client) > MOST_QUEUED and not self._stopped.wait(BEHIND_S):
             pass  # pictures that a page does not take would fill the memory
@@ -138,6 +140,8 @@ class Session:
             return
         if self._around_at is not None and time.monotonic() >= self._around_at:
             self._guarded(partial(self._draw_around, picture))
+        if stage is not None and stage.wait_s == 0.0:
+            self._guarded(stage.turn)
         if self.display.due_in_s == 0.0:
             self._guarded(partial(self._settle, picture))
 
