@@ -53,7 +53,6 @@ def carried() -> list[bytes]:
 
 
 def camera(**fields: object) -> bytes:
-    """Write a message of a camera."""
     return pack({**CAMERA, **fields})
 
 
@@ -88,7 +87,6 @@ def nonsense() -> list[bytes]:
 
 
 def upload(name: str, content: bytes) -> tuple[str, str]:
-    """Give the event by which a page sends a file."""
     coded = base64.b64encode(content).decode()
     return "files:file", f"{len(content)}\n{name}\n{coded}"
 

@@ -70,7 +70,6 @@ LIVE = LiveModel()
 
 
 def wait_until_open(page: "Page") -> None:
-    """Wait until all of a page is there."""
     page.wait_for_selector("html[data-warpspace=open] [data-piece=head] h1", timeout=60_000)
 
 
@@ -95,7 +94,6 @@ class Tab:
 
     @property
     def session(self) -> Session:
-        """The session of this tab."""
         token = self.page.evaluate("window.__warpspaceTab")
         return next(session for session in self.viewer.sessions if session.token == token)
 
@@ -107,36 +105,30 @@ class Tab:
     # --- what a user does ----------------------------------------------------------------------
 
     def click(self, name: str, role: Any = "button", within: str = "#ws-page") -> None:
-        """Click a button, or something of another role, by its name."""
         self.actions += 1
         found = self.page.locator(within).get_by_role(role, name=name, exact=True)
         found.first.click()
 
     def task(self, name: str) -> None:
-        """Open a task."""
         self.click(name, "tab")
 
     def unfold(self, name: str) -> None:
-        """Unfold a section of the open task by its first words."""
         self.actions += 1
         self.page.locator(f"#ws-right .ws-fold:has-text({name!r})").first.click()
 
     def type(self, label: str, text: str) -> None:
-        """Type into a box and press Enter."""
         self.actions += 1
         box = self.page.get_by_label(label, exact=True).first
         box.fill(text)
         box.press("Enter")
 
     def give(self, name: str, content: bytes, click: Callable[[], None]) -> None:
-        """Give a file to the chooser that a click opens."""
         with self.page.expect_file_chooser() as chooser:
             click()
         self.actions += 1
         chooser.value.set_files({"name": name, "mimeType": "text/plain", "buffer": content})
 
     def press(self, *keys: str) -> None:
-        """Press keys with nothing in focus."""
         self.page.evaluate("document.activeElement && document.activeElement.blur()")
         for key in keys:
             self.actions += 1
@@ -149,11 +141,9 @@ class Tab:
     # --- what is seen --------------------------------------------------------------------------
 
     def part(self, name: str) -> "Locator":
-        """A piece of the page by the name of its place."""
         return self.page.locator(f"[data-piece='{name}']")
 
     def says(self, words: str, within: str = "#ws-page") -> None:
-        """Wait until something is said."""
         self.page.locator(within).get_by_text(words).first.wait_for(timeout=60_000)
 
     def seen(self) -> tuple[int, int, int]:
@@ -162,13 +152,11 @@ class Tab:
         return buttons, inputs, words
 
     def in_sight(self, place: str) -> bool:
-        """Whether an element is on the screen as it stands."""
         box = self.page.locator(place).first.bounding_box()
         size = self.page.viewport_size or {"width": 0, "height": 0}
         return box is not None and box["y"] >= 0 and box["y"] + box["height"] <= size["height"]
 
     def until(self, fine: Callable[[], bool], seconds: float = 60.0) -> None:
-        """Wait until something holds."""
         for _ in range(int(seconds / 0.05)):
             if fine():
                 return
@@ -198,15 +186,18 @@ class Tab:
         return None if found is None else np.reshape(found, (-1, 3))
 
     def shows_state(self, state: AppState) -> bool:
-        """Whether the surface drawn is that of a state."""
-        wanted, drawn = map_mesh(LIVE.evaluate(state)).vertices_mm, self.vertices()
-        fine = drawn is not None and drawn.shape == wanted.shape
-        return fine and np.allclose(drawn, wanted, atol=1e-3)
+        return same_points(self.vertices(), map_mesh(LIVE.evaluate(state)).vertices_mm)
 
     def place(self, name: str) -> np.ndarray | None:
         """Where a node that is shown stands, in the drawing's axes, mm."""
         found = self.page.evaluate(PLACE, name)
         return None if found is None else 100.0 * np.array(found)
+
+
+def same_points(drawn: np.ndarray | None, wanted: np.ndarray, atol: float = 2e-3) -> bool:
+    return (
+        drawn is not None and drawn.shape == wanted.shape and np.allclose(drawn, wanted, atol=atol)
+    )
 
 
 def open_page(

@@ -145,7 +145,7 @@ PLACED = replace(replace(start_state(SECOND), placed=True, nodes=5), loop=Loop("
 
 @pytest.mark.parametrize("at", [{}, {"C": "90", "B": "-40"}])
 def test_the_drawn_field_is_that_of_the_command_wherever_the_axes_stand(at):
-    state = PLACED
+    state = PLACED.with_amplitude("EXX", 7.0).with_amplitude("EAY", 10.0)
     for axis, angle in at.items():
         state = put(state, f"positions.{axis}", angle)
     picture = LIVE.evaluate(state)

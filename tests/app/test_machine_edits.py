@@ -61,16 +61,17 @@ def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(stat
 
 
 def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state):
-    key = "EAX"
-    state = state.with_amplitude(key, 2.5 * state.amplitudes[key])
-    changed = with_word(state, "volume X 1 400")
-    at = np.linspace(-200.0, 300.0, 5)
-    shapes = [s.amplitudes[key] * s.scene.errors.shape(key, at) for s in (state, changed)]
-    np.testing.assert_allclose(*shapes, rtol=1e-12)
-    assert {*changed.changed_keys} == {*state.changed_keys} == {key}
+    key, at = "EAX", np.linspace(-200.0, 300.0, 5)
+
+    def curve(state):
+        return state.amplitudes[key] * state.scene.errors.shape(key, at)
+
+    scaled = state.with_amplitude(key, 2.5 * state.amplitudes[key])
+    changed = with_word(scaled, "volume X 1 400")
+    np.testing.assert_allclose(curve(changed), curve(scaled), rtol=1e-12)
+    assert changed.changed_keys == scaled.changed_keys == (key,)
     reset = changed.reset()
-    own = state.scene.errors.evaluate(key, at)
-    np.testing.assert_allclose(reset.amplitudes[key] * reset.scene.errors.shape(key, at), own)
+    np.testing.assert_allclose(curve(reset), curve(state))
     assert reset.scene.workspace == changed.scene.workspace
 
 
@@ -201,24 +202,22 @@ def test_a_gantry_is_made_its_guides_are_set_and_their_distance_keeps_them(state
     made = with_word(state, "gantry X")
     gantry = made.scene.machine.gantries["X"]
     assert (gantry.span_mm, gantry.across) == (450.0, "y")  # as far as Y travels
+    assert with_word(made, "gantry X").scene.machine.gantries == {}
+    turned = with_word(made, "across X")
+    assert turned.scene.machine.gantries["X"].across == "z"
     made = made.with_amplitude("EXX", 0.0).with_amplitude("ECX", 0.0)
     one = with_word(with_word(made, "guide X 0 4"), "guide X 1 13")
     # by hand: the second guide, at +225 mm in y, is 9 µm ahead, which turns X about −z
-    assert one.amplitudes["EXX"] == pytest.approx(8.5)
-    assert one.amplitudes["ECX"] == pytest.approx(-9.0 / 450.0 * 1000.0)
-    assert guides(one, "X") == pytest.approx((4.0, 13.0))
+    assert [one.amplitudes[key] for key in ("EXX", "ECX")] == pytest.approx([8.5, -20.0])
     nearer = with_word(one, "span X 0 225")
-    assert guides(nearer, "X") == pytest.approx((4.0, 13.0))
     assert nearer.amplitudes["ECX"] == pytest.approx(-40.0)
-    turned = with_word(one, "across X")
-    assert turned.scene.machine.gantries["X"].across == "z"
-    assert with_word(one, "gantry X").scene.machine.gantries == {}
+    opened, _ = open_text(state_to_toml(nearer), "own", "own.toml")
+    assert opened.scene.machine.gantries == nearer.scene.machine.gantries
+    for found in (one, nearer, opened):
+        assert guides(found, "X") == pytest.approx((4.0, 13.0))
     far = with_word(one, "guide X 0 1e9")
     assert far.amplitudes["EXX"] == MAX_ERROR
     assert "clamped" in far.notes[-1]
-    opened, _ = open_text(state_to_toml(nearer), "own", "own.toml")
-    assert opened.scene.machine.gantries == nearer.scene.machine.gantries
-    assert guides(opened, "X") == pytest.approx((4.0, 13.0))
 
 
 def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
@@ -228,14 +227,13 @@ def test_guides_share_the_curve_of_the_axis_and_other_curves_are_said(state):
     pair = with_word(made, "guide Y 1 12")
     assert guides(pair, "Y") == pytest.approx((8.0, 12.0))
     assert pair.curve("ECY").evaluate(np.array([-225.0])) == pytest.approx(0.0)
-    other = with_curve(pair, "ECY", Constant(ramp.span, 5.0))
-    assert guides(other, "Y") is None
-    there, back = (Ramp(ramp.span, value) for value in (8.0, 6.0))
-    by_direction = with_curve(pair, "ECY", Directional(ramp.span, there, back))
-    assert guides(by_direction, "Y") is None
-    refused = with_word(other, "guide Y 0 1")
-    assert "different curves" in refused.notes[-1]
-    assert refused.amplitudes == other.amplitudes
+    by_direction = Directional(ramp.span, ramp, Ramp(ramp.span, 6.0))
+    for curve in (Constant(ramp.span, 5.0), by_direction):
+        other = with_curve(pair, "ECY", curve)
+        assert guides(other, "Y") is None
+        refused = with_word(other, "guide Y 0 1")
+        assert "different curves" in refused.notes[-1]
+        assert refused.amplitudes == other.amplitudes
 
 
 def test_meshes_of_the_scene_are_listed_without_their_folder_and_go(tmp_path):

@@ -33,7 +33,6 @@ class Wire(Page):
         self._socket.send(pack(message))
 
     def say(self, name: str, value: object = "") -> None:
-        """Send an event."""
         self.send(said((name, value)))
 
     def read_until(self, fine: Callable[[], bool], seconds: float = 20.0) -> bool:
@@ -54,7 +53,6 @@ class Wire(Page):
 
     @property
     def is_open(self) -> bool:
-        """Whether all of the page is there."""
         return self.stage == "open"
 
 
