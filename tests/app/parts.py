@@ -37,6 +37,7 @@ class Alone:
         self.store = StateStore(state)
         self.context = Nobody(
             act=self._act, renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
+            is_still=True,
             notify=lambda *words: self.said.append(words), post=self.store.apply, reported=[],
             send=lambda *event: self.sent.append(event), closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,

@@ -12,6 +12,7 @@ from warpspace.field.grid import Grid
 from warpspace.units import Array
 
 P95 = 0.95
+SAMPLED = 61
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,5 +90,13 @@ def _percentile(values: Array, place: float) -> float:
     place = min(max(place, 0.0), values.size - 1.0)
     below = int(place)
     above = min(below + 1, values.size - 1)
-    low, high = np.partition(values, (below, above))[[below, above]]
+    # those far below that place, as a sample tells, are only counted: five times as fast
+    sample = np.sort(values[::SAMPLED])
+    top = values[values > sample[int(sample.size * max(place / values.size - 0.05, 0.0))]]
+    counted = values.size - top.size
+    if counted > below:
+        top, counted = values, 0
+    low, high = np.partition(top, (below - counted, above - counted))[
+        [below - counted, above - counted]
+    ]
     return float(low + (place - below) * (high - low))

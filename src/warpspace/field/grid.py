@@ -269,9 +269,9 @@ CELLS = 40  # about as many cells per axis; a coarse grid is subdivided
 
 def cell_values(values: Array) -> Array:
     """Interpolate values at nodes, [x, y, z], to the middles of cells that are equally large."""
-    for nodes in values.shape:
-        values = np.tensordot(values, _to_cells(nodes), axes=(0, 1))
-    return values
+    x, y, z = (_to_cells(nodes) for nodes in values.shape)
+    found = y @ (values @ z.T)
+    return np.tensordot(x, found, axes=1)
 
 
 @cache

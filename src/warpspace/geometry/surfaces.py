@@ -9,6 +9,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -107,6 +108,7 @@ def segments(lines: list[Index]) -> Index:
     return np.concatenate(pairs) if pairs else np.zeros((0, 2), dtype=np.intp)
 
 
+@lru_cache(maxsize=16)
 def corners(shape: Shape) -> Index:
     """Flat grid indices of the corners, [8] for a full volume."""
     numbers = np.arange(np.prod(shape)).reshape(shape)

@@ -1,5 +1,6 @@
 """What is said of a picture wherever it goes: numbers, place of the max, colour bar, conditions."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -93,6 +94,7 @@ def legend_html(picture: LivePicture) -> Markup:
     )  # fmt: skip
 
 
+@lru_cache(maxsize=16)
 def _stops(scale: ColourScale) -> list[str]:
     limit = getattr(scale, "limit", None)
     if limit is None:

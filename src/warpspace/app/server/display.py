@@ -12,7 +12,7 @@ from warpspace.app.tasks.parts import Part, Window
 
 PAUSE_S = 0.1
 """Pause in the changes after which parts follow: longer than between two moves of a drag."""
-LONGEST_PAUSE_S = 0.4  # what follows in a pause lags no longer than this while a slider is dragged
+LONGEST_PAUSE_S = 0.8  # what follows in a pause lags no longer than this while a slider is dragged
 REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 
 
@@ -30,6 +30,7 @@ class Display:
         self._noted_at = 0.0
         self._changed_at: float | None = None  # since when parts wait for a pause
         self._is_to_rest = False
+        self._late: set[Part] = set()  # that wait for a rest, whatever they usually wait for
 
     def add(
         self, picture: LivePicture, layers: Sequence[Layer] = (), parts: Sequence[Part] = ()
@@ -60,8 +61,9 @@ class Display:
         self._rest_again()
         self._changed_at = self._changed_at or self._noted_at
 
-    def _rest_again(self) -> None:
+    def _rest_again(self, *parts: Part) -> None:
         self._noted_at, self._is_to_rest = time.monotonic(), True
+        self._late.update(parts)
 
     def _renew(self, part: Part) -> None:
         if self._context.shown is not None:
@@ -102,6 +104,9 @@ class Display:
             self._waiting.extend(p for p in self.parts.values() if p.follows == follows)
             if self._changed_at is None:
                 self._is_to_rest = False
+                self._waiting.extend(self._late)
+                self._shown |= dict.fromkeys(self._late)
+                self._late.clear()
                 for layer in self.layers:
                     if rest := getattr(layer, "rest", None):
                         guarded(partial(rest, picture))

@@ -38,8 +38,11 @@ def changes(old: AppState, new: AppState) -> dict[str, str]:
 
 
 def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[str, str]]:
+    tables = getattr(old, group), getattr(new, group)
+    is_table = isinstance(tables[0], Mapping)  # of many entries, most of which stay
     for path, leaf in leaves(new).items():
-        if path.partition(".")[0] != group:
+        head, _, key = path.partition(".")
+        if head != group or (is_table and _equal(*(table.get(key) for table in tables))):
             continue
         before, after = stored(old, path), stored(new, path)
         if isinstance(before, frozenset) and isinstance(after, frozenset):

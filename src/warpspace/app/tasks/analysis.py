@@ -172,8 +172,8 @@ class AnalysisPart(Section):
     def _body(self, state: AppState) -> Markup:
         question, is_quick = self.question(state), self.is_quick(state)
         is_ready, answer = self.is_ready(state), self._answer
-        if is_quick and is_ready and question != self._asked and not self._jobs.busy:
-            self._run(state)
+        if is_quick and is_ready:
+            self.keep_up(state)
         stale = answer is not None and answer.question != question
         problem = self.problem_html(state)
         parts: list[object] = [self.before_result(state), problem]
@@ -281,6 +281,15 @@ class AnalysisPart(Section):
             return Answer(question, found, cards, took_s)
 
         self._make(self.kind.doing, answer, self._take_answer)
+
+    def keep_up(self, state: AppState) -> None:
+        """Run it for what has changed; while something is dragged, once that rests."""
+        if self.question(state) == self._asked or self._jobs.busy:
+            return
+        if self._asked and not self.context.is_still:
+            self.context.rest_again(self)
+        else:
+            self._run(state)
 
     def _make(self, words: str, make: Callable[[Job], T], take: Callable[[T], None]) -> None:
         """Make something beside the session, which then takes it."""

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from warpspace.app.tasks.parts import Part
 
 MOST_FILES = 16  # that may wait for the session
+STILL_S = 0.09
 
 
 class Context:
@@ -50,10 +51,11 @@ class Context:
         self.shown: LivePicture | None = None
         self.stage: MovingLayer | None = None
         # of the display, for the session: write a part anew, at once; what the page has closed by
-        # itself may be opened again; what follows at rest is due once nothing has happened a while
+        # itself may be opened again; what follows at rest, and these parts, are due once nothing
+        # has happened for a while
         self.renew: Callable[[Part], None] = lambda _: None
         self.closed: Callable[[], None] = lambda: None
-        self.rest_again: Callable[[], None] = lambda: None
+        self.rest_again: Callable[..., None] = lambda *_: None
         self.jobs: set[threading.Event] = set()  # work that goes on; set when the page has gone
         self.reported: list[tuple[str, Result]] = []  # what is to stand in the report
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
@@ -102,6 +104,11 @@ class Context:
         """Take note that something has been set; returns at once."""
         self.changed_at = time.monotonic()
         self._wake.set()
+
+    @property
+    def is_still(self) -> bool:
+        """Whether nothing has been set for longer than between two moves of a drag."""
+        return time.monotonic() - self.changed_at >= STILL_S
 
     def send(self, event: str, value: str = "") -> None:
         self.take(Events([(event, value)]))

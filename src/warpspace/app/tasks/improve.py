@@ -116,8 +116,7 @@ class BestPart(RepairPart):
         if not _is_of_errors(picture):
             return {self.name: EMPTY}
         question = self.question(state)
-        if question != self._asked and not self._jobs.busy:
-            self._run(state)
+        self.keep_up(state)
         is_known = answer is not None and answer.question == question
         words = "No adjustment helps." if is_known else "Searching …"
         body = self.problem_html(state) or self.cards_html(question)
