@@ -20,7 +20,7 @@ class Nobody(SimpleNamespace):
     """The context of a page that is not there."""
 
     def __init__(self, **given: Any) -> None:
-        super().__init__(jobs=set(), **given)
+        super().__init__(jobs=set(), is_still=True, **given)
 
     def __getattr__(self, name: str) -> Any:  # the state is that of its store, unless one is set
         if name == "state":
@@ -37,7 +37,6 @@ class Alone:
         self.store = StateStore(state)
         self.context = Nobody(
             act=self._act, renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
-            is_still=True,
             notify=lambda *words: self.said.append(words), post=self.store.apply, reported=[],
             send=lambda *event: self.sent.append(event), closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,

@@ -124,7 +124,7 @@ class Exact(NamedTuple):
 
     def words(self) -> str:
         change = f"{100.0 * (self.probability - self.first_order):+.2f}"
-        beside = f"{change} % against" if float(change) else "the same as to"
+        beside = f"{change} % against" if float(change) else "as many as to"
         return (
             f"exact chain: {100.0 * self.probability:.2f} % of {self.machines:,} of these machines,"
             f" {beside} the first order"
