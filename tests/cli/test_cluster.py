@@ -3,11 +3,7 @@
 import json
 import os
 import signal
-import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
@@ -19,42 +15,17 @@ from warpspace.cli.machines import find_workers
 from warpspace.exceptions import OptionError, WorkersLostError
 from warpspace.outputs.processes import ProcessPool
 
-SERVE = """
-import sys
-from distributed import LocalCluster
-if __name__ == "__main__":
-    with LocalCluster(
-        n_workers=int(sys.argv[1]), threads_per_worker=1, processes=True, host="127.0.0.1",
-        dashboard_address=None, memory_limit=0, worker_dashboard_address=None,
-    ) as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
 
-
-@contextmanager
-def dask_cluster(workers: int, folder: Path) -> Iterator[str]:
-    path = folder / "serve.py"
-    path.write_text(SERVE, encoding="utf-8")
-    process = subprocess.Popen(
-        [sys.executable, str(path), str(workers)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        cwd=folder,
-        env={**os.environ, "DASK_TEMPORARY_DIRECTORY": str(folder)},
+def dask_cluster(workers, folder):
+    return distributed.LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address=":0",
+        worker_dashboard_address=None,
+        memory_limit=0,
+        local_directory=str(folder),
     )
-    try:
-        yield process.stdout.readline().strip()
-    finally:
-        process.stdin.close()
-        try:
-            process.wait(20)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        process.stdout.close()
 
 
 distributed = pytest.importorskip("distributed")
@@ -65,8 +36,8 @@ RUN = (
 
 @pytest.fixture(scope="module")
 def scheduler(tmp_path_factory):
-    with dask_cluster(2, tmp_path_factory.mktemp("dask")) as address:
-        yield address
+    with dask_cluster(2, tmp_path_factory.mktemp("dask")) as cluster:
+        yield cluster.scheduler_address
 
 
 def test_a_cluster_gives_the_same_numbers_to_the_last_bit(warpspace, scheduler, tmp_path):
@@ -112,8 +83,8 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path):
     scene = package.load_scene("dvf5000_general")
     alone = package.montecarlo(scene, samples=samples, seed=4, spec_um=40.0)
     with (
-        dask_cluster(3, tmp_path) as address,
-        distributed.Client(address, set_as_default=False) as client,
+        dask_cluster(3, tmp_path) as cluster,
+        distributed.Client(cluster.scheduler_address, set_as_default=False) as client,
     ):
         killed: list[int] = []
 

@@ -19,16 +19,9 @@ BORROWED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
 
 
 def run(command, folder):
-    environment = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "PYTHONHOME"}}
-    result = subprocess.run(
-        command,
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
+    kept = {k: v for k, v in os.environ.items() if k not in {"PYTHONPATH", "PYTHONHOME"}}
+    how = {"cwd": folder, "env": kept, "timeout": 240, "text": True}
+    result = subprocess.run(command, capture_output=True, check=False, **how)
     assert result.returncode == 0, f"{command}\n{result.stdout}\n{result.stderr}"
     return result.stdout
 
@@ -94,16 +87,10 @@ def test_sdist_carries_scenes_and_machines(tmp_path):
     assert set(bundled()) <= names
 
 
-def test_data_comes_from_the_installed_package(installation):
+def test_elsewhere_the_program_has_the_scenes_it_was_installed_with(installation):
     code = "from warpspace import resources as r; print(r.scenes_dir(), r.assets_dir(), sep='\\n')"
     folders = [Path(line) for line in installation.python("-c", code).splitlines()]
     assert all(folder.is_relative_to(installation.root.resolve()) for folder in folders)
     assert all(folder.is_dir() for folder in folders)
-
-
-def test_module_lists_scenes_elsewhere(installation):
     assert "dvf5000_first" in installation.python("-m", "warpspace", "scenes")
-
-
-def test_command_checks_a_bundled_scene_elsewhere(installation):
     installation.warpspace("check", "dvf5000_first")

@@ -22,19 +22,37 @@ SAMPLES = (
     *("montecarlo", "dvf5000_general", "--samples", "10000000", "--over", "max"),
     *("--workers", "2", "--force", "-o", "x.csv"),
 )
-# writes slowly, so that it is hit while its temporary file is there
-WRITER = """
-import sys, time
+WORKING = """
+import os, signal, sys, time
 from warpspace.cli import main
 from warpspace.cli.main import cli
 from warpspace.outputs.files import write_atomically
+{}
+cli.main = work
+main()
+"""
+# writes slowly, so that it is hit while its temporary file is there
+WRITER = WORKING.format("""
 def work(**options):
     with write_atomically("x.csv") as temporary, temporary.open("w") as file:
         while True:
             file.write("0,1,2\\n"); file.flush(); time.sleep(0.001)
-cli.main = work
-main()
-"""
+""")
+# as dataclasses do while packages are imported
+IN_EXEC = WORKING.format("""
+def work(**options):
+    exec("print('here', flush=True); time.sleep(60)")
+""")
+# Python drops what is raised in finalizers, where matplotlib and VTK have many
+IN_FINALIZER = WORKING.format("""
+class Thing:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(0.01)
+def work(**options):
+    Thing()
+    time.sleep(20)
+""")
 
 
 def heed_signals():
@@ -143,40 +161,12 @@ def test_the_next_run_clears_what_a_killed_one_left(tmp_path):
     assert all(f"-{alive.pid}-" in name or name == ".warpspace-notes.csv" for name in left)
 
 
-# as dataclasses do while packages are imported
-IN_EXEC = """
-from warpspace.cli import main
-from warpspace.cli.main import cli
-def work(**options):
-    exec("import time; print('here', flush=True); time.sleep(60)")
-cli.main = work
-main()
-"""
-
-
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
 def test_the_status_says_which_signal_it_was(how, tmp_path):
     process = start(tmp_path, code=IN_EXEC)
     wait_until(lambda: "here" in said(tmp_path), process)
     process.send_signal(how)
     assert process.wait(20) == 128 + how
-
-
-# Python drops what is raised in finalizers, where matplotlib and VTK have many
-IN_FINALIZER = """
-import os, signal, time
-from warpspace.cli import main
-from warpspace.cli.main import cli
-class Thing:
-    def __del__(self):
-        os.kill(os.getpid(), signal.SIGTERM)
-        time.sleep(0.01)
-def work(**options):
-    Thing()
-    time.sleep(20)
-cli.main = work
-main()
-"""
 
 
 def test_a_signal_that_comes_within_a_finalizer_is_heeded_without_a_traceback(tmp_path):
