@@ -27,6 +27,7 @@ TABS, IDLE, SECONDS, RATE = 5, 15, 15.0, 20.0
 GROWING = (1, 2, 4, 8)
 KEY = "EAY"
 POSITIONS = 61
+OPENED_S = 3.0  # until what a page computes once it has opened is done: no part of a drag
 FINAL_S = 10.0
 """How long the last value may take to be shown before it counts as stale."""
 
@@ -98,6 +99,7 @@ async def drag_all(app: App, tabs: int, idle: int) -> Found:
     dragging = every[:tabs]
     for tab in every:
         await tab.open()
+    await asyncio.sleep(OPENED_S)
     for tab in dragging:
         tab.seen.clear()
         tab.bytes = 0

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import warpspace
 from app.parts import LIVE, lone_part
 from warpspace.app.documents.legend import kept_words, legend_html, marks
 from warpspace.app.drawing.colours import colour_levels
@@ -15,10 +16,12 @@ from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, 
 from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
-from warpspace.app.tasks.over import HeadPart
+from warpspace.app.tasks.design import SAMPLES
+from warpspace.app.tasks.over import HeadPart, OrderPart
 from warpspace.exceptions import SceneError
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import deform
+from warpspace.machine.errors import ToleranceSet
 from warpspace.picture.mesh import map_mesh
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.save import scene_to_toml
@@ -42,6 +45,13 @@ def test_the_heading_says_numbers_place_and_limit_once():
     assert re.search(r"<h1>mean 3\d\.\d µm · max 51\.7 µm</h1>", head)
     assert head.count("X 275 Y −225 Z −480") == 1
     assert "in R" not in head
+
+
+def test_the_heading_says_what_machines_within_tolerance_reach():
+    none = replace(START, tolerances=ToleranceSet())
+    largest = warpspace.montecarlo(FIRST, samples=SAMPLES, over="max").max_um
+    assert f"tolerances allow {largest:.1f} µm" in pieces(OrderPart, START)["head.order"]
+    assert "tolerances" not in pieces(OrderPart, none)["head.order"]
 
 
 @pytest.mark.parametrize(("limit", "kept"), [(51.0, False), (52.0, True), (1.0, False)])

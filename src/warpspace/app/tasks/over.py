@@ -22,6 +22,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.design import allowed_words
 from warpspace.app.tasks.parts import Part
 from warpspace.geometry.surfaces import corners
 from warpspace.machine.axes import is_linear
@@ -60,9 +61,9 @@ def _limit(words: str, kept: bool, limit: str) -> Markup:
 
 
 class OrderPart(Part):
-    """What the first order leaves out, and errors that a change of scene left behind.
+    """What machines within tolerance reach, what the first order leaves out, errors left behind.
 
-    Evaluating the former is too slow for every move.
+    All but the last are too slow for every move.
     """
 
     name = "order"
@@ -70,6 +71,8 @@ class OrderPart(Part):
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         words, left = [*order_conditions(picture)], picture.state.left_behind
+        if not picture.is_difference:
+            words[:0] = allowed_words(picture.drawn_state)
         words += [f"with its own errors; those of “{left}” are left behind"] if left else []
         return {"head.order": tag("p", " · ".join(words)) if words else EMPTY}
 
