@@ -81,7 +81,7 @@ def test_a_foreign_page_gets_neither_socket_nor_frame_nor_text(page):
 
 
 def test_a_tab_with_the_token_lives_on(browser):
-    """Its page, its websocket, a connection that drops, a reload without the token's address."""
+    """Its page, its websocket, a reload without the token's address, its links."""
     scene = load_scene("dvf5000_first")
     moved = start_state(scene).with_amplitude("EXX", 7.0)
     with Viewer(scene, access=Access(token=TOKEN)) as viewer:
@@ -90,16 +90,6 @@ def test_a_tab_with_the_token_lives_on(browser):
         tab.until(lambda: "token" not in tab.page.url)
         tab.until(lambda: "fixedDpr=1" in tab.page.url)
         tab.send("errors:set.EXX", "7")
-        tab.until(lambda: tab.state == moved)
-        before = tab.session
-        viewer._server._websock_server.disconnect_all_clients()
-        tab.until(lambda: before not in viewer.sessions)
-        tab.until(lambda: any(s.token == before.token for s in viewer.sessions))
-        tab.until(lambda: tab.state == moved)
-        tab.page.wait_for_selector("[data-box='errors:set.EXX'][data-text='7']", state="attached")
-        tab.press("Control+z")  # its history as well
-        tab.until(lambda: tab.state == start_state(scene))
-        tab.press("Control+Shift+z")
         tab.until(lambda: tab.state == moved)
         tab.page.reload()
         wait_until_open(tab.page)
@@ -208,7 +198,10 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
         )
         page.wait_for_selector(f"{BOX}[role=status]")
         tab.until(lambda: "everything is as it was, Undo too" in page.inner_text(BOX))
-        tab.until(lambda: tab.state.amplitudes["EXX"] == 7.0)
+        page.wait_for_selector("[data-box='errors:set.EXX'][data-text='7']", state="attached")
+        for keys, value in (("Control+z", 0.0), ("Control+Shift+z", 7.0)):
+            tab.press(keys)
+            tab.until(lambda value=value: tab.state.amplitudes["EXX"] == value)
         # what a page has kept may be anything
         viewer._memory._left.clear()
         page.evaluate("sessionStorage.setItem('warpspace-tab', 'f'.repeat(32))")

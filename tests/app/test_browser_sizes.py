@@ -45,16 +45,11 @@ ACROSS = """() => {
 
 
 def overlap(a, b):
-    return a[0] < b[2] - 0.5 and b[0] < a[2] - 0.5 and a[1] < b[3] - 0.5 and b[1] < a[3] - 0.5
+    return all(a[i] < b[i + 2] - 0.5 and b[i] < a[i + 2] - 0.5 for i in (0, 1))
 
 
 def within(inner, outer):
-    return (
-        inner[0] >= outer[0] - 0.5
-        and inner[1] >= outer[1] - 0.5
-        and inner[2] <= outer[2] + 0.5
-        and inner[3] <= outer[3] + 0.5
-    )
+    return all(inner[i] >= outer[i] - 0.5 and inner[i + 2] <= outer[i + 2] + 0.5 for i in (0, 1))
 
 
 def nodes():

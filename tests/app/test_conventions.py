@@ -158,16 +158,14 @@ def test_the_drawn_field_is_that_of_the_command_wherever_the_axes_stand(at):
 
 
 def test_the_heading_and_files_say_when_the_first_order_is_not_enough():
-    measured = load_scene("dvf5000_first")
-    assert order_conditions(LIVE.evaluate(start_state(measured))) == ()
-    large = start_state(repaired(measured, {"EC0Y": 3000.0, "EA0Z": 3000.0}))
+    assert order_conditions(LIVE.evaluate(START)) == ()
+    large = start_state(repaired(START.scene, {"EC0Y": 3000.0, "EA0Z": 3000.0}))
     picture = LIVE.evaluate(large)
     (words,) = order_conditions(picture)
     assert words.startswith("first order; the exact chain differs by up to")
     assert words in picture_conditions(picture)
     # what is excluded does not count
-    excluded = replace(large.exclusions, excluded=frozenset({"EC0Y", "EA0Z"}))
-    assert order_conditions(LIVE.evaluate(replace(large, exclusions=excluded))) == ()
+    assert order_conditions(LIVE.evaluate(put(large, "exclusions.excluded", "EC0Y,EA0Z"))) == ()
 
 
 # --- What data in a wrong convention would cost ---------------------------------------------------
