@@ -8,7 +8,12 @@ from functools import partial
 from pathlib import Path
 
 from warpspace.app.documents.files import unpack, upload_text
-from warpspace.formats.registry import formats
+from warpspace.bench.base import find_test, run_test
+from warpspace.calibration import read_readings
+from warpspace.calibration.readings import bundled_data, find_data
+from warpspace.formats.compensation.compensate import Compensate, compensate
+from warpspace.formats.registry import ReadOptions, find_format, formats, open_upload, read_errors
+from warpspace.formats.to_scene import base_scene, into_scene
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 
@@ -22,7 +27,7 @@ class Format:
     text: bool = True
 
 
-CSV_SCENE = """
+CSV_SCENE = b"""
 machine = "dvf5000"
 [errors]
 EXX = { csv = "x.csv", column = "error" }
@@ -39,10 +44,6 @@ WORDS = [
 """What mutations put into texts: words of the formats, and what readers stumble over."""
 
 
-def _scenes() -> list[bytes]:
-    return [(scenes_dir() / f"{name}.toml").read_bytes() for name in scene_names()]
-
-
 def _put(content: bytes, folder: Path, name: str) -> Path:
     path = folder / name
     path.write_bytes(content)
@@ -52,11 +53,6 @@ def _put(content: bytes, folder: Path, name: str) -> Path:
 def _csvs() -> list[bytes]:
     rows = "\n".join(f"{x},{x / 100}" for x in range(-275, 276, 25))
     return [f"X,error\n{rows}\n".encode(), b"\xef\xbb\xbfX,error\r\n-275,0\r\n275,4.1\r\n"]
-
-
-def _read_csv(content: bytes, folder: Path) -> object:
-    _put(content, folder, "x.csv")
-    return load_scene(_put(CSV_SCENE.encode(), folder, "s.toml"))
 
 
 def _mesh_seeds(ending: str) -> list[bytes]:
@@ -128,9 +124,6 @@ Run Target Data:
 
 
 def _import_seeds(name: str) -> list[bytes]:
-    from warpspace.formats.compensation.compensate import Compensate, compensate
-    from warpspace.formats.registry import find_format
-
     if not find_format(name).can_write:
         return [b"%% x.rtl\n" + RTL.encode()]
     points = None if name in {"marlin", "klipper"} else 3
@@ -142,9 +135,6 @@ def _import_seeds(name: str) -> list[bytes]:
 
 def _read_import(name: str | None, content: bytes, _: Path) -> object:
     """Read files as their format whatever their first lines say, or as what they look like."""
-    from warpspace.formats.registry import ReadOptions, find_format, open_upload, read_errors
-    from warpspace.formats.to_scene import base_scene, into_scene
-
     base = base_scene("dvf5000")
     options = ReadOptions(base.machine, axis="X" if name in {None, "rtl"} else "")
     parts = SPLIT.split(content)[1:] if name else []
@@ -163,16 +153,8 @@ def _measured() -> list[bytes]:
 
 
 def _readings() -> list[bytes]:
-    from warpspace.calibration.readings import bundled_data, find_data
-
     points = b"session,x_mm,z_mm,ex_um,ey_um,ez_um,u_um\na,0,0,1,2,3,1\nb,100,-200,4,5,6,1\n"
     return [*(find_data(name).read_bytes() for name in bundled_data()), points]
-
-
-def _read_readings(content: bytes, folder: Path) -> object:
-    from warpspace.calibration import read_readings
-
-    return read_readings(str(_put(content, folder, "r.csv")), load_scene("fork_head_bc"))
 
 
 def _tests() -> list[bytes]:
@@ -185,40 +167,37 @@ def _tests() -> list[bytes]:
     return [f"run,direction,target_mm,deviation_um\n{rows}\n".encode()]
 
 
-def _read_test(content: bytes, folder: Path) -> object:
-    from warpspace.bench.base import find_test, run_test
+def _read_csv(content: bytes, folder: Path) -> object:
+    _put(content, folder, "x.csv")
+    return load_scene(_put(CSV_SCENE, folder, "s.toml"))
 
+
+def _read_data(content: bytes, folder: Path) -> object:
+    return read_readings(str(_put(content, folder, "r.csv")), load_scene("fork_head_bc"))
+
+
+def _read_test(content: bytes, folder: Path) -> object:
     path = _put(content, folder, "t.csv")
     return run_test(load_scene("dvf5000_first"), find_test("positioning")(), path)
 
 
+SCENES = [(scenes_dir() / f"{name}.toml").read_bytes() for name in scene_names()]
+LINKS = [b"ZXJyb3JzPUVBWDo1", b"Y29sb3VyPXg"]
 FORMATS: list[Format] = [
-    Format(
-        "scene", _scenes, lambda content, _: parse_scene(upload_text(content, "f.toml"), "f"), 6
-    ),
-    Format("scene file", _scenes, lambda *given: load_scene(_put(*given, "s.toml")), 2),
+    Format("scene", lambda: SCENES, lambda text, _: parse_scene(upload_text(text, "f"), "f"), 6),
+    Format("scene file", lambda: SCENES, lambda *given: load_scene(_put(*given, "s.toml")), 2),
     Format("csv", _csvs, _read_csv, 2),
     *(
         Format(ending, partial(_mesh_seeds, ending), partial(_read_mesh, ending), text=text)
         for ending, text in (("stl", False), ("obj", True), ("ply", False), ("glb", False))
     ),
     Format("urdf", lambda: [URDF.encode()], _read_urdf),
-    Format(
-        "link",
-        lambda: [b"ZXJyb3JzPUVBWDo1", b"Y29sb3VyPXg"],
-        lambda content, _: unpack(content.decode("latin-1")),
-        0.5,
-    ),
+    Format("link", lambda: LINKS, lambda text, _: unpack(text.decode("latin-1")), 0.5),
     Format("measured", _measured, partial(_read_import, None)),
     *(
-        Format(
-            f"import {one.name}",
-            partial(_import_seeds, one.name),
-            partial(_read_import, one.name),
-            0.5,
-        )
-        for one in formats()
+        Format(f"import {name}", partial(_import_seeds, name), partial(_read_import, name), 0.5)
+        for name in (one.name for one in formats())
     ),
-    Format("readings", _readings, _read_readings),
+    Format("readings", _readings, _read_data),
     Format("test", _tests, _read_test),
 ]
