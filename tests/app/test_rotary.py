@@ -31,11 +31,12 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     assert "8.00 µm" in text
     located = with_curve(STATE, "EX0C", Constant(rising.span, 6.0))
     text = body_of(RotarySection, located.with_amplitude("EA0C", 20.0))
-    for head, unit in (("axis displaced", "µm"), ("axis inclined", "µrad"), ("radial", "µm")):
+    for head, unit in (("displaced", "µm"), ("inclined", "µrad"), ("radial", "µm")):
         assert f"<th>{head} <small>{unit}</small></th>" in text
     # by hand: 450 mm above the table, 20 µrad add 9 µm across to 6 µm
-    row = ("275.0", "10.82", "20.00", "21.63 / 0.00", "0.00 / 0.00", "40.00 / 0.00")
-    assert f"C at B 0°, point (0, 275, 450) mm</td><td>{'</td><td>'.join(row)}</td>" in text
+    row = ("275.0", "10.82", "20.00", "21.63 /\u00a00.00", "0.00 /\u00a00.00", "40.00 /\u00a00.00")
+    name = "C at B 0°, point (0, 275, 450) mm"
+    assert f"{name}</td></tr><tr><td>{'</td><td>'.join(row)}</td>" in text
     hidden = body_of(RotarySection, put(state, "shown.traces", "0"))
     assert "Draw the traces" in hidden
     assert "<svg" not in hidden

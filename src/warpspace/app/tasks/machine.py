@@ -1,13 +1,12 @@
 """The task Machine: where the axes stand, and how points run while a rotary axis turns."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
+from itertools import starmap
 
 from markupsafe import Markup
 
 from warpspace.analysis.axis_motion import AxisMotion, assemble_motion
-from warpspace.analysis.blocks import Column, Table
 from warpspace.app.browser.html import button, choice, field, fill, join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import HERE, chosen_trace, played_axis, standing
@@ -60,15 +59,17 @@ KEY = (
     '<span class="ws-s1">dashed: about the axis average line</span></p>'
 )
 HEADS = {
-    "trace": "",
     "radius": "mm",
-    "axis displaced": "µm",
-    "axis inclined": "µrad",
+    "displaced": "µm",
+    "inclined": "µrad",
     "radial": "µm",
     "axial": "µm",
     "tilt": "µrad",
 }
-"""Columns of the traces in numbers, with their units; the axis is where it runs on average."""
+AVERAGE = (
+    "By how much the axis average line is displaced at the height of the point and inclined; error"
+    " motions peak to valley / about that line."
+)
 MOST_ROWS = 24  # traces in the table
 
 
@@ -129,18 +130,23 @@ def _trace(picture: LivePicture) -> Markup:
     motions = {one: motion_of(picture, moved[one]) for one in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
     shown = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
-    columns = tuple(Column(head, unit=unit) for head, unit in HEADS.items())
-    rows = [(one, *_numbers(found)) for one, found in motions.items()]
-    table = tag("summary", "All traces in numbers") + block_html(Table(columns, rows))
-    return chosen + shown + tag("details", table, class_="ws-options")
+    head = join(fill("<th>{} <small>{}</small></th>", *one) for one in HEADS.items())
+    table = tag("table", tag("tr", head) + join(starmap(_numbers, motions.items())))
+    parts = tag("summary", "All traces in numbers") + tag("p", AVERAGE, class_="ws-tiny") + table
+    return chosen + shown + tag("details", parts, class_="ws-options")
 
 
-def _numbers(motion: AxisMotion | None) -> Sequence[str]:
-    if motion is None:
-        return "on the axis", *[""] * (len(HEADS) - 2)
-    axis = (f"{one.once_a_turn:.2f}" for one in (motion.radial, motion.tilt))
-    pairs = (f"{one.peak_to_valley:.2f} / {one.motion_value:.2f}" for one in motion.motions)
-    return f"{motion.radius_mm:.1f}", *axis, *pairs
+def _numbers(name: str, motion: AxisMotion | None) -> Markup:
+    """Write a trace in two lines, since its name is long."""
+    cells = ["on the axis"]
+    if motion is not None:
+        axis = (f"{one.once_a_turn:.2f}" for one in (motion.radial, motion.tilt))
+        pairs = (
+            f"{one.peak_to_valley:.2f} /\u00a0{one.motion_value:.2f}" for one in motion.motions
+        )
+        cells = [f"{motion.radius_mm:.1f}", *axis, *pairs]
+    line = f'<tr><td colspan="{len(HEADS)}" class="ws-quiet">{{}}</td></tr>'
+    return fill(line, name) + tag("tr", join(tag("td", cell) for cell in cells))
 
 
 def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
