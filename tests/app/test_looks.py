@@ -65,15 +65,9 @@ def test_traces_that_no_error_moves_are_not_drawn():
 
 
 def test_kept_results_are_dropped_oldest_first():
-    kept: Cache[str] = Cache(10)
-    built: list[str] = []
-
-    def build(name):
-        built.append(name)
-        return name
-
+    kept, built = Cache[str](10), list[str]()
     for name in "abacb":
-        kept.get(name, lambda name=name: build(name), lambda _: 5)
+        kept.get(name, lambda name=name: built.append(name) or name, lambda _: 5)
     assert built == ["a", "b", "c", "b"]
 
 
@@ -103,11 +97,11 @@ def test_slices_lie_where_they_are_put_and_have_the_models_errors():
         assert part.drawn_mm == pytest.approx(expected, abs=1e-6)
 
 
-def test_tilt_is_coloured_in_microradians():
-    picture = LIVE.evaluate(looking(quantity="orientation"))
-    assert (picture.scale.label, picture.scale.unit) == ("|φ|", "µrad")
-    assert picture.values == pytest.approx(np.linalg.norm(picture.field.orientation_urad, axis=-1))
-    assert picture.statistics.max_um == LIVE.evaluate(START).statistics.max_um
+def test_tilt_is_coloured_in_microradians(picture):
+    tilted = LIVE.evaluate(looking(quantity="orientation"))
+    assert (tilted.scale.label, tilted.scale.unit) == ("|φ|", "µrad")
+    assert tilted.values == pytest.approx(np.linalg.norm(tilted.field.orientation_urad, axis=-1))
+    assert tilted.statistics.max_um == picture.statistics.max_um
 
 
 def test_colour_ranges():

@@ -5,7 +5,6 @@ import logging
 import re
 import threading
 import time
-from operator import attrgetter
 from types import SimpleNamespace
 
 import psutil
@@ -36,17 +35,6 @@ def client():
         assert Wire(socket).read_until(lambda: bool(server.get_clients()))
         (handle,) = server.get_clients().values()
         yield server, handle
-
-
-@pytest.mark.parametrize(
-    ("which", "path"),
-    [
-        *((0, f"_websock_server.{name}") for name in ("queue_message", "_live_connections")),
-        *((1, f"_websock_connection.{name}") for name in ("queue_message", "get_message_buffer")),
-    ],
-)
-def test_viser_has_what_viser_private_uses_of_it(client, which, path):
-    assert attrgetter(path)(client[which])
 
 
 def test_its_connections_are_ours_and_send_at_once(client):

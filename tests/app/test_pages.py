@@ -5,6 +5,7 @@ import threading
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
+from unittest.mock import Mock
 
 import pytest
 
@@ -66,12 +67,9 @@ def test_what_lies_around_the_map_comes_when_that_is_drawn(wire, monkeypatch):
 
 
 def test_a_broken_update_is_said_and_takes_nothing_else_with_it(wire, viewer, caplog):
-    def broken(_):
-        raise RuntimeError("a wheel came off")
-
     assert wire.read_until(lambda: wire.is_open)
     own = viewer.sessions[-1]
-    own.context.post(broken)
+    own.context.post(Mock(side_effect=RuntimeError("a wheel came off")))
     own.context.post(lambda state: state.with_amplitude("EXX", 4.0))
     assert wire.read_until(lambda: bool(wire.toasts))
     assert wire.read_until(lambda: own.state.amplitudes["EXX"] == 4.0)
@@ -125,15 +123,8 @@ def test_what_comes_just_as_a_wait_ends_is_not_lost():
 
 def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch, caplog):
     told, stop = threading.Event(), Session.stop
-
-    def stop_late(own):
-        assert told.wait(20.0)
-        stop(own)
-
-    def fail():
-        raise RuntimeError("Cannot assign to a removed handle")
-
-    monkeypatch.setattr(Session, "stop", stop_late)
+    fail = Mock(side_effect=RuntimeError("Cannot assign to a removed handle"))
+    monkeypatch.setattr(Session, "stop", lambda own: told.wait(20.0) and stop(own))
     with dial(viewer) as socket:
         Wire(socket).read_until(lambda: bool(viewer.sessions))
         (own,) = viewer.sessions
