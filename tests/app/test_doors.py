@@ -88,9 +88,8 @@ def test_the_page_itself_is_answered(running, upgrade, name):
 @pytest.mark.parametrize("origin", ORIGINS)
 def test_a_foreign_page_is_refused(running, upgrade, origin):
     status, headers, text = ask(running, upgrade=upgrade, Origin=origin.format(port=running.port))
-    assert status == 403
+    assert (status, headers["x-frame-options"]) == (403, "DENY")
     assert "own page" in text
-    assert headers["x-frame-options"] == "DENY"
 
 
 @KINDS
@@ -98,10 +97,10 @@ def test_a_foreign_page_is_refused(running, upgrade, origin):
 def test_a_foreign_name_is_refused(running, upgrade, host):
     """A name of a foreign page that has been made to point here, with the Origin to it."""
     host = host and host.format(port=running.port)
-    assert ask(running, upgrade=upgrade, Host=host)[0] == 403
-    status, _, text = ask(running, upgrade=upgrade, Host=host, Origin=f"http://{host}")
-    assert status == 403
-    assert "--allow-host" in text
+    for more in ({}, {"Origin": f"http://{host}"}):
+        status, _, text = ask(running, upgrade=upgrade, Host=host, **more)
+        assert status == 403
+        assert "--allow-host" in text or not more
 
 
 @pytest.mark.parametrize("path", ["/", "/nothing", "/?token=x"])
