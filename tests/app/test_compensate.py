@@ -113,14 +113,13 @@ def test_the_machine_may_drift_under_its_table(left, controller):
 
 
 def test_before_and_after_stand_side_by_side(left, controller):
-    picture = LIVE.evaluate(with_box(START, BOTH, controller))
-    assert picture.compared.a == LIVE.evaluate(START).statistics
-    after = LIVE.evaluate(left)
-    assert picture.compared.b == after.statistics
-    assert WITH_TABLE in picture.compared.titles[1]
-    assert "table" not in picture.compared.titles[0]
-    change = np.linalg.norm(after.field.error_um - LIVE.evaluate(START).field.error_um, axis=-1)
-    assert picture.compared.difference.max_um == pytest.approx(change.max())
+    compared = LIVE.evaluate(with_box(START, BOTH, controller)).compared
+    before, after = LIVE.evaluate(START), LIVE.evaluate(left)
+    assert (compared.a, compared.b) == (before.statistics, after.statistics)
+    assert WITH_TABLE in compared.titles[1]
+    assert "table" not in compared.titles[0]
+    change = np.linalg.norm(after.field.error_um - before.field.error_um, axis=-1)
+    assert compared.difference.max_um == pytest.approx(change.max())
 
 
 def test_slices_and_the_tool_point_have_the_table_too(controller):

@@ -43,13 +43,10 @@ class Column(Alone):
     """A section that is unfolded."""
 
     def __init__(self, kind, state, *more):
-        super().__init__(kind, state, *more)
-        page = replace(state.page, task="measure", open=frozenset({self.part.name}))
-        self.store.apply(lambda now: replace(now, page=page))
+        super().__init__(kind, put(state, "page.task", "measure"), *more)
+        self.store.apply(lambda now: put(now, "page.open", self.part.name))
 
-    @property
-    def state(self):
-        return self.store.state
+    state = property(lambda self: self.store.state)
 
     def do(self, word, value=""):
         super().do(word, value)
