@@ -196,6 +196,7 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(46.09, abs=0.01)
     assert applied.comparison.b is not None
     previewed = part.take(START, "preview", "0")
+    assert previewed.comparison.b.title == "after repair: EA0Z → 30.0"
     assert previewed.amplitudes == START.amplitudes
     assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(46.09, abs=0.01)
     moved = START.with_amplitude("EAX", 9.0)
@@ -213,6 +214,16 @@ def test_an_excluded_error_is_neither_adjusted_nor_lost():
     assert "EA0Z" not in html_of(part, state)
     applied = part.take(state, "apply", "0")
     assert applied.amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
+
+
+def test_nothing_is_adjusted_where_all_errors_are_excluded():
+    state = START
+    for key in START.amplitudes:
+        state = put(state, "exclusions.excluded", f"+{key}")
+    part = lone_part(BestPart)
+    html_of(part, state)
+    wait(part)
+    assert "No adjustment helps." in html_of(part, state)
 
 
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():

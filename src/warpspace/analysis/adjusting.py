@@ -34,7 +34,7 @@ class Volume:
     @cached_property
     def response(self) -> Array:
         """Response of every node, [K, N, 3], µm per µm or µrad."""
-        return self.basis.position.reshape(len(self.basis.keys), -1, 3)
+        return self.basis.position.reshape(len(self.basis.keys), self.grid.weights.size, 3)
 
     @cached_property
     def error_um(self) -> Array:

@@ -249,7 +249,8 @@ class AnalysisPart(Section):
         elif word in ("preview", "apply") and (change := self._change(state, value)) is not None:
             what = self.title.lower()
             if word == "preview":
-                words = f"after {what}: {change.words.removeprefix(f'after {what}: ')}"
+                words = change.words if change.words.startswith("after ") else ""
+                words = words or f"after {what}: {change.words}"
                 return with_proposal(state, change.scene, words)
             found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
