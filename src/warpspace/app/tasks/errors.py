@@ -62,7 +62,7 @@ class ErrorsPart(Part):
         self._made_for: tuple[object, ...] = ()
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture), self._sorted_for)
+        return (id(picture), self._sorted_for, Identity(self._said))
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
@@ -157,6 +157,7 @@ class ErrorsPart(Part):
                 return put(state, f"amplitudes.{key}", value)
             state, said = edit_curve(state, what, key, value)
             self._said = {**self._said, key: said}
+            self.context.act(lambda: self.context.renew(self))  # also where it is refused
             return state
         if what in ("sort", "find"):
             self._sorted_for = ()
