@@ -233,7 +233,7 @@ class Session:
             with turn():
                 self._show(self._live.evaluate(state), shown, anew=bool(notes))
         if notes:
-            context.notify("Not taken as typed", "\n".join(notes), "warning")
+            context.notify("Please note", "\n".join(notes), "warning")
 
     def _show(self, picture: LivePicture, before: LivePicture, *, anew: bool) -> None:
         context = self.context
