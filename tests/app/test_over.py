@@ -50,8 +50,8 @@ def test_the_heading_says_numbers_place_and_limit_once():
 def test_the_heading_says_what_machines_within_tolerance_reach():
     none = replace(START, tolerances=ToleranceSet())
     largest = warpspace.montecarlo(FIRST, samples=SAMPLES, over="max").max_um
-    assert f"tolerances allow {largest:.1f} µm" in pieces(OrderPart, START)["head.order"]
-    assert "tolerances" not in pieces(OrderPart, none)["head.order"]
+    assert f"tolerances allow {largest:.1f} µm" in pieces(OrderPart, START)["head.allowed"]
+    assert not pieces(OrderPart, none)["head.allowed"]
 
 
 @pytest.mark.parametrize(("limit", "kept"), [(51.0, False), (52.0, True), (1.0, False)])

@@ -222,14 +222,14 @@ def sample_machines(state: AppState) -> Ensemble:
     return ENSEMBLES.get(_sampled(state), build, lambda found: found.size)
 
 
-def allowed_words(state: AppState) -> list[str]:
+def allowed_words(state: AppState) -> str:
     """Say the largest error of the machines within tolerance; nothing where there are none."""
     try:
         ensemble = sample_machines(state)
     except WarpspaceError:
-        return []
+        return ""
     largest = float(ensemble.norm_um(*_centres_and_widths(ensemble, state.tolerances)).max())
-    return [f"tolerances allow {number(largest)} µm"] if largest else []
+    return f"tolerances allow {number(largest)} µm" if largest else ""
 
 
 def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:

@@ -44,7 +44,8 @@ class HeadPart(Part):
             limit = f"{picture.state.specification.limit_um:g}"
             said.append(_limit(*kept_words(picture), limit))
         head = fill(
-            '<h1>{numbers}</h1><div>{said}</div>{words}<div data-piece="head.order"></div>',
+            '<h1>{numbers}</h1><div>{said}<span data-piece="head.allowed"></span></div>{words}'
+            '<div data-piece="head.order"></div>',
             numbers=numbers_words(picture), said=Markup(" · ").join(filter(None, said)),
             words=tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY,
         )  # fmt: skip
@@ -71,10 +72,10 @@ class OrderPart(Part):
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         words, left = [*order_conditions(picture)], picture.state.left_behind
-        if not picture.is_difference:
-            words[:0] = allowed_words(picture.drawn_state)
         words += [f"with its own errors; those of “{left}” are left behind"] if left else []
-        return {"head.order": tag("p", " · ".join(words)) if words else EMPTY}
+        allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
+        return {"head.order": tag("p", " · ".join(words)) if words else EMPTY,
+                "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
 
 
 class RoomPart(Part):
