@@ -43,6 +43,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.tree import put
 from warpspace.scene.library import load_scene
 
 PAGE: Any = {"width": 1600, "height": 900}
@@ -124,7 +125,9 @@ def model_part() -> dict[str, float]:
     live.evaluate(state)
     return {
         "model_ms": median_ms(lambda n: live.evaluate(state.with_amplitude("EAX", n / 10)), 50),
-        "new_place_ms": median_ms(lambda n: live.evaluate(state.with_position("B", -1.0 - n)), 10),
+        "new_place_ms": median_ms(
+            lambda n: live.evaluate(put(state, "positions.B", str(-1 - n))), 10
+        ),
     }
 
 
@@ -299,6 +302,7 @@ def browser_part(
         browser = launch(playwright)
         with recorder.into() as start:
             ours = open_page(browser, viewer.url, OURS_READY)
+            timed_move(ours, None, -0.3)  # from then on a move sends points and colours alone
         recorded: list[list[Any]] = []
         for value in (-0.1, -0.2):
             with recorder.into() as sent:
