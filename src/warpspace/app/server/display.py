@@ -7,11 +7,9 @@ from functools import partial
 
 from warpspace.app.drawing.shapes import Layer
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
 
-PAUSE_S = 0.1
-"""Pause in the changes after which parts follow: longer than between two moves of a drag."""
 LONGEST_PAUSE_S = 0.8  # what follows in a pause lags no longer than this while a slider is dragged
 REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from warpspace.app.tasks.parts import Part
 
 MOST_FILES = 16  # that may wait for the session
-STILL_S = 0.09
+PAUSE_S = 0.1
+"""Pause in the changes after which parts follow: longer than between two moves of a drag."""
 
 
 class Context:
@@ -107,8 +108,8 @@ class Context:
 
     @property
     def is_still(self) -> bool:
-        """Whether nothing has been set for longer than between two moves of a drag."""
-        return time.monotonic() - self.changed_at >= STILL_S
+        """Whether changes pause, so that work may follow them."""
+        return time.monotonic() - self.changed_at >= PAUSE_S
 
     def send(self, event: str, value: str = "") -> None:
         self.take(Events([(event, value)]))
