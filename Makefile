@@ -38,7 +38,6 @@ golden: $(DEV_STAMP) ## keep the outputs of the commands anew (ARGS="report thes
 	PYTHONPATH=tests $(BIN)/python -m golden $(ARGS)
 
 reliability: system-packages $(DEV_STAMP) ## try to break it, and write docs/reliability.md (ARGS="--fraction 0.01")
-	$(PIP_INSTALL) --no-build-isolation -e '.[fuzz]' || echo "no atheris here: leave out the row coverage"
 	PYTHONPATH=tests $(BIN)/python -m reliability $(ARGS)
 
 coverage: system-packages $(DEV_STAMP) ## run the tests and say which lines none of them reaches

@@ -138,7 +138,7 @@ async def _move_all(app: App, count: int) -> None:
 
 def _serve() -> None:
     sys.path.append(str(HERE.parent / "benchmarks"))
-    import soak_app  # pyright: ignore[reportMissingImports] - its folder is no package
+    import soak_app
 
     from warpspace.app.evaluation import evaluate
 

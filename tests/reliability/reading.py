@@ -218,44 +218,9 @@ def _read_hypothesis(reader: Reader, count: int, seed: int) -> None:
         seeded(seed + done)(chosen(given(scene_texts(), st.integers(0, 2**32))(read)))()
 
 
-def _read_atheris(reader: Reader, count: int, seed: int) -> None:
-    import atheris
-
-    from reliability.formats import FORMATS, WORDS
-
-    for module in [name for name in sys.modules if name.startswith(("warpspace.", "tomllib"))]:
-        holder = sys.modules[module]
-        for name, value in list(vars(holder).items()):
-            if getattr(value, "__module__", None) == module and hasattr(value, "__code__"):
-                try:
-                    setattr(holder, name, atheris.instrument_func(value))
-                except (AttributeError, TypeError, ValueError):
-                    continue
-    chosen = [each for each in FORMATS if each.share >= 1.0]
-    corpus = reader._folder / "corpus"
-    corpus.mkdir()
-    for number, each in enumerate(chosen):
-        for at, content in enumerate(each.seeds()):
-            (corpus / f"{number}-{at}").write_bytes(bytes([number]) + content)
-    words = reader._folder / "words"
-    spelt = ("".join(f"\\x{byte:02x}" for byte in word) for word in WORDS if len(word) < 60)
-    words.write_text("".join(f'"{word}"\n' for word in spelt))
-
-    def read(data: bytes) -> None:
-        if data:
-            reader.read(chosen[data[0] % len(chosen)].name, data[1:])
-        if sum(reader.by_format.values()) >= count:
-            reader.say(ended=True)
-            os._exit(0)
-
-    options = [f"-seed={seed % 2**31 or 1}", "-max_len=60000", "-rss_limit_mb=2000"]
-    atheris.Setup([sys.argv[0], *options, f"-dict={words}", "-timeout=60", str(corpus)], read)
-    atheris.Fuzz()
-
-
 if __name__ == "__main__":  # way, count, seed, and the folder for files and for what is said
     reader = Reader(Path(sys.argv[4]))
     reader.say()
-    run = {"bytes": _read_bytes, "hypothesis": _read_hypothesis, "atheris": _read_atheris}
+    run = {"bytes": _read_bytes, "hypothesis": _read_hypothesis}
     run[sys.argv[1]](reader, int(sys.argv[2]), int(sys.argv[3]))
     reader.say(ended=True)

@@ -44,7 +44,6 @@ class Row:
 ROWS = {
     "files": Row(100_000, "files", partial(read_many, "bytes", seed=SEED)),
     "scenes": Row(50_000, "scenes", partial(read_many, "hypothesis", seed=SEED)),
-    "coverage": Row(50_000, "files", partial(read_many, "atheris", seed=SEED)),
     "messages": Row(100_000, "messages", messages.run),
     "kills": Row(1_000, "kills", kills.run),
     "surroundings": Row(160, "runs", surroundings.run),
