@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from scipy.spatial.transform import Rotation
 
 from chains import (
     MAX_LINEAR_MM,
@@ -21,12 +22,11 @@ from warpspace.exceptions import ChainError
 from warpspace.field.evaluate import View, evaluate_exact, evaluate_first_order
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, columns, jacobian, loop_error, nominal_point
-from warpspace.kinematics.model import Loop, Model, convention_names
+from warpspace.kinematics.model import Loop, convention_names
 from warpspace.machine.axes import parameter
 from warpspace.machine.description import parse_chain
 from warpspace.machine.errors import Constant, ErrorSet
 
-ANGLES = st.floats(-10.0, 10.0)
 SHAPES = hnp.array_shapes(min_dims=0, max_dims=2, max_side=3)
 
 
@@ -45,25 +45,9 @@ def test_inverse_undoes_a_rigid_motion(turn, shift):
 
 
 @given(turn=vector_batches())
-def test_rotations_are_orthonormal_and_right_handed(turn):
-    rotation = transforms.vector_rotation(turn)
-    product = rotation @ np.swapaxes(rotation, -1, -2)
-    np.testing.assert_allclose(product, np.broadcast_to(np.eye(3), rotation.shape), atol=1e-13)
-    np.testing.assert_allclose(np.linalg.det(rotation), 1.0, atol=1e-13)
-
-
-@given(turn=vector_batches())
-def test_turning_forth_and_back_is_the_identity(turn):
-    product = transforms.vector_rotation(turn) @ transforms.vector_rotation(-turn)
-    np.testing.assert_allclose(product, np.broadcast_to(np.eye(3), product.shape), atol=1e-13)
-
-
-@given(index=st.integers(0, 2), angle=hnp.arrays(float, SHAPES, elements=ANGLES))
-def test_axis_rotation_is_the_rotation_about_that_unit_vector(index, angle):
-    about = angle[..., None] * np.eye(3)[index]
-    np.testing.assert_allclose(
-        transforms.axis_rotation(index, angle), transforms.vector_rotation(about), atol=1e-13
-    )
+def test_a_rotation_vector_turns_as_that_of_scipy(turn):
+    expected = Rotation.from_rotvec(turn.reshape(-1, 3)).as_matrix().reshape(*turn.shape, 3)
+    np.testing.assert_allclose(transforms.vector_rotation(turn), expected, atol=1e-13)
 
 
 @given(exponent=st.integers(-14, -2), direction=vector_batches(1.0))
@@ -74,22 +58,6 @@ def test_small_rotations_are_one_plus_skew_to_second_order(exponent, direction):
     angle = np.linalg.norm(turn, axis=-1).max(initial=0.0)
     difference = np.abs(transforms.vector_rotation(turn) - second_order).max()
     assert difference <= angle**3 + 1e-15
-
-
-@given(left=vector_batches(), right=st.tuples(*[st.floats(-5, 5)] * 3))
-def test_skew_is_the_cross_product(left, right):
-    product = transforms.rotate(transforms.skew(left), np.array(right))
-    np.testing.assert_allclose(product, np.cross(left, np.array(right)), atol=1e-12)
-
-
-@given(first=vector_batches(1e3), second=st.tuples(*[st.floats(-1e3, 1e3)] * 3))
-def test_translations_add_up(first, second):
-    moved = transforms.apply(transforms.translation(first), np.array(second))
-    np.testing.assert_allclose(moved, first + np.array(second), atol=1e-9)
-    np.testing.assert_array_equal(
-        transforms.translation(np.zeros_like(first)),
-        np.broadcast_to(np.eye(4), (*first.shape[:-1], 4, 4)),
-    )
 
 
 @given(turn=vector_batches(), shift=st.tuples(*[st.floats(-10, 10)] * 3))
@@ -210,19 +178,6 @@ def test_every_parameter_of_every_axis_moves_some_point_of_its_loop_and_of_no_ot
 
 @settings(max_examples=40)
 @given(data=st.data())
-def test_relative_loop_is_tool_minus_workpiece(data):
-    model: Model = data.draw(models())
-    coordinates = data.draw(positions(model))
-    point, keys = np.array(data.draw(vectors())), model.machine.allowed_keys
-    by_loop = {loop: jacobian(model, loop, keys, coordinates, point) for loop in Loop}
-    for part in (0, 1):
-        np.testing.assert_array_equal(
-            by_loop[Loop.RELATIVE][part], by_loop[Loop.TOOL][part] - by_loop[Loop.WORKPIECE][part]
-        )
-
-
-@settings(max_examples=40)
-@given(data=st.data())
 def test_lever_explains_the_gain_of_every_rotation(data):
     model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
     coordinates, point = data.draw(positions(model)), np.array(data.draw(vectors()))
@@ -234,11 +189,6 @@ def test_lever_explains_the_gain_of_every_rotation(data):
 
 
 FILLERS = st.text(alphabet=" ()[]{}'’′-_\t", max_size=3)
-
-
-@given(chain=chains())
-def test_canonical_spelling_reads_back(chain):
-    assert parse_chain(str(chain)) == chain
 
 
 @given(chain=chains(), frame=st.sampled_from("Fb"), data=st.data())
