@@ -93,130 +93,101 @@ def test_nominal_poses_agree_with_pinocchio(name):
             np.testing.assert_allclose(found[frame], expected, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("dy", [0.0, 23.0])
-def test_trunnion_a_c_moves_like_xyzac_trt_kins(dy):
+def sin_cos(*angles_deg):
+    return [value for angle in np.deg2rad(angles_deg) for value in (np.sin(angle), np.cos(angle))]
+
+
+def xyzac_trt_kins(machine, X, Y, Z, A, C):
     # trtfuncs_math.h, xyzac_forward_math, conventional directions, rotary point and tool offset 0;
     # the centre of the table lies (0, −dy, −dz) off the A axis
-    dz = 60.0
-    machine = build_machine(
-        "wCAFXYZt", offset_mm={"A": (0, dy, dz), "C": (0, -dy, -dz)},
-    )  # fmt: skip
-    rng = np.random.default_rng(3)
-    for _ in range(POSES):
-        x, y, z = rng.uniform(-200, 200, 3)
-        a, c = rng.uniform(-120, 120), rng.uniform(0, 360)
-        sa, ca, sc, cc = *_sin_cos(a), *_sin_cos(c)
-        # their angles carry the tool to the workpiece: ours of the table are opposite
-        expected = (
-            cc * x - sc * ca * (y - dy) + sc * sa * (z - dz) - sc * dy,
-            sc * x + cc * ca * (y - dy) - cc * sa * (z - dz) + cc * dy,
-            sa * (y - dy) + ca * (z - dz) + dz,
-        )
-        np.testing.assert_allclose(tip(machine, X=x, Y=y, Z=z, A=-a, C=-c), expected, atol=1e-9)
-    library = load_machine("trunnion_ac")
-    assert library.axes["A"].offset_mm[2] == -library.axes["C"].offset_mm[2]
+    _, dy, dz = np.negative(machine.axes["C"].offset_mm)
+    sa, ca, sc, cc = sin_cos(A, C)
+    return (
+        cc * X - sc * ca * (Y - dy) + sc * sa * (Z - dz) - sc * dy,
+        sc * X + cc * ca * (Y - dy) - cc * sa * (Z - dz) + cc * dy,
+        sa * (Y - dy) + ca * (Z - dz) + dz,
+    )
 
 
-@pytest.mark.parametrize("dx", [0.0, -17.0])
-def test_trunnion_b_c_moves_like_xyzbc_trt_kins(dx):
+def xyzbc_trt_kins(machine, X, Y, Z, B, C):
     # trtfuncs_math.h, xyzbc_forward_math
-    dz = 70.0
-    machine = build_machine("wCBFXYZt", offset_mm={"B": (dx, 0, dz), "C": (-dx, 0, -dz)})
-    rng = np.random.default_rng(4)
-    for _ in range(POSES):
-        x, y, z = rng.uniform(-200, 200, 3)
-        b, c = rng.uniform(-110, 110), rng.uniform(0, 360)
-        sb, cb, sc, cc = *_sin_cos(b), *_sin_cos(c)
-        expected = (
-            cc * cb * (x - dx) - sc * y + cc * sb * (z - dz) + cc * dx,
-            sc * cb * (x - dx) + cc * y + sc * sb * (z - dz) + sc * dx,
-            -sb * (x - dx) + cb * (z - dz) + dz,
-        )
-        np.testing.assert_allclose(tip(machine, X=x, Y=y, Z=z, B=-b, C=-c), expected, atol=1e-9)
+    dx, _, dz = np.negative(machine.axes["C"].offset_mm)
+    sb, cb, sc, cc = sin_cos(B, C)
+    return (
+        cc * cb * (X - dx) - sc * Y + cc * sb * (Z - dz) + cc * dx,
+        sc * cb * (X - dx) + cc * Y + sc * sb * (Z - dz) + sc * dx,
+        -sb * (X - dx) + cb * (Z - dz) + dz,
+    )
 
 
-def test_table_and_head_of_the_library_move_like_maxkins():
+def maxkins(machine, X, Y, Z, B, C):
     # maxkins.c, max_forward with conventional-directions 1, without U, V and W
-    machine, rng = load_machine("table_head_bc"), np.random.default_rng(6)
     pivot = -machine.fixed_mm["S"][2] - machine.fixed_mm["t"][2]
-    zero = tip(machine, X=0, Y=0, Z=0, B=0, C=0)
-    for _ in range(POSES):
-        x, y, z = rng.uniform(-250, 250, 3)
-        b, c = rng.uniform(-110, 110), rng.uniform(0, 360)
-        (sb, cb), (sc, cc) = _sin_cos(b), _sin_cos(c)
-        mx = x - pivot * sb
-        expected = (cc * mx - sc * y, sc * mx + cc * y, z - pivot * cb + pivot)
-        # their angle C carries the tool to the workpiece: ours of the table is opposite
-        moved = tip(machine, X=x, Y=y, Z=z, B=b, C=-c) - zero
-        np.testing.assert_allclose(moved, expected, atol=1e-9)
+    sb, cb, sc, cc = sin_cos(B, C)
+    x = X - pivot * sb
+    return cc * x - sc * Y, sc * x + cc * Y, Z - pivot * cb
 
 
-def test_fork_head_of_the_library_moves_like_5axiskins():
+def fiveaxiskins(machine, X, Y, Z, B, C):
     # 5axiskins_math.h, fiveaxis_forward_math: spherical coordinates about the pivot
-    machine, rng = load_machine("head_head_cb"), np.random.default_rng(5)
     pivot = -machine.fixed_mm["S"][2] - machine.fixed_mm["t"][2]
-    zero = tip(machine, X=0, Y=0, Z=0, B=0, C=0)
-    for _ in range(POSES):
-        x, y, z = rng.uniform(-700, 0, 3)
-        b, c = rng.uniform(-110, 110), rng.uniform(-360, 360)
-        polar, azimuth = np.deg2rad(180.0 - b), np.deg2rad(c)
-        expected = np.array([
-            x + pivot * np.sin(polar) * np.cos(azimuth),
-            y + pivot * np.sin(polar) * np.sin(azimuth),
-            z + pivot + pivot * np.cos(polar),
-        ])  # fmt: skip
-        moved = tip(machine, X=x, Y=y, Z=z, B=b, C=c) - zero
-        np.testing.assert_allclose(moved, expected, atol=1e-9)
+    sp, cp, sc, cc = sin_cos(180.0 - B, C)
+    return X + pivot * sp * cc, Y + pivot * sp * sc, Z + pivot * cp
 
 
-def test_nutating_head_of_the_library_moves_like_xyzacb_trsrn():
+def xyzacb_trsrn(machine, X, Y, Z, B, C):
     # xyzacb_trsrn.comp, TCP kinematics forward, table at zero: nut-angle 45°, x- and y-offset 0;
     # y is what the program says, whether the table moves or the tool
-    machine, rng = load_machine("nutating_head"), np.random.default_rng(6)
     length = np.linalg.norm(machine.fixed_mm["S"]) - machine.fixed_mm["t"][2]
     sv = cv = np.sqrt(0.5)
-    zero = tip(machine, X=0, Y=0, Z=0, B=0, C=0)
-    for _ in range(POSES):
-        x, y, z = rng.uniform(-400, 0, 3)
-        b, c = rng.uniform(-180, 180), rng.uniform(-360, 360)
-        ss, cs, sp, cp = *_sin_cos(b), *_sin_cos(c)
-        s, t = cs + cv * cv * (1 - cs), sv * cv * (1 - cs)
-        expected = np.array([
-            x - (cp * sv * ss - sp * t) * length,
-            y - (sp * sv * ss + cp * t) * length,
-            z - s * length + length,
-        ])  # fmt: skip
-        moved = tip(machine, X=x, Y=y, Z=z, B=b, C=c) - zero
-        np.testing.assert_allclose(moved, expected, atol=1e-9)
+    ss, cs, sp, cp = sin_cos(B, C)
+    s, t = cs + cv * cv * (1 - cs), sv * cv * (1 - cs)
+    return (
+        X - (cp * sv * ss - sp * t) * length,
+        Y - (sp * sv * ss + cp * t) * length,
+        Z - s * length,
+    )
 
 
-def test_nutating_head_lays_the_tool_down_at_180_degrees():
-    machine = load_machine("nutating_head")
-    upright, lying = (poses(machine, {"B": b})["t"][:3, 2] for b in (0.0, 180.0))
-    np.testing.assert_allclose(upright, (0, 0, 1), atol=1e-12)
-    np.testing.assert_allclose(lying, (0, 1, 0), atol=1e-12)
-
-
-def test_scara_of_the_library_moves_like_scarakins():
+def scarakins(machine, C1, C2, Z):
     # scarakins_math.h, scara_forward_math with d6 = 0; Z counts upwards here
-    machine, rng = load_machine("scara"), np.random.default_rng(8)
     inner, outer = machine.axes["C2"].offset_mm[0], machine.axes["Z"].offset_mm[0]
-    height = poses(machine, {"C1": 0.0, "C2": 0.0, "Z": 0.0})["t"][2, 3]
+    s1, c1, s2, c2 = sin_cos(C1, C1 + C2)
+    return inner * c1 + outer * c2, inner * s1 + outer * s2, Z
+
+
+OFF_A = {"A": (0, 23, 60), "C": (0, -23, -60)}
+OFF_B = {"B": (-17, 0, 70), "C": (17, 0, -70)}
+
+
+@pytest.mark.parametrize(
+    ("machine", "forward"),
+    [
+        (load_machine("trunnion_ac"), xyzac_trt_kins),
+        (build_machine("wCAFXYZt", offset_mm=OFF_A), xyzac_trt_kins),
+        (load_machine("trunnion_bc"), xyzbc_trt_kins),
+        (build_machine("wCBFXYZt", offset_mm=OFF_B), xyzbc_trt_kins),
+        (load_machine("table_head_bc"), maxkins),
+        (load_machine("head_head_cb"), fiveaxiskins),
+        (load_machine("nutating_head"), xyzacb_trsrn),
+        (load_machine("scara"), scarakins),
+    ],
+)
+def test_machines_move_like_those_of_linuxcnc(machine, forward):
+    rng, zero = np.random.default_rng(3), dict.fromkeys(machine.axes, 0.0)
+    # their x, y and z count from the table
+    start = dict(zip("XYZ", tip(machine, **zero), strict=True))
+    # their angles carry the tool to the workpiece: ours of a table are opposite
+    tables = {name for name in machine.chain.workpiece if not machine.axes[name].is_linear}
+
+    def place(at):
+        theirs = {q: -at[q] if q in tables else at[q] + start.get(q, 0.0) for q in at}
+        return np.array(forward(machine, **theirs))
+
     for _ in range(POSES):
-        one, two, z = rng.uniform(-130, 130), rng.uniform(-140, 140), rng.uniform(-80, 70)
-        a, b = np.deg2rad(one), np.deg2rad(one + two)
-        expected = (
-            inner * np.cos(a) + outer * np.cos(b),
-            inner * np.sin(a) + outer * np.sin(b),
-            height + z,
-        )
-        found = poses(machine, {"C1": one, "C2": two, "Z": z})["t"][:3, 3]
-        np.testing.assert_allclose(found, expected, atol=1e-9)
-
-
-def _sin_cos(angle_deg):
-    angle = np.deg2rad(angle_deg)
-    return np.sin(angle), np.cos(angle)
+        at = random_positions(machine, rng)
+        moved = tip(machine, **at) - tip(machine, **zero)
+        np.testing.assert_allclose(moved, place(at) - place(zero), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", LIBRARY)
