@@ -7,28 +7,12 @@ import pytest
 
 from warpspace import evaluate, load_scene
 from warpspace.analysis.statistics import statistics
-from warpspace.field.evaluate import View, evaluate_exact
-from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, columns
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.scene.library import scene_names, scene_path
 from warpspace.scene.model import second_order
 
 SCENES = scene_names()
-TURN_DEG = np.arange(0.0, 360.0, 15.0)
-
-
-def table_errors(scene, point_mm, c_deg, b_deg=0.0):
-    """Nominal position in R and exact error of a point of the workpiece frame, [..., 3]."""
-    coordinates = complete_coordinates(scene.machine, {"B": b_deg, "C": c_deg})
-    pose = branch_pose(scene.model, "workpiece", coordinates)
-    point = transforms.apply(pose, point_mm)
-    field = evaluate_exact(scene.model, scene.errors, coordinates, View(Loop.WORKPIECE), point)
-    return point, field.error_um
-
-
-def harmonic(values, order):
-    return float(2.0 * np.abs(np.fft.rfft(values)[order]) / len(values))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -121,45 +105,3 @@ def test_wobbling_table_leaves_the_tool_loop_straight_and_bends_the_relative_one
     scene = load_scene("teach_wobbling_table")
     assert statistics(evaluate(scene, grid=5)).max_um == 0.0
     assert statistics(evaluate(scene, grid=5, loop="relative")).max_um > 1.0
-
-
-def test_wobbling_table_moves_a_traced_point_axially_once_and_radially_twice_a_turn():
-    scene = load_scene("teach_wobbling_table")
-    point, error = table_errors(scene, scene.trace_points_mm[0], TURN_DEG)
-    outward = point[:, :2] / np.linalg.norm(point[:, :2], axis=-1, keepdims=True)
-    radial = np.sum(error[:, :2] * outward, axis=-1)
-    assert harmonic(radial, 2) == pytest.approx(4.0, abs=0.01)
-    assert harmonic(radial, 1) < 0.01
-    tilted = -15.0 * 0.275 * np.sin(np.deg2rad(TURN_DEG))
-    axial = 3.0 * np.cos(np.deg2rad(TURN_DEG - 45.0))
-    np.testing.assert_allclose(error[:, 2], tilted + axial, atol=0.01)
-    assert harmonic(error[:, 2], 2) < 0.01
-    tilt = evaluate(scene, at={"C": TURN_DEG}, loop="workpiece").orientation_urad
-    np.testing.assert_allclose(np.linalg.norm(tilt, axis=-1), 15.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("index", [0, 1])
-def test_tilted_c_keeps_circles_circles_but_tilted_and_displaced(index):
-    scene = load_scene("teach_tilted_c")
-    point_mm = scene.trace_points_mm[index]
-    point, error = table_errors(scene, point_mm, TURN_DEG)
-    actual = point + error / 1e3
-    centre = actual.mean(axis=0)
-    radius = np.linalg.norm(actual - centre, axis=-1)
-    np.testing.assert_allclose(radius, 275.0, rtol=0, atol=1e-9)
-    _, size, (*_, normal) = np.linalg.svd(actual - centre)
-    assert size[2] < 1e-9
-    tilt = np.arccos(np.abs(normal[2])) * 1e6
-    assert tilt == pytest.approx(np.hypot(40.0, 25.0), rel=1e-3)
-    displaced = (centre - point.mean(axis=0)) * 1e3
-    expected = np.array([8.0, -5.0, 0.0]) + np.cross([40.0, -25.0, 0.0], [0, 0, point_mm[2]]) / 1e3
-    np.testing.assert_allclose(displaced, expected, atol=1e-3)
-
-
-def test_tilting_b_turns_the_error_of_the_c_axis_with_the_table():
-    scene = load_scene("teach_tilted_c")
-    _, level = table_errors(scene, (275.0, 0.0, 0.0), 30.0)
-    _, tilted = table_errors(scene, (275.0, 0.0, 0.0), 30.0, -90.0)
-    turn = transforms.axis_rotation(1, np.deg2rad(-90.0))
-    np.testing.assert_allclose(tilted, transforms.rotate(turn, level), atol=1e-9)
-    assert np.abs(tilted - level).max() > 1.0

@@ -1,29 +1,11 @@
-"""Readings of tests as files, the figures of many of them, and circles by themselves."""
-
-from dataclasses import replace
+"""Readings of tests as files: read back, in any order of columns, and in another unit."""
 
 import numpy as np
 import pytest
 
-import warpspace
 from bench_scenes import scene_with
 from warpspace.bench.base import bench_names, find_test, run_test
 from warpspace.bench.data import parse_table, unit_notes
-from warpspace.machine.errors import Constant, Directional, ErrorSet
-
-HEADER = "run,direction,target_mm,deviation_um\n"
-GOOD = "".join(
-    f"{run},{sign},{target},{target / 10 + run}\n"
-    for run in (1, 2) for sign in "+-" for target in (0, 10, 20)
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("text", ["\ufeff" + HEADER + GOOD, (HEADER + GOOD).replace("\n", "\r\n")])
-def test_marks_and_line_ends_of_other_systems(text, tmp_path):
-    path = tmp_path / "data.csv"
-    path.write_bytes(text.encode("utf-8"))
-    found = run_test(scene_with(), find_test("positioning")(), path).measured
-    assert found.outcome["E_um"] == pytest.approx(2.0)
 
 
 def test_columns_may_stand_in_any_order_among_others():
@@ -82,17 +64,3 @@ def test_thousandfold_readings_are_said():
     (text,) = unit_notes(model / 1000.0, model, "µm")
     assert "in mm?" in text
     assert unit_notes(model * 1000.0, model * 0.0, "µm") == ()
-
-
-def test_a_reversal_sets_the_runs_of_a_circle_apart():
-    span = (-275.0, 275.0)
-    errors = {"EXX": Directional(span, Constant(span, 3.0), Constant(span, 0.0))}
-    scene = replace(warpspace.load_scene("dvf5000_nominal"), errors=ErrorSet(errors))
-    found = warpspace.ballbar(scene, plane="XY", radius_mm=150)
-    # X runs down over the upper half of the counter-clockwise circle, up over that of the other
-    assert found.hysteresis_um > 1e-3
-    assert found.hysteresis_um == pytest.approx(3.0, abs=1e-3)
-    # a circle that touches the limits is run
-    touching = warpspace.ballbar(warpspace.load_scene("dvf5000_first"), plane="XY", radius_mm=225)
-    assert touching.radial_um.shape == (360,)
-    assert touching.hysteresis_um < 1e-9
