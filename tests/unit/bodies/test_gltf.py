@@ -1,35 +1,14 @@
-import json
-import struct
-
 import numpy as np
 import pytest
 import trimesh
 
+from glb import opened, values
 from warpspace.bodies.gltf import GltfTemplate, Material, Part, build_gltf
 from warpspace.geometry.colour import linear_to_srgb
 
 POINTS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
 COLOURS = np.array([[0.0, 0.1, -0.2], [2.5, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
 TRIANGLE = Part("surface", POINTS, np.array([[0, 1, 2]]), colours=COLOURS)
-
-
-def opened(data):
-    magic, version, length = struct.unpack_from("<4sII", data)
-    assert (magic, version, length) == (b"glTF", 2, len(data))
-    json_length = struct.unpack_from("<I", data, 12)[0]
-    return json.loads(data[20 : 20 + json_length]), data[28 + json_length :]
-
-
-def values(data, accessor):
-    document, body = opened(data)
-    found = document["accessors"][accessor]
-    kind = {5123: "<u2", 5125: "<u4", 5126: "<f4"}[found["componentType"]]
-    width = {"SCALAR": 1, "VEC3": 3}[found["type"]]
-    view = document["bufferViews"][found["bufferView"]]
-    assert view["byteLength"] >= found["count"] * width * np.dtype(kind).itemsize
-    start = view["byteOffset"] + found.get("byteOffset", 0)
-    read = np.frombuffer(body, kind, found["count"] * width, start)
-    return read if width == 1 else read.reshape(-1, width)
 
 
 def only_primitive(data):
