@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpspace.analysis.convert import Target, convert_scene, field_difference
-from warpspace.exceptions import SceneError, WarpspaceError
+from warpspace.exceptions import WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import ComponentErrors
 from warpspace.machine.errors import (
@@ -207,11 +207,6 @@ def test_readings_may_stand_in_a_file_beside_the_scene(tmp_path):
         Run("-", ((-275.0, 2.5),)),
     )
     assert parse_scene(scene_to_toml(scene), "s") == scene  # needs no other file
-
-
-def test_a_number_too_large_for_any_scene_is_spelled_by_its_size():
-    with pytest.raises(SceneError, match="a whole number of 1329 bits: is too large"):
-        parse_scene(DVF + f"[errors]\nEAX = {{ ramp = {10**400} }}\n", "x")
 
 
 FIRST = load_scene("dvf5000_first")

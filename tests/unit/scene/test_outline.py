@@ -1,8 +1,6 @@
 """Text that would be expensive to parse is refused before it is parsed, and spelled in a line."""
 
 import contextlib
-import subprocess
-import sys
 import time
 import tomllib
 from datetime import UTC, datetime
@@ -100,29 +98,15 @@ def test_keys_and_empty_tables_are_counted(entry):
         "'''\n" + "''\n" * 300_000,
         '"' * 1_000_000,
         "=" * 1_000_000,
+        "a" + ".a" * 30_000 + " = 1",  # took 13 s and 3.5 GB
     ],
-    ids=["escaped quotes", "single quotes", "quotes", "signs"],
+    ids=["escaped quotes", "single quotes", "quotes", "signs", "parts of a key"],
 )
 def test_time_grows_with_the_length_only(text):
     started = time.process_time()
     with pytest.raises(SceneError):
         parse_toml(text, "x.toml")
     assert time.process_time() - started < 5.0
-
-
-def test_a_key_of_thirty_thousand_parts_takes_no_memory():
-    """It took 13 s and 3.5 GB."""
-    code = (
-        "import resource; resource.setrlimit(resource.RLIMIT_AS, (800 << 20, 800 << 20))\n"
-        "from warpspace.scene.files import parse_toml\n"
-        "from warpspace.exceptions import SceneError\n"
-        "try: parse_toml('a' + '.a' * 30000 + ' = 1', 'x')\n"
-        "except SceneError as error: print(error)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
-    )
-    assert done.stdout.strip() == "x: line 1: a key of over 8 parts; expected at most 8"
 
 
 @pytest.mark.parametrize("entry", ["1,", "[],", "#\n", "\n", "1.5,", "'',"])
