@@ -104,24 +104,18 @@ def test_bodies_of_any_chain_are_closed_small_and_clear_of_the_volume(first):
                 assert not nodes_inside(body, placed, nodes), (str(machine.chain), body.name)
 
 
-@pytest.mark.parametrize("name", LIBRARY)
-def test_bodies_of_a_library_machine_are_closed_small_grey_and_clear_of_its_volume(name):
-    scene = load_scene(f"machine_{name}")
+@pytest.mark.parametrize("name", ["dvf5000_general", *(f"machine_{name}" for name in LIBRARY)])
+def test_bodies_of_a_bundled_machine_are_closed_small_grey_and_clear_of_its_volume(name):
+    scene = load_scene(name)
     placed = place_bodies(scene, scene_motions(scene, scene.view()), 0.0)
     nodes = build_grid(scene.model, scene.workspace, 7).nominal_mm.reshape(-1, 3)
     assert sum(len(part.body.triangles) for part in placed) < MAX_TRIANGLES
     for part in placed:
         assert_closed(part.body)
-        assert np.ptp(part.body.colour) <= 24
+        assert np.ptp(part.body.colour) <= 24, "bodies are grey: colour means error"
         assert len(part.body.edges_mm) > 0
         if not of_head(scene.machine, part.body):
             assert not nodes_inside(part.body, part.nominal_mm, nodes), part.body.name
-
-
-@pytest.mark.parametrize("name", LIBRARY)
-def test_tool_ends_in_the_tool_point(name):
-    bodies = {body.frame: body for body in generate_bodies(load_machine(name))}
-    assert bodies["t"].vertices_mm[:, 2].min() == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("chain", ["wXYZFt", "wZFXYt", "wBYFXZt", "wXYFZt", "wCAZYXFt"])
@@ -202,37 +196,17 @@ def nominal(scene, body, **positions):
     return place_points(motion[body.frame], body.vertices_mm, 0.0)
 
 
-def test_every_part_of_the_machine_is_there_and_right_side_out(bodies):
+def test_every_part_of_the_machine_is_there(bodies):
     assert set(bodies) == {
         "R_bed", "R_column", "R_towers", "X_saddle", "Y_saddle", "Z_ram", "S_spindle", "t_tool",
         "B_cradle", "C_table",
     }  # fmt: skip
-    for body in bodies.values():
-        assert_closed(body)
-        assert len(body.edges_mm) > 0
-        assert np.ptp(body.colour) <= 24, "bodies are grey: colour means error"
-
-
-def test_the_stored_tool_ends_in_the_tool_point(scene, bodies):
-    tip = bodies["t_tool"].vertices_mm
-    assert tip[:, 2].min() == pytest.approx(0.0, abs=1e-4)
-    assert tip[np.argmin(tip[:, 2])][:2] == pytest.approx((0, 0), abs=8.01)
 
 
 def test_table_is_500_across_with_its_top_in_the_workpiece_frame(scene, bodies):
     table = nominal(scene, bodies["C_table"], B=0.0, C=0.0)
     assert table[:, 2].max() == pytest.approx(0.0, abs=1e-4)
     assert np.ptp(table[:, 0]) == pytest.approx(500.0, abs=1e-3)
-
-
-def test_nothing_but_the_table_reaches_into_the_working_volume(scene, bodies):
-    low, high = np.array([-275, -225, 0.5]), np.array([275, 225, 429])
-    for name in ("R_bed", "R_column", "R_towers", "B_cradle", "C_table"):
-        points = nominal(scene, bodies[name])
-        triangles = points[bodies[name].triangles]
-        # no triangle's box meets the volume (boxes and cylinders: coarse, but on the safe side)
-        apart = (triangles.max(axis=1) < low) | (triangles.min(axis=1) > high)
-        assert apart.any(axis=1).all(), name
 
 
 def test_bent_tool_point_lies_in_the_deformed_grid(scene, bodies):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpspace.analysis.convert import Target, convert_scene, field_difference
-from warpspace.exceptions import WarpspaceError
+from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import ComponentErrors
 from warpspace.machine.errors import (
