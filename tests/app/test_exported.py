@@ -15,18 +15,24 @@ from PIL import Image
 
 from offline import EVIL, opened_offline, wait_for_the_map
 from warpspace.app.documents.files import exported_words, file_stem, shown_sides
-from warpspace.app.documents.legend import seen_words
+from warpspace.app.documents.legend import (
+    look_words,
+    picture_conditions,
+    seen_words,
+    state_conditions,
+)
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
-from warpspace.app.drawing.camera import fit_camera
+from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import Side, start_state
+from warpspace.app.state.app_state import Picked, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.cli.services import draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure as draw
+from warpspace.picture.words import range_words
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()
@@ -156,6 +162,54 @@ def test_volumes_that_differ_export_the_side_that_is_drawn():
     assert len(shown_sides(picture, sheet=True)) == 1
     assert file_stem(picture) == "B_other"
     assert "sheet" not in exported_words(picture)
+
+
+def without(key):
+    return put(START, "exclusions.excluded", f"+{key}")
+
+
+def fixed(state):
+    return LIVE.evaluate(put(put(state, "look.range_top", "50"), "look.range_mode", "fixed"))
+
+
+def test_conditions_name_what_is_excluded_and_the_range():
+    assert picture_conditions(LIVE.evaluate(START)) == ()
+    both = put(without("EA0Z"), "exclusions.excluded", "+EAX")
+    assert picture_conditions(fixed(both)) == ("excluded: EAX, EA0Z", "range fixed 0–50 µm")
+    only = put(START, "exclusions.only", "+EAX")
+    assert picture_conditions(LIVE.evaluate(only)) == ("only: EAX",)
+    # an error that is zero changes nothing when it is left out
+    assert picture_conditions(LIVE.evaluate(without("EYX"))) == ()
+    assert range_words(-20.0, 20.0, "µm") == "range fixed −20 to 20 µm"
+
+
+def test_exports_say_the_conditions():
+    picture = fixed(without("EA0Z"))
+    assert rows_of(picture)[0]["conditions"] == "excluded: EA0Z; range fixed 0–50 µm"
+    extras = read_glb(write_export(picture, ".glb"))["asset"]["extras"]
+    assert extras["settings"]["conditions"] == ["excluded: EA0Z", "range fixed 0–50 µm"]
+    assert extras["statistics"]["max_at_axes"]["Z"] in (-480.0, -80.0)
+    footer = build_offline_html(picture).partition("<footer>")[2]
+    assert "excluded: EA0Z" in footer
+    assert "range fixed 0–50 µm" in footer
+    assert "excluded: EA0Z" in look_words(picture)  # of pictures of the screen
+
+
+def test_a_comparison_says_the_conditions_of_each_side():
+    picture = picture_of("difference", with_sides(without("EA0Z"), Side(), scene_side(SECOND)))
+    assert picture_conditions(picture) == ("A excluded: EA0Z",)
+    assert rows_of(picture)[0]["conditions"] == "A excluded: EA0Z"
+    conditions = [state_conditions(one) for one in shown_sides(picture)]
+    assert conditions == [("excluded: EA0Z",), ()]
+
+
+def test_a_page_keeps_the_camera_and_the_point():
+    at = {"X": 275.0, "Y": -225.0, "Z": -480.0}
+    picture = LIVE.evaluate(replace(start_state(FIRST, nodes=5), picked=Picked(at)))
+    camera = CameraMemory((9.25, 1.5, 2.5), (0.5, 0.25, 0.125), (0.0, 0.0, 1.0), 0.5)
+    page = build_offline_html(picture, camera=camera)
+    assert "51.7 µm at X 275 Y −225 Z −480" in page.partition("<aside>")[2]
+    assert page != build_offline_html(picture)
 
 
 def page_of(scene, **changes):

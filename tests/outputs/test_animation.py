@@ -15,6 +15,7 @@ from warpspace.outputs.animation import (
     AnimationSettings,
     draw_frame,
     one_round,
+    shared_palette,
     sweep_factor,
     write_animation,
 )
@@ -82,6 +83,15 @@ def test_files_are_read_back(ending, renderer, tmp_path):
                 shots.append(np.asarray(image.convert("RGB")).astype(int))
             apart = np.abs(shots[1] - shots[0]).mean()
     assert apart > 0.5
+
+
+def test_all_pictures_of_a_gif_share_one_palette():
+    colours = [(250, 10, 10), (10, 250, 10), (10, 10, 250)]
+    pictures = [Image.new("RGB", (8, 8), colour) for colour in colours]
+    palette = shared_palette(pictures)
+    for picture, colour in zip(pictures, colours, strict=True):
+        again = picture.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB")
+        assert again.getpixel((0, 0)) == colour
 
 
 def test_nothing_to_turn(tmp_path):

@@ -12,6 +12,7 @@ from PIL import Image
 from products import pairwise
 from warpspace import load_scene, scene_names
 from warpspace.exceptions import OptionError
+from warpspace.machine.errors import ToleranceSet
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure, figure_kinds
 from warpspace.outputs.save import figure_bytes, render_figure
@@ -53,6 +54,10 @@ def scene_of(name):
 def pair(name):
     first = load_scene("dvf5000_first")
     return [first, load_scene("dvf5000_second")] if name in TWO else [first]
+
+
+def words_of(drawing):
+    return " ".join(text.get_text() for axes in drawing.figure.axes for text in axes.texts)
 
 
 def inside(drawing, size):
@@ -175,6 +180,26 @@ def test_a_range_that_is_given_is_that_of_every_map(name, component):
         assert "max" in marks
 
 
+@pytest.mark.parametrize("figure", ["error-map", "slices", "orientation-map", "error-curves"])
+def test_figures_say_what_is_excluded(figure):
+    settings = FigureSettings(
+        grid=5, range_top=50.0, range_fixed=True, conditions=("excluded: EA0Z",)
+    )
+    held = replace(load_scene("dvf5000_first"), reference={"X": 0.0, "Y": 0.0, "Z": -280.0})
+    said = words_of(draw_figure(figure, [held], settings))
+    assert "excluded: EA0Z" in said
+    assert "reference point X 0 Y 0 Z −280" in said
+    assert ("range fixed 0–50" in said) == (figure != "error-curves")
+
+
+@pytest.mark.parametrize(("name", "panels"), [("dvf5000_first", 3), ("teach_squareness", 0)])
+def test_error_curves_have_no_empty_panels(name, panels):
+    # first machine: EAX, EAY, ECY and EAZ are curves; squareness is a constant beside them
+    scene = replace(load_scene(name), tolerances=ToleranceSet())
+    texts = [text.get_text() for text in draw_figure("error-curves", [scene]).figure.texts]
+    assert sum(text.startswith(("translation of", "rotation of")) for text in texts) == panels
+
+
 @pytest.mark.parametrize("name", ["gains", "montecarlo", "ballbar"])
 def test_charts_stand_on_a_dark_ground_with_light_ink(name):
     settings = FigureSettings(size=(900, 700), dark=True)
@@ -191,7 +216,7 @@ def test_traces_of_the_figure_hold_the_reference_point_still_like_the_export():
     """Without the reference the figure showed 4.53 µm where the export had 2.23 µm."""
     scene = replace(load_scene("teach_wobbling_table"), reference={"X": 0.0, "Y": 0.0, "Z": -280.0})
     drawing = draw_figure("traces", [scene], FigureSettings(size=(800, 600)))
-    words = " ".join(text.get_text() for axes in drawing.figure.axes for text in axes.texts)
+    words = words_of(drawing)
     lines = trace_lines(evaluate_picture(scene, grid=3).traces)
     found = {line.trace.label: spell(line.largest_um) for line in lines}
     over_b = [spell(line.largest_um) for line in lines if line.trace.axis == "B"]
