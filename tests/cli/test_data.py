@@ -37,16 +37,8 @@ def test_figure_with_data_over_the_model(warpspace, tmp_path):
     data, plot = tmp_path / "runs.csv", tmp_path / "plot.svg"
     data.write_text(RUNS, encoding="utf-8")
     arguments = ("test", "positioning", "dvf5000_first", "--data", data, "--plot", plot)
-    out = warpspace(*arguments).out
-    assert "measured" in out
-    text = plot.read_text("utf-8")
-    assert "forward, measured" in text
-    warpspace(*arguments).refused("exists already")
-    plot.unlink()
-    data.write_text(RUNS.replace("0.6", "nan"), encoding="utf-8")
-    warpspace(*arguments).refused(str(data), "expected a finite number")
-    assert not plot.exists()
-    warpspace("test", "positioning", "dvf5000_first", "--data", plot).refused("no such file")
+    assert "measured" in warpspace(*arguments).out
+    assert "forward, measured" in plot.read_text("utf-8")
 
 
 def test_readings_in_another_unit_are_said(warpspace, tmp_path):
@@ -142,19 +134,13 @@ EYX = 0.5
 def test_fields_have_a_direction_and_an_uncertainty(warpspace, tmp_path):
     path = tmp_path / "s.toml"
     path.write_text(SCENE)
-    errors = {}
-    for way in ("mean", "forward", "backward", "difference"):
-        result = warpspace("field", str(path), "--at", "X=275", "--direction", way, "--json")
-        errors[way] = json.loads(result.out)["points"][0]["error_um"][1]
-    assert errors["forward"] - errors["backward"] == pytest.approx(1.0)
-    assert errors["difference"] == pytest.approx(1.0)
-    assert errors["mean"] - errors["backward"] == pytest.approx(0.5)
-    result = warpspace("field", str(path), "--at", "X=275", "--uncertainty", "--json")
-    assert json.loads(result.out)["points"][0]["uncertainty_um"] == [0.0, 0.5, 0.0]
-    result = warpspace(
-        "montecarlo", str(path), "--from", "uncertainty", "--samples", "500", "--json"
-    )
-    found = json.loads(result.out)
+    field = ("field", path, "--at", "X=275", "--json")
+    (point,) = json.loads(warpspace(*field, "--direction", "difference").out)["points"]
+    assert point["error_um"] == pytest.approx([0.0, 1.0, 0.0])
+    (point,) = json.loads(warpspace(*field, "--uncertainty").out)["points"]
+    assert point["uncertainty_um"] == [0.0, 0.5, 0.0]
+    run = ("montecarlo", path, "--from", "uncertainty", "--samples", "500", "--json")
+    found = json.loads(warpspace(*run).out)
     assert (found["from"], found["distribution"]) == ("uncertainty", "normal")
     table = tmp_path / "f.csv"
     warpspace("export", str(path), "-o", str(table), "--grid", "2", "--direction", "difference")

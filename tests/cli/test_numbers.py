@@ -47,15 +47,6 @@ def test_positions_outside_the_travel_are_warned_of(warpspace, command):
     assert warpspace(command, "dvf5000_first", "--at", "X=275", "--json").err == ""
 
 
-def test_long_tables_repeat_their_headings(capsys):
-    from warpspace.analysis.blocks import Column
-    from warpspace.cli.tables import print_table
-
-    print_table([Column("key"), Column("value", unit="µm")], [(str(n), "1") for n in range(85)])
-    lines = capsys.readouterr().out.splitlines()
-    assert sum(line.split() == ["key", "[µm]"] for line in lines) == 3
-
-
 SAID = "first order; the exact chain differs by up to"
 GANTRY = """title = "Gantry, 3 mrad out of square"
 machine = "dvf5000"

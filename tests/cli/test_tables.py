@@ -122,6 +122,12 @@ def test_columns_that_join_are_not_parted(capsys, monkeypatch):
     assert lines[-2:] == ["key   x   y   z", "K   1.5 2.5 3.5"]
 
 
+def test_long_tables_repeat_their_headings(capsys):
+    columns = (Column("key"), Column("value", unit="µm"))
+    lines = printed(capsys, columns, [(str(n), "1") for n in range(85)])
+    assert sum(line.split() == ["key", "[µm]"] for line in lines) == 3
+
+
 def test_a_terminal_that_is_too_narrow_cuts_nothing(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "5")
     columns = (Column("name", wraps=True, leads=True), Column("value", "s"))

@@ -4,14 +4,11 @@ import subprocess
 import sys
 import urllib.error
 import urllib.request
-from collections.abc import Callable
 from contextlib import contextmanager
 from typing import Any
 
 from warpspace.app.server import viewer
 from warpspace.app.server.doors import Access
-
-Command = Callable[..., Any]
 
 
 def test_options_reach_the_app(warpspace, monkeypatch):

@@ -217,27 +217,3 @@ def test_a_million_nodes_are_written_in_little_memory(ending, tmp_path):
     assert found["points_written"] == 101**3
     assert set(found["statistics"]) == set(found["statistics_nodes"])
     assert target.stat().st_size > 10_000_000
-
-
-def test_command_writes_what_it_evaluates(tmp_path):
-    from click.testing import CliRunner
-
-    from warpspace.cli.main import cli
-
-    target = tmp_path / "a.parquet"
-    options = ["--grid", "3", "--exact", "--loop", "relative", "--frame", "workpiece"]
-    result = CliRunner().invoke(cli, ["field", "dvf5000_first", *options, "-o", str(target)])
-    assert result.exit_code == 0, result.output
-    assert "a.parquet" in result.output
-    table = pq.read_table(target)
-    expected = evaluate(
-        load_scene("dvf5000_first"), grid=3, loop="relative", exact=True, frame="workpiece"
-    )
-    np.testing.assert_array_equal(table["error_relative_w_y_um"], expected.error_um[..., 1].ravel())
-    about = json.loads(table.schema.metadata[b"warpspace"])
-    assert about["model"] == "exact chain"
-    assert (about["frame"], about["loop"], about["scene"]) == (
-        "workpiece",
-        "relative",
-        "dvf5000_first",
-    )

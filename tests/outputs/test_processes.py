@@ -16,7 +16,7 @@ from warpspace.outputs.processes import ProcessPool
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def children():
     before = set(psutil.Process().children(recursive=True))
     yield
@@ -24,7 +24,6 @@ def children():
     assert [process for process in left if "resource_tracker" not in str(process.cmdline())] == []
 
 
-@pytest.mark.usefixtures("children")
 def test_a_task_of_a_process_that_died_is_done_again(tmp_path):
     pool = ProcessPool(2, losses=1)
     futures = [pool.submit(square, number, str(tmp_path), "once") for number in range(8)]
@@ -33,7 +32,6 @@ def test_a_task_of_a_process_that_died_is_done_again(tmp_path):
     pool.shutdown()
 
 
-@pytest.mark.usefixtures("children")
 def test_processes_that_die_too_often_are_not_replaced(tmp_path):
     pool = ProcessPool(1, losses=2)
     for _ in range(2):  # the second time no process is started any more
@@ -44,7 +42,6 @@ def test_processes_that_die_too_often_are_not_replaced(tmp_path):
     pool.shutdown()
 
 
-@pytest.mark.usefixtures("children")
 @pytest.mark.parametrize("size", [100, 1_000_000])
 def test_half_an_answer_is_not_waited_for(size, tmp_path):
     pool = ProcessPool(2)
@@ -55,7 +52,6 @@ def test_half_an_answer_is_not_waited_for(size, tmp_path):
     pool.shutdown()
 
 
-@pytest.mark.usefixtures("children")
 def test_killing_a_pool_does_not_wait_for_its_tasks(tmp_path):
     pool = ProcessPool(1)
     begun, waiting = (pool.submit(sleep_after, str(tmp_path / name)) for name in ("a", "b"))
@@ -71,7 +67,6 @@ def test_killing_a_pool_does_not_wait_for_its_tasks(tmp_path):
     assert not (tmp_path / "b").exists()
 
 
-@pytest.mark.usefixtures("children")
 def test_a_process_is_replaced_after_its_number_of_tasks():
     pool = ProcessPool(1, tasks_per_process=2)
     pids = [pool.submit(os.getpid).result(60) for _ in range(4)]
@@ -79,7 +74,6 @@ def test_a_process_is_replaced_after_its_number_of_tasks():
     pool.shutdown()
 
 
-@pytest.mark.usefixtures("children")
 def test_what_cannot_be_sent_is_an_error_and_ends_nothing(tmp_path):
     pool = ProcessPool(1)
     with pytest.raises(TypeError, match="pickle"):  # the task

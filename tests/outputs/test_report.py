@@ -136,18 +136,6 @@ def test_every_part_is_there(both):
     assert [heading.split(" · ")[0] for heading in headings[1:]] == [
         f"Appendix {letter}" for letter in "ABCDEFGHIJ"
     ]
-    assert [heading.split(" · ")[1] for heading in headings[1:]] == [
-        "Where the error is",
-        "Error budget at the worst point",
-        "Repair",
-        "What differs",
-        "Errors and tolerances",
-        "How errors arrive at the point",
-        "What the tolerances promise",
-        "Concepts side by side",
-        "Conventions",
-        "Provenance",
-    ]
     first = both.sections[0].blocks
     assert isinstance(first[0], Text)
     assert isinstance(first[1], Table)

@@ -22,10 +22,6 @@ NODES = 11
 SQUARENESS = ("EC0Y", "EA0Z", "EB0Z")
 
 
-def with_values(scene, **values):
-    return repaired(scene, values)
-
-
 def outcome_of(scene, nodes=NODES):
     """Mean, RMS, P95 and max of a scene by evaluating it anew."""
     grid = build_grid(scene.model, scene.workspace, nodes)
@@ -53,7 +49,7 @@ def response(keys, scene=FIRST):
     present = errors(scene.errors)
     columns = []
     for key in keys:
-        raised = with_values(scene, **{key: scene.errors.amplitude(key) + 1.0})
+        raised = repaired(scene, {key: scene.errors.amplitude(key) + 1.0})
         columns.append(errors(raised.errors) - present)
     return np.array(columns).T, present, np.repeat(grid.weights.reshape(-1), 3)
 
@@ -90,7 +86,7 @@ def test_leaving_one_out_is_what_direct_evaluation_gives():
             errors=ErrorSet({k: f for k, f in FIRST.errors.functions.items() if k != effect.key}),
         )
         assert numbers(effect.left_out) == pytest.approx(outcome_of(without), abs=1e-9)
-        best = with_values(FIRST, **{effect.key: effect.best.value})
+        best = repaired(FIRST, {effect.key: effect.best.value})
         assert numbers(effect.best) == pytest.approx(outcome_of(best), abs=1e-9)
 
 
@@ -147,9 +143,7 @@ def test_max_is_what_a_second_solver_finds(keys, limit):
     )
     found = plan.run(FIRST).repairs[-1]
     assert found.max_um == pytest.approx(least_max(keys, -limit, limit), abs=1e-3)
-    assert outcome_of(with_values(FIRST, **found.adjust))[3] == pytest.approx(
-        found.max_um, abs=1e-9
-    )
+    assert outcome_of(repaired(FIRST, found.adjust))[3] == pytest.approx(found.max_um, abs=1e-9)
     for key, value in found.adjust.items():
         assert abs(value - FIRST.errors.amplitude(key)) <= limit + 1e-9
 

@@ -34,15 +34,8 @@ def read(text, name="file.csv", **options):
         GOOD.encode("utf-16-be"),
         GOOD.replace("\n", "\r\n").encode(),
         GOOD.replace("\n", "\r").encode(),
-        GOOD.replace(",", ";").replace(".", ",").encode(),
-        GOOD.replace(",", "\t").replace(".", ",").encode(),
         GOOD.rstrip("\n").encode(),
-        "\n".join('"' + row.replace(",", '","') + '"' for row in GOOD.splitlines()).encode(),
-        "\n".join(
-            '"' + row.replace(",", '";"').replace(".", ",") + '"' for row in GOOD.splitlines()
-        ).encode(),
         ("# gemessen in München\n" + GOOD).encode("cp1252"),
-        ("\n\n" + GOOD + "\n  \n,,\n").encode(),
         GOOD.replace("[um]", "[mm]").replace(",1,", ",0.001,").replace("-1.5", "-0.0015").encode(),
         GOOD.replace("[urad]", "[arcsec]")
         .replace(",2\n", ",0.41252961\n")

@@ -9,7 +9,6 @@ from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensate, compensate, sweep
 from warpspace.formats.compensation.wanted import build_corrector
 from warpspace.formats.kinds import fanuc_3d
-from warpspace.formats.kinds.csv_own import surface_template
 from warpspace.formats.registry import ReadOptions, formats, read_errors, recognise
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Line, Product
@@ -19,7 +18,7 @@ from warpspace.kinematics.chain import branch_pose, error_transform, point_in_br
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.simple import Directional
-from warpspace.machine.errors import ErrorSet, Harmonics, Poly, Table, TwoArguments
+from warpspace.machine.errors import ErrorSet, Harmonics, Poly, Table
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
 
@@ -49,7 +48,6 @@ def read_back(found, scene):
     return into_scene(reading, replace(scene, errors=ErrorSet()), "", "written").scene
 
 
-BASE = load_scene("dvf5000_nominal")
 WRITTEN = {one.name: one for one in formats() if one.can_write}
 SURFACE = (
     'EXY = { table2 = { axes = ["Y", "Z"], Y = [-225, 0, 225], Z = [-480, -80],'
@@ -203,8 +201,6 @@ def test_orientation_is_corrected_where_the_format_has_a_place_for_it():
     tilt = [np.linalg.norm(one.after.orientation_urad, axis=-1).mean() for one in (plain, both)]
     assert tilt[1] < 0.8 * tilt[0]
     assert both.after_statistics.max_um < 0.05
-    with pytest.raises(OptionError, match="no rotary axis"):
-        corrected(load_scene("machine_gantry_mill"), "csv", 5, orientation=True)
 
 
 def test_orientation_is_corrected_by_rotary_axes_under_the_workpiece_too():
@@ -214,8 +210,6 @@ def test_orientation_is_corrected_by_rotary_axes_under_the_workpiece_too():
     assert both.loop == "relative"
     assert set(both.axes) == {"X", "Y", "Z", "B", "C"}
     assert both.tilt_urad(both.after)[0] < 0.6 * both.tilt_urad(both.before)[0]
-    with pytest.raises(OptionError, match="expected loop relative"):
-        corrected(scene, "sinumerik-cec", 5, orientation=True, loop="tool")
 
 
 def test_what_a_format_cannot_hold_is_said_and_stays():
@@ -285,30 +279,6 @@ def test_a_part_on_a_moving_bed_is_corrected_where_it_has_its_shape(name, asked,
     assert found.after_statistics.rms_um < left_um
     assert found.assumed[-1].startswith("a part is judged by its shape")
     assert ("no place for it" in found.assumed[-1]) is not asked
-
-
-@pytest.mark.parametrize("points", [2, 41])  # a table over two axes keeps its own points
-def test_what_is_written_is_read_again_to_the_printed_digits(points):
-    values = np.round(np.random.default_rng(3).uniform(-20, 20, (7, 5)), 6)
-    nodes = [tuple(np.linspace(*ends).tolist()) for ends in ((-225, 225, 7), (-480, -80, 5))]
-    curve = TwoArguments(
-        BASE.axis_span("Y"), ("Y", "Z"), (*nodes,), (*map(tuple, values.tolist()),)
-    )
-    scene = replace(BASE, errors=ErrorSet({"EXY": curve}))
-    assert read_back(corrected(scene, "csv", points, 3), BASE).errors.functions["EXY"] == curve
-
-
-def test_the_table_to_fill_in_is_recognised_and_read_once_it_is_filled():
-    text = surface_template(("X", "C"), ((-100.0, 100.0), (0.0, 90.0, 180.0)))
-    assert "X [mm],C [deg],EXX [um]" in text
-    filled = "\n".join(
-        line if line.startswith(("#", "X")) else line.replace(",,,,,,", ",1,2,3,4,5,6")
-        for line in text.splitlines()
-    )
-    found = read_errors([source_of_text(filled, "s.csv")], ReadOptions(BASE.machine)).found
-    assert [plane.key for plane in found.planes] == ["EXX", "EYX", "EZX", "EAX", "EBX", "ECX"]
-    assert found.planes[0].axes == ("X", "C")
-    assert found.planes[2].values == ((3.0,) * 3,) * 2
 
 
 POSITIONING = "EXX = { forward = { poly = [4, 0.01] }, backward = { poly = [-4, 0.01] } }"

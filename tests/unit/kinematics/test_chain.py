@@ -134,15 +134,6 @@ def test_only_bodies_behind_an_error_move():
     assert moved == {"Y", "Z", "S", "t"}
 
 
-def test_errors_before_the_motion_stand_in_fixed_directions():
-    machine = build_machine("wCFt")
-    at = {"C": np.array(90.0)}
-    after = body_motions(Model(machine), {"EAC": 10.0}, at)["C"]
-    before = body_motions(Model(machine, ComponentErrors.BEFORE_MOTION), {"EAC": 10.0}, at)["C"]
-    np.testing.assert_allclose(after.rotation_rad, [0.0, 1e-5, 0.0], atol=1e-18)
-    np.testing.assert_allclose(before.rotation_rad, [1e-5, 0.0, 0.0], atol=1e-18)
-
-
 MODEL = Model(build_machine("wCFXt", offset_mm={"X": (1.0, 2.0, 3.0), "t": (0.0, 0.0, -100.0)}))
 POINT = np.array([21.0, 2.0, -97.0])
 

@@ -27,7 +27,6 @@ from warpspace.machine.errors import (
     ErrorSet,
     Harmonics,
     Poly,
-    Ramp,
     Table,
     TwoArguments,
 )
@@ -173,19 +172,6 @@ def test_the_other_order_has_the_same_field_and_the_way_back_the_same_curves(sce
     again, back = convert_order(model, errors, spans, dict.fromkeys(axes, present))
     assert again == scene.model
     assert_same_curves(scene.errors, back, spans)
-
-
-def test_the_abbe_arm_of_one_pitch():
-    model = Model(build_machine("wFXt"))
-    span = (-100.0, 100.0)
-    pitch = ErrorSet({"EBX": Ramp(span, 10.0), "EXX": Constant(span, 2.0)})
-    line = {"X": (0.0, 0.0, 100.0)}
-    found = move_measuring_line(model, pitch, {"X": span}, line, to_origin=False)
-    # 10 µrad × 100 mm = 1 µm; the cosine of the pitch is too small to be seen
-    np.testing.assert_allclose(found.evaluate("EXX", np.array(span)), [2.0, 3.0], atol=1e-9)
-    measured = ErrorSet({"EBX": Ramp(span, 10.0), "EXX": Constant(span, 3.0)})
-    moved = move_measuring_line(model, measured, {"X": span}, line, to_origin=True)
-    np.testing.assert_allclose(moved.evaluate("EXX", np.array(span)), [3.0, 2.0], atol=1e-9)
 
 
 def test_the_line_shows_what_a_reflector_there_would_move_by(scene):

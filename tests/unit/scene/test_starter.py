@@ -1,5 +1,7 @@
 """Scenes to start from: any chain opens, tool and table meet, and the examples show."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -45,21 +47,13 @@ def test_every_chain_gives_a_scene_that_bends(chain):
 @pytest.mark.parametrize("chain", [*CLASSIC, *LYING])
 def test_tool_and_table_meet(chain):
     scene = starter_scene(chain)
-    machine = scene.machine
-    at = complete_coordinates(machine, {}, scene.workspace.positions)
-    tool = nominal_point(scene.model, Loop.TOOL, at)
-    table = nominal_point(
-        type(scene.model)(machine, workpiece_point_mm=(0.0, 0.0, 0.0)), Loop.WORKPIECE, at
-    )
-    assert tool[:2] == pytest.approx(table[:2])
-    assert tool[2] - table[2] == pytest.approx(200.0)  # middle of the upright axis, 400 mm long
+    machine, bare = scene.machine, replace(scene.model, workpiece_point_mm=(0.0, 0.0, 0.0))
     up = next(axis for axis in machine.axes if axis[0] == ("Y" if chain in LYING else "Z"))
-    at = complete_coordinates(machine, {up: machine.axes[up].travel[0]}, scene.workspace.positions)
-    tool = nominal_point(scene.model, Loop.TOOL, at)
-    table = nominal_point(
-        type(scene.model)(machine, workpiece_point_mm=(0.0, 0.0, 0.0)), Loop.WORKPIECE, at
-    )
-    assert tool - table == pytest.approx([0.0, 0.0, 0.0])
+    # middle of the upright axis, 400 mm long, and its lower end
+    for moved, height_mm in (({}, 200.0), ({up: machine.axes[up].travel[0]}, 0.0)):
+        at = complete_coordinates(machine, moved, scene.workspace.positions)
+        apart = nominal_point(bare, Loop.TOOL, at) - nominal_point(bare, Loop.WORKPIECE, at)
+        assert apart == pytest.approx([0.0, 0.0, height_mm])
 
 
 @pytest.mark.parametrize("chain", LYING)
