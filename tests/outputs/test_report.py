@@ -18,14 +18,7 @@ from warpspace.analysis.concepts import Concepts, compare_concepts
 from warpspace.analysis.statistics import share_below
 from warpspace.exceptions import NoRendererError, RenderError
 from warpspace.outputs.report import ReportSettings, build_report, sections, write_report
-from warpspace.outputs.report.render import (
-    Embedded,
-    Items,
-    Table,
-    Text,
-    render_html,
-    render_pdf,
-)
+from warpspace.outputs.report.render import Embedded, Items, Table, Text, render_html, render_pdf
 from warpspace.outputs.report.review import build_review, first_page
 
 FAST = ReportSettings(grid=5, samples=2000, spec_um=50.0)
@@ -88,10 +81,7 @@ def test_rows_of_zeros_are_counted_and_errors_that_are_zero():
     columns = (Column("key"), *number_columns(("x", "y")))
     rows = [("a", 0.0, 0.001), ("b", 0.0, 0.2), ("c", None, None)]
     table, none = sections.said(
-        [
-            Table(columns, rows, "Of errors.", marks=("", "worse", "key")),
-            Table(columns, rows[:1]),
-        ]
+        [Table(columns, rows, "Of errors.", marks=("", "worse", "key")), Table(columns, rows[:1])]
     )
     assert [row[0] for row in table.rows] == ["b", "c"]
     assert table.marks == ["worse", "key"]
@@ -103,11 +93,7 @@ def test_rows_of_zeros_are_counted_and_errors_that_are_zero():
     assert found.title.endswith("Errors that are zero left out: 34.")
     assert {
         row[0] for row, mark in zip(found.rows, found.marks, strict=True) if mark == "worse"
-    } == {
-        "EAY",
-        "EAZ",
-        "EA0Z",
-    }
+    } == {"EAY", "EAZ", "EA0Z"}
 
 
 def test_difference_of_two_scenes_is_taken_as_vectors():

@@ -55,13 +55,7 @@ UNIFORM = Distribution.UNIFORM
         # |E| = 0.2 w |z| / 3
         (NORMAL, {"EBX": 50.0}, {}, {"EBX": 3.0 * 40.0 / (LEVER * Z95)}, 0.008),
         # 10 + w u within ±40: only the upper end is met, by (1 + 30/w)/2 of the machines
-        (
-            UNIFORM,
-            {"centre": 10.0, "EXX": 5.0},
-            {"probability": 0.9},
-            {"EXX": 30.0 / 0.8},
-            0.008,
-        ),
+        (UNIFORM, {"centre": 10.0, "EXX": 5.0}, {"probability": 0.9}, {"EXX": 30.0 / 0.8}, 0.008),
         # isotropic normal errors follow Maxwell
         (
             NORMAL,

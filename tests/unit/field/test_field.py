@@ -18,13 +18,7 @@ from warpspace.field.evaluate import (
     find_placement,
     placement_effect,
 )
-from warpspace.field.grid import (
-    PLANES,
-    Workspace,
-    build_grid,
-    build_slice,
-    node_counts,
-)
+from warpspace.field.grid import PLANES, Workspace, build_grid, build_slice, node_counts
 from warpspace.geometry.surfaces import outer_faces
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.machine.description import build_machine
