@@ -21,16 +21,6 @@ from warpspace.scene.library import load_scene
 FIRST = start_state(load_scene("dvf5000_first"))
 
 
-def test_starts_as_the_scene_says():
-    assert FIRST.amplitudes["EAY"] == -43.7
-    assert len(FIRST.amplitudes) == 41
-    assert FIRST.positions == {"B": 0.0, "C": 0.0}
-    assert FIRST.exaggeration is None
-    assert FIRST.loop is Loop.TOOL
-    # with errors of the table only
-    assert start_state(load_scene("teach_tilted_c")).loop is Loop.RELATIVE
-
-
 @pytest.mark.parametrize(
     ("path", "text", "kept", "note"),
     [
@@ -48,6 +38,14 @@ def test_starts_as_the_scene_says():
         ("exclusions.excluded", "EXX,EYX,?", "EXX,EYX", "excluded errors: ? left out"),
         ("rotary.own_mm", "10; 20,5; -3e3", "10.0,20.5,-2000.0", "clamped to -2000 mm"),
         ("rotary.held.B", "-30 0 90", "-30.0,0.0", "B held at: 90 left out"),
+        ("rotary.held.B", "−30, 0; 30° 0", "-30.0,0.0,30.0", ""),
+        ("rotary.held.B", "10, abc nan inf", "10.0", "left out"),
+        (
+            "rotary.held.B",
+            "0 1 2 3 4 5 6 7 8",
+            "0.0,1.0,2.0,3.0,4.0,5.0,6.0,7.0",
+            "the first 8 are taken",
+        ),
         ("tolerances.EAX", "3", "3.0", ""),
         ("tolerances.EAX", "-1", "0.0", "tolerance of roll of X = -1 is outside 0 to 1000 µrad"),
         ("tolerances.EAX", "1e9", "1000.0", "clamped to 1000 µrad"),
@@ -107,10 +105,9 @@ def test_undo_says_what_it_takes_back(state, words):
     assert store.undo() == words
 
 
-def test_reset_and_zero():
-    edited = FIRST.with_amplitude("EAY", 10.0).with_amplitude("EXX", 5.0)
-    assert edited.reset().amplitudes == FIRST.amplitudes
-    assert not any(edited.zeroed().amplitudes.values())
+def test_a_machine_with_errors_of_its_table_only_opens_in_the_relative_loop():
+    assert start_state(load_scene("teach_tilted_c")).loop is Loop.RELATIVE
+    assert FIRST.loop is Loop.TOOL
 
 
 def test_another_scene_keeps_how_it_is_looked_at():

@@ -36,13 +36,6 @@ _A, _B = 0.0245786, 0.000090537
 _C, _D, _E = 0.983729, 0.4329510, 0.238081
 
 
-def tone_map(linear: Array) -> Array:
-    """Do what the client does, [..., 3] linear; the result is cut to 0 … 1."""
-    v = (linear * _EXPOSURE) @ _IN.T
-    v = (v * (v + _A) - _B) / (v * (_C * v + _D) + _E)
-    return np.clip(v @ _OUT.T, 0.0, 1.0)
-
-
 def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
     """Find the linear colours that the client turns into given ones."""
     wanted = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
