@@ -1,5 +1,6 @@
 """The app as it runs, and pages of it in a real browser."""
 
+import os
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -7,11 +8,15 @@ import pytest
 
 from app.frames import draw
 from app.page_tab import SCENES, Tab, open_page
+from warpspace.app.server import network
 from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
+
+# two workers that look for a free port from the same one on may both find it
+network.DEFAULT_PORT += 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 
 
 @pytest.fixture(scope="session")

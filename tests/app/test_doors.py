@@ -4,7 +4,7 @@ import logging
 import os
 import socket
 import time
-from contextlib import closing, nullcontext, suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -16,8 +16,9 @@ from websockets.http11 import Request
 from websockets.protocol import State
 
 from app.wire import dial
-from page_client import PROTOCOL, pack, said
-from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN
+from page_client import pack, said
+from reliability import doors
+from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN, UPGRADE
 from warpspace.app.server import guard, network, viewer
 from warpspace.app.server.doors import Access, Doors, Place, read_place
 from warpspace.app.server.guard import Limits, Rate
@@ -26,13 +27,6 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
-UPGRADE = {
-    "Upgrade": "websocket",
-    "Connection": "Upgrade",
-    "Sec-WebSocket-Version": "13",
-    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
-    "Sec-WebSocket-Protocol": PROTOCOL,
-}
 KINDS = pytest.mark.parametrize("upgrade", [{}, UPGRADE], ids=["page", "websocket"])
 SCENE = load_scene("dvf5000_nominal")
 
@@ -51,24 +45,10 @@ def guarded():
 
 
 def ask(running, path="/", /, upgrade=None, **headers):
-    """Send a request as it stands; give status, headers (in lower case) and the text after them."""
+    """Ask an app that runs here; what is None is not sent."""
     sent = {"Host": f"127.0.0.1:{running.port}", **(upgrade or {}), **headers}
-    lines = [f"{name}: {value}" for name, value in sent.items() if value is not None]
-    with closing(socket.create_connection(("127.0.0.1", running.port), timeout=20.0)) as raw:
-        raw.sendall("\r\n".join([f"GET {path} HTTP/1.1", *lines, "", ""]).encode("latin-1"))
-        answer = b""
-        while b"\r\n\r\n" not in answer or (b" 101 " not in answer and len(answer) < 5000):
-            part = raw.recv(65536)
-            if not part:
-                break
-            answer += part
-    head, _, text = answer.partition(b"\r\n\r\n")
-    first, *rest = head.decode("latin-1").split("\r\n")
-    pairs = (line.partition(": ") for line in rest)
-    return (
-        int(first.split()[1]),
-        {name.lower(): value for name, _, value in pairs},
-        text.decode("utf-8", "replace"),
+    return doors.ask(
+        running.port, path, {name: one for name, one in sent.items() if one is not None}
     )
 
 
@@ -198,10 +178,10 @@ def test_a_proxy_is_allowed(guarded):
 
 
 def test_all_addresses_of_a_machine_are_served_but_not_all_names():
-    doors = Doors(served_names("0.0.0.0", "0.0.0.0"), 8080, everywhere=True)
+    served_here = Doors(served_names("0.0.0.0", "0.0.0.0"), 8080, everywhere=True)
     served = ("localhost:8080", "192.0.2.7", f"{socket.gethostname()}:8080")
     for host in (*served, "evil.example", "192.0.2.8"):
-        refused = doors.check(Request("/", Headers(Host=host)), "192.0.2.7")
+        refused = served_here.check(Request("/", Headers(Host=host)), "192.0.2.7")
         assert (refused is None) is (host in served), host
 
 

@@ -1,19 +1,19 @@
 """Attacks on the doors of an app that asks for a token, from raw clients; see the app's guard."""
 
 import asyncio
-import base64
-import http.client
 import itertools
+import socket
 import tempfile
 import time
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.hostile import upload
-from page_client import App, Tab, running_app, said
+from page_client import PROTOCOL, App, Tab, running_app, said
 from reliability.outcome import Lag, Outcome
 
 TOKEN = "kp3Zq8vN2xT7wR5yLd0m"
@@ -22,8 +22,9 @@ MOST_MB = 200.0
 UPGRADE = {
     "Upgrade": "websocket",
     "Connection": "Upgrade",
-    "Sec-WebSocket-Key": base64.b64encode(bytes(16)).decode(),
     "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    "Sec-WebSocket-Protocol": PROTOCOL,
 }
 HOSTS = (
     "evil.example", "evil.example:{port}", "localhost.evil.example:{port}", "127.0.0.7:{port}",
@@ -78,25 +79,34 @@ def attempts(port: int) -> Iterator[tuple[str, str, dict[str, str]]]:
         yield "oversized", f"/?token={'A' * length}", own
 
 
+def ask(port: int, path: str, headers: Mapping[str, str]) -> tuple[int, dict[str, str], str]:
+    """Send a request as it stands; give status, headers (in lower case) and the text after them."""
+    lines = [f"{name}: {value}" for name, value in headers.items()]
+    with closing(socket.create_connection(("127.0.0.1", port), timeout=20.0)) as raw:
+        raw.sendall("\r\n".join([f"GET {path} HTTP/1.1", *lines, "", ""]).encode("latin-1"))
+        answer = b""
+        while b"\r\n\r\n" not in answer or (b" 101 " not in answer and len(answer) < 5000):
+            part = raw.recv(65536)
+            if not part:
+                break
+            answer += part
+    head, _, text = answer.partition(b"\r\n\r\n")
+    first, *rest = head.decode("latin-1").split("\r\n")
+    pairs = (line.partition(": ") for line in rest)
+    found = {name.lower(): value for name, _, value in pairs}
+    return int(first.split()[1]), found, text.decode("utf-8", "replace")
+
+
 def try_one(port: int, kind: str, path: str, headers: dict[str, str], tally: Tally) -> None:
     began = time.perf_counter()
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
     try:
-        connection.putrequest("GET", path, skip_host=True, skip_accept_encoding=True)
-        for name, value in headers.items():
-            connection.putheader(name, value.encode("latin-1", "replace"))
-        connection.endheaders()
-        answer = connection.getresponse()
-        status, body = answer.status, answer.read()
-        cookie = answer.getheader("Set-Cookie")
-    except (http.client.HTTPException, OSError, ValueError):
-        status, body, cookie = 0, b"", None  # closed without an answer, or no request at all
-    finally:
-        connection.close()
+        status, found, text = ask(port, path, headers)
+    except (OSError, IndexError):
+        status, found, text = 0, {}, ""  # closed without an answer
     tally.slowest_s = max(tally.slowest_s, time.perf_counter() - began)
     tally.done[kind] += 1
     refused = (403, 400, 0, 414, 431) if kind == "oversized" else (403, 400, 0)
-    if status not in refused or cookie or TOKEN.encode() in body or b"<html" in body.lower():
+    if status not in refused or "set-cookie" in found or TOKEN in text or "<html" in text.lower():
         tally.faults.append(f"{kind}: {status} to {path[:80]} {headers}")
 
 

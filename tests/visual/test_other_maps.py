@@ -16,6 +16,7 @@ pytestmark = [pytest.mark.render, pytest.mark.usefixtures("renderer")]
 def test_slices_show_the_middle_planes():
     scene = load_scene("dvf5000_first")
     maps = draw_figure("slices", [scene]).maps
+    assert len({drawn.projection.px_per_mm for drawn in maps}) == 1
     axes = {axis: np.linspace(*scene.workspace.ranges[axis], 21) for axis in "XYZ"}
     for drawn, held, view in zip(maps, ("Z", "Y", "X"), ("top", "front", "right"), strict=True):
         at = {axis: values for axis, values in axes.items() if axis != held}
@@ -30,11 +31,6 @@ def test_slices_show_the_middle_planes():
         assert len(reading.known) > 250
         assert reading.agrees(), (held, reading.slope)
         assert not read_map(drawn, nodes, 1.02 * known, view).agrees()
-
-
-def test_slices_share_one_scale_of_length():
-    maps = draw_figure("slices", [load_scene("dvf5000_first")]).maps
-    assert len({drawn.projection.px_per_mm for drawn in maps}) == 1
 
 
 @pytest.mark.parametrize("component", ["norm", "x"])
