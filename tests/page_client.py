@@ -114,6 +114,24 @@ class App:
         return [] if self.path is None else self.path.read_text("utf-8").splitlines()
 
 
+def free_port() -> int:
+    with sockets.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+def wait_for(port: int, process: psutil.Popen | subprocess.Popen[bytes]) -> None:
+    """Wait until a process takes connections."""
+    end = time.monotonic() + 300.0  # a busy machine takes its time
+    while True:
+        with contextlib.suppress(OSError):
+            sockets.create_connection(("127.0.0.1", port), 5).close()
+            return
+        assert process.poll() is None, "the process has ended"
+        assert time.monotonic() < end, "the process does not answer"
+        time.sleep(0.1)
+
+
 @contextlib.contextmanager
 def running_app(
     *options: str,
@@ -122,9 +140,7 @@ def running_app(
     launcher: tuple[str, ...] = ("-m", "warpspace"),
     **how: Any,
 ) -> Generator[App]:
-    with sockets.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = port or free.getsockname()[1]
+    port = port or free_port()
     view = [sys.executable, *launcher, "view", "--no-browser", "--port", str(port), *options]
     # what the C library keeps for threads that have ended, up to 64 MB each, is not counted
     how = {"env": {**os.environ, "MALLOC_ARENA_MAX": "2"}, "stdout": subprocess.DEVNULL, **how}
@@ -134,14 +150,7 @@ def running_app(
             how["stdout"] = how["stderr"] = stack.enter_context(log.open("wb"))
         process = psutil.Popen(view, **how)
         try:
-            until = time.monotonic() + 300.0  # a busy machine takes its time
-            while True:
-                with contextlib.suppress(OSError):
-                    sockets.create_connection(("127.0.0.1", port), 5).close()
-                    break
-                assert process.poll() is None, "the app has ended"
-                assert time.monotonic() < until, "the app does not answer"
-                time.sleep(0.1)
+            wait_for(port, process)
             yield App(f"ws://127.0.0.1:{port}", process, log)
         finally:
             process.terminate()

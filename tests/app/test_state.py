@@ -50,6 +50,10 @@ FIRST = start_state(load_scene("dvf5000_first"))
         ("tolerances.EAX", "-1", "0.0", "tolerance of roll of X = -1 is outside 0 to 1000 µrad"),
         ("tolerances.EAX", "1e9", "1000.0", "clamped to 1000 µrad"),
         ("specification.costs", "EXX=4; EYX=1", "EXX=4", ""),
+        *(
+            ("specification.costs", text, "", f"costs of tolerances = '{text}'; ")
+            for text in ("EXX", "EXX=2=3", "EXQ=2", "EXX=nan", "EXX=0", "EXX=-1", "EXX=9e9")
+        ),
         ("picked", "X 1,5", "X 1.5 Y 0.0 Z -280.0", ""),
         ("page.open", "gains,budget", "budget,gains", ""),
         ("page.task", "improve", "improve", ""),

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from app.parts import Alone, wait
-from warpspace.app.documents.scene_file import SceneList, open_text
+from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
@@ -92,14 +92,6 @@ def test_files_that_a_page_refuses_or_invents_are_said_or_left():
     window.do("link", "no link")
     assert window.saved == []
     assert "cannot be read" in window.said[-1][1]
-
-
-def test_a_saved_scene_opens_to_the_same_errors():
-    window = Alone(FilesWindow, STATE.with_amplitude("EAX", 7.0))
-    window.do("save")
-    ((name, text),) = window.saved
-    assert name == "dvf5000_first.toml"
-    assert open_text(text, "x", "x.toml")[0].amplitudes["EAX"] == 7.0
 
 
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():

@@ -60,18 +60,6 @@ def test_small_rotations_are_one_plus_skew_to_second_order(exponent, direction):
     assert difference <= angle**3 + 1e-15
 
 
-@given(turn=vector_batches(), shift=st.tuples(*[st.floats(-10, 10)] * 3))
-def test_batch_gives_what_a_loop_gives(turn, shift):
-    point = np.array(shift)
-    pose = transforms.rigid(transforms.vector_rotation(turn), point)
-    moved, inverse = transforms.apply(pose, point), transforms.inverse(pose)
-    for index in np.ndindex(turn.shape[:-1]):
-        single = transforms.rigid(transforms.vector_rotation(turn[index]), point)
-        np.testing.assert_allclose(pose[index], single, atol=1e-14)
-        np.testing.assert_allclose(moved[index], transforms.apply(single, point), atol=1e-13)
-        np.testing.assert_allclose(inverse[index], transforms.inverse(single), atol=1e-13)
-
-
 REACH_MM = 8.0 * (MAX_OFFSET_MM + MAX_LINEAR_MM)
 SPAN = (-1.0, 1.0)
 

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from chains import models, positions, vectors
 from warpspace.field.evaluate import (
     View,
-    amplitudes_of,
     build_basis,
     evaluate_exact,
     evaluate_first_order,
@@ -68,21 +67,6 @@ def test_the_response_is_the_derivative_of_the_exact_field_by_the_amplitude(data
         ]
         slope = (moved[0].error_um - moved[1].error_um) / (2.0 * STEP)
         np.testing.assert_allclose(basis.position[0], slope, rtol=0, atol=1e-6)
-
-
-@settings(max_examples=40)
-@given(data=st.data())
-def test_amplitudes_scale_the_field_and_zero_is_none(data):
-    model, errors = data.draw(cases())
-    at = data.draw(positions(model, (4,)))
-    keys = tuple(errors)
-    basis = build_basis(model, errors, keys, at)
-    amplitudes = amplitudes_of(errors, keys)
-    field = evaluate_first_order(model, errors, at).error_um
-    np.testing.assert_allclose(basis.evaluate(amplitudes).error_um, field, atol=1e-9)
-    assert not basis.evaluate(0.0 * amplitudes).error_um.any()
-    nothing = ErrorSet({key: one.scaled(0.0) for key, one in errors.functions.items()})
-    np.testing.assert_allclose(evaluate_exact(model, nothing, at).error_um, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("curve", [Constant(SPAN, 3.0), Ramp(SPAN, 3.0)])

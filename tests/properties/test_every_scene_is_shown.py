@@ -14,7 +14,6 @@ from app.parts import lone_part
 from random_scenes import scenes
 from warpspace import to_pyvista
 from warpspace.app.documents.legend import kept_words, legend_html, numbers_words, subject_words
-from warpspace.app.documents.offline_page import build_offline_html, offline_picture
 from warpspace.app.drawing.around import around, words
 from warpspace.app.drawing.box import box, ghost_dashes
 from warpspace.app.drawing.camera import VIEWS, fit_camera
@@ -152,10 +151,3 @@ def test_every_scene_is_exported(scene):
     blocks = to_pyvista(scene, grid=SIDE_NODES)
     assert np.isfinite(blocks["surface"].points).all()
     assert blocks["surface"].n_cells > 0
-
-
-@settings(SLOW, max_examples=3)
-@given(scene=scenes())
-def test_every_scene_has_an_offline_page(scene):
-    page = build_offline_html(offline_picture(scene, exaggeration=100.0, nodes=SIDE_NODES))
-    assert "×100" in page

@@ -21,7 +21,6 @@ from warpspace.field.grid import build_grid
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import ErrorValues, branch_pose, tool_axis
 from warpspace.kinematics.model import Coordinates, Loop, Model
-from warpspace.machine.errors import ErrorSet, Table
 from warpspace.scene.library import scene_names
 from warpspace.scene.model import choose_view, grid_basis
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
@@ -162,15 +161,3 @@ def test_an_error_of_several_axes_is_a_field_too(monkeypatch):
         np.testing.assert_allclose(exact, plain, rtol=0, atol=1e-8)
         np.testing.assert_allclose(first, plain, rtol=0, atol=0.05)
         assert np.ptp(first[:, 0, :, 1]) > 1.0
-
-
-def test_a_table_between_its_points_is_as_its_curve_says():
-    """A number by hand: EYX moves the tool along y by the value of the table, whatever Y and Z."""
-    scene = load_scene("dvf5000_first")
-    curve = Table((-275.0, 275.0), ((-275.0, 0.0), (275.0, 11.0)))
-    only = replace(scene, errors=ErrorSet({"EYX": curve}))
-    error = evaluate(only, grid=(3, 2, 2)).error_um
-    np.testing.assert_allclose(
-        error[:, :, :, 1], np.array([0.0, 5.5, 11.0])[:, None, None] + np.zeros((3, 2, 2))
-    )
-    assert not error[..., [0, 2]].any()

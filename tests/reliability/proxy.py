@@ -1,7 +1,6 @@
 """examples/deployment/nginx.conf with a real nginx, TLS, two servers and many visitors."""
 
 import asyncio
-import contextlib
 import http.client
 import re
 import shutil
@@ -9,14 +8,13 @@ import socket as sockets
 import ssl
 import subprocess
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from http.cookies import SimpleCookie
 from pathlib import Path
 
-from page_client import App, Tab, running_app
+from page_client import App, Tab, free_port, running_app, wait_for
 from reliability.outcome import Outcome
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "deployment" / "nginx.conf"
@@ -65,7 +63,7 @@ class Answer:
 def site() -> Iterator[Site]:
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        https, plain = _free_port(), _free_port()
+        https, plain = free_port(), free_port()
         servers: list[App] = []
         for number in range(2):
             (folder / str(number)).mkdir()
@@ -86,14 +84,7 @@ def site() -> Iterator[Site]:
         )
         stack.callback(nginx.wait, 10)
         stack.callback(nginx.terminate)
-        until = time.monotonic() + 15.0
-        while True:
-            with contextlib.suppress(OSError):
-                sockets.create_connection(("127.0.0.1", https), 1).close()
-                break
-            assert time.monotonic() < until, "nginx does not start"
-            assert nginx.poll() is None, (folder / "error.log").read_text()
-            time.sleep(0.05)
+        wait_for(https, nginx)
         yield Site(https, plain, trust, tuple(servers))
 
 
@@ -103,12 +94,6 @@ def nginx_is_there() -> bool:
 
 def _nginx() -> str:
     return shutil.which("nginx", path="/usr/local/bin:/usr/bin:/usr/sbin:/usr/local/sbin") or ""
-
-
-def _free_port() -> int:
-    with sockets.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return free.getsockname()[1]
 
 
 def _certificate(folder: Path) -> ssl.SSLContext:

@@ -40,9 +40,7 @@ def test_colours_and_shape_are_the_models(name):
     picture = evaluate_picture(load_scene(name))
     reading = read(picture, FigureSettings())
     assert len(reading.known) > 300
-    assert reading.slope == pytest.approx(1.0, abs=0.005)
-    assert np.abs(reading.depth_mm).max() < 1.0
-    assert reading.agrees()
+    assert reading.agrees(), (reading.slope, np.abs(reading.depth_mm).max())
 
 
 @pytest.mark.parametrize(
