@@ -85,14 +85,6 @@ def test_a_loop_of_links_is_refused(scene, tmp_path, warpspace):
 FIVE_AXES = """title = "W"
 [machine]
 chain = "wCbWXYZt"
-[machine.offset_mm]
-Z = [0, 0, 300]
-[machine.travel]
-W = [0, 100]
-X = [-100, 100]
-Y = [-100, 100]
-Z = [-100, 0]
-C = [-180, 180]
 [errors]
 EXX = 3.0
 EAW = 4.0

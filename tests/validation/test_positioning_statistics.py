@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bench_scenes import scene_with
+from warpspace.bench.base import Run
 from warpspace.bench.data import parse_table
 from warpspace.bench.kinds.positioning import Positioning
 
@@ -29,15 +30,18 @@ def csv_text(directions="+-"):
     return "\n".join(rows) + "\n"
 
 
+TEST = Positioning(axis="X")
+
+
 def evaluated(text):
-    scene, test = scene_with(), Positioning(axis="X")
-    table = parse_table(text, test.data_columns(scene), "data.csv")
-    plan, readings = test.plan_data(scene, table)
-    return test.evaluate(plan, readings)
+    scene = scene_with()
+    table = parse_table(text, TEST.data_columns(scene), "data.csv")
+    plan, readings = TEST.plan_data(scene, table)
+    return Run("measured", plan, readings, TEST.evaluate(plan, readings))
 
 
 def test_every_number_of_the_standard():
-    found = evaluated(csv_text())
+    found = evaluated(csv_text()).outcome
     # B_i = x̄↑ − x̄↓ = 2, 3, 4, 3, 3
     assert found["B_um"] == pytest.approx(4.0)
     assert found["B_mean_um"] == pytest.approx(3.0)
@@ -64,18 +68,12 @@ def test_every_number_of_the_standard():
 
 
 def test_one_direction_gives_the_one_directional_numbers_only():
-    found = evaluated(csv_text("+"))
+    found = evaluated(csv_text("+")).outcome
     keys = {quantity.key for quantity in found.quantities}
     assert keys == {"A_forward_um", "E_forward_um", "R_forward_um"}
 
 
 def test_bands_of_the_figure_are_two_standard_deviations_wide():
-    from warpspace.bench.base import Run
-
-    scene, test = scene_with(), Positioning(axis="X")
-    table = parse_table(csv_text(), test.data_columns(scene), "data.csv")
-    plan, readings = test.plan_data(scene, table)
-    run = Run("measured", plan, readings, test.evaluate(plan, readings))
-    (chart,) = test.charts([run])
+    (chart,) = TEST.charts([evaluated(csv_text())])
     forward = chart.bands[0]
     np.testing.assert_allclose(forward.high - forward.low, 4.0 * S * np.array(STEP_FORWARD))

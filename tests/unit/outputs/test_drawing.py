@@ -76,22 +76,12 @@ def test_without_bodies_all_is_visible():
     assert hidden == []
 
 
-def test_a_wall_hides_what_is_behind_it():
-    line = np.array([[-50.0, 20.0, 0.0], [50.0, 20.0, 0.0]])
-    seen, hidden = split_visible([line], FRONT, wall(100, 0.0))
-    assert len(seen) == 1
-    assert len(hidden) == 1
-    assert seen[0][-1, 0] == pytest.approx(100.0, abs=2.0)
-    assert hidden[0][0, 0] == pytest.approx(100.0, abs=2.0)
-
-
-def test_a_wall_hides_nothing_in_front_of_it_or_on_it():
-    for y in (-20.0, 0.0):
-        line = np.array([[-50.0, y, 0.0], [50.0, y, 0.0]])
-        seen, hidden = split_visible([line], FRONT, wall(100, 0.0))
-        assert len(seen) == 1
-        assert hidden == []
-        assert len(seen[0]) == 2
+@pytest.mark.parametrize(("y", "ends"), [(20.0, [100.0]), (0.0, []), (-20.0, [])])
+def test_a_wall_hides_what_is_behind_it_and_nothing_in_front_of_it_or_on_it(y, ends):
+    line = np.array([[-50.0, y, 0.0], [50.0, y, 0.0]])
+    (seen,), hidden = split_visible([line], FRONT, wall(100, 0.0))
+    assert seen[-1, 0] == pytest.approx(*(ends or [150.0]), abs=2.0)
+    assert [part[0, 0] for part in hidden] == pytest.approx(ends, abs=2.0)
 
 
 RECT = (100.0, 50.0, 900.0, 650.0)
