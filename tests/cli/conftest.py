@@ -1,8 +1,10 @@
 """Run the command line in process, as the installed command does."""
 
+import json
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
@@ -16,6 +18,10 @@ class Result:
     status: int
     out: str
     err: str
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.out)
 
     def refused(self, *fragments: str) -> None:
         """Check for exit 2 with one message that has all fragments, and nothing on stdout."""

@@ -1,6 +1,5 @@
 """Monte Carlo on processes and on a real Dask cluster: the same numbers, whoever is lost."""
 
-import json
 import os
 import signal
 import sys
@@ -51,7 +50,7 @@ def test_a_cluster_gives_the_same_numbers_to_the_last_bit(warpspace, scheduler, 
     first, second = (pq.read_table(path) for path in tables)
     assert first.equals(second)
     assert first.num_rows == 33 * BLOCK + 5
-    assert max(first["error_um"].to_pylist()) == json.loads(here.out)["max_um"]
+    assert max(first["error_um"].to_pylist()) == here.json["max_um"]
 
 
 def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
@@ -60,7 +59,7 @@ def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
     here, there = warpspace(*sweep, *steps), warpspace(*sweep, *steps, "--scheduler", scheduler)
     assert there.status == 0, there.err
     assert here.out == there.out
-    assert len(json.loads(there.out)["rows"]) == 6
+    assert len(there.json["rows"]) == 6
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "gopher://x:1", ""])

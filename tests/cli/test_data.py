@@ -1,7 +1,6 @@
 """Measured data on the command line: the commands test, calibrate and import."""
 
 import itertools
-import json
 import re
 
 import numpy as np
@@ -19,9 +18,7 @@ RUNS = "run,direction,target_mm,deviation_um\n" + "".join(
 def test_json_of_positioning_data_has_the_keys_of_the_contract(warpspace, tmp_path):
     data = tmp_path / "runs.csv"
     data.write_text(RUNS, encoding="utf-8")
-    found = json.loads(
-        warpspace("test", "positioning", "dvf5000_first", "--data", data, "--json").out
-    )
+    found = warpspace("test", "positioning", "dvf5000_first", "--data", data, "--json").json
     for key in ("A_um", "E_um", "M_um", "R_um", "B_um"):
         assert isinstance(found[key], float)
     for way in ("forward", "backward"):
@@ -48,7 +45,7 @@ def test_readings_in_another_unit_are_said(warpspace, tmp_path):
     run = warpspace("test", "circular", "dvf5000_first", "--data", data, "--json")
     assert run.status == 0
     assert "are they in nm?" in run.err
-    assert json.loads(run.out)["notes"]
+    assert run.json["notes"]
 
 
 TCP = ("calibrate", "fork_head_bc", "--data", "tcp_on.csv", "--kind", "sphere-tcp")
@@ -56,12 +53,12 @@ TCP = ("calibrate", "fork_head_bc", "--data", "tcp_on.csv", "--kind", "sphere-tc
 
 def test_calibrated_scene_opens_and_leaves_what_was_promised(warpspace, tmp_path):
     target = tmp_path / "fitted.toml"
-    found = json.loads(warpspace(*TCP, "-o", target, "--json").out)
+    found = warpspace(*TCP, "-o", target, "--json").json
     scene = load_scene(str(target))
     assert scene.title == "Fork head B-C, a real machine, calibrated"
     for one in found["parameters"]:
         assert scene.errors.amplitude(one["key"]) == pytest.approx(one["value"])
-    again = json.loads(warpspace("calibrate", target, "--data", "tcp_on.csv", "--json").out)
+    again = warpspace("calibrate", target, "--data", "tcp_on.csv", "--json").json
     assert again["rms_before_mm"] == pytest.approx(found["rms_after_mm"])
     warpspace(*TCP, "-o", target).refused("fitted.toml", "exists")
 
@@ -86,7 +83,7 @@ def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
         table, printed = tmp_path / f"{frame}.csv", tmp_path / f"{frame}.json"
         out = warpspace(*relative, "--frame", frame, "--csv", table, "--json").out
         printed.write_text(out, encoding="utf-8")
-        found += [json.loads(warpspace(*fit, path).out) for path in (table, printed)]
+        found += [warpspace(*fit, path).json for path in (table, printed)]
     for one in found:
         values = [row["value"] for row in one["parameters"]]
         assert values == pytest.approx([25.0, -30.0, 12.0], rel=1e-6)
@@ -94,12 +91,12 @@ def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
     # a table that does not say its frame
     bare, text = tmp_path / "bare.csv", (tmp_path / "machine.csv").read_text(encoding="utf-8")
     bare.write_text(re.sub("error_relative_R_(.)_um", r"e\1_um", text), encoding="utf-8")
-    wrong = json.loads(warpspace(*fit, bare).out)
+    wrong = warpspace(*fit, bare).json
     assert wrong["rms_after_mm"] > 5e-3
     (note,) = (note for note in wrong["notes"] if "likely wrong" in note)
     assert f"{1e3 * wrong['rms_after_mm']:.3g} µm" in note
     assert "--frame machine" in note
-    right = json.loads(warpspace(*fit, bare, "--frame", "machine").out)
+    right = warpspace(*fit, bare, "--frame", "machine").json
     assert right["rms_after_mm"] < 1e-8
     assert not any("frame" in note for note in right["notes"])
     # what contradicts itself, and what is no relative error
@@ -110,7 +107,7 @@ def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
     (tmp_path / "placed.json").write_text(placed, encoding="utf-8")
     for name in ("placed.csv", "placed.json"):
         warpspace(*fit, tmp_path / name).refused("error_relative_placed_r", "--kind tracker")
-        read = json.loads(warpspace(*fit, tmp_path / name, "--kind", "tracker").out)
+        read = warpspace(*fit, tmp_path / name, "--kind", "tracker").json
         assert [row["value"] for row in read["parameters"] if row["told"] == "yes"] == (
             pytest.approx([25.0, -30.0, 12.0], rel=1e-3)
         )
@@ -135,12 +132,12 @@ def test_fields_have_a_direction_and_an_uncertainty(warpspace, tmp_path):
     path = tmp_path / "s.toml"
     path.write_text(SCENE)
     field = ("field", path, "--at", "X=275", "--json")
-    (point,) = json.loads(warpspace(*field, "--direction", "difference").out)["points"]
+    (point,) = warpspace(*field, "--direction", "difference").json["points"]
     assert point["error_um"] == pytest.approx([0.0, 1.0, 0.0])
-    (point,) = json.loads(warpspace(*field, "--uncertainty").out)["points"]
+    (point,) = warpspace(*field, "--uncertainty").json["points"]
     assert point["uncertainty_um"] == [0.0, 0.5, 0.0]
     run = ("montecarlo", path, "--from", "uncertainty", "--samples", "500", "--json")
-    found = json.loads(warpspace(*run).out)
+    found = warpspace(*run).json
     assert (found["from"], found["distribution"]) == ("uncertainty", "normal")
     table = tmp_path / "f.csv"
     warpspace("export", str(path), "-o", str(table), "--grid", "2", "--direction", "difference")
@@ -151,7 +148,7 @@ def test_a_table_that_is_cut_says_so(warpspace, tmp_path, monkeypatch):
     monkeypatch.setattr("warpspace.analysis.convert.MAX_SHOWN", 2)
     wishes = ("--to", "component_errors=before_motion", "--to", "squareness=over_90")
     found = warpspace("convert", "dvf5000_first", *wishes, "-o", tmp_path / "a.toml", "--json")
-    count = len(json.loads(found.out)["changed"])
+    count = len(found.json["changed"])
     printed = warpspace("convert", "dvf5000_first", *wishes, "-o", tmp_path / "b.toml").out
     assert count > 2
     assert f"and {count - 2} more; --json lists them all" in printed

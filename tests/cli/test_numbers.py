@@ -1,7 +1,6 @@
 """Numbers that commands print agree with each other, and say what they leave out."""
 
 import csv
-import json
 
 import pytest
 
@@ -14,17 +13,17 @@ from warpspace.scene.model import evaluate
 
 def test_a_placed_part_is_asked_for_in_the_relative_loop(warpspace):
     scene = ("dvf5000_second", "--placed")
-    lying = json.loads(warpspace("field", "dvf5000_second", "--loop", "relative", "--json").out)
-    placed = json.loads(warpspace("field", *scene, "--json").out)
+    lying = warpspace("field", "dvf5000_second", "--loop", "relative", "--json").json
+    placed = warpspace("field", *scene, "--json").json
     assert placed["statistics"]["rms_um"] == pytest.approx(2.750, abs=0.001)
     assert lying["statistics"]["rms_um"] == pytest.approx(14.841, abs=0.001)
     node = placed["points"][-1]
     at = ",".join(f"{axis}={place}" for axis, place in node["axes"].items())
-    (same,) = json.loads(warpspace("field", *scene, "--at", at, "--json").out)["points"]
+    (same,) = warpspace("field", *scene, "--at", at, "--json").json["points"]
     assert same["error_um"] == pytest.approx(node["error_um"], abs=1e-9)
-    compared = json.loads(warpspace("compare", "dvf5000_nominal", *scene, "--json").out)
+    compared = warpspace("compare", "dvf5000_nominal", *scene, "--json").json
     assert compared["b"]["rms_um"] == pytest.approx(placed["statistics"]["rms_um"])
-    repair = json.loads(warpspace("repair", *scene, "--count", 1, "--json").out)
+    repair = warpspace("repair", *scene, "--count", 1, "--json").json
     assert repair["before"]["rms_um"] == pytest.approx(placed["statistics"]["rms_um"])
     out = " ".join(warpspace("field", *scene, "--grid", 3).out.split())
     assert "relative loop · placement of the workpiece fitted out" in out
@@ -34,7 +33,7 @@ def test_the_worst_point_is_printed_as_an_argument_that_gives_it_back(warpspace)
     out = warpspace("field", "dvf5000_first", "--grid", 5).out
     assert "max at axes X 275 Y −225 Z −480 · in R x 275 y −225 z −51 mm" in out
     argument = next(line for line in out.splitlines() if "--at" in line).split()
-    found = json.loads(warpspace("field", "dvf5000_first", *argument, "--json").out)
+    found = warpspace("field", "dvf5000_first", *argument, "--json").json
     assert found["statistics"]["max_um"] == pytest.approx(51.72, abs=0.01)
     assert found["statistics"]["max_at_axes"] == {"X": 275, "Y": -225, "Z": -480, "B": 0, "C": 0}
 
@@ -99,7 +98,7 @@ def test_three_milliradians_are_said_with_the_number_in_the_json_object(warpspac
     loud = warpspace(command, gantry, *COMMANDS[name], "--json")
     assert loud.status == 0, loud.err
     assert loud.err.count(SAID) == 1
-    found = json.loads(loud.out)["second_order_um"]
+    found = loud.json["second_order_um"]
     assert found > 1.0
     if name in {"check", "field", "compare", "measured"}:
         assert exact_minus_first_um() <= found <= exact_minus_first_um() * 3**0.5
@@ -120,13 +119,13 @@ def test_the_exact_field_says_nothing(warpspace, gantry):
 
 def test_a_repair_is_verified_with_the_exact_chain(warpspace, gantry):
     wide = ("repair", gantry, "--limit", "9000", "--count", "1", "--grid", "5")
-    (found,) = json.loads(warpspace(*wide, "--json").out)["repairs"]
+    (found,) = warpspace(*wide, "--json").json["repairs"]
     text = GANTRY
     for key, value in found["adjust"].items():
         text = text.replace(f"{key} = 3000\n", f"{key} = {value!r}\n", 1)
     target = gantry.with_name("repaired.toml")
     target.write_text(text, encoding="utf-8")
-    exact = json.loads(warpspace("field", target, "--exact", "--grid", "5", "--json").out)
+    exact = warpspace("field", target, "--exact", "--grid", "5", "--json").json
     for name, value in found["exact"].items():
         assert value == pytest.approx(exact["statistics"][name], rel=1e-9)
     assert abs(found["exact"]["rms_um"] - found["rms_um"]) > 0.01
@@ -135,7 +134,7 @@ def test_a_repair_is_verified_with_the_exact_chain(warpspace, gantry):
 
 def test_an_allocation_is_verified_with_the_exact_chain(warpspace, gantry):
     wide = ("allocate", gantry, "--limit-um", "5000", *QUICK)
-    found = json.loads(warpspace(*wide, "--json").out)["exact"]
+    found = warpspace(*wide, "--json").json["exact"]
     assert found["machines"] == 2000
     assert 0.9 < found["probability"] < 1.0
     assert found["first_order"] == pytest.approx(found["probability"], abs=0.02)
@@ -156,19 +155,17 @@ def machines(warpspace, tmp_path):
 
 def test_concepts_agree_with_montecarlo_and_contributions(warpspace, machines):
     limit = ("--limit-um", "25")
-    found = json.loads(warpspace("concepts", *machines, *limit, *SAMPLES, "--json").out)
+    found = warpspace("concepts", *machines, *limit, *SAMPLES, "--json").json
     assert found["tolerances"] == {"translation": 10.0, "rotation": 20.0, "squareness": 25.0}
     for path, concept in zip(machines, found["concepts"], strict=True):
-        alone = json.loads(
-            warpspace(
-                *("montecarlo", path, *SAMPLES, "--spec-um", "25", "--over", "max"),
-                *("--grid", "11", "--loop", "relative", "--json"),
-            ).out
-        )
+        alone = warpspace(
+            *("montecarlo", path, *SAMPLES, "--spec-um", "25", "--over", "max"),
+            *("--grid", "11", "--loop", "relative", "--json"),
+        ).json
         for key in ("mean_um", "p95_um", "max_um"):
             assert concept[key] == alone[key]
         assert concept["probability"] == alone["specification"]["probability"]
-        shares = json.loads(warpspace("contributions", path, "--loop", "relative", "--json").out)
+        shares = warpspace("contributions", path, "--loop", "relative", "--json").json
         leading = [(row["key"], row["share"]) for row in shares["contributions"][:3]]
         assert [(row["key"], row["share"]) for row in concept["errors"]] == leading
     # the axes of the second machine carry the table, nearer to the workpiece: shorter levers
@@ -178,8 +175,8 @@ def test_concepts_agree_with_montecarlo_and_contributions(warpspace, machines):
 def test_tolerances_are_those_of_the_first_scene_unless_each_has_its_own(warpspace, machines):
     text = machines[1].read_text(encoding="utf-8")
     machines[1].write_text(text.replace("translation = 10", "translation = 100"), encoding="utf-8")
-    same = json.loads(warpspace("concepts", *machines, *SAMPLES, "--json").out)
-    own = json.loads(warpspace("concepts", *machines, *SAMPLES, "--own-tolerances", "--json").out)
+    same = warpspace("concepts", *machines, *SAMPLES, "--json").json
+    own = warpspace("concepts", *machines, *SAMPLES, "--own-tolerances", "--json").json
     assert same["concepts"][0] == own["concepts"][0]
     assert own["concepts"][1]["mean_um"] > 3.0 * same["concepts"][1]["mean_um"]
     assert own["tolerances"] is None
@@ -196,9 +193,7 @@ FEW = ("--samples", "3000")
 
 def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path):
     steps = ("--tolerance", "EAX=5:20:2", "--tolerance", "translation=4,8")
-    found = json.loads(
-        warpspace("sweep", "dvf5000_general", *steps, "--limit-um", "40", *FEW, "--json").out
-    )
+    found = warpspace("sweep", "dvf5000_general", *steps, "--limit-um", "40", *FEW, "--json").json
     assert found["tolerances"] == {"EAX": [5.0, 20.0], "translation": [4.0, 8.0]}
     rows = found["rows"]
     assert [(row["EAX"], row["translation"]) for row in rows] == [
@@ -210,7 +205,7 @@ def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path):
     assert changed.count("translation = 8") == 1
     scene.write_text(changed, encoding="utf-8")
     run = ("montecarlo", scene, "--spec-um", "40", *FEW, "--json")
-    alone = json.loads(warpspace(*run).out)
+    alone = warpspace(*run).json
     for key in ("mean_um", "median_um", "p95_um", "p99_um", "max_um"):
         assert rows[3][key] == pytest.approx(alone[key], rel=1e-12), key
     assert rows[3]["probability"] == alone["specification"]["probability"]
@@ -229,7 +224,7 @@ def test_a_fleet_of_a_folder(warpspace, tmp_path):
     assert [row["scene"] for row in rows] == ["a", "b"]
     assert rows[0]["title"] == "'=machine a"
     assert float(rows[1]["mean_um"]) == pytest.approx(2.0 * float(rows[0]["mean_um"]))
-    both = json.loads(warpspace("montecarlo", tmp_path, *FEW, "--json").out)["scenes"]
+    both = warpspace("montecarlo", tmp_path, *FEW, "--json").json["scenes"]
     assert [float(row["mean_um"]) for row in rows] == [one["mean_um"] for one in both]
     table = warpspace("montecarlo", tmp_path, *FEW)
     assert table.out.count("\n  a ") == 1
@@ -240,7 +235,7 @@ def test_every_machine_is_written(warpspace, tmp_path):
     pq = pytest.importorskip("pyarrow.parquet")
     target = tmp_path / "m.parquet"
     run = ("montecarlo", "dvf5000_general", "dvf5000_proposed", "--samples", "9000", "--json")
-    found = json.loads(warpspace(*run, "-o", target).out)["scenes"]
+    found = warpspace(*run, "-o", target).json["scenes"]
     table = pq.read_table(target)
     assert table.num_rows == 18_000
     names = table["scene"].to_pylist()

@@ -194,7 +194,7 @@ def test_json_is_printed_in_pieces_and_is_one_object_with_every_point(monkeypatc
     assert result.status == 0, result.err
     assert sum(lengths) == 23**3 > 2 * POINTS_AT_ONCE >= 2 * max(lengths)
     assert result.out.count("\n") == 1
-    found = json.loads(result.out)
+    found = result.json
     assert set(found) == {
         *("points", "loop", "frame", "statistics", "statistics_nodes", "second_order_um")
     }
@@ -212,6 +212,6 @@ def test_check_names_a_mesh_that_is_not_closed_and_refuses_an_empty_one(tmp_path
         (tmp_path / f"{name}.toml").write_text(text)
     opened = warpspace("check", str(tmp_path / "open.toml"), "--json")
     assert opened.status == 0
-    assert "not closed" in " ".join(json.loads(opened.out)["notes"])
+    assert "not closed" in " ".join(opened.json["notes"])
     refused = warpspace("check", str(tmp_path / "empty.toml"))
     refused.refused("bodies.Z", "the file is empty")

@@ -1,7 +1,6 @@
 """What a plug-in adds is found everywhere: a curve, a convention, a test, a figure, a format."""
 
 import io
-import json
 import zipfile
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -298,7 +297,7 @@ def test_the_app_offers_a_convention_says_what_it_changes_and_stores_it():
 def test_a_test_is_a_command_and_in_the_app(warpspace, tmp_path):
     assert "corner" in bench_names()
     assert "corner" in warpspace("test", "--list").out
-    assert "x_um" in json.loads(warpspace("test", "corner", FIRST.name, "--json").out)
+    assert "x_um" in warpspace("test", "corner", FIRST.name, "--json").json
     plot = tmp_path / "corner.svg"
     warpspace("test", "corner", FIRST.name, "--plot", plot)
     assert plot.stat().st_size > 1000
