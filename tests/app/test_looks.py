@@ -93,13 +93,6 @@ def test_slices_lie_where_they_are_put_and_have_the_models_errors():
         assert part.drawn_mm == pytest.approx(expected, abs=1e-6)
 
 
-def test_tilt_is_coloured_in_microradians(picture):
-    tilted = LIVE.evaluate(looking(quantity="orientation"))
-    assert (tilted.scale.label, tilted.scale.unit) == ("|φ|", "µrad")
-    assert tilted.values == pytest.approx(np.linalg.norm(tilted.field.orientation_urad, axis=-1))
-    assert tilted.statistics.max_um == picture.statistics.max_um
-
-
 def test_colour_ranges():
     fixed = LIVE.evaluate(replace(looking(range_mode="fixed", range_top=33.0), component="x")).scale
     assert (fixed.low, fixed.high, fixed.diverging) == (-33.0, 33.0, True)

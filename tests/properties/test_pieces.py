@@ -1,4 +1,4 @@
-"""Fields evaluated axis by axis and in pieces are those of the plain formulas, point by point."""
+"""Fields evaluated axis by axis and in pieces are those of one response and of one chain."""
 
 import itertools
 from dataclasses import replace
@@ -18,55 +18,10 @@ from warpspace.field.evaluate import (
     evaluate_first_order,
 )
 from warpspace.field.grid import build_grid
-from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import ErrorValues, branch_pose, tool_axis
-from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.kinematics.chain import loop_error
+from warpspace.kinematics.model import Loop
 from warpspace.scene.library import scene_names
 from warpspace.scene.model import choose_view, grid_basis
-from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
-
-
-def plain_exact_error(
-    model: Model, loop: Loop, coordinates: Coordinates, values: ErrorValues, point_mm: Array
-) -> tuple[Array, Array]:
-    """Position error in µm and rotation vector of the tool axis in µrad, [..., 3] each."""
-    point = np.asarray(point_mm, dtype=float)
-    nominal_axis = tool_axis(model, coordinates)
-    moved = {side: np.eye(4) for side in ("tool", "workpiece")}
-    for side in moved:
-        if loop in (Loop.RELATIVE, Loop(side)):
-            actual = branch_pose(model, side, coordinates, values)
-            moved[side] = actual @ transforms.inverse(branch_pose(model, side, coordinates))
-    tool, workpiece = moved["tool"], moved["workpiece"]
-    if loop is Loop.WORKPIECE:
-        shift, actual_axis = _shift(workpiece, point), _turned(workpiece, nominal_axis)
-        rotation = _between(nominal_axis, actual_axis)
-    else:
-        shift = _shift(tool, point) - _shift(workpiece, point)
-        rotation = _between(_turned(workpiece, nominal_axis), _turned(tool, nominal_axis))
-    shape = np.broadcast_shapes(shift.shape, rotation.shape, point.shape)
-    return (
-        np.broadcast_to(shift * UM_PER_MM, shape).copy(),
-        np.broadcast_to(rotation * URAD_PER_RAD, shape).copy(),
-    )
-
-
-def _shift(moved: Array, point: Array) -> Array:
-    """Displacement of a point by a small rigid motion, without cancellation of large numbers."""
-    return transforms.rotate(moved[..., :3, :3] - np.eye(3), point) + moved[..., :3, 3]
-
-
-def _turned(moved: Array, direction: Array) -> Array:
-    return transforms.rotate(moved[..., :3, :3], direction)
-
-
-def _between(start: Array, end: Array) -> Array:
-    cross = np.cross(start, end)
-    sine = np.linalg.norm(cross, axis=-1, keepdims=True)
-    cosine = np.sum(start * end, axis=-1, keepdims=True)
-    angle = np.arctan2(sine, cosine)
-    return cross * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 1.0)
-
 
 NODES = (3, 2, 3)
 FRAMES = ("machine", "workpiece")
@@ -92,7 +47,7 @@ def check(scene, loop, frame):
     np.testing.assert_allclose(found.orientation_urad, plain.orientation_urad, **close)
     exact_found = evaluate(replace(scene, reference=None), grid=NODES, loop=loop, exact=True)
     values = error_values(scene.model, scene.errors, grid.coordinates)
-    exact = plain_exact_error(scene.model, loop, grid.coordinates, values, grid.point_mm)
+    exact = loop_error(scene.model, loop, grid.coordinates, values, grid.point_mm)
     # whole poses round with the lengths in them, 1 mm being 1000 µm
     close["atol"] += ROUNDING * reach_mm(scene, grid.point_mm) * 1e3
     np.testing.assert_allclose(exact_found.error_um, exact[0], **close)
@@ -101,13 +56,13 @@ def check(scene, loop, frame):
 
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
-def test_fields_of_random_scenes_are_those_of_the_plain_formulas(data):
+def test_fields_of_random_scenes_are_those_of_a_response_and_of_a_chain(data):
     scene = data.draw(scenes(everything=True))
     check(scene, data.draw(st.sampled_from(Loop)), data.draw(st.sampled_from(FRAMES)))
 
 
 @pytest.mark.parametrize("name", scene_names())
-def test_fields_of_bundled_scenes_are_those_of_the_plain_formulas(name):
+def test_fields_of_bundled_scenes_are_those_of_a_response_and_of_a_chain(name):
     scene = load_scene(name)
     for loop, frame in itertools.product(Loop, FRAMES):
         check(scene, loop, frame)
@@ -153,7 +108,7 @@ def test_an_error_of_several_axes_is_a_field_too(monkeypatch):
 
     monkeypatch.setattr("warpspace.field.evaluate.error_values", together)
     values = together(scene.model, scene.errors, grid.coordinates)
-    plain, _ = plain_exact_error(scene.model, Loop.TOOL, grid.coordinates, values, grid.point_mm)
+    plain, _ = loop_error(scene.model, Loop.TOOL, grid.coordinates, values, grid.point_mm)
     for most in (1, 4, 10_000):
         monkeypatch.setattr("warpspace.field.grid.NODES", most)
         exact = evaluate(scene, grid=(3, 4, 5), exact=True).error_um
