@@ -16,7 +16,7 @@ from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
 from warpspace.app.tasks.design import SAMPLES
-from warpspace.app.tasks.over import HeadPart, OrderPart
+from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart
 from warpspace.exceptions import SceneError
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import deform
@@ -130,10 +130,10 @@ def test_comparing_is_shown_and_left_by_one_switch():
     assert part.take(pinned, "set.b", NOBODY).comparison.b is None
     assert part.take(pinned, "set.a", "no such scene") is pinned
     change = put(pinned, "comparison.shown", "difference")
-    head = pieces(HeadPart, change)
-    assert "change: mean" in head["head"]
-    assert "volume within" not in head["head"]
-    assert "E<sub>B</sub> − E<sub>A</sub>" in head["legend"]
+    assert "change: mean" in pieces(HeadPart, change)["head"]
+    legend = pieces(LegendPart, change)
+    assert not legend["head.kept"]
+    assert "E<sub>B</sub> − E<sub>A</sub>" in legend["legend"]
 
 
 def picture_of(state, shown):

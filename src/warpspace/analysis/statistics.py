@@ -40,16 +40,20 @@ class Statistics(Summary):
 
 def volume_statistics(field: ErrorField, grid: Grid) -> Statistics:
     """Summarise the volume that a grid fills, whatever the number of its nodes."""
-    norm, weights = field.norm_um.reshape(grid.shape), grid.weights
-    cells = field.cells_um.reshape(-1)
+    norm, cells = field.norm_um.reshape(grid.shape), field.cells_um.reshape(-1)
     return _summed_up(
         norm,
-        float(np.sum(weights * norm)),
-        float(np.sqrt(np.sum(weights * norm * norm))),
+        volume_mean(norm, grid),
+        float(np.sqrt(np.sum(grid.weights * norm * norm))),
         _percentile(cells, P95 * cells.size - 0.5),
         grid.nominal_mm,
         grid.coordinates,
     )
+
+
+def volume_mean(values: Array, grid: Grid) -> float:
+    """Give the mean over the volume that a grid fills, of values at its nodes."""
+    return float(np.sum(grid.weights * values.reshape(grid.shape)))
 
 
 def statistics(field: ErrorField, axes: Mapping[str, Array] | None = None) -> Statistics:
@@ -67,8 +71,15 @@ def _summed_up(
 ) -> Statistics:
     worst = np.unravel_index(int(np.argmax(norm)), norm.shape)
     x, y, z = (float(value) for value in nominal[worst])
-    at = {name: float(np.broadcast_to(q, norm.shape)[worst]) for name, q in axes.items()}
+    at = axes_at(axes, worst, norm.shape)
     return Statistics(mean, rms, p95, float(norm[worst]), (x, y, z), at)
+
+
+def axes_at(
+    axes: Mapping[str, Array], node: tuple[np.intp, ...], shape: tuple[int, ...]
+) -> dict[str, float]:
+    """Give the positions of the axes at a node of a batch, mm or degrees."""
+    return {name: float(np.broadcast_to(q, shape)[node]) for name, q in axes.items()}
 
 
 def share_within(field: ErrorField, share: float) -> float:

@@ -83,8 +83,7 @@ def script_source(name: str) -> str:
 
 def _spelt(value: object) -> str:
     """Spell a value as JavaScript; a text of a user's can end neither it nor the script."""
-    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+    return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def page_script() -> str:

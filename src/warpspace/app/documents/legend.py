@@ -6,15 +6,17 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.statistics import share_below, volume_statistics
+from warpspace.analysis.statistics import axes_at, share_below, volume_mean, volume_statistics
 from warpspace.app.browser.html import fill, join, lowered, number, tag
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import axis_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
 from warpspace.app.state.table import table_words
 from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
+from warpspace.field.grid import Grid
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture import words
 from warpspace.picture.comparison import conditions_of_both
@@ -59,7 +61,7 @@ def marked(picture: LivePicture) -> dict[str, float]:
     found, values = picture.statistics, picture.values
     if picture.component != "norm":
         # the length of the error says nothing of a signed component: its own ends do
-        mean = float(np.sum(picture.grid.weights * values.reshape(picture.shape)))
+        mean = volume_mean(values, picture.grid)
         return {"min": float(values.min()), "mean": mean, "max": float(values.max())}
     if picture.tilts:  # summarised as the length of the position error is
         tilt = picture.field.orientation_urad
@@ -110,14 +112,22 @@ def _stops(scale: ColourScale) -> list[str]:
 
 def numbers_words(picture: LivePicture) -> str:
     """Say mean and max: ``mean 30.9 µm · max 51.7 µm``."""
-    found = picture.statistics
-    change = "change: " if picture.is_difference else ""
-    return f"{change}mean {number(found.mean_um)} µm · max {number(found.max_um)} µm"
+    norm, change = picture.field.norm_um, "change: " if picture.is_difference else ""
+    mean, most = volume_mean(norm, picture.grid), float(norm.max())
+    return f"{change}mean {number(mean)} µm · max {number(most)} µm"
 
 
 def place_words(picture: LivePicture) -> str:
     """Say where the max is: ``at X 275 Y −225 Z −480``."""
-    axes = words.own_axes(picture.drawn_state.scene, picture.statistics.max_at_axes)
+    node = int(np.argmax(picture.field.norm_um))
+    return _node_words(Identity(picture.drawn_state.scene), Identity(picture.grid), node)
+
+
+@lru_cache(maxsize=64)
+def _node_words(scene: Identity, grid: Identity, node: int) -> str:
+    of: Grid = grid.thing
+    at = axes_at(of.coordinates, np.unravel_index(node, of.shape), of.shape)
+    axes = words.own_axes(scene.thing, at)
     return f"at {words.list_axes(axes)}" if axes else ""
 
 
@@ -128,7 +138,7 @@ def kept_words(picture: LivePicture) -> tuple[str, bool]:
     """
     limit = picture.state.specification.limit_um
     percent = 100.0 * share_below(picture.field, limit)
-    kept = picture.statistics.max_um <= limit
+    kept = float(picture.field.norm_um.max()) <= limit
     shown = number(min(percent, 99.9), 0 if percent < 99.0 else 1)
     return f"{'all' if kept else f'{shown} %'} of the volume within {limit:g} µm", kept
 

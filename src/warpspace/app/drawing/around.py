@@ -66,6 +66,8 @@ def _traces(picture: LivePicture) -> Shapes:
     What no error moves is not drawn, nor what the actual trace covers of the nominal one.
     """
     moved = picture.moved_traces
+    if not moved:
+        return {}
     name = chosen_trace(picture)
     others = [line.actual_mm for other, line in moved.items() if other != name]
     faint = lines(polylines(others), colour(picture, "trace_elsewhere"), 1.0)

@@ -10,7 +10,8 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
 
-LONGEST_PAUSE_S = 0.8  # what follows in a pause lags no longer than this while a slider is dragged
+OFTEN_S = 0.2  # between two writings of what follows often
+LONGEST_PAUSE_S = 2.0  # what follows in a pause lags no longer than this while a slider is dragged
 REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 
 
@@ -24,6 +25,9 @@ class Display:
         self.layers: tuple[Layer, ...] = ()
         self.parts: dict[str, Part] = {}
         self._shown: dict[Part, object] = {}
+        self._following: list[Part] = []
+        self._urgent: dict[Part, object] = {}
+        self._often_at = 0.0
         self._waiting: deque[Part] = deque()
         self._noted_at = 0.0
         self._changed_at: float | None = None  # since when parts wait for a pause
@@ -36,6 +40,7 @@ class Display:
         """Add what has just been built, and write its pieces."""
         self.layers = (*self.layers, *layers)
         self.parts |= {part.name: part for part in parts}
+        self._following = [p for p in self.parts.values() if p.follows in ("at once", "often")]
         self._write(parts, picture)
         self._note(picture)
 
@@ -43,16 +48,27 @@ class Display:
         """Show a picture; what is slow follows when changes pause."""
         for layer in self.layers:
             layer.show(picture)
-        # a part that has just come into sight is not kept waiting, nor is one that has left it
-        due = [
-            part for part in self.parts.values()
-            if anew or part.follows == "at once" or self._shown.get(part) is None
-            or not part.is_seen(picture.state)
-        ]  # fmt: skip
         if anew:
             self._shown.clear()
-        self._write(due, picture)
+        now = time.monotonic()
+        often = now - self._often_at >= OFTEN_S
+        self._often_at = now if often else self._often_at
+        # what is in sight changes with what is open on the page
+        known = self._context.shown
+        same = known is not None and known.state.page is picture.state.page and not anew
+        parts = self._following if same else self.parts.values()
+        self._write([one for one in parts if self._is_due(one, picture, often)], picture)
         self._note(picture)
+
+    def _is_due(self, part: Part, picture: LivePicture, often: bool) -> bool:
+        is_shown = self._shown.get(part) is not None
+        # a part that has just come into sight is not kept waiting, nor is one that has left it
+        if part.is_seen(picture.state) != is_shown:
+            return True
+        if not is_shown or part.follows != "often":
+            return is_shown and part.follows == "at once"
+        before, self._urgent[part] = self._urgent.get(part), part.urgent(picture)
+        return often or before != self._urgent[part]
 
     def _note(self, picture: LivePicture) -> None:
         self._context.shown = picture
@@ -98,8 +114,8 @@ class Display:
     def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
         """Bring the next part up to date; one at a time, so that a slider never waits for all."""
         if not self._waiting:
-            follows = "at rest" if self._changed_at is None else "in a pause"
-            self._waiting.extend(p for p in self.parts.values() if p.follows == follows)
+            follows = ("at rest",) if self._changed_at is None else ("often", "in a pause")
+            self._waiting.extend(p for p in self.parts.values() if p.follows in follows)
             if self._changed_at is None:
                 self._is_to_rest = False
                 self._waiting.extend(self._late)

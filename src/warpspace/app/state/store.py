@@ -17,12 +17,15 @@ from warpspace.app.state.tree import leaves, stored
 # --- What differs between two states --------------------------------------------------------------
 
 
+_COMPARED = [entry for entry in fields(AppState) if entry.compare]
+
+
 def changes(old: AppState, new: AppState) -> dict[str, str]:
     """Say in words what differs between two states, each by its path; page and forms do not."""
     found: dict[str, str] = {}
-    for entry in fields(AppState):
+    for entry in _COMPARED:
         before, after = getattr(old, entry.name), getattr(new, entry.name)
-        if not entry.compare or _equal(before, after):
+        if before is after or _equal(before, after):
             continue
         own = description(entry)
         # what differs within a scene, say, has no name
@@ -38,11 +41,13 @@ def changes(old: AppState, new: AppState) -> dict[str, str]:
 
 
 def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[str, str]]:
-    tables = getattr(old, group), getattr(new, group)
-    is_table = isinstance(tables[0], Mapping)  # of many entries, most of which stay
-    for path, leaf in leaves(new).items():
-        head, _, key = path.partition(".")
-        if head != group or (is_table and _equal(*(table.get(key) for table in tables))):
+    was, now, known = getattr(old, group), getattr(new, group), leaves(new)
+    if isinstance(now, Mapping):  # of many entries, most of which stay
+        paths = [f"{group}.{key}" for key in {**was, **now} if was.get(key) is not now.get(key)]
+    else:
+        paths = [path for path in known if path.partition(".")[0] == group]
+    for path in paths:
+        if (leaf := known.get(path)) is None:
             continue
         before, after = stored(old, path), stored(new, path)
         if isinstance(before, frozenset) and isinstance(after, frozenset):

@@ -20,7 +20,7 @@ from warpspace.app.tasks.improve import BestPart, CompensatePart, RepairPart
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.app.tasks.measure import CalibratePart, TestsPart
-from warpspace.app.tasks.over import HeadPart, OrderPart, RoomPart
+from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart, RoomPart
 from warpspace.app.tasks.parts import Part, Section
 from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
 from warpspace.app.tasks.understand import VolumePart, WorstPart
@@ -88,8 +88,8 @@ def build_parts(context: Context) -> list[Part]:
         *(kind(context) for kind in of_machine),
     ]
     kinds = (
-        TopPart, HeadPart, OrderPart, ControlsPart, ComparePart, ErrorsPart, RoomPart, StatePart,
-        PagePart, ScenesWindow, MachinesWindow, FilesWindow, ReportWindow, HelpWindow,
+        TopPart, HeadPart, LegendPart, OrderPart, ControlsPart, ComparePart, ErrorsPart, RoomPart,
+        StatePart, PagePart, ScenesWindow, MachinesWindow, FilesWindow, ReportWindow, HelpWindow,
     )  # fmt: skip
     others = [kind(context) for kind in kinds]
     return [*others, TasksPart(context, found), *found, BestPart(context)]

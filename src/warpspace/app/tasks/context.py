@@ -82,7 +82,8 @@ class Context:
         """Apply a pure update to the present state. For the session."""
 
         def own(state: AppState) -> AppState:
-            found = update(replace(state, page=self.unfolded))
+            page = self.unfolded
+            found = update(state if state.page is page else replace(state, page=page))
             self.unfolded = found.page
             return found
 

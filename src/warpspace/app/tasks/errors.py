@@ -185,21 +185,31 @@ def _row(
     row: Parameter, value: float, span: Span, effect: float, share: float, hint: str, *,
     active: bool,
 ) -> Markup:  # fmt: skip
-    key, name, text = row.key, f"errors:set.{row.key}", _shown(value)
+    html = _row_template(row, span, hint, active).format(
+        effect=number(effect) if active else "–", share=f"{100.0 * share:.1f}",
+        value=f"{value:.10g}", typed=spell_typed(value), text=_shown(value),
+    )  # fmt: skip
+    return Markup(html)  # noqa: S704 - escaped there
+
+
+@lru_cache(maxsize=128)
+def _row_template(row: Parameter, span: Span, hint: str, active: bool) -> str:
+    """Write a row with the places of the numbers that change while it is dragged."""
+    key, name, text = row.key, f"errors:set.{row.key}", Markup("{text}")
+    hint = f"{row.name}: {hint}. Drag, or type a number.".replace("{", "{{").replace("}", "}}")
     head = fill(
         '<div class="{kind}" id="ws-error-{key}" data-do="errors:row" data-value="{key}"'
         ' title="{symbol}, {words}: {of}"><span>{effect} µm</span><b>{key}</b> {words}</div>',
         kind="ws-error-head" if active else "ws-error-head off", key=key, symbol=row.symbol,
-        of=row.kind.value, words=row.name, effect=number(effect) if active else "–",
+        of=row.kind.value, words=row.name, effect=Markup("{effect}"),
     )  # fmt: skip
     return head + fill(
         '<div class="ws-effect"><i style="width:{share}%"></i></div>'
         '<div class="ws-error-set" title="{hint}">{slider}'
         '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
         ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
-        share=f"{100.0 * share:.1f}", key=key, name=name, typed=spell_typed(value), text=text,
-        hint=f"{row.name}: {hint}. Drag, or type a number.",
-        slider=slider(name, value, span.low, span.high, span.step, twin=f"box-{key}",
+        share=Markup("{share}"), key=key, name=name, typed=Markup("{typed}"), text=text, hint=hint,
+        slider=slider(name, "{value}", span.low, span.high, span.step, twin=f"box-{key}",
                       label=f"{key} {row.name}", text=f"{text} {row.unit}"),
         unit=row.unit,
     )  # fmt: skip

@@ -24,6 +24,7 @@ from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.design import allowed_words
 from warpspace.app.tasks.parts import Part
+from warpspace.field.grid import Grid
 from warpspace.geometry.surfaces import corners
 from warpspace.machine.axes import is_linear
 from warpspace.picture.mesh import isoline_labels
@@ -32,24 +33,39 @@ from warpspace.units import Array, spell_short
 
 
 class HeadPart(Part):
-    """Mean and max with the place of the latter, the limit, and the colour bar."""
+    """Mean and max with the place of the latter."""
 
     name = "head"
     follows = "at once"
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        words = subject_words(picture)
-        said: list[str] = [place_words(picture)]
-        if not picture.is_difference:
-            limit = f"{picture.state.specification.limit_um:g}"
-            said.append(_limit(*kept_words(picture), limit))
+        words, place = subject_words(picture), place_words(picture)
         head = fill(
-            '<h1>{numbers}</h1><div>{said}<span data-piece="head.allowed"></span></div>{words}'
+            '<h1>{numbers}</h1><div>{place}<span data-piece="head.kept"></span>'
+            '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
-            numbers=numbers_words(picture), said=Markup(" · ").join(filter(None, said)),
+            numbers=numbers_words(picture), place=place,
             words=tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY,
         )  # fmt: skip
-        return {"head": head, "legend": legend_html(picture)}
+        return {"head": head}
+
+
+class LegendPart(Part):
+    """The colour bar, and how much of the volume keeps the limit."""
+
+    name = "legend"
+    follows = "often"
+
+    def urgent(self, picture: LivePicture) -> object:
+        return picture.scale, picture.is_difference
+
+    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+        kept = EMPTY
+        if not picture.is_difference:
+            limit = f"{picture.state.specification.limit_um:g}"
+            kept = _limit(*kept_words(picture), limit)
+            kept = Markup(" · ") + kept if place_words(picture) else kept
+        return {"head.kept": kept, "legend": legend_html(picture)}
 
 
 @lru_cache(maxsize=64)
@@ -104,22 +120,16 @@ class RoomPart(Part):
 
 
 def _facts(picture: LivePicture) -> dict[str, Any]:
-    look, grid = picture.state.look, picture.grid
+    look = picture.state.look
     isolines = look.isolines and look.surface != "grid"
     bounds = [one.grid.bounds_mm for one in picture.slices]
     return {
         "axes": _words(Identity(axis_labels(picture))),
-        "triad": [
-            {"name": name if name and is_linear(name) else "xyz"[k],
-             "way": [float(k == i) * float(grid.ways[k]) for i in range(3)]}
-            for k, name in enumerate(grid.axes)
-        ],
+        **_still(Identity(picture.grid)),
         "bars": look.bars,
         "solid": look.surface in ("surface", "cut"),
         "factor": picture.exaggeration,
         "spelt": spell_factor(picture.exaggeration),
-        "perMm": SCENE_PER_MM,
-        "centre": _scene(grid.bounds_mm.mean(axis=0)),
         "corners": [_scene(at) for at in picture.drawn_mm.reshape(-1, 3)[corners(picture.shape)]],
         "marks": list(map(_word, point_labels(picture))),
         "labels": [
@@ -135,8 +145,23 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
     }  # fmt: skip
 
 
+@lru_cache(maxsize=32)
+def _still(of: Identity) -> dict[str, Any]:
+    """Say what stays the same while errors change."""
+    grid: Grid = of.thing
+    return {
+        "triad": [
+            {"name": name if name and is_linear(name) else "xyz"[k],
+             "way": [float(k == i) * float(grid.ways[k]) for i in range(3)]}
+            for k, name in enumerate(grid.axes)
+        ],
+        "perMm": SCENE_PER_MM,
+        "centre": _scene(grid.bounds_mm.mean(axis=0)),
+    }  # fmt: skip
+
+
 def _scene(point_mm: Array) -> list[float]:
-    return [round(float(value) * SCENE_PER_MM, 4) for value in point_mm]
+    return [round(value * SCENE_PER_MM, 4) for value in point_mm.tolist()]
 
 
 @lru_cache(maxsize=32)

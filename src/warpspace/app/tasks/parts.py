@@ -15,14 +15,15 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.context import Context
 
-Follows = Literal["at once", "in a pause", "at rest"]
+Follows = Literal["at once", "often", "in a pause", "at rest"]
+"""With every picture of a drag; a few times a second; when the hand pauses; when it has left."""
 
 
 class Part:
     """A part of the page."""
 
     name: str = ""  # its events begin with it
-    follows: ClassVar[Follows] = "in a pause"  # at once: with every picture of a drag
+    follows: ClassVar[Follows] = "in a pause"
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -34,6 +35,10 @@ class Part:
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what its pieces are made of; as long as that is equal they are not made anew."""
         return (id(picture),)
+
+    def urgent(self, picture: LivePicture) -> object:
+        """Give what makes pieces that follow "often" follow at once where it has changed."""
+        return None
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         """Give HTML by the name of its place."""
