@@ -8,7 +8,7 @@ an array over these.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -96,12 +96,12 @@ class ErrorBasis:
             self._combine(amplitudes, self.position),
             self._combine(amplitudes, self.orientation)
             if orientation
-            else np.broadcast_to(np.nan, self.nominal_mm.shape),
+            else _unknown(self.nominal_mm.shape),
         )
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:
         flat = response.reshape(len(self.keys), self.nominal_mm.size)
-        used = np.flatnonzero(amplitudes)
+        (used,) = amplitudes.nonzero()
         if 2 * len(used) > len(self.keys):
             return (amplitudes @ flat).reshape(self.nominal_mm.shape)
         if not len(used):
@@ -117,6 +117,11 @@ class ErrorBasis:
         """Split the position error at one node into the parameters, [K, 3], µm."""
         chosen = self.position[(slice(None), *index)]
         return amplitudes[:, None] * chosen.reshape(len(self.keys), 3)
+
+
+@lru_cache(maxsize=32)
+def _unknown(shape: tuple[int, ...]) -> Array:
+    return np.broadcast_to(np.nan, shape)
 
 
 # They are a shift along the axes of the workpiece frame and a small rotation about them, so that

@@ -45,5 +45,13 @@
       this.moves++;
       window.__viserMutable.requestRender?.();
     },
+    // as viser does what its own message says
+    move(name, at) {
+      const pose = window.__viserMutable?.nodePoseData[name];
+      if (!pose) return;
+      pose.position = at;
+      if (pose.poseUpdateState !== "waitForMakeObject") pose.poseUpdateState = "needsUpdate";
+      window.__viserMutable.requestRender?.();
+    },
   };
 })();

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.statistics import axes_at, share_below, volume_mean, volume_statistics
+from warpspace.analysis.statistics import P95, axes_at, share_below, share_within, volume_mean
 from warpspace.app.browser.html import fill, join, lowered, number, tag
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import axis_labels, point_labels
@@ -58,15 +58,17 @@ def marks(picture: LivePicture) -> list[Mark]:
 
 def marked(picture: LivePicture) -> dict[str, float]:
     """Name what is marked on the colours: statistics of what is coloured, and the limit."""
-    found, values = picture.statistics, picture.values
+    field, values = picture.field, picture.values
     if picture.component != "norm":
         # the length of the error says nothing of a signed component: its own ends do
         mean = volume_mean(values, picture.grid)
         return {"min": float(values.min()), "mean": mean, "max": float(values.max())}
     if picture.tilts:  # summarised as the length of the position error is
-        tilt = picture.field.orientation_urad
-        found = volume_statistics(ErrorField(picture.field.nominal_mm, tilt, tilt), picture.grid)
-    marks = {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
+        tilt = field.orientation_urad
+        field = ErrorField(field.nominal_mm, tilt, tilt)
+    norm = field.norm_um
+    marks = {"mean": volume_mean(norm, picture.grid), "P95": share_within(field, P95),
+             "max": float(norm.max())}  # fmt: skip
     if not picture.tilts and not picture.is_difference:
         marks["limit"] = picture.state.specification.limit_um
     return marks
@@ -92,19 +94,19 @@ def legend_html(picture: LivePicture) -> Markup:
         label=lowered(scale.label), unit=scale.unit, leads=leads, names=names,
         words=f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
         + ", ".join(mark.words for mark in named if mark.name),
-        colours=",".join(_stops(scale)),
+        colours=_stops(scale),
     )  # fmt: skip
 
 
 @lru_cache(maxsize=16)
-def _stops(scale: ColourScale) -> list[str]:
+def _stops(scale: ColourScale) -> str:
     limit = getattr(scale, "limit", None)
     if limit is None:
         colours = scale.colours(np.linspace(scale.low, scale.high, _STOPS)).tolist()
-        return [f"rgb({r},{g},{b})" for r, g, b in colours]
+        return ",".join(f"rgb({r},{g},{b})" for r, g, b in colours)
     at = 100.0 * min(limit / scale.high, 1.0)  # two colours that meet there
     colours = scale.colours(np.array([0.0, 2.0 * limit])).tolist()
-    return [f"rgb({r},{g},{b}) {at:.1f}%" for r, g, b in colours]
+    return ",".join(f"rgb({r},{g},{b}) {at:.1f}%" for r, g, b in colours)
 
 
 # --- The heading ----------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 
 from viser import ClientHandle
 
+from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import around, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
 from warpspace.app.drawing.shapes import Nodes, Shape, Shapes, ball, lines, mesh
@@ -58,10 +59,11 @@ def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **more: object) -> S
 class MovingLayer:
     """Everything around the box, which may also move by itself: the session turns it on."""
 
-    def __init__(self, client: ClientHandle, picture: LivePicture) -> None:
+    def __init__(self, client: ClientHandle, page: Page, picture: LivePicture) -> None:
         self._client = client
         self._picture = picture
-        self._around, self._ghost, self._turning = (Nodes(client.scene) for _ in range(3))
+        self._around = Nodes(client.scene, page)
+        self._ghost, self._turning = Nodes(client.scene), Nodes(client.scene)
         self._ghost_of: object = None
         self.position: dict[str, float] = {}  # of the played axis, degrees; none where it stands
         self.moved: Callable[[], None] = lambda: None
@@ -80,6 +82,9 @@ class MovingLayer:
         self._around.draw(around(picture))
         self._draw_ghost(picture)
         self._draw_turning()
+
+    def rest(self, picture: LivePicture) -> None:  # noqa: ARG002
+        self._around.rest()
 
     def _draw_ghost(self, picture: LivePicture) -> None:
         """Errors do not move the ghost; it is not drawn beside the machine itself."""

@@ -10,7 +10,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
 
-OFTEN_S = 0.2  # between two writings of what follows often
+OFTEN_S = 0.25  # between two writings of what follows often
 LONGEST_PAUSE_S = 2.0  # what follows in a pause lags no longer than this while a slider is dragged
 REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 

@@ -181,7 +181,7 @@ class Session:
         self._around_at = None
         context = self.context
         with context.page.as_one():
-            context.stage = MovingLayer(self._client, picture)
+            context.stage = MovingLayer(self._client, context.page, picture)
             self.display.add(picture, [context.stage])
             context.page.call("stage", "open")
 

@@ -43,7 +43,8 @@ def changes(old: AppState, new: AppState) -> dict[str, str]:
 def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[str, str]]:
     was, now, known = getattr(old, group), getattr(new, group), leaves(new)
     if isinstance(now, Mapping):  # of many entries, most of which stay
-        paths = [f"{group}.{key}" for key in {**was, **now} if was.get(key) is not now.get(key)]
+        keys = [key for key, value in now.items() if was.get(key) is not value]
+        paths = [f"{group}.{key}" for key in (*keys, *(was.keys() - now.keys()))]
     else:
         paths = [path for path in known if path.partition(".")[0] == group]
     for path in paths:

@@ -203,7 +203,7 @@ def _row_template(row: Parameter, span: Span, hint: str, active: bool) -> str:
         kind="ws-error-head" if active else "ws-error-head off", key=key, symbol=row.symbol,
         of=row.kind.value, words=row.name, effect=Markup("{effect}"),
     )  # fmt: skip
-    return head + fill(
+    body = fill(
         '<div class="ws-effect"><i style="width:{share}%"></i></div>'
         '<div class="ws-error-set" title="{hint}">{slider}'
         '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
@@ -213,6 +213,7 @@ def _row_template(row: Parameter, span: Span, hint: str, active: bool) -> str:
                       label=f"{key} {row.name}", text=f"{text} {row.unit}"),
         unit=row.unit,
     )  # fmt: skip
+    return f"{head}{body}"
 
 
 def _shown(value: float) -> str:
