@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -91,19 +92,14 @@ class Page:
         return name
 
 
+@dataclass(frozen=True)
 class App:
-    def __init__(
-        self,
-        url: str,
-        process: psutil.Process,
-        log: Path | None = None,
-        *,
-        headers: Mapping[str, str] | None = None,
-        trust: ssl.SSLContext | None = None,
-        address: tuple[str, int] | None = None,
-    ) -> None:
-        self.url, self.process, self.path = url, process, log
-        self.headers, self.trust, self.address = dict(headers or {}), trust, address
+    url: str
+    process: psutil.Process
+    path: Path | None = None  # of its log
+    headers: Mapping[str, str] = field(default_factory=dict)
+    trust: ssl.SSLContext | None = None
+    address: tuple[str, int] | None = None
 
     @property
     def memory_mb(self) -> float:

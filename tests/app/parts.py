@@ -17,10 +17,18 @@ LIVE = LiveModel()
 
 
 class Nobody(SimpleNamespace):
-    """The context of a page that is not there."""
+    """The context of a page that is not there; what it posts and tells a user goes into lists."""
+
+    is_still, shown, stage = True, None, None
 
     def __init__(self, **given: Any) -> None:
-        super().__init__(jobs=set(), is_still=True, **given)
+        posted, told = [], []
+        super().__init__(
+            jobs=set(), scenes=SceneList({}), services=Services(), posted=posted, told=told,
+            act=lambda do: do(), renew=lambda _: None, post=posted.append,
+            notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
+        )  # fmt: skip
+        vars(self).update(given)
 
     def __getattr__(self, name: str) -> Any:  # the state is that of its store, unless one is set
         if name == "state":
@@ -32,11 +40,10 @@ class Alone:
     """One part on a page that is not there, with what it has the page do."""
 
     def __init__(self, kind: Any, state: AppState, *more: Any, **given: Any) -> None:
-        given = {"scenes": SceneList({}), "services": Services()} | given
         self.said, self.sent, self.saved, self.called = [], [], [], []
         self.store = StateStore(state)
         self.context = Nobody(
-            act=self._act, renew=lambda _: None, store=self.store, shown=LIVE.evaluate(state),
+            act=self._act, store=self.store, shown=LIVE.evaluate(state),
             notify=lambda *words: self.said.append(words), post=self.store.apply, reported=[],
             send=lambda *event: self.sent.append(event), closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
@@ -68,14 +75,8 @@ class Alone:
 
 
 def lone_part(kind: Any, name: str = "") -> Any:
-    """Build a part for nobody; what it posts and tells a user goes into lists of its context."""
-    posted, told = [], []
-    context = Nobody(
-        act=lambda do: do(), renew=lambda _: None, post=posted.append, posted=posted, told=told,
-        notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
-        scenes=SceneList({}), services=Services(), shown=None, stage=None,
-    )  # fmt: skip
-    return kind(context, *(one for one in entries() if one.name == name))
+    """Build a part for nobody, of an analysis where one is named."""
+    return kind(Nobody(), *(one for one in entries() if one.name == name))
 
 
 def wait(part: Any) -> None:

@@ -4,7 +4,6 @@ import csv
 import html
 import json
 import re
-import struct
 import threading
 from dataclasses import replace
 from io import BytesIO, StringIO
@@ -13,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import glb
 from offline import EVIL, opened_offline, wait_for_the_map
 from warpspace.app.documents.files import exported_words, file_stem, shown_sides
 from warpspace.app.documents.legend import (
@@ -50,10 +50,6 @@ def picture_of(shown, state=BOTH):
     return LIVE.evaluate(put(state, "comparison.shown", shown))
 
 
-def read_glb(data):
-    return json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])
-
-
 def rows_of(picture):
     """Rows of the exported CSV, once their errors are those that are drawn."""
     text = write_export(picture, ".csv").decode()
@@ -75,7 +71,7 @@ def test_csv_holds_the_numbers_that_are_drawn(shown):
 @pytest.mark.parametrize("shown", WORDS)
 def test_glb_has_the_title_the_factor_and_the_shared_colours(shown):
     picture = picture_of(shown)
-    extras = read_glb(write_export(picture, ".glb"))["asset"]["extras"]
+    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
     assert extras["settings"]["exaggeration"] == picture.exaggeration
     assert extras["colours"]["low"] == picture.scale.low
     assert extras["colours"]["high"] == picture.scale.high
@@ -116,7 +112,7 @@ def tilted(top=None):
 @pytest.mark.parametrize("top", [None, 7.0])
 def test_glb_has_the_tilts_and_the_range_that_are_coloured(top):
     picture = tilted(top)
-    extras = read_glb(write_export(picture, ".glb"))["asset"]["extras"]
+    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
     assert extras["settings"]["coloured"] == "tool-orientation error"
     assert extras["colours"]["high"] == (picture.scale.high if top is None else top)
     assert extras["colours"]["unit"] == "µrad"
@@ -186,7 +182,7 @@ def test_conditions_name_what_is_excluded_and_the_range():
 def test_exports_say_the_conditions():
     picture = fixed(without("EA0Z"))
     assert rows_of(picture)[0]["conditions"] == "excluded: EA0Z; range fixed 0–50 µm"
-    extras = read_glb(write_export(picture, ".glb"))["asset"]["extras"]
+    extras = glb.opened(write_export(picture, ".glb"))[0]["asset"]["extras"]
     assert extras["settings"]["conditions"] == ["excluded: EA0Z", "range fixed 0–50 µm"]
     assert extras["statistics"]["max_at_axes"]["Z"] in (-480.0, -80.0)
     footer = build_offline_html(picture).partition("<footer>")[2]

@@ -143,9 +143,7 @@ def watched(monkeypatch):
     """Jobs, with what they show and report."""
     monkeypatch.setattr(jobs, "TICK_S", -1.0)
     bars, failures = list[str](), list[Exception]()
-    found = Jobs(
-        Part(Nobody(act=lambda do: do())), lambda: bars.append(str(found.html())), failures.append
-    )
+    found = Jobs(Part(Nobody()), lambda: bars.append(str(found.html())), failures.append)
     return found, bars, failures
 
 

@@ -190,8 +190,8 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     assert "Searching" in html_of(part)
     wait(part)
     html = html_of(part)
-    for words in ("EA0Z 33.9 → 30.0 µrad", "51.7 → 46.1 µm", "30.9 → 28.3 µm"):
-        assert words in html
+    assert "EA0Z 33.9 → 30.0 µrad" in html
+    assert "30.9 → 28.3 µm" in html
     applied = part.take(START, "apply", "0")
     assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(46.09, abs=0.01)
     assert applied.comparison.b is not None
