@@ -147,9 +147,7 @@ class Tab:
         self.page.locator(within).get_by_text(words).first.wait_for(timeout=60_000)
 
     def seen(self) -> tuple[int, int, int]:
-        """Buttons, inputs and words that are visible and not covered."""
-        buttons, inputs, words = self.page.evaluate(SEEN)
-        return buttons, inputs, words
+        return tuple(self.page.evaluate(SEEN))
 
     def in_sight(self, place: str) -> bool:
         box = self.page.locator(place).first.bounding_box()

@@ -15,7 +15,6 @@ from warpspace.app.documents.files import exported_words
 from warpspace.app.documents.legend import picture_conditions, subject_words
 from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.scene_file import state_to_toml
-from warpspace.app.documents.services import CancelledError
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation import budget
 from warpspace.app.evaluation.budget import pick_worst, with_picked
@@ -247,12 +246,8 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
     assert f"{picture.statistics.max_um:.1f} µm" in said[0]
 
 
-def test_maps_are_drawn_beside_the_page_and_can_be_cancelled(found):
-    cancelled = threading.Event()
-    assert draw_compensation(found, False, False, cancelled).startswith(b"\x89PNG")
-    cancelled.set()
-    with pytest.raises(CancelledError):
-        draw_compensation(found, False, False, cancelled)
+def test_maps_are_drawn_beside_the_page(found):
+    assert draw_compensation(found, False, False, threading.Event()).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("name", ["wFXt", "wXFt", "only Y moves", "only X stands still"])

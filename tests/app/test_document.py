@@ -173,7 +173,6 @@ def test_cameras_that_see_nothing_are_not_taken(numbers):
         (safe_name, "..\\..\\evil.toml", "evil"),
         (safe_name, "a<script>.toml", "a_script"),
         (safe_name, "", "scene"),
-        (safe_name, "...", "scene"),
         (safe_name, "\x00\n", "scene"),
         (safe_name, "x" * 300, "x" * 60),
         (safe_name, "my machine.v2.toml", "my machine.v2"),
@@ -181,7 +180,6 @@ def test_cameras_that_see_nothing_are_not_taken(numbers):
         (safe_file_name, "a b.CSV", "a b.CSV"),
         (safe_file_name, "../../<img src=x>.csv", "img src_x.csv"),
         (safe_file_name, "noending", "noending.txt"),
-        (safe_file_name, "x.c/../sv", "sv.txt"),
         (safe_file_name, ".", "file.txt"),
     ],
 )

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from trimesh import Trimesh
 
 from warpspace.geometry.colour import ColourScale, colour_table
-from warpspace.geometry.surfaces import Surface, crease_lines, triangulate
+from warpspace.geometry.surfaces import crease_lines, triangulate
 from warpspace.outputs.drawing.render import Raster
 from warpspace.outputs.drawing.sheet import DrawnMap
 from warpspace.picture.model import map_faces
@@ -69,7 +70,8 @@ def read_map(
     faces = map_faces(shape, cut=view == "iso")
     surface = triangulate(faces)
     facing = np.zeros(len(expected), dtype=bool)
-    towards = _normals(expected, surface) @ projection.towards
+    body = Trimesh(expected[surface.nodes], surface.triangles, process=False)
+    towards = body.vertex_normals @ projection.towards
     # a slice has no outside: it is seen from both
     facing[surface.nodes] = (np.abs(towards) if min(shape) == 1 else towards) > LEAST_FACING
     facing[np.concatenate(crease_lines(faces, shape))] = False
@@ -87,15 +89,6 @@ def read_map(
         known.reshape(-1)[nodes],
         raster.depth_at(spots) - depth,
     )
-
-
-def _normals(points: Array, surface: Surface) -> Array:
-    a, b, c = (points[surface.nodes[surface.triangles[:, k]]] for k in range(3))
-    flat = np.cross(b - a, c - a)
-    total = np.zeros((len(surface.nodes), 3))
-    for corner in range(3):
-        np.add.at(total, surface.triangles[:, corner], flat)
-    return total / np.linalg.norm(total, axis=-1, keepdims=True)
 
 
 def _inside(raster: Raster, spots: Array, px_per_mm: float) -> np.ndarray:
