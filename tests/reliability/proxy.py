@@ -15,11 +15,11 @@ from http.cookies import SimpleCookie
 from pathlib import Path
 
 from page_client import App, Tab, free_port, running_app, wait_for
+from reliability.doors import TOKEN, UPGRADE
 from reliability.outcome import Outcome
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "deployment" / "nginx.conf"
 NAME = "review.example"
-TOKEN = "Zr4nV7qLx0pW2tKd9s"
 WHOLE = """
 daemon off; master_process off; pid {folder}/nginx.pid; error_log {folder}/error.log;
 events {{}}
@@ -173,13 +173,11 @@ def run(count: int) -> Outcome:
 
 
 def _try_doors(at: Site, faults: list[str]) -> None:
-    key = "AAAAAAAAAAAAAAAAAAAAAA=="
-    upgrade = {"Upgrade": "websocket", "Sec_WebSocket_Key": key, "Sec_WebSocket_Version": "13"}
     valid = f"/?token={TOKEN}"
     expected = {
         "no token": (ask(at), 403),
         "wrong token": (ask(at, f"/?token={TOKEN[::-1]}"), 403),
-        "no token for the socket": (ask(at, **upgrade), 403),
+        "no token for the socket": (ask(at, **UPGRADE), 403),
         "foreign origin": (ask(at, valid, Origin="https://evil.example"), 403),
         "origin without TLS": (ask(at, valid, Origin=f"http://{NAME}"), 403),
         "own origin": (ask(at, valid, Origin=f"https://{at.host}"), 200),

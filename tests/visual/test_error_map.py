@@ -1,9 +1,11 @@
 """Semantic tests of the error map: what is read off the picture is what the model says."""
 
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from products import pairwise
 from visual.reading import read_map
@@ -11,6 +13,7 @@ from warpspace import load_scene
 from warpspace.geometry.colour import component_values
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.figures.catalogue import draw_figure
+from warpspace.outputs.save import figure_bytes
 from warpspace.picture.model import evaluate_picture
 from warpspace.units import MM_PER_UM
 
@@ -103,12 +106,6 @@ def test_a_wrong_colour_map_is_noticed(truth, component):
 
 def test_the_png_holds_the_very_pixels(truth):
     """Where nothing is drawn over the body, the file has the renderer's colours."""
-    import io
-
-    from PIL import Image
-
-    from warpspace.outputs.save import figure_bytes
-
     drawing = draw_figure("error-map", [truth.scene], FigureSettings())
     drawn = drawing.maps[0]
     pixels = np.asarray(Image.open(io.BytesIO(figure_bytes(drawing, "png"))))
