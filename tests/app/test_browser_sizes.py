@@ -34,9 +34,12 @@ PROJECT = """points => {
   });
 }"""
 """Where points of the drawing are on the page, by three.js itself."""
-BARS = """() => Object.fromEntries([...document.querySelectorAll("[data-bar-scale]")].map(bar =>
-    [bar.dataset.barScale, [+bar.dataset.length,
-      bar.firstElementChild.getBoundingClientRect().width, bar.textContent.trim()]]))"""
+BARS = """() => ["mm", "um"].map(name => {
+  const bar = document.querySelector(`[data-bar-scale=${name}]`);
+  const { width } = bar.firstElementChild.getBoundingClientRect();
+  return [+bar.dataset.length, width, bar.textContent.trim()];
+})"""
+"""What the bars of lengths and of errors stand for, mm and µm, their pixels and words."""
 
 
 def overlap(a, b):
@@ -126,22 +129,16 @@ def bars_agree(tab):
         )
 
     def agree():
-        (mm, mm_px, _), (um, um_px, _) = bars_of(tab)
+        (mm, mm_px, _), (um, um_px, _) = tab.page.evaluate(BARS)
         wanted = [pixels(mm), pixels(um * 1e-3 * PICTURE.exaggeration)]
         return [mm_px, um_px] == pytest.approx(wanted, abs=0.1)
 
     # bars follow the camera with the next frame, for which software rendering takes its time
     tab.until(agree)
-    (mm, mm_px, mm_text), (um, um_px, um_text) = bars_of(tab)
+    (mm, mm_px, mm_text), (um, um_px, um_text) = tab.page.evaluate(BARS)
     assert min(mm_px, um_px) > 20
     assert mm_text == f"{mm:g} mm geometry"
     assert um_text == f"{um:g} µm error, drawn ×1000"
-
-
-def bars_of(tab):
-    """Length, pixels and words of the bar of lengths and of that of errors."""
-    bars = tab.page.evaluate(BARS)
-    return bars["mm"], bars["um"]
 
 
 VIEWS = {"front": (0, -1, 0), "right": (1, 0, 0), "top": (0, 0, 1), "iso": None}

@@ -100,8 +100,6 @@ X = [-275, 275]
 Y = [-225, 225]
 Z = [-480, -80]
 [errors]
-EXX = { table2 = { axes = ["X", "Z"], X = [-275, 275], Z = [-480, -80], values = [
-  [0, 4], [3, 9]] } }
 EYX = { forward = { table = [[-275, 1], [275, 3]] }, backward = { ramp = 2 } }
 [uncertainty]
 EYX = 0.4
