@@ -71,15 +71,8 @@ def _summed_up(
 ) -> Statistics:
     worst = np.unravel_index(int(np.argmax(norm)), norm.shape)
     x, y, z = (float(value) for value in nominal[worst])
-    at = axes_at(axes, worst, norm.shape)
+    at = {name: float(np.broadcast_to(q, norm.shape)[worst]) for name, q in axes.items()}
     return Statistics(mean, rms, p95, float(norm[worst]), (x, y, z), at)
-
-
-def axes_at(
-    axes: Mapping[str, Array], node: tuple[np.intp, ...], shape: tuple[int, ...]
-) -> dict[str, float]:
-    """Give the positions of the axes at a node of a batch, mm or degrees."""
-    return {name: float(np.broadcast_to(q, shape)[node]) for name, q in axes.items()}
 
 
 def share_within(field: ErrorField, share: float) -> float:

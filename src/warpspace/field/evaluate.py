@@ -8,7 +8,7 @@ an array over these.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -96,7 +96,7 @@ class ErrorBasis:
             self._combine(amplitudes, self.position),
             self._combine(amplitudes, self.orientation)
             if orientation
-            else _unknown(self.nominal_mm.shape),
+            else np.broadcast_to(np.nan, self.nominal_mm.shape),
         )
 
     def _combine(self, amplitudes: Array, response: Array) -> Array:
@@ -117,11 +117,6 @@ class ErrorBasis:
         """Split the position error at one node into the parameters, [K, 3], µm."""
         chosen = self.position[(slice(None), *index)]
         return amplitudes[:, None] * chosen.reshape(len(self.keys), 3)
-
-
-@lru_cache(maxsize=32)
-def _unknown(shape: tuple[int, ...]) -> Array:
-    return np.broadcast_to(np.nan, shape)
 
 
 # They are a shift along the axes of the workpiece frame and a small rotation about them, so that

@@ -46,10 +46,6 @@ class TraceLines:
         """Where they are drawn, [T, n, 3], mm."""
         return deform(self.nominal_mm, self.error_um, self.exaggeration)
 
-    def moved(self) -> list[TraceLine]:
-        """List those that an error moves."""
-        return [line for line in self.each() if is_moved(line)] if np.any(self.error_um) else []
-
     def each(self) -> Iterator[TraceLine]:
         for number, trace in enumerate(self.group.traces):
             yield TraceLine(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.statistics import P95, axes_at, share_below, share_within, volume_mean
+from warpspace.analysis.statistics import P95, share_below, share_within, volume_mean
 from warpspace.app.browser.html import fill, join, lowered, number, tag
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import axis_labels, point_labels
@@ -16,7 +16,6 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.table import table_words
 from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
-from warpspace.field.grid import Grid
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture import words
 from warpspace.picture.comparison import conditions_of_both
@@ -127,8 +126,8 @@ def place_words(picture: LivePicture) -> str:
 
 @lru_cache(maxsize=64)
 def _node_words(scene: Identity, grid: Identity, node: int) -> str:
-    of: Grid = grid.thing
-    at = axes_at(of.coordinates, np.unravel_index(node, of.shape), of.shape)
+    shape, axes = grid.thing.shape, grid.thing.coordinates
+    at = {name: float(np.broadcast_to(q, shape).flat[node]) for name, q in axes.items()}
     axes = words.own_axes(scene.thing, at)
     return f"at {words.list_axes(axes)}" if axes else ""
 

@@ -83,9 +83,6 @@ class MovingLayer:
         self._draw_ghost(picture)
         self._draw_turning()
 
-    def rest(self, picture: LivePicture) -> None:  # noqa: ARG002
-        self._around.rest()
-
     def _draw_ghost(self, picture: LivePicture) -> None:
         """Errors do not move the ghost; it is not drawn beside the machine itself."""
         state = picture.state

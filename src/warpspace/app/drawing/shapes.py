@@ -41,15 +41,11 @@ Shapes = Mapping[str, Shape | None]
 
 
 class Nodes:
-    """Nodes of a scene, by name: added when first drawn, then changed in place or hidden.
-
-    With a page, places of nodes are sent by its script; what viser holds follows with `rest`.
-    """
+    """Nodes of a scene, by name: added when first drawn, then changed in place or hidden."""
 
     def __init__(self, scene: SceneApi, page: Page | None = None) -> None:
         self._scene, self._page = scene, page
         self._drawn: dict[str, tuple[Any, Shape]] = {}
-        self._moved: set[str] = set()  # since the last rest
 
     def draw(self, shapes: Shapes) -> None:
         """Draw these shapes and hide all others; what has not changed is not sent."""
@@ -66,23 +62,13 @@ class Nodes:
             return getattr(self._scene, shape.add)(name, **shape.stays, **shape.follows)
         handle, held = known
         for word, value in shape.follows.items():
-            if value is held.follows[word]:
-                continue
-            if word == "position" and self._page is not None:
-                # viser's own message takes the server ten times as long
+            if word == "position" and self._page is not None:  # viser takes ten times as long
                 self._page.run_script(f'warpspaceMesh.move("{name}",{value.tolist()});')
-                self._moved.add(name)
-            else:
+            elif value is not held.follows[word]:
                 setattr(handle, word, value)
         if not handle.visible:
             handle.visible = True
         return handle
-
-    def rest(self) -> None:
-        """Have viser hold where the page has nodes."""
-        for handle, shape in map(self._drawn.__getitem__, self._moved):
-            handle.position = shape.follows["position"]
-        self._moved.clear()
 
 
 def _same(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:

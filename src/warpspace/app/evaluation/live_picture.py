@@ -10,7 +10,7 @@ from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.bench import BenchPicture, bench_picture
 from warpspace.app.state.app_state import AppState
 from warpspace.picture.model import Picture, picture_size_mm
-from warpspace.picture.traces import TraceLine, TraceLines, name_trace
+from warpspace.picture.traces import TraceLine, TraceLines, is_moved, name_trace
 from warpspace.units import Array
 
 
@@ -66,7 +66,8 @@ class LivePicture(Picture):
     def moved_traces(self) -> Mapping[str, TraceLine]:
         if not self.state.shown.traces:
             return {}
-        return {name_trace(one.trace): one for of in self.traces for one in of.moved()}
+        lines = (one for of in self.traces if of.error_um.any() for one in of.each())
+        return {name_trace(one.trace): one for one in lines if is_moved(one)}
 
     @property
     def drawn_state(self) -> AppState:

@@ -10,7 +10,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
 
-OFTEN_S = 0.25  # between two writings of what follows often
+OFTEN_S = 0.4  # between two writings of what follows often
 LONGEST_PAUSE_S = 2.0  # what follows in a pause lags no longer than this while a slider is dragged
 REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 
@@ -26,8 +26,7 @@ class Display:
         self.parts: dict[str, Part] = {}
         self._shown: dict[Part, object] = {}
         self._following: list[Part] = []
-        self._urgent: dict[Part, object] = {}
-        self._often_at = 0.0
+        self._often: dict[Part, tuple[float, object]] = {}
         self._waiting: deque[Part] = deque()
         self._noted_at = 0.0
         self._changed_at: float | None = None  # since when parts wait for a pause
@@ -50,25 +49,24 @@ class Display:
             layer.show(picture)
         if anew:
             self._shown.clear()
-        now = time.monotonic()
-        often = now - self._often_at >= OFTEN_S
-        self._often_at = now if often else self._often_at
         # what is in sight changes with what is open on the page
         known = self._context.shown
         same = known is not None and known.state.page is picture.state.page and not anew
         parts = self._following if same else self.parts.values()
-        self._write([one for one in parts if self._is_due(one, picture, often)], picture)
+        self._write([one for one in parts if self._is_due(one, picture)], picture)
         self._note(picture)
 
-    def _is_due(self, part: Part, picture: LivePicture, often: bool) -> bool:
-        is_shown = self._shown.get(part) is not None
+    def _is_due(self, part: Part, picture: LivePicture) -> bool:
         # a part that has just come into sight is not kept waiting, nor is one that has left it
-        if part.is_seen(picture.state) != is_shown:
+        if part.is_seen(picture.state) != (self._shown.get(part) is not None):
             return True
-        if not is_shown or part.follows != "often":
-            return is_shown and part.follows == "at once"
-        before, self._urgent[part] = self._urgent.get(part), part.urgent(picture)
-        return often or before != self._urgent[part]
+        if part.follows != "often":
+            return part.follows == "at once"
+        now, urgent = time.monotonic(), part.depends(picture)[0]
+        at, before = self._often.get(part, (0.0, None))
+        is_due = now - at >= OFTEN_S or urgent != before
+        self._often[part] = (now, urgent) if is_due else (at, before)
+        return is_due
 
     def _note(self, picture: LivePicture) -> None:
         self._context.shown = picture

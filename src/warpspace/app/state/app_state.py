@@ -7,10 +7,9 @@ changed.
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.state.leaf import Identity, Span, described, error_names, said
+from warpspace.app.state.leaf import Span, described, error_names, said
 from warpspace.app.state.look import (
     Look,
     MachineLook,
@@ -348,8 +347,9 @@ class AppState:
 
     def view(self, loop: Loop | None = None) -> View:
         """Give the view through a loop, the present one by default, at the present positions."""
-        of = Identity(self.scene), Identity(self.positions)
-        return _view(*of, self.placed, loop or self.loop)
+        workspace = self.scene.workspace.moved(self.positions)
+        scene = replace(self.scene, placed=self.placed, workspace=workspace)
+        return scene.view(loop or self.loop)
 
     def noted(self, *notes: str) -> "AppState":
         """Say what could not be taken as it was given; an empty note is none."""
@@ -418,12 +418,6 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         tolerances=scene.tolerances,
     )
     return replace(state, **changes)
-
-
-@lru_cache(maxsize=64)
-def _view(scene: Identity, positions: Identity, placed: bool, loop: Loop) -> View:
-    workspace = scene.thing.workspace.moved(positions.thing)
-    return replace(scene.thing, placed=placed, workspace=workspace).view(loop)
 
 
 def start_loop(scene: Scene) -> Loop:

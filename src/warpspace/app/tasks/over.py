@@ -24,7 +24,6 @@ from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.design import allowed_words
 from warpspace.app.tasks.parts import Part
-from warpspace.field.grid import Grid
 from warpspace.geometry.surfaces import corners
 from warpspace.machine.axes import is_linear
 from warpspace.picture.mesh import isoline_labels
@@ -56,8 +55,8 @@ class LegendPart(Part):
     name = "legend"
     follows = "often"
 
-    def urgent(self, picture: LivePicture) -> object:
-        return picture.scale, picture.is_difference
+    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+        return (picture.scale, id(picture))
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         kept = EMPTY
@@ -120,12 +119,18 @@ class RoomPart(Part):
 
 
 def _facts(picture: LivePicture) -> dict[str, Any]:
-    look = picture.state.look
+    look, grid = picture.state.look, picture.grid
     isolines = look.isolines and look.surface != "grid"
     bounds = [one.grid.bounds_mm for one in picture.slices]
     return {
         "axes": _words(Identity(axis_labels(picture))),
-        **_still(Identity(picture.grid)),
+        "triad": [
+            {"name": name if name and is_linear(name) else "xyz"[k],
+             "way": [float(k == i) * way for i in range(3)]}
+            for k, (name, way) in enumerate(zip(grid.axes, grid.ways.tolist(), strict=True))
+        ],
+        "perMm": SCENE_PER_MM,
+        "centre": _scene(grid.bounds_mm.mean(axis=0)),
         "bars": look.bars,
         "solid": look.surface in ("surface", "cut"),
         "factor": picture.exaggeration,
@@ -142,21 +147,6 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
              "low": _scene(low), "high": _scene(high)}
             for low, high in bounds
         ],
-    }  # fmt: skip
-
-
-@lru_cache(maxsize=32)
-def _still(of: Identity) -> dict[str, Any]:
-    """Say what stays the same while errors change."""
-    grid: Grid = of.thing
-    return {
-        "triad": [
-            {"name": name if name and is_linear(name) else "xyz"[k],
-             "way": [float(k == i) * float(grid.ways[k]) for i in range(3)]}
-            for k, name in enumerate(grid.axes)
-        ],
-        "perMm": SCENE_PER_MM,
-        "centre": _scene(grid.bounds_mm.mean(axis=0)),
     }  # fmt: skip
 
 

@@ -16,7 +16,8 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.context import Context
 
 Follows = Literal["at once", "often", "in a pause", "at rest"]
-"""With every picture of a drag; a few times a second; when the hand pauses; when it has left."""
+"""With every picture of a drag; a few times a second, and where the first of what they depend on
+has changed; when the hand pauses; when it has left."""
 
 
 class Part:
@@ -35,10 +36,6 @@ class Part:
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         """Give what its pieces are made of; as long as that is equal they are not made anew."""
         return (id(picture),)
-
-    def urgent(self, picture: LivePicture) -> object:
-        """Give what makes pieces that follow "often" follow at once where it has changed."""
-        return None
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         """Give HTML by the name of its place."""
