@@ -1,7 +1,8 @@
 """The app's speed: serving, page, one slider move on the server, bytes of a move, click to pixels.
 
 Click to pixels is measured in a software-rendered Chromium beside a bare viser page: the app's own
-scene and text messages of two slider moves, recorded once and replayed by one callback. What is
+scene and text messages of two slider moves, recorded until all is at rest and replayed by one
+callback: the picture at once, what follows it as long after it as the app sent it. What is
 compared is our part, not the renderer of this machine. It is measured as the app starts, and with
 all views on: cut octant, isolines, arrows, bent machine.
 
@@ -12,6 +13,7 @@ until they are drawn, however faintly, is printed too.
 
 """
 
+import asyncio
 import contextlib
 import copy
 import io
@@ -46,8 +48,9 @@ from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.tree import put
 from warpspace.scene.library import load_scene
 
-PAGE: Any = {"width": 1600, "height": 900}
-MOVES = 15
+PAGE: Any = {"width": 1440, "height": 900}
+MOVES = 40
+TOGETHER_S = 0.003  # messages of one picture are queued within it
 CHROMIUM = [
     "--headless=new",
     "--no-sandbox",
@@ -136,7 +139,7 @@ class Recorder:
 
     def __init__(self) -> None:
         self.bytes_sent = 0
-        self.messages: list[Any] = []
+        self.messages: list[tuple[float, Any]] = []
         self.step_ms: list[float] = []
         self.recording = True
         send, queue = ServerConnection.send, WebsockClientConnection.queue_message
@@ -148,7 +151,7 @@ class Recorder:
 
         def note(connection: Any, message: Any) -> None:
             if self.recording:
-                self.messages.append(message)
+                self.messages.append((time.monotonic(), message))
             queue(connection, message)
 
         def timed(session: Session) -> None:
@@ -161,8 +164,8 @@ class Recorder:
         Session._follow = timed  # noqa: SLF001
 
     @contextlib.contextmanager
-    def into(self) -> Iterator[list[Any]]:
-        """Collect the messages of a while."""
+    def into(self) -> Iterator[list[tuple[float, Any]]]:
+        """Collect the messages of a while, each with when it was queued."""
         self.messages = []
         yield self.messages
         self.messages = []
@@ -185,10 +188,20 @@ def replayed(messages: list[Any]) -> Iterator[Any]:
             yield type(message)(source=script)
 
 
+def as_sent(messages: list[tuple[float, Any]]) -> list[tuple[float, list[Any]]]:
+    """Give the picture of a move, and later messages with how long after it they came, s."""
+    picture = next(at for at, m in messages if "warpspaceMesh.bend(" in getattr(m, "source", ""))
+    batches = [(0.0, [m for at, m in messages if at <= picture + TOGETHER_S])]
+    for at, message in messages:
+        if at > picture + TOGETHER_S:
+            batches.append((at - picture, [message]))
+    return [(at, list(replayed(batch))) for at, batch in batches]
+
+
 class BarePage:
     """A viser page with the same nodes and texts, one text box and nothing behind it."""
 
-    def __init__(self, start: list[Any], moves: list[list[Any]]) -> None:
+    def __init__(self, start: list[Any], moves: list[list[tuple[float, list[Any]]]]) -> None:
         with contextlib.redirect_stdout(io.StringIO()):
             self.server = viser.ViserServer(host="127.0.0.1", port=8580, verbose=False)
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
@@ -196,7 +209,12 @@ class BarePage:
         send_script_to_all(self.server, page_script())
         self.server.on_client_connect(lambda client: self.build(client, start, moves))
 
-    def build(self, client: viser.ClientHandle, start: list[Any], moves: list[list[Any]]) -> None:
+    def build(
+        self,
+        client: viser.ClientHandle,
+        start: list[Any],
+        moves: list[list[tuple[float, list[Any]]]],
+    ) -> None:
         """Replay the page and the first picture."""
         text = client.gui.add_text("EAX", "0")
         self.carrier = text._impl.uuid  # noqa: SLF001
@@ -214,7 +232,11 @@ class BarePage:
 
         @text.on_update
         async def _(_: object) -> None:
-            replay(moves[round(float(text.value) * 10) % 2])
+            done = 0.0
+            for at, messages in moves[round(float(text.value) * 10) % 2]:
+                await asyncio.sleep(at - done)
+                done = at
+                replay(messages)
 
 
 def open_page(browser: Browser, url: str, ready: str) -> Page:
@@ -233,10 +255,14 @@ def values(count: int) -> list[float]:
 
 
 def timed_move(page: Page, slider: str | None, value: float) -> float:
-    """Click to pixels of one move of a slider, ms."""
+    """Click to pixels of one move of a slider on a page that has nothing left to draw, ms."""
     page.bring_to_front()
     page.wait_for_timeout(SETTLED_MS)
-    return page.evaluate(MOVE, [slider, SLIDER, value])
+    page.evaluate(DRAWN)
+    taken = page.evaluate(MOVE, [slider, SLIDER, value])
+    page.wait_for_timeout(SETTLED_MS)
+    page.evaluate(DRAWN)  # the pages share one renderer: what is left would meet the other
+    return taken
 
 
 def all_views(state: AppState) -> AppState:
@@ -307,10 +333,9 @@ def browser_part(
         for value in (-0.1, -0.2):
             with recorder.into() as sent:
                 timed_move(ours, None, value)
-                ours.wait_for_timeout(30)
-                recorded.append(list(replayed(sent)))
+                recorded.append(as_sent(sent))
         recorder.recording = False
-        bare = BarePage(start, recorded)
+        bare = BarePage([message for _, message in start], recorded)
         plain = open_page(browser, bare.url, BARE_READY)
         recorder.step_ms.clear()
         app_ms: list[float] = []
@@ -319,7 +344,6 @@ def browser_part(
         for value in values(moves + 2):  # in turns, so that other load meets both
             before = recorder.bytes_sent
             app_ms.append(timed_move(ours, None, value))
-            ours.wait_for_timeout(SETTLED_MS)
             between = recorder.bytes_sent
             bare_ms.append(timed_move(plain, bare.carrier, value))
             app_bytes += between - before
