@@ -163,6 +163,8 @@ def subject_words(picture: LivePicture) -> list[str]:
 
 def _left_out(state: AppState) -> list[str]:
     active = state.active
+    if active is state.amplitudes:
+        return []
     return [key for key, value in state.amplitudes.items() if value != active[key]]
 
 

@@ -11,7 +11,7 @@ from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
 
 OFTEN_S = 0.4  # between two writings of what follows often
-LONGEST_PAUSE_S = 2.0  # what follows in a pause lags no longer than this while a slider is dragged
+LONGEST_PAUSE_S = 3.0  # what follows in a pause lags no longer than this while a slider is dragged
 REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
 
 
