@@ -198,6 +198,8 @@ def least_max(
     their error. It ends when the best x met is within `CLOSE_UM` of the lower bound, which is
     proof for all nodes at once.
     """
+    if len(indices) == 1:
+        return _least_max_of_one(volume, indices[0], bounds[indices[0]], give_up_um)
     from scipy.optimize import linprog
 
     chosen = volume.response[list(indices)]
@@ -229,6 +231,39 @@ def least_max(
             break
         change = np.clip(found.x[:size], *bounds[list(indices)].T)
     return Solution(indices, best, best_um)
+
+
+def _least_max_of_one(
+    volume: Volume, index: int, bounds: Array, give_up_um: float
+) -> Solution | None:
+    """Do the same along one error: the planes are lines, and two of them give the next place."""
+    error, way = volume.error_um, volume.response[index]
+    low, high = map(float, bounds)
+    products = np.stack([np.einsum("nc,nc->n", a, b) for a, b in
+                         ((error, error), (error, way), (way, way))])  # fmt: skip
+    ends: dict[bool, tuple[float, float, float]] = {}  # place, value, slope where it falls, rises
+    at, best, best_um = 0.0, 0.0, np.inf
+    for _ in range(MOST_STEPS):
+        squares = np.array([1.0, 2.0 * at, at * at]) @ products
+        worst = int(np.argmax(squares))
+        value = float(np.sqrt(max(squares[worst], 0.0)))
+        slope = float(products[1, worst] + at * products[2, worst]) / value if value else 0.0
+        if value < best_um:
+            best, best_um = at, value
+        ends[slope > 0.0] = at, value, slope
+        if slope == 0.0 or at == (low if slope > 0.0 else high):
+            floor_um = value
+        elif len(ends) < 2:
+            at, floor_um = (low if slope > 0.0 else high), -np.inf
+        else:
+            (x, falls, down), (y, rises, up) = ends[False], ends[True]
+            at = (rises - falls + down * x - up * y) / (down - up)
+            floor_um = falls + down * (at - x)
+        if floor_um > give_up_um - CLOSE_UM:
+            return None
+        if best_um - floor_um < CLOSE_UM:
+            break
+    return Solution((index,), np.array([best]), best_um)
 
 
 def _joined(indices: Sequence[int]) -> tuple[int, ...]:
