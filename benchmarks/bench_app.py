@@ -62,23 +62,17 @@ CHROMIUM = [
 ]
 SETTLED_MS = 1500  # until what follows at rest has been sent and drawn, too
 MOVE = """async ([uuid, name, value]) => {
-  const m = window.__viserMutable;
-  const mesh = () => {
-    let found = null;
-    const node = m.nodeRefFromName['/box/surface'];
-    if (node) node.traverse(o => { if (o.isMesh && o.geometry.attributes.color) found = o; });
-    return `${warpspaceMesh.moves} ${found && found.geometry.uuid}`;
-  };
-  const frame = () => new Promise(done => requestAnimationFrame(done));
-  const before = mesh();
+  const m = window.__viserMutable, { bend } = warpspaceMesh;
+  const bent = new Promise((done, fail) => {
+    warpspaceMesh.bend = function (...given) { bend.apply(this, given); done(); };
+    setTimeout(() => fail(new Error('nothing moved')), 60000);
+  });
   const start = performance.now();
   if (uuid) m.sendMessage({type: 'GuiUpdateMessage', uuid, updates: {value: String(value)}});
   else warpspacePage.send(name, value);
-  while (mesh() === before || mesh().endsWith('null')) {
-    await frame();
-    if (performance.now() - start > 60000) throw new Error('nothing moved');
-  }
-  await frame();
+  await bent;
+  warpspaceMesh.bend = bend;
+  // viser has drawn it in the same callback; reading waits until the renderer is done with it
   const gl = m.canvas.getContext('webgl2');
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   return performance.now() - start;
