@@ -47,6 +47,10 @@ MAX_KEYS = 50_000  # parts of all keys of a file together
 MAX_MARKS = 1_000_000
 MAX_TEXT = 4000  # characters of a title or description
 MAX_TRACES = 64
+MAX_NOTES = 500  # review notes of a scene
+MAX_NOTE_TEXT = 2000  # characters of a note, and of a reply
+MAX_NOTE_VIEW = 20_000  # characters of what was on the screen, as in a link
+MAX_REPLIES = 200  # of one note, and versions of it
 
 # --- meshes and robots: what is counted before anything is built ----------------------------------
 

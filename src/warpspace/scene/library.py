@@ -13,7 +13,7 @@ from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, sort_
 from warpspace.machine.curves.curve import MISSING, ErrorFunction, ValueReader
 from warpspace.machine.curves.simple import Constant
 from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME, Table
-from warpspace.machine.description import Machine, Range, build_machine
+from warpspace.machine.description import BODY_FRAMES, Machine, Range, build_machine
 from warpspace.machine.errors import (
     RUN_DIRECTIONS,
     UNKNOWN,
@@ -35,6 +35,7 @@ from warpspace.scene.machines import (
     read_bodies,
 )
 from warpspace.scene.model import Scene, scene_notes
+from warpspace.scene.notes import Note, is_changeable
 from warpspace.scene.save import Notation, read_errors
 from warpspace.scene.schema import Problems
 
@@ -103,6 +104,7 @@ SECTIONS = (
     "uncertainty",
     "measured",
     "view",
+    "notes",
 )
 STAND_IN = build_machine("wFXYZABCt")
 """Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
@@ -132,6 +134,7 @@ def parse_scene(
     errors, tolerances = document.errors(), document.tolerances()
     uncertainty, measured = document.uncertainties(), document.measurements()
     reference = _reference(view, workspace, problems)
+    review = _review(raw.get("notes", []), machine, problems)
     orders, lines = _conventions(convention or {}, machine, problems)
     if problems.lines:
         raise SceneError(source, problems.lines)
@@ -157,6 +160,7 @@ def parse_scene(
         notes=(*scene_notes(machine, workspace, errors), *body_notes(machine)),
         uncertainty=uncertainty,
         measured=measured,
+        review=review,
     )
 
 
@@ -217,6 +221,29 @@ def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str,
         name: q for name, q in workspace.positions.items() if is_linear(name) or name in spanning
     }
     return {**middle, **given}
+
+
+def _review(raw: object, machine: Machine, problems: Problems) -> tuple[Note, ...]:
+    notes: tuple[Note, ...] = problems.read(schema.NOTES, "notes", raw) or ()
+    seen: set[str] = set()
+    for index, note in enumerate(notes):
+        where = f"notes[{index}]"
+        if note.id in seen:
+            problems.add(
+                f"{where}.id", "another note has this id; expected one of its own", note.id
+            )
+        seen.add(note.id)
+        frames = (*machine.axes, *BODY_FRAMES)
+        if note.on and note.on.body and note.on.body not in frames:
+            problems.unknown(f"{where}.on.body", note.on.body, frames, "body")
+        for one in (note, *note.versions):
+            for axis in one.at:
+                if axis not in machine.axes and machine is not STAND_IN:
+                    problems.unknown(f"{where}.at", axis, machine.axes, "axis of this machine")
+            for key in one.change:
+                if not is_changeable(key):
+                    problems.unknown(f"{where}.change", key, PARAMETERS, "error parameter")
+    return notes
 
 
 def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) -> Workspace:

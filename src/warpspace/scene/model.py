@@ -32,6 +32,7 @@ from warpspace.machine.axes import (
 from warpspace.machine.description import Machine, Vector
 from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics, Measurement, ToleranceSet
 from warpspace.machine.limits import MAX_ERROR
+from warpspace.scene.notes import Note
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,8 @@ class Scene:
         Readings that errors were made from, by key.
     limit_um : float or None, µm
         Largest length of an error that is accepted.
+    review : tuple of Note
+        What people have pinned, asked and decided.
     """
 
     name: str
@@ -83,6 +86,7 @@ class Scene:
     uncertainty: Mapping[str, ErrorFunction] = field(default_factory=dict[str, ErrorFunction])
     measured: Mapping[str, Measurement] = field(default_factory=dict[str, Measurement])
     limit_um: float | None = None
+    review: tuple[Note, ...] = ()
 
     @property
     def machine(self) -> Machine:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
 from typing import cast
 
 import tomli_w
@@ -17,6 +18,7 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
+from warpspace.scene.notes import notes_to_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +145,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         **({} if scene.limit_um is None else {"limit_um": scene.limit_um}),
     }
     parts.append(_section("view", view))
+    parts.append(notes_to_toml(scene.review, _inline))
     return "\n".join(part for part in parts if part)
 
 
@@ -228,6 +231,8 @@ def _inline(value: object) -> str:
         if len(entries) <= _WRAP:
             return "[" + ", ".join(entries) + "]"
         return "[\n" + "".join(f"  {entry},\n" for entry in entries) + "]"
+    if isinstance(value, datetime):
+        return value.isoformat().replace("+00:00", "Z")
     if isinstance(value, str):
         return tomli_w.dumps({"value": value}).split("=", 1)[1].strip()
     if isinstance(value, int):

@@ -1,12 +1,14 @@
 """What each section of a scene or machine file may hold, and the list that its problems go to."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any, cast
 
 from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.kinematics.conversion import SquarenessSign
-from warpspace.kinematics.model import ComponentErrors, convention_names
+from warpspace.kinematics.model import ComponentErrors, Loop, convention_names
 from warpspace.machine import limits
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import MISSING, Path, ValueReader
@@ -14,6 +16,7 @@ from warpspace.machine.curves.table import MAX_FILE_NAME
 from warpspace.machine.description import MESH_UNITS, ORIGIN, TOOL_SHAPES, BodySource
 from warpspace.machine.errors import TOLERANCE_CLASSES, Tolerance
 from warpspace.scene.files import location, spell_value
+from warpspace.scene.notes import KINDS, MEASURES, STATUSES, Mark, Note, Reply
 
 Kind = Callable[[ValueReader, Any, Path], Any]
 """Checks one raw value at its place: notes what is wrong with it, or gives what it means."""
@@ -126,11 +129,6 @@ def _reference(reader: ValueReader, value: Any, path: Path) -> dict[str, float] 
     return None
 
 
-def _traces(reader: ValueReader, value: Any, path: Path) -> tuple[Any, ...]:
-    entries = reader.entries(value, path, limits.MAX_TRACES, least=0)
-    return tuple(POINT(reader, entry, (*path, index)) for index, entry in enumerate(entries))
-
-
 def _component_errors(reader: ValueReader, value: Any, path: Path) -> str | dict[str, str]:
     name = _choice(convention_names)
     return (_by_name(name) if isinstance(value, dict) else name)(reader, value, path)
@@ -140,6 +138,43 @@ def _placed(reader: ValueReader, value: Any, path: Path) -> bool:
     if not isinstance(value, bool):
         reader.note(path, "expected true or false", value)
     return value is True
+
+
+def _date(reader: ValueReader, value: Any, path: Path) -> datetime:
+    if isinstance(value, datetime) and value.tzinfo is not None:
+        return value
+    reader.note(path, "expected a time with its zone, for instance 2026-11-22T10:00:00Z", value)
+    return datetime.min.replace(tzinfo=UTC)
+
+
+def _word(longest: int) -> Kind:
+    def read(reader: ValueReader, value: Any, path: Path) -> str:
+        found = reader.text(value, path, longest)
+        if not re.fullmatch(r"[a-z0-9]*", found):
+            reader.note(path, "expected small letters and digits", value)
+        return found
+
+    return read
+
+
+def _said(longest: int, least: int = 0) -> Kind:
+    """Take a text of people: of several lines, without other control characters."""
+
+    def read(reader: ValueReader, value: Any, path: Path) -> str:
+        found = reader.text(value, path, longest, least)
+        if any(ord(sign) < ord(" ") and sign not in "\n\t" for sign in found):
+            reader.note(path, "expected a text without control characters", value)
+        return found
+
+    return read
+
+
+def _list(kind: Kind, most: int) -> Kind:
+    def read(reader: ValueReader, value: Any, path: Path) -> tuple[Any, ...]:
+        entries = reader.entries(value, path, most, least=0)
+        return tuple(kind(reader, entry, (*path, index)) for index, entry in enumerate(entries))
+
+    return read
 
 
 @dataclass(frozen=True)
@@ -161,6 +196,14 @@ class Section:
             found[name] = kind(reader, entry, (*path, name)) if name in table else entry
         reader.only(table, path, self.fields)
         return self.build(**found)
+
+
+def _given(**entries: float | None) -> dict[str, float]:
+    return {name: value for name, value in entries.items() if value is not None}
+
+
+def _note(step: float, **entries: Any) -> Note:
+    return Note(step=int(step), **entries)
 
 
 LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
@@ -210,7 +253,13 @@ CONVENTION = Section(
         "measuring_line_mm": (_by_name(POINT), {}),
     }
 )
-POINTS = Section({"tool": (POINT, ORIGIN), "workpiece": (POINT, ORIGIN), "traces": (_traces, ())})
+POINTS = Section(
+    {
+        "tool": (POINT, ORIGIN),
+        "workpiece": (POINT, ORIGIN),
+        "traces": (_list(POINT, limits.MAX_TRACES), ()),
+    }
+)
 VIEW = Section(
     {
         "exaggeration": (_exaggeration, None),
@@ -229,6 +278,50 @@ _RANGE = Section(
 )
 _WIDTH = _number(*_HALF_WIDTH, "a half width or { centre = , half_width = }")
 _PLACE = _number(*LIMIT, expected="a number or [lower, upper]")
+_MOST_UM = _number(0.0, limits.MAX_ERROR * 10.0)
+_PAIR = _numbers("[from, to]", limits.MAX_ERROR)
+_MEASURES = Section(dict.fromkeys(MEASURES, (_MOST_UM, None)), _given)
+_NOTE: dict[str, tuple[Kind, Any]] = {
+    "id": (_word(16), MISSING),
+    "kind": (_one_of(KINDS), "note"),
+    "at": (_by_name(LENGTH), {}),
+    "on": (
+        Section(
+            {"loop": (_one_of(Loop), ""), "point_mm": (POINT, None), "body": (_text(8), "")}, Mark
+        ),
+        None,
+    ),
+    "text": (_said(limits.MAX_NOTE_TEXT, 1), MISSING),
+    "author": (_said(100), ""),
+    "date": (_date, MISSING),
+    "status": (_one_of(STATUSES), "open"),
+    "loop": (_one_of(Loop), Loop.TOOL.value),
+    "numbers": (_MEASURES, {}),
+    "before": (_MEASURES, {}),
+    "change": (_by_name(_PAIR), {}),
+    "step": (_number(0.0, limits.MAX_NOTES), 0),
+    "view": (_text(limits.MAX_NOTE_VIEW), ""),
+    "replaces": (_list(_word(16), limits.MAX_REPLIES), ()),
+}
+_REPLY = Section(
+    {
+        "text": (_said(limits.MAX_NOTE_TEXT, 1), MISSING),
+        "author": (_said(100), ""),
+        "date": (_date, MISSING),
+    },
+    Reply,
+)
+NOTES = _list(
+    Section(
+        {
+            **_NOTE,
+            "replies": (_list(_REPLY, limits.MAX_REPLIES), ()),
+            "versions": (_list(Section(_NOTE, _note), limits.MAX_REPLIES), ()),
+        },
+        _note,
+    ),
+    limits.MAX_NOTES,
+)
 
 
 def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:
