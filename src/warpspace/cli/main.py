@@ -40,7 +40,7 @@ BUNDLED: "dict[Task, str]" = {
     "see": "view draw compare export report",
     "understand": "field",
     "measure": "test import",
-    "machine": "check list new-machine thesis",
+    "machine": "check notes merge list new-machine thesis",
 }
 """Commands that are made from no analysis, by their task; `warpspace.cli.commands` has them."""
 FORMER: dict[str, tuple[str, tuple[str, ...]]] = {

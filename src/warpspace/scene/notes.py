@@ -8,8 +8,8 @@ until somebody chooses one.
 import hashlib
 import json
 import secrets
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -178,25 +178,12 @@ def note_to_toml(note: Note) -> dict[str, object]:
         "change": {key: list(pair) for key, pair in note.change.items()},
         "step": note.step,
         "view": note.view,
-        "replies": [_filled(vars_of_reply(one)) for one in note.replies],
+        "replies": [_filled(asdict(one)) for one in note.replies],
         "replaces": list(note.replaces),
         "versions": [note_to_toml(one) for one in note.versions],
     }
     return _filled(entries)
 
 
-def vars_of_reply(reply: Reply) -> dict[str, object]:
-    return {"text": reply.text, "author": reply.author, "date": reply.date}
-
-
 def _filled(entries: Mapping[str, object]) -> dict[str, object]:
     return {name: value for name, value in entries.items() if value not in ("", 0, {}, [])}
-
-
-def notes_to_toml(notes: Iterable[Note], spell: Callable[[object], str]) -> str:
-    """Spell notes as tables of a scene file, an entry a line."""
-    return "\n".join(
-        "[[notes]]\n"
-        + "".join(f"{name} = {spell(value)}\n" for name, value in note_to_toml(one).items())
-        for one in notes
-    )

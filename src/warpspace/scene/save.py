@@ -1,6 +1,6 @@
 """Scenes back into the file format: the text reloads to the identical scene, in any notation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from typing import cast
@@ -18,7 +18,7 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
-from warpspace.scene.notes import notes_to_toml
+from warpspace.scene.notes import Note, note_to_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +145,17 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         **({} if scene.limit_um is None else {"limit_um": scene.limit_um}),
     }
     parts.append(_section("view", view))
-    parts.append(notes_to_toml(scene.review, _inline))
+    parts.append(spell_notes(scene.review))
     return "\n".join(part for part in parts if part)
+
+
+def spell_notes(notes: Iterable[Note]) -> str:
+    """Spell notes as tables of a scene file, an entry a line."""
+    return "\n".join(
+        "[[notes]]\n"
+        + "".join(f"{name} = {_inline(value)}\n" for name, value in note_to_toml(one).items())
+        for one in notes
+    )
 
 
 def _bundled(machine: Machine) -> Machine | None:

@@ -1,9 +1,13 @@
 """Commands about scenes and machines: what there is, what is right, what the thesis prints."""
 
+import csv
+import io
+import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -18,19 +22,22 @@ from warpspace.cli.options import (
     json_option,
     loop_option,
     output_option,
+    parse_point,
     print_json,
     say_first_order,
     say_second_order,
     scene_argument,
+    warn_outside_travel,
     write_text,
 )
-from warpspace.cli.tables import print_table, print_text, progress
+from warpspace.cli.tables import echo, print_table, print_text, progress, warn
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.measured import Check, Measured
     from warpspace.analysis.thesis import Row
     from warpspace.scene.model import Scene
+    from warpspace.scene.notes import Note
 
 OWN = "own"
 Kind = Literal["scenes", "machines"]
@@ -170,7 +177,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.model import second_order
 
-    notes = (*scene.notes, *check_meshes(scene.machine))
+    remarks = (*scene.notes, *check_meshes(scene.machine))
     found = second_order(scene)
     say_second_order(found)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
@@ -184,7 +191,8 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
                 "parameters": len(scene.parameter_keys),
                 "non_zero": non_zero,
                 "linearisation_error_um": found.um,
-                "notes": list(notes),
+                "remarks": list(remarks),
+                "notes": notes_json(scene),
             }
         )
         return
@@ -195,9 +203,174 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     count = f"{len(non_zero)} of {len(scene.parameter_keys)} parameters not zero"
     facts.append(("errors", count + (f": {', '.join(non_zero)}" if non_zero else "")))
     facts.append(("first order", f"differs from the exact chain by at most {found.um:.2g} µm"))
-    facts.extend(("note", note) for note in notes)
+    facts.extend(("remark", remark) for remark in remarks)
     columns = (Column(leads=True), Column(wraps=True))
     print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts)))
+    if scene.review:
+        from warpspace.analysis.reviewing import note_numbers, notes_table
+
+        print_blocks([notes_table(scene.review, note_numbers(scene, scene.review), "notes")])
+
+
+def notes_json(scene: "Scene") -> list[dict[str, object]]:
+    """List the notes of a scene with their numbers, then and now."""
+    from warpspace.analysis.reviewing import note_numbers
+    from warpspace.scene.notes import is_stale
+
+    return [
+        {
+            "id": note.id,
+            "kind": note.kind,
+            "stale": is_stale(note.numbers, now),
+            "numbers": dict(note.numbers),
+            "now": {name: now[name] for name in note.numbers if name in now},
+        }
+        for note, now in zip(scene.review, note_numbers(scene, scene.review), strict=True)
+    ]
+
+
+@click.command()
+@scene_argument()
+@click.option("--add", "text", metavar="TEXT", help="Add a note with this text.")
+@click.option(
+    "--at",
+    "point",
+    metavar="X=..,Y=..",
+    help="Where the new note is pinned: axis positions in mm and degrees.  [the whole]",
+)
+@click.option(
+    "--kind",
+    type=click.Choice(("note", "question", "decision")),
+    default="note",
+    show_default=True,
+    help="What the new note is.",
+)
+@click.option("--author", default="", help="Who adds it.")
+@click.option(
+    "--step", type=int, default=0, help="Its place in the story; 0 for none.", show_default=True
+)
+@output_option(
+    "File to write: the notes as .csv or .md, or with --add the scene as .toml.  [SCENE]",
+    ".csv", ".md", ".toml", required=False,
+)  # fmt: skip
+@loop_option
+@force_option
+@json_option
+def notes(
+    scene: str,
+    text: str | None,
+    point: str | None,
+    output: str | None,
+    *,
+    force: bool,
+    as_json: bool,
+    **about: Any,
+) -> None:
+    """List the review notes of SCENE, or add one.
+
+    A note whose numbers no longer hold is marked "changed" with its number then and now.
+    """
+    from warpspace.analysis.reviewing import note_numbers, notes_markdown, notes_table
+    from warpspace.scene.library import load_scene
+
+    loaded = load_scene(scene)
+    if text is None:
+        if point is not None or (output or "").endswith(".toml"):
+            raise OptionError("--at and an .toml file belong to --add; there is no text to add")
+    else:
+        loaded, path = _with_note(loaded, scene, text, point, output, about)
+        _write_note(loaded, scene, path, force=force)
+        output = None
+    if as_json:
+        print_json({"notes": [{**one, **_said(note)} for one, note in
+                              zip(notes_json(loaded), loaded.review, strict=True)]})  # fmt: skip
+        return
+    found = note_numbers(loaded, loaded.review)
+    table = notes_table(loaded.review, found)
+    if output is None:
+        print_blocks([f"{loaded.name}: {loaded.title}", table])
+    elif output.endswith(".md"):
+        write_text(output, notes_markdown(loaded, loaded.review, found), force=force)
+    else:
+        content = io.StringIO()
+        csv.writer(content, lineterminator="\n").writerows(table.csv_rows())
+        write_text(output, content.getvalue(), force=force)
+
+
+def _said(note: "Note") -> dict[str, object]:
+    from warpspace.scene.notes import note_to_toml
+
+    said = note_to_toml(note)
+    del said["id"], said["kind"]
+    said.pop("numbers", None)
+    return json.loads(json.dumps(said, default=str))
+
+
+def _with_note(
+    scene: "Scene",
+    name: str,
+    text: str,
+    point: str | None,
+    output: str | None,
+    about: dict[str, Any],
+) -> "tuple[Scene, str]":
+    from warpspace.analysis.reviewing import note_numbers
+    from warpspace.scene.library import scene_names
+    from warpspace.scene.notes import Note, with_note
+
+    if output is None and name in scene_names():
+        raise OptionError(f"{name} is bundled and stays as it is; expected -o FILE.toml")
+    if output is not None and not output.endswith(".toml"):
+        raise OptionError(f"-o {output}: expected a .toml file with --add")
+    at = {} if point is None else parse_point(point, scene.machine.axes)
+    warn_outside_travel(scene.machine, at)
+    note = Note(text=text, at=at, **about)
+    note = replace(note, numbers=note_numbers(scene, [note])[0])
+    return replace(scene, review=with_note(scene.review, note)), output or name
+
+
+def _write_note(scene: "Scene", name: str, path: str, *, force: bool) -> None:
+    """Write a scene whose last note is new; what its author has written besides stays."""
+    from warpspace.machine.limits import MAX_SCENE_BYTES
+    from warpspace.scene.files import read_text
+    from warpspace.scene.library import parse_scene, scene_path
+    from warpspace.scene.save import spell_notes
+
+    file = scene_path(name)
+    text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_notes(scene.review[-1:])}"
+    parse_scene(text, scene.name, path, file.parent)
+    write_text(path, text, force=force or file == Path(path))
+    note = scene.review[-1]
+    echo(f"{path}: {note.kind} {note.id} added", err=True)
+
+
+@click.command()
+@scene_argument("first")
+@scene_argument("second")
+@output_option("Scene file to write: .toml.", *SCENES)
+@force_option
+def merge(first: str, second: str, output: str, *, force: bool) -> None:
+    """Unite the review notes of two copies of a scene, FIRST and SECOND.
+
+    Notes are matched by their id and replies united. A note that both have edited is kept in both
+    versions, side by side. Everything else of the scene is that of FIRST.
+    """
+    from warpspace.scene.library import load_scene
+    from warpspace.scene.notes import merge_notes
+    from warpspace.scene.save import scene_to_toml
+
+    a, b = load_scene(first), load_scene(second)
+    merged = merge_notes(a.review, b.review)
+    write_text(output, scene_to_toml(replace(a, review=merged)), force=force)
+    print_text(f"{output}: {len(merged)} notes of {len(a.review)} and {len(b.review)}")
+    for note in merged:
+        if note.versions:
+            print_text(f"  {note.id}: {1 + len(note.versions)} versions kept side by side")
+    other = [key for key in {**a.errors.functions, **b.errors.functions}
+             if a.errors.functions.get(key) != b.errors.functions.get(key)]  # fmt: skip
+    if other or replace(b, name=a.name, errors=a.errors, review=()) != replace(a, review=()):
+        said = f", among them the errors {', '.join(other)}" if other else ""
+        warn(f"the scenes differ beside their notes{said}; those of {first} are kept")
 
 
 def laser_tracer_um(scene: "Scene") -> float | None:
