@@ -28,11 +28,12 @@ from warpspace.app.state.forms import linked_forms, with_form
 from warpspace.app.state.leaf import Unreadable
 from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
 from warpspace.exceptions import OptionError
-from warpspace.machine.limits import MAX_PACKED_TEXT
+from warpspace.machine.limits import MAX_NOTE_VIEW, MAX_PACKED_TEXT
 from warpspace.resources import __version__
 from warpspace.scene.files import parse_number
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.model import Scene
+from warpspace.scene.notes import Note
 from warpspace.scene.save import scene_to_toml
 
 MARK = "# warpspace-view: "
@@ -49,7 +50,7 @@ Opened = tuple[AppState, CameraMemory | None]
 
 
 def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
-    scene = state.resulting_scene()
+    scene = replace(state.resulting_scene(), review=kept_views(state))
     line = settings_line(replace(state, scene=scene, loaded=None), camera)
     if len(line) > MAX_LINE:
         raise OptionError("what is compared is too large to be stored with the scene")
@@ -100,6 +101,10 @@ def state_to_link(state: AppState, camera: CameraMemory | None, known: Known) ->
 def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
     if link := named_link(state, camera, known):
         return link
+    return _packed(state, camera)
+
+
+def _packed(state: AppState, camera: CameraMemory | None) -> str:
     text = zlib.compress(state_to_toml(state, camera).encode(), 9)
     word = base64.urlsafe_b64encode(text).decode().rstrip("=")
     return urlencode({NAME: state.scene.name, PACKED: word})
@@ -108,7 +113,10 @@ def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
 def named_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
     """Spell a state of a scene that others have as a link of any length; any other as nothing."""
     scene = state.scene
-    plain = state.loaded is None and state.tolerances == scene.tolerances
+    plain = state.loaded is None and (state.tolerances, state.review) == (
+        scene.tolerances,
+        scene.review,
+    )
     if not plain or _find(scene.name, known) != scene:
         return ""
     line = settings_line(state, camera, known)
@@ -151,16 +159,30 @@ def _unpack(packed: str) -> str:
 # --- The line of settings -------------------------------------------------------------------------
 
 
-def settings_line(state: AppState, camera: CameraMemory | None = None, known: Known = None) -> str:
+SAVED = ("amplitudes.", "positions.", "exaggeration", "loop", "placed", "specification.limit_um")
+
+
+def settings_line(
+    state: AppState,
+    camera: CameraMemory | None = None,
+    known: Known = None,
+    *,
+    whole: bool = False,
+) -> str:
+    """Spell what differs from the scene as opened; `whole` all that saving changes of a scene."""
     opened = start_state(state.scene)
     pairs = [
         (leaf.linked, spell_value(leaf, now))
         for leaf in leaves(state).values()
-        if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
+        if leaf.linked
+        and (
+            (now := stored(state, leaf.path)) != stored(opened, leaf.path)
+            or (whole and leaf.path.startswith(SAVED) and now != 0.0)
+        )
     ]
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
-        pairs.append((CAMERA, ",".join(f"{number:.6g}" for number in numbers)))
+        pairs.append((CAMERA, ",".join(f"{number:.9g}" for number in numbers)))
     return urlencode([*pairs, *linked_forms(state), *_sides(state, known)])
 
 
@@ -214,6 +236,54 @@ def camera_of(line: str) -> CameraMemory | None:
     if not usable or not FOV_RAD[0] <= numbers[9] <= FOV_RAD[1]:
         return None
     return CameraMemory(position, look_at, up, numbers[9])
+
+
+# --- Notes: what was on the screen, and back to it -----------------------------------------------
+
+
+def view_of(state: AppState, camera: CameraMemory | None) -> str:
+    """Spell what is on the screen, for a note: relative to the scene as opened where that does."""
+    shown = replace(state, review=())
+    if state.loaded is None and state.tolerances == state.scene.tolerances:
+        return settings_line(shown, camera, whole=True)
+    link = _packed(shown, camera)
+    # curves of thousands of points are left to the scene
+    return link if len(link) <= MAX_NOTE_VIEW else settings_line(shown, camera, whole=True)
+
+
+def kept_views(state: AppState) -> tuple[Note, ...]:
+    """Give the notes as a file keeps them, whose scene may differ from the one as opened."""
+    opened, scene = start_state(state.origin), state.resulting_scene()
+    as_opened = replace(
+        opened.resulting_scene(), errors=scene.errors, workspace=scene.workspace,
+        exaggeration=scene.exaggeration, placed=scene.placed, limit_um=scene.limit_um,
+        review=state.review,
+    )  # fmt: skip
+    if state.loaded is None and as_opened == scene:
+        return state.review
+    found: list[Note] = []
+    for note in state.review:
+        if note.view and PACKED not in dict(_pairs(note.view)):
+            shown = with_settings(replace(opened.at_rest(), review=()), note.view)
+            link = _packed(shown, camera_of(note.view))
+            found.append(replace(note, view=link) if len(link) <= MAX_NOTE_VIEW else note)
+        else:
+            found.append(note)
+    return tuple(found)
+
+
+def reopened(state: AppState, note: Note, known: Known = None) -> Opened:
+    """Give what was on the screen when a note was made; what cannot be restored is named."""
+    origin = state.origin
+    if PACKED in dict(_pairs(note.view)):
+        found, camera = _read_link(note.view, known)
+        same = found.scene.machine.axes == origin.machine.axes
+        found = replace(found, loaded=None if found.scene == origin else origin,
+                        start=state.start if same else found.start)  # fmt: skip
+    else:
+        found = with_settings(start_state(origin).at_rest(), note.view, known)
+        camera = camera_of(note.view)
+    return replace(found, review=state.review, page=state.page, forms=state.forms), camera
 
 
 # --- The sides of a comparison in it --------------------------------------------------------------

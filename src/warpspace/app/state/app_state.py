@@ -27,6 +27,7 @@ from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Toleranc
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, PROBABILITY
 from warpspace.scene.model import Scene
+from warpspace.scene.notes import Note
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
@@ -274,6 +275,8 @@ class AppState:
     comparison: Comparison = field(default_factory=Comparison, metadata=said("Comparison"))
     # whose table corrects the machine that is drawn; never saved or linked
     controller: "Controller | None" = field(default=None, metadata=said("Table of compensation"))
+    # notes of reviewers; beside the scene, which is a key of what has been computed of it
+    review: tuple[Note, ...] = field(default=(), metadata=said("Notes"))
     # what of the page is open, and what its forms were told (`state/forms.py`); undo leaves both
     page: PageLook = field(default_factory=PageLook, compare=False)
     forms: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
@@ -338,6 +341,7 @@ class AppState:
             tolerances=self.tolerances,
             exaggeration=self.exaggeration,
             placed=self.placed,
+            review=self.review,
             limit_um=None if scene.limit_um is None and limit == START_UM else limit,
         )
 
@@ -398,6 +402,11 @@ class AppState:
         changed = replace(self.scene, errors=ErrorSet(self.own_curves))
         return replace(self.with_edited(changed), amplitudes=self.start)
 
+    def at_rest(self) -> "AppState":
+        """Give the state from which a line that spells all that is not zero is read."""
+        positions = dict.fromkeys(self.positions, 0.0)
+        return replace(self.zeroed(), positions=positions, placed=False)
+
     def zeroed(self) -> "AppState":
         return replace(self, amplitudes=dict.fromkeys(self.amplitudes, 0.0))
 
@@ -416,6 +425,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         placed=scene.placed,
         specification=Specification(START_UM if scene.limit_um is None else scene.limit_um),
         tolerances=scene.tolerances,
+        review=scene.review,
     )
     return replace(state, **changes)
 
