@@ -55,6 +55,8 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
      "Rank the error parameters of SCENE by their gain."),
     ("line", "understand", "analysis.line:Line",
      "Follow the error of SCENE along a straight line."),
+    ("distance", "understand", "analysis.distance:Distance",
+     "Measure between points of SCENE: distance, angle."),
     ("reach", "understand", "analysis.reach:Reach",
      "Say which part of the volume of SCENE keeps a limit."),
     ("certify", "understand", "analysis.certify:Certify",

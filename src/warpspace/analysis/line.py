@@ -42,9 +42,9 @@ class Line(Analysis):
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: Scene, watch: Watch, /) -> "LineResult":
-        ends = self._ends(scene)
+        start, end = complete_ends(scene, self.start, self.end)
         share = np.linspace(0.0, 1.0, self.points)
-        axes = {name: low + (high - low) * share for name, (low, high) in ends.items()}
+        axes = {name: at + (end[name] - at) * share for name, at in start.items()}
         field = evaluate(scene, at=axes, loop=self.loop, exact=self.exact)
         watch(1.0)
         nominal = field.nominal_mm
@@ -59,24 +59,30 @@ class Line(Analysis):
             title=f"{scene.title} · {self.loop} loop",
         )
 
-    def _ends(self, scene: Scene) -> dict[str, tuple[float, float]]:
-        ranges, stand = scene.workspace.ranges, scene.workspace.positions
-        low = {name: ranges.get(name, (at,))[0] for name, at in stand.items()}
-        high = {name: ranges.get(name, (at,))[-1] for name, at in stand.items()}
-        given = self.start or self.end
-        first, last = (
-            complete_coordinates(scene.machine, dict(place), stand if given else default)
-            for place, default in ((self.start, low), (self.end, high))
-        )
-        ends = {name: (float(first[name]), float(last[name])) for name in first}
-        if all(a == b for a, b in ends.values()):
-            raise OptionError("{start} and {end} are one point; expected two")
-        return ends
-
     def warnings(self, scene: Scene) -> Iterator[str]:
         for name, place in (("start", self.start), ("end", self.end)):
             for words in outside_travel(scene.machine, dict(place)):
                 yield f"{{{name}}} {words}"
+
+
+def complete_ends(scene: Scene, start: Place, end: Place) -> tuple[dict[str, float], ...]:
+    """Give where all axes stand at two points; by default the diagonal of the working volume."""
+    ranges, stand = scene.workspace.ranges, scene.workspace.positions
+    low = {name: ranges.get(name, (at,))[0] for name, at in stand.items()}
+    high = {name: ranges.get(name, (at,))[-1] for name, at in stand.items()}
+    given = start or end
+    ends = tuple(
+        {
+            name: float(at)
+            for name, at in complete_coordinates(
+                scene.machine, dict(place), stand if given else default
+            ).items()
+        }
+        for place, default in ((start, low), (end, high))
+    )
+    if ends[0] == ends[1]:
+        raise OptionError("{start} and {end} are one point; expected two")
+    return ends
 
 
 @dataclass(frozen=True, kw_only=True)

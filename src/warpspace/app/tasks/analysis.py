@@ -40,7 +40,8 @@ from warpspace.picture.words import spell_at
 from warpspace.scene.model import Scene
 
 TITLES = {
-    "gains": "Error gains", "line": "Along a line", "reach": "Volume within a limit",
+    "gains": "Error gains", "line": "Along a line",
+    "distance": "Distance and angle", "reach": "Volume within a limit",
     "certify": "Flatness, straightness, squareness", "convert": "Another convention",
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
     "allocate": "Tolerances", "concepts": "Machines side by side",

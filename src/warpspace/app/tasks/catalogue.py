@@ -32,7 +32,9 @@ HOOKS: dict[str, type[AnalysisPart]] = {
 """Parts of analyses that do more than their description says, by name."""
 FIRST = ("compensate", "concepts", "allocate")
 """Sections that stand first in their task, short ones before long ones."""
-RARE = frozenset({"volume", "gains", "line", "reach", "certify", "convert", "contributions"})
+RARE = frozenset(
+    {"volume", "gains", "line", "distance", "reach", "certify", "convert", "contributions"}
+)
 """Sections that stand under "More analyses", so that a task is calm at first sight."""
 
 
