@@ -19,7 +19,6 @@ from warpspace.app.documents.files import (
     upload_text,
 )
 from warpspace.app.documents.scene_file import (
-    MAX_PACKED_TEXT,
     MOST_OPENED,
     PREFIX,
     SIDES,
@@ -55,7 +54,7 @@ from warpspace.app.state.tree import leaves, put
 from warpspace.app.tasks.conventions import with_choice, with_reference
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.machine.errors import Ramp, Table
-from warpspace.machine.limits import MAX_ERROR
+from warpspace.machine.limits import MAX_ERROR, MAX_PACKED_TEXT
 from warpspace.scene.library import load_scene, scene_names
 
 KNOWN = FIRST, SECOND = (load_scene("dvf5000_first"), load_scene("dvf5000_second"))

@@ -10,14 +10,10 @@ Reading trusts nothing: every value passes the pure updates of the state, what c
 left out and named.
 """
 
-import base64
-import binascii
 import math
-import re
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from urllib.parse import parse_qsl, urlencode
+from urllib.parse import urlencode
 
 from warpspace.app.documents.files import LONGEST_NAME, safe_name
 from warpspace.app.drawing.camera import CameraMemory
@@ -28,22 +24,26 @@ from warpspace.app.state.forms import linked_forms, with_form
 from warpspace.app.state.leaf import Unreadable
 from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
 from warpspace.exceptions import OptionError
-from warpspace.machine.limits import MAX_NOTE_VIEW, MAX_PACKED_TEXT
+from warpspace.machine.limits import MAX_NOTE_VIEW
 from warpspace.resources import __version__
 from warpspace.scene.files import parse_number
 from warpspace.scene.library import load_scene, parse_scene, scene_names
+from warpspace.scene.links import (
+    CAMERA,
+    MARK,
+    MAX_LINE,
+    PACKED,
+    pack_scene,
+    read_settings,
+    settings_of,
+    unpack_scene,
+)
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note
 from warpspace.scene.save import scene_to_toml
 
-MARK = "# warpspace-view: "
 MAX_LINK = 5_500  # characters of a link before it is packed: servers take request lines of 8 kB
-MAX_LINE = 400_000  # characters of a line of settings in a file
-MAX_FIELDS = 400
-SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
-_HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
-# what was compared had a line of its own in files of earlier versions
-_LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
+SCENE, NAME = "scene", "name"
 Known = Sequence[Scene] | None
 """Scenes that whoever opens a file or a link also has; None for those of the program."""
 Opened = tuple[AppState, CameraMemory | None]
@@ -61,17 +61,12 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
 def open_text(text: str, name: str, source: str, *, alone: bool = False) -> Opened:
     """Build the state of a scene file that somebody has uploaded; `alone` with no comparison."""
     scene = _recognised(parse_scene(text, name, source, folder=None))
-    line = "&".join(filter(None, _lines(text)))
+    line = settings_of(text)
     return with_settings(start_state(scene), line, alone=alone), camera_of(line)
 
 
 def is_looked_at(text: str) -> bool:
-    return bool(_lines(text))
-
-
-def _lines(text: str) -> list[str]:
-    head = _HEAD.match(text)
-    return _LINES.findall(head[0] if head else "")
+    return bool(settings_of(text))
 
 
 def _find(name: str, known: Known) -> Scene | None:
@@ -105,8 +100,7 @@ def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
 
 
 def _packed(state: AppState, camera: CameraMemory | None) -> str:
-    text = zlib.compress(state_to_toml(state, camera).encode(), 9)
-    word = base64.urlsafe_b64encode(text).decode().rstrip("=")
+    word = pack_scene(state_to_toml(state, camera))
     return urlencode({NAME: state.scene.name, PACKED: word})
 
 
@@ -132,28 +126,16 @@ def open_link(link: str, known: Known) -> Opened:
 
 
 def _read_link(link: str, known: Known, *, alone: bool = False) -> Opened:
-    pairs = dict(_pairs(link))
+    pairs = dict(read_settings(link))
     if PACKED in pairs:
         name = safe_name(pairs.get(NAME, ""), "link")
-        return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", alone=alone)
+        return open_text(unpack_scene(pairs[PACKED]), name, "the scene in the link", alone=alone)
     name = pairs.pop(SCENE, "")
     scene = _find(name, known)
     if scene is None:
         raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
     line = urlencode(pairs)
     return with_settings(start_state(scene), line, known, alone=alone), camera_of(line)
-
-
-def _unpack(packed: str) -> str:
-    try:
-        data = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))
-        reader = zlib.decompressobj()
-        text = reader.decompress(data, MAX_PACKED_TEXT)
-        if reader.unconsumed_tail or not reader.eof:
-            raise OptionError("the scene in the link is cut off or too large")
-        return text.decode("utf-8")
-    except (binascii.Error, zlib.error, ValueError):
-        raise OptionError("the scene in the link cannot be read; was the link cut?") from None
 
 
 # --- The line of settings -------------------------------------------------------------------------
@@ -190,7 +172,7 @@ def with_settings(
     state: AppState, line: str, known: Known = None, *, alone: bool = False
 ) -> AppState:
     """Apply a line of settings to a state; `alone` without a comparison."""
-    pairs = [pair for pair in _pairs(line) if not (alone and pair[0].startswith(PREFIX))]
+    pairs = [pair for pair in read_settings(line) if not (alone and pair[0].startswith(PREFIX))]
     state, unread = _with_sides(state, dict(pairs), known), list[str]()
     for name, text in pairs:
         if name == CAMERA or name in SIDES:
@@ -208,15 +190,6 @@ def with_settings(
     return state
 
 
-def _pairs(line: str) -> list[tuple[str, str]]:
-    if len(line) > MAX_LINE:
-        raise OptionError(f"{len(line):,} characters of settings; expected at most {MAX_LINE:,}")
-    try:
-        return parse_qsl(line, keep_blank_values=True, max_num_fields=MAX_FIELDS)
-    except ValueError:
-        raise OptionError("there are too many settings; this program did not write them") from None
-
-
 CAMERA_NUMBERS = 10
 FARTHEST = 1000.0  # farthest place of a camera, in units of the drawing
 FOV_RAD = (0.01, 2.5)
@@ -225,7 +198,9 @@ FOV_RAD = (0.01, 2.5)
 def camera_of(line: str) -> CameraMemory | None:
     """Read the camera of a line of settings; None where there is none that can be used."""
     try:
-        numbers = [parse_number(word) for word in dict(_pairs(line)).get(CAMERA, "").split(",")]
+        numbers = [
+            parse_number(word) for word in dict(read_settings(line)).get(CAMERA, "").split(",")
+        ]
     except ValueError:
         return None
     if len(numbers) != CAMERA_NUMBERS:
@@ -263,7 +238,7 @@ def kept_views(state: AppState) -> tuple[Note, ...]:
         return state.review
     found: list[Note] = []
     for note in state.review:
-        if note.view and PACKED not in dict(_pairs(note.view)):
+        if note.view and PACKED not in dict(read_settings(note.view)):
             shown = with_settings(replace(opened.at_rest(), review=()), note.view)
             link = _packed(shown, camera_of(note.view))
             found.append(replace(note, view=link) if len(link) <= MAX_NOTE_VIEW else note)
@@ -275,7 +250,7 @@ def kept_views(state: AppState) -> tuple[Note, ...]:
 def reopened(state: AppState, note: Note, known: Known = None) -> Opened:
     """Give what was on the screen when a note was made; what cannot be restored is named."""
     origin = state.origin
-    if PACKED in dict(_pairs(note.view)):
+    if PACKED in dict(read_settings(note.view)):
         found, camera = _read_link(note.view, known)
         same = found.scene.machine.axes == origin.machine.axes
         found = replace(found, loaded=None if found.scene == origin else origin,

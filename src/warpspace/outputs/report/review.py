@@ -19,6 +19,7 @@ from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
+from warpspace.outputs.report.findings import open_questions
 from warpspace.outputs.report.render import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
@@ -287,7 +288,8 @@ def first_page(review: Review, picture: Block) -> list[Block]:
         marks: list[Mark] = ["" if one.keeps else "worse" for one in review.scenes]
         numbered = [(title, *row) for title, row in zip(titles, rows, strict=True)]
         said = Table(columns, numbered, marks=marks)
-    asked = review.settings.questions
+    noted = (one.titled(text) for one in review.scenes for text in open_questions(one.scene))
+    asked = (*review.settings.questions, *noted)
     return [
         Text(verdict(review), "lead"),
         said,

@@ -22,6 +22,7 @@ from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
 from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import FigureWorker
+from warpspace.outputs.report import findings
 from warpspace.outputs.report.render import (
     Block,
     Embedded,
@@ -116,6 +117,14 @@ class ReportFigures:
         settings = FigureSettings(loop=str(plan.loop), grid=self._grid, concepts=plan)
         return self._begin("concepts", scenes, caption, settings=settings)()
 
+    def step(self, step: findings.Step) -> Drawn:
+        shown = step.shown
+        settings = FigureSettings(
+            exaggeration=self._factor, loop=shown.loop, grid=self._grid,
+            component=shown.component, view=shown.view,
+        )  # fmt: skip
+        return self._begin("error-map", [shown.scene], step.caption, settings=settings)
+
     def chart(self, chart: Chart) -> Block:
         data = self._worker.begin_chart("chart", CHART, self._form, chart)()
         width = LINES_WIDTH if isinstance(chart, Lines) else 1.0
@@ -209,7 +218,6 @@ def build_report(
         review = build_review(scenes, settings, pictures)
         compared = compare_with([one.scene for one in review.scenes], concepts, settings)
         found = {
-            "": first_page(review, painter.first()),
             "Where the error is": where(review, painter, embed),
             "Error budget at the worst point": map(explanation, review.scenes),
             "Repair": told(review, painter, "repair"),
@@ -222,9 +230,17 @@ def build_report(
             "Conventions": [conventions(review)],
             "Provenance": provenance(review, files),
         }
-        parts = tuple(
-            Section(heading and f"Appendix {_letters(number)} · {heading}", tuple(blocks))
-            for number, (heading, blocks) in enumerate(found.items())
+        parts = (
+            Section("", tuple(first_page(review, painter.first()))),
+            *(
+                [Section(findings.HEADING, noted)]
+                if (noted := tuple(notes(review, painter)))
+                else []
+            ),
+            *(
+                Section(f"Appendix {_letters(number)} · {heading}", tuple(blocks))
+                for number, (heading, blocks) in enumerate(found.items(), 1)
+            ),
         )
     machines = [one.scene.machine for one in review.scenes]
     facts = (
@@ -289,6 +305,18 @@ def _first_bars(bars: Bars) -> Bars:
     ]
     rows, keys = bars.rows[:MOST_BARS], bars.keys[:MOST_BARS]
     return replace(bars, rows=rows, keys=keys, panels=tuple(panels))
+
+
+def notes(review: Review, painter: ReportFigures) -> Iterator[Block]:
+    """Give what people have noted of each scene, and the story that they tell; a figure a step."""
+    for reviewed in (one for one in review.scenes if one.scene.review):
+        if reviewed.letter:
+            yield Text(reviewed.titled(reviewed.scene.title), "heading")
+        yield from findings.tables(reviewed.scene)
+        drawn = [painter.step(step) for step in findings.steps(reviewed.scene)]
+        if drawn:
+            yield Text(reviewed.titled("The story"), "heading")
+        yield from (wait() for wait in drawn)
 
 
 def told(review: Review, painter: ReportFigures, *names: str) -> Iterator[Block]:
