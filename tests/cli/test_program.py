@@ -212,6 +212,6 @@ def test_check_names_a_mesh_that_is_not_closed_and_refuses_an_empty_one(tmp_path
         (tmp_path / f"{name}.toml").write_text(text)
     opened = warpspace("check", str(tmp_path / "open.toml"), "--json")
     assert opened.status == 0
-    assert "not closed" in " ".join(opened.json["notes"])
+    assert "not closed" in " ".join(opened.json["remarks"])
     refused = warpspace("check", str(tmp_path / "empty.toml"))
     refused.refused("bodies.Z", "the file is empty")
