@@ -227,6 +227,8 @@ BYTES_PER_RESPONSE = 48  # position and orientation error of one node to one par
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
     from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+    from warpspace.app.documents.story_page import build_story_html
+    from warpspace.scene.notes import story
 
     _check_size(picture)
     live = offline_picture(
@@ -236,7 +238,13 @@ def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> N
         loop=picture.view.loop,
         component=picture.component,
     )
-    write_text(target, build_offline_html(live, picture.provenance), force=overwrite)
+    told = story(live.state.review)
+    page = (
+        build_story_html(live.state, picture.provenance)
+        if told
+        else build_offline_html(live, picture.provenance)
+    )
+    write_text(target, page, force=overwrite)
 
 
 def _check_size(picture: "ScenePicture") -> None:

@@ -98,6 +98,18 @@ def lowered(text: str) -> Markup:
     return Markup(re.sub("_(.)", r"<sub>\1</sub>", str(escape(text))))  # noqa: S704 - escaped before
 
 
+_LINK = re.compile(r"(https?://[^\s<>\"']+[^\s<>\"'.,;:!?)\]])")
+
+
+def linked(words: str) -> Markup:
+    """Give what somebody has written, with links made of addresses of http and https alone."""
+    parts = _LINK.split(words)
+    return join(
+        tag("a", part, href=part, target="_blank", rel="noopener noreferrer") if i % 2 else part
+        for i, part in enumerate(parts)
+    )
+
+
 # --- What can be set ------------------------------------------------------------------------------
 
 

@@ -4,7 +4,7 @@
   if (window.warpspaceMesh) return;
   const known = { lines: {}, palette: null, count: 0 };
   const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
-  const floats = text => new Float32Array(bytes(text).buffer);
+  const floats = text => text.BYTES_PER_ELEMENT ? text : new Float32Array(bytes(text).buffer);
   const find = (name, wanted) => {
     let found = null;
     window.__viserMutable?.nodeRefFromName[name]?.traverse(part => {
@@ -14,7 +14,25 @@
   };
   const follow = (attribute, values) => { attribute.array.set(values); attribute.needsUpdate = true; };
 
+  const draw = (mesh, place, shade) => {
+    const at = mesh.geometry.attributes;
+    follow(at.position, place);
+    follow(at.color, shade);
+    mesh.geometry.computeBoundingSphere();
+    for (const [name, { ends, lifts }] of Object.entries(known.lines)) {
+      const line = find(name, part => part.geometry?.attributes.instanceStart);
+      const data = line?.geometry.attributes.instanceStart.data;
+      if (data?.array.length !== lifts.length) continue;
+      for (let i = 0; i < ends.length; i++)
+        for (let k = 0; k < 3; k++) data.array[3 * i + k] = place[3 * ends[i] + k] + lifts[3 * i + k];
+      data.needsUpdate = true;
+    }
+    window.__viserMutable.requestRender?.();
+  };
+  let turn = 0;
+
   window.warpspaceMesh = {
+    glide: 0,  // how long the next changes take, ms; between steps of a story
     moves: 0,  // for whoever measures from outside
     // number of points, table of colours, per lines their ends' points and how far these are lifted
     open({ count, palette, lines }) {
@@ -26,24 +44,29 @@
     bend(points, colours) {
       const mesh = find("/box/surface", part => part.isMesh && part.geometry.attributes.color);
       const at = mesh?.geometry.attributes;
-      if (!at || at.position.count !== known.count) return;  // it comes with what is sent at rest
+      if (!at || at.position.count !== known.count) return false;  // it comes with what is sent at rest
       const place = floats(points), level = bytes(colours), { palette } = known;
-      follow(at.position, place);
-      const size = at.color.itemSize, shade = at.color.array;
+      const size = at.color.itemSize, shade = at.color.array.slice();
       for (let i = 0; i < level.length; i++)
         for (let k = 0; k < 3; k++) shade[size * i + k] = palette[3 * level[i] + k];
-      at.color.needsUpdate = true;
-      mesh.geometry.computeBoundingSphere();
-      for (const [name, { ends, lifts }] of Object.entries(known.lines)) {
-        const line = find(name, part => part.geometry?.attributes.instanceStart);
-        const data = line?.geometry.attributes.instanceStart.data;
-        if (data?.array.length !== lifts.length) continue;
-        for (let i = 0; i < ends.length; i++)
-          for (let k = 0; k < 3; k++) data.array[3 * i + k] = place[3 * ends[i] + k] + lifts[3 * i + k];
-        data.needsUpdate = true;
-      }
+      const own = ++turn, was = this.glide && [at.position.array.slice(), at.color.array.slice()];
+      const mixed = (from, to, share) => share < 1 ? to.map((x, i) => from[i] + share * (x - from[i])) : to;
+      this.eased(this.glide, share => {
+        if (own === turn) draw(mesh, mixed(was[0], place, share), mixed(was[1], shade, share));
+      });
       this.moves++;
-      window.__viserMutable.requestRender?.();
+      return true;
+    },
+    // calls with a share that goes from 0 to 1 in a time, ms
+    eased(long, call) {
+      if (!long || matchMedia("(prefers-reduced-motion: reduce)").matches) { call(1); return; }
+      const start = performance.now();
+      const next = now => {
+        const part = Math.min(1, Math.max(0, now - start) / long);
+        call(part * part * (3 - 2 * part));
+        if (part < 1) requestAnimationFrame(next);
+      };
+      requestAnimationFrame(next);
     },
     // as viser does what its own message says
     move(name, at) {

@@ -7,7 +7,7 @@ colour bar, statistics, factor, parameters) is ours, since the export has no wid
 import contextlib
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from string import Template
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import viser
-from markupsafe import escape
+from markupsafe import Markup, escape
 
 from warpspace.app.browser.html import attributes, fill, join, lowered, number, rows, tag
 from warpspace.app.documents import legend
@@ -23,7 +23,7 @@ from warpspace.app.drawing.around import around, words
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.drawing.labels import axes_room_mm, point_labels
-from warpspace.app.drawing.shapes import Nodes, light_scene
+from warpspace.app.drawing.shapes import Nodes, Shapes, light_scene
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import start_state
@@ -66,15 +66,22 @@ def offline_picture(
     return replace(picture, colours=colours or picture.colours)
 
 
-def build_scene_html(picture: LivePicture, camera: CameraMemory | None = None) -> str:
-    """Export the 3-D scene of a picture as a page of its own, without a word around it."""
+def usual_camera(picture: LivePicture) -> CameraMemory:
     drawn = np.concatenate([axes_room_mm(picture), picture.drawn_mm.reshape(-1, 3)])
-    kept = camera or fit_camera(drawn, ASPECT)
+    return fit_camera(drawn, ASPECT)
+
+
+def build_scene_html(
+    picture: LivePicture, camera: CameraMemory | None = None, shapes: Shapes | None = None
+) -> str:
+    """Export the 3-D scene of a picture as a page of its own, without a word around it."""
+    kept = camera or usual_camera(picture)
+    drawn = {**box(picture), **around(picture), **words(picture)} if shapes is None else shapes
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)
-            Nodes(server.scene).draw({**box(picture), **around(picture), **words(picture)})
+            Nodes(server.scene).draw(drawn)
             first = server.initial_camera
             first.up, first.fov = kept.up, kept.fov_rad
             first.position, first.look_at = kept.position, kept.look_at
@@ -89,16 +96,10 @@ def build_offline_html(
     camera: CameraMemory | None = None,
 ) -> str:
     """Build the page: the interactive scene with its colour bar, numbers and factor."""
-    # a page in an attribute: only these two characters would end or change it
-    inner = build_scene_html(picture, camera=camera).replace("&", "&amp;").replace('"', "&quot;")
     conditions = list(legend.picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
-    stored = json.dumps(about, ensure_ascii=False, allow_nan=False)
-    template = files("warpspace.app.documents").joinpath("offline.html").read_text("utf-8")
     errors = _error_rows(picture)
     counted = "unlike in A and B" if picture.is_difference else "not zero"
-    found = picture.statistics
-    numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um, "max": found.max_um}
     kept = "" if picture.is_difference else f" · {legend.kept_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)
     heading = (
@@ -107,15 +108,14 @@ def build_offline_html(
     )
     asked = [label for label in point_labels(picture) if label.kind == "asked"]
     remarks = (*looks, "drag to turn, wheel to zoom", f"warpspace {__version__}")
-    return Template(template).substitute(
-        title=escape(picture.title),
-        program=f"warpspace {__version__}",
-        policy=POLICY,
-        heading=join(tag("p", words) for words in heading),
+    return fill_page(
+        picture.title,
+        heading,
+        build_scene_html(picture, camera=camera),
+        about,
+        remarks,
         legend=legend.legend_html(picture),
-        numbers=tag("b", lowered(f"{picture.length_words} over the volume"))
-        + rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
-        scene=inner,
+        numbers=numbers_html(picture),
         point=tag("p", " · ".join(one.text for one in asked)),
         errors=fill(
             "<details{open}><summary>{count} {counted}</summary><table>{rows}</table></details>",
@@ -123,9 +123,44 @@ def build_offline_html(
             count=f"{len(errors)} error{'' if len(errors) == 1 else 's'}", counted=counted,
             rows=join(tag("tr", join(tag("td", cell) for cell in row)) for row in errors),
         ),
-        remarks=join(tag("span", words) for words in remarks),
-        provenance=stored.replace("<", "\\u003c"),
     )  # fmt: skip
+
+
+def numbers_html(picture: LivePicture) -> Markup:
+    found = picture.statistics
+    numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um, "max": found.max_um}
+    return tag("b", lowered(f"{picture.length_words} over the volume")) + rows(
+        (name, f"{number(value, 2)} µm") for name, value in numbers.items()
+    )
+
+
+def fill_page(
+    title: str,
+    heading: Iterable[str],
+    scene: str,
+    about: Mapping[str, Any],
+    remarks: Iterable[str],
+    **pieces: str,
+) -> str:
+    """Put an exported scene into a page; `pieces` are those of its template, empty by default."""
+    template = files("warpspace.app.documents").joinpath("offline.html").read_text("utf-8")
+    empty = dict.fromkeys(("legend", "numbers", "point", "errors", "kind", "scripts"), "")
+    return Template(template).substitute(
+        **(empty | pieces),
+        title=escape(title),
+        program=f"warpspace {__version__}",
+        policy=POLICY,
+        heading=join(tag("p", words) for words in heading),
+        # a page in an attribute: only these two characters would end or change it
+        scene=scene.replace("&", "&amp;").replace('"', "&quot;"),
+        remarks=join(tag("span", words) for words in remarks),
+        provenance=as_json(about),
+    )
+
+
+def as_json(value: object) -> str:
+    """Spell a value for a script block of a page, which no text in it can end."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
 
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:

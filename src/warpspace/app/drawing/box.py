@@ -126,7 +126,13 @@ def only_bent(held: LivePicture, picture: LivePicture) -> bool:
 
 
 def _open_script(picture: LivePicture, vertices_mm: Array) -> str:
-    """Write the script that tells a page which points its lines end at, and the colours."""
+    colours = packed(level_colours(diverging=picture.scale.diverging))
+    facts = {"palette": colours, **line_facts(picture, vertices_mm)}
+    return f"warpspaceMesh.open({json.dumps(facts)});"
+
+
+def line_facts(picture: LivePicture, vertices_mm: Array) -> dict[str, object]:
+    """Say which points the lines of a box end at, how far they are lifted: for `mesh.js`."""
     nodes, of = picture.drawn_mm.reshape(-1, 3), picture.topology
     number = np.zeros(len(nodes), "<u4")
     number[of.surface.nodes] = np.arange(len(of.surface.nodes))
@@ -138,9 +144,7 @@ def _open_script(picture: LivePicture, vertices_mm: Array) -> str:
         points = number[segments]
         lifts = ends.reshape(-1, 3) - vertices_mm[points.reshape(-1)]
         lines[name] = (packed(points), packed(lifts.astype("<f4")))
-    colours = packed(level_colours(diverging=picture.scale.diverging))
-    facts = {"count": len(vertices_mm), "palette": colours, "lines": lines}
-    return f"warpspaceMesh.open({json.dumps(facts)});"
+    return {"count": len(vertices_mm), "lines": lines}
 
 
 def packed(values: NDArray[Any]) -> str:

@@ -21,6 +21,7 @@ from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.parts import Window, actions
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
+from warpspace.scene.notes import story
 
 LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
@@ -101,7 +102,9 @@ class FilesWindow(JobWindow):
             actions(button("Save figure (PNG)", "files:figure")),
             tag("h3", "Export"),
             actions(button("Interactive page (HTML)", "files:page",
-                           hint="One file that needs no network"), *exports),
+                           hint="One file that needs no network"),
+                    *((button("Story (HTML)", "files:story", hint="Its steps in such a file"),)
+                      if story(picture.state.review) else ()), *exports),
             self._jobs.html(),
         ))  # fmt: skip
 
@@ -117,6 +120,7 @@ class FilesWindow(JobWindow):
             "figure": self._draw,
             "view": self._view,
             "page": self._page,
+            "story": self._story,
             "export": partial(self._export, value),
         }
         if word in doing:
@@ -201,6 +205,17 @@ class FilesWindow(JobWindow):
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
         self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
+
+    def _story(self) -> None:
+        from warpspace.app.documents.story_page import build_story_html
+
+        toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
+        state, known = without_table(self.context.state), self.context.scenes.fixed
+
+        def write(*_: object) -> bytes:
+            return build_story_html(state, toml, known).encode()
+
+        self.make("Story", "_story.html", write, as_drawn=True)
 
     def _export(self, ending: str) -> None:
         services = self.context.services

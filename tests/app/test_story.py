@@ -1,0 +1,92 @@
+"""A story: notes in order, each with what was on the screen, in one file without a network."""
+
+from dataclasses import replace
+
+import pytest
+
+from offline import EVIL, opened_offline, wait_for_the_map
+from warpspace.app.browser.html import linked
+from warpspace.app.documents.scene_file import view_of
+from warpspace.app.documents.story_page import build_story_html
+from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.state.app_state import start_state
+from warpspace.picture.mesh import map_mesh
+from warpspace.scene.library import load_scene
+from warpspace.scene.notes import Note
+
+START = start_state(load_scene("dvf5000_first"))
+STEPS = 8
+MOST_BYTES = 1_200_000
+PLACES = """() => {
+  const view = document.querySelector("iframe").contentWindow.__viserMutable;
+  let mesh = null;
+  view?.nodeRefFromName["/box/surface"]?.traverse(part => {
+    if (!mesh && part.isMesh && part.geometry.attributes.color) mesh = part;
+  });
+  const { position, color } = mesh?.geometry.attributes ?? {};
+  return [position?.array.slice(0, 300), color?.array.slice(0, 300)].map(a => [...a ?? []]).concat(
+    [view?.camera.position.toArray() ?? []]);
+}"""
+
+
+def camera(number):
+    return CameraMemory((9.0 + number, -12.0, 8.0), (0.5, 0.0, -2.5), (0.0, 0.0, 1.0), 0.4)
+
+
+def shown(number):
+    """Give what step `number` shows."""
+    bent = {**START.amplitudes, "EA0Z": 33.9 - 8.0 * number}
+    return replace(START, amplitudes=bent, component="x" if number == 3 else "norm")
+
+
+def told(text="Look here.", **changes):
+    notes = [
+        Note(text=f"{text} {number}", author="Ada", step=number + 1, **changes,
+             view=view_of(shown(number), camera(number)))
+        for number in reversed(range(STEPS))
+    ]  # fmt: skip
+    return replace(START, review=tuple(notes))
+
+
+def test_links_are_made_of_http_alone():
+    found = linked('<i> "javascript:x" http://a.b/c?d=1&e. data:text')
+    assert str(found) == (
+        "&lt;i&gt; &quot;javascript:x&quot; <a href=\"http://a.b/c?d=1&amp;e\" target=\"_blank\""
+        " rel=\"noopener noreferrer\">http://a.b/c?d=1&amp;e</a>. data:text"
+    )  # fmt: skip
+
+
+def test_a_step_that_cannot_be_drawn_keeps_its_words_and_says_why():
+    state = told()
+    lost = replace(state.review[0], view="compare.b=scene%3Dgone")
+    page = build_story_html(replace(state, review=(lost, *state.review[1:]), nodes=3))
+    assert "The drawing of the step before stays" in page
+    assert f"Look here. {STEPS - 1}" in page
+
+
+def test_a_story_in_a_file_moves_points_colours_and_camera_without_a_network(browser, tmp_path):
+    text = build_story_html(told(EVIL, numbers={"mean_um": 1.0}), {"title": EVIL})
+    assert len(text.encode()) <= MOST_BYTES
+    path = tmp_path / "story.html"
+    path.write_text(text, encoding="utf-8")
+    with opened_offline(browser, path) as page:
+        wait_for_the_map(page, page.frame_locator("iframe").locator("canvas").first, 20_000)
+        assert "1 of 8" in page.inner_text("aside")
+        assert f"{EVIL} 0" in page.inner_text("aside")
+        assert "changed: 1.0 → 30.9 µm" in page.inner_text("aside")
+        before = page.evaluate(PLACES)
+        page.keyboard.press("ArrowRight")
+        page.wait_for_timeout(2_000)
+        assert "2 of 8" in page.inner_text("aside")
+        after = page.evaluate(PLACES)
+        for was, now in zip(before, after, strict=True):
+            assert was != now
+        expected = map_mesh(LiveModel().evaluate(shown(1))).vertices_mm.reshape(-1)[:300]
+        assert after[0] == pytest.approx(expected.tolist(), abs=0.02)
+        # viser draws in a world whose y is up and whose x looks against our y
+        assert after[2] == pytest.approx([12.0, 8.0, -10.0], abs=1e-3)
+        page.keyboard.press("ArrowLeft")
+        page.wait_for_timeout(2_000)
+        for was, now in zip(before, page.evaluate(PLACES), strict=True):
+            assert now == pytest.approx(was, abs=0.02)
