@@ -2,14 +2,17 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from app.page_tab import open_page
 from offline import EVIL, opened_offline, wait_for_the_map
 from warpspace.app.browser.html import linked
 from warpspace.app.documents.scene_file import view_of
 from warpspace.app.documents.story_page import build_story_html
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.picture.mesh import map_mesh
 from warpspace.scene.library import load_scene
@@ -17,6 +20,7 @@ from warpspace.scene.notes import Note
 
 START = start_state(load_scene("dvf5000_first"))
 STEPS = 8
+PLACES_IN_THE_APP = "() => window.__viserMutable.camera.position.toArray()"
 MOST_BYTES = 1_200_000
 PLACES = """() => {
   const view = document.querySelector("iframe").contentWindow.__viserMutable;
@@ -90,3 +94,33 @@ def test_a_story_in_a_file_moves_points_colours_and_camera_without_a_network(bro
         page.wait_for_timeout(2_000)
         for was, now in zip(before, page.evaluate(PLACES), strict=True):
             assert now == pytest.approx(was, abs=0.02)
+
+
+def place_of(tab):
+    return np.array(tab.page.evaluate(PLACES_IN_THE_APP))
+
+
+def test_a_story_in_the_app_goes_from_step_to_step_and_back_to_before(browser):
+    scene = replace(START.scene, review=told().review)
+    with Viewer(scene, shared=True) as viewer:
+        tab = open_page(viewer, browser)
+        before, camera_before = tab.state, tab.still(lambda: place_of(tab))
+        tab.send("state:set.component", "y")
+        tab.until(lambda: tab.state.component == "y")
+        before = tab.state
+        tab.send("story:start")
+        tab.says("1 of 8", "#ws-story")
+        tab.page.keyboard.press("ArrowRight")
+        tab.says("2 of 8", "#ws-story")
+        tab.until(lambda: tab.shows_state(shown(1)))
+        tab.until(lambda: np.allclose(place_of(tab), [12.0, 8.0, -10.0], atol=1e-6))
+        assert not tab.page.locator("#ws-left").is_visible()
+        tab.page.keyboard.press("g")  # no key but its own acts
+        tab.page.keyboard.press("ArrowLeft")
+        tab.says("1 of 8", "#ws-story")
+        assert viewer.sessions[0].context.store.state is before  # nobody else is disturbed
+        tab.page.keyboard.press("Escape")
+        tab.until(lambda: tab.state is before)
+        tab.until(lambda: np.allclose(place_of(tab), camera_before, atol=1e-6))
+        assert tab.page.locator("#ws-left").is_visible()
+        assert tab.errors == []

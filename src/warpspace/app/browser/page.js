@@ -22,6 +22,7 @@
       <div class="ws-foot"><div class="ws-controls" role="group" aria-label="How it is drawn"><div data-piece="controls"></div>
         <div data-piece="compare"></div></div>
       <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div></div></div></div>
+    <section id="ws-story" aria-label="Story" aria-live="polite" data-piece="story"></section>
     <aside id="ws-right" aria-label="Tasks" data-piece="tasks"></aside>
     <dialog id="ws-window" aria-labelledby="ws-window-title" data-piece="window"></dialog>
     <div id="ws-toasts" role="status" aria-live="polite" popover="manual"></div>`;
@@ -197,6 +198,7 @@
   const spelt = event => [event.ctrlKey || event.metaKey ? "ctrl" : "", event.shiftKey ? "shift" : "",
     event.altKey ? "alt" : "", event.key.toLowerCase()].filter(Boolean).join("+");
   addEventListener("keydown", event => {
+    if (document.documentElement.classList.contains("ws-told")) return;  // keys are those of the story
     const node = event.target, own = node.tagName;
     if (own === "INPUT" && node.type === "range" && /^[-−0-9.,]$/.test(event.key)) {
       const box = document.getElementById(node.dataset.twin ?? "");

@@ -149,9 +149,21 @@ class TabCamera:
         if memory is None:
             self.fit(picture)
             return
+        self._note(memory)
+        self._stand_at(memory, np.array([memory.look_at]) / SCENE_PER_MM)
+
+    def _note(self, memory: CameraMemory) -> None:
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
         self.orthographic, self._puts = bool(telephoto), ()
-        self._stand_at(memory, np.array([memory.look_at]) / SCENE_PER_MM)
+
+    def take(self, memory: CameraMemory) -> list[float]:
+        """Get ready for a place that the page itself moves to; give its numbers."""
+        self._note(memory)
+        points = np.array([memory.look_at])
+        self._camera.near, self._camera.far = clipping(
+            np.array(memory.position), points, orthographic=self.orthographic
+        )
+        return [*memory.position, *memory.look_at, *memory.up, memory.fov_rad]
 
     def fit(self, picture: LivePicture) -> None:
         """Fill the room between the panels with the box, its traces and axes."""

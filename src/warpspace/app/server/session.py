@@ -192,7 +192,7 @@ class Session:
     def _clicked(self, origin: object, direction: object) -> None:
         """Ask why a point is off."""
         context, picture = self.context, self.context.shown
-        if picture is None:
+        if picture is None or context.telling is not None:
             return
         ray = np.array([origin, direction], dtype=float)
         picked = pick(picture, ray[0] / SCENE_PER_MM, ray[1])

@@ -180,7 +180,7 @@ class TabKeeper(Part):
         self.context.page.call("server.back", known)
 
     def is_seen(self, state: AppState) -> bool:  # noqa: ARG002
-        return self._may_keep
+        return self._may_keep and self.context.telling is None
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         return (id(picture.state), self.context.camera.remember())

@@ -22,6 +22,7 @@ from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.app.tasks.measure import CalibratePart, TestsPart
 from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart, RoomPart
 from warpspace.app.tasks.parts import Part, Section
+from warpspace.app.tasks.story import StoryPart
 from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
 from warpspace.app.tasks.understand import VolumePart, WorstPart
 
@@ -92,6 +93,7 @@ def build_parts(context: Context) -> list[Part]:
     kinds = (
         TopPart, HeadPart, LegendPart, OrderPart, ControlsPart, ComparePart, ErrorsPart, RoomPart,
         StatePart, PagePart, ScenesWindow, MachinesWindow, FilesWindow, ReportWindow, HelpWindow,
+        StoryPart,
     )  # fmt: skip
     others = [kind(context) for kind in kinds]
     return [*others, TasksPart(context, found), *found, BestPart(context)]

@@ -18,7 +18,7 @@ from warpspace.app.browser.incoming import LONGEST_VALUE, Event, Events, event_o
 from warpspace.app.browser.page import Page
 from warpspace.app.documents.scene_file import MOST_OPENED, SceneList
 from warpspace.app.documents.services import Services
-from warpspace.app.drawing.camera import CameraMemory, TabCamera
+from warpspace.app.drawing.camera import CameraMemory, TabCamera, focus
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
@@ -62,6 +62,8 @@ class Context:
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
         self.changed_at = time.monotonic()
         self.unfolded = store.state.page  # of this page, also where the state is shared
+        # what a step of a story shows in place of the present state, which it does not change
+        self.telling: AppState | None = None
         self.notes: list[str] = []  # what updates of the state had to clamp
         self._own: tuple[object, AppState] = (None, store.state)
         self._wake = threading.Event()
@@ -69,7 +71,9 @@ class Context:
 
     @property
     def state(self) -> AppState:
-        """The present state, with what is unfolded on this page."""
+        """The present state, with what is unfolded on this page; or that of a step of a story."""
+        if self.telling is not None:
+            return self.telling
         shared = self.store.state
         if shared.page is self.unfolded:
             return shared
@@ -139,6 +143,14 @@ class Context:
     def look_from(self, memory: CameraMemory) -> None:
         """Put the camera somewhere with what is shown next."""
         self.camera.wanted = memory
+        self._wake.set()
+
+    def fly(self, memory: CameraMemory | None, long_ms: int) -> None:
+        """Have camera and box go to what is shown next in a time, on the page."""
+        if memory and self.shown and focus(self.shown.state) != focus(self.state):
+            memory, self.camera.wanted = None, memory  # of another machine: at once, with it
+        numbers = None if memory is None else self.camera.take(memory)
+        self.page.call("step", long_ms, numbers)
         self._wake.set()
 
     def show_opened(

@@ -122,6 +122,7 @@ COMMANDS = (
     Command("Save and export", "page:open", "files"),
     Command("Copy a link to what is shown", "files:share"),
     Command("Write a report", "page:open", "report"),
+    Command("Tell the story", "story:start"),
     Command("Find an error", "find", keys=("/",)),
     Command("Fit the view", "page:fit", keys=("f",)),
     Command("Component: length of the error", "state:set.component", "norm", ("1",)),
