@@ -131,6 +131,24 @@ def test_a_drag_ends_where_the_hand_stopped_and_digits_set_a_number(tab):
     assert tab.state.amplitudes["EA0Z"] == 12.5
 
 
+def test_a_distance_is_measured_between_two_clicks_and_stands_in_the_drawing(tab):
+    draw(tab.page)
+    tab.page.locator("#ws-task summary", has_text="More analyses").click()
+    tab.unfold("Distance and angle")
+    tab.click("Pick points")
+    tab.says("Click the first point")
+    box = tab.page.locator("#root canvas").first.bounding_box()
+    for part, words in ((0.42, "Click the second point"), (0.58, "Click the corner")):
+        tab.page.mouse.click(box["x"] + part * box["width"], box["y"] + 0.5 * box["height"])
+        tab.says(words)
+    tab.click("Stop")
+    tab.until(lambda: tab.page.locator(".ws-words span", has_text=" mm, ").count() == 1)
+    assert tab.page.locator(".ws-words span", has_text="Δx").count() == 1
+    tab.click("Clear")
+    tab.until(lambda: tab.page.locator(".ws-words span", has_text="Δx").count() == 0)
+    assert tab.state.picked is None
+
+
 def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
     draw(tab.page)
     box = tab.page.locator("#root canvas").first.bounding_box()

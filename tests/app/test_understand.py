@@ -6,15 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.parts import LIVE, lone_part, wait
+from app.parts import LIVE, Alone, lone_part, wait
+from warpspace.analysis.catalogue import entries
+from warpspace.analysis.description import silent
+from warpspace.analysis.distance import Distance
+from warpspace.app.drawing.around import around
+from warpspace.app.drawing.labels import measured_words, point_labels
 from warpspace.app.evaluation.budget import answer, pick, pick_worst, with_picked
 from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.measuring import point_form
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_positions
 from warpspace.app.tasks.analysis import AnalysisPart
 from warpspace.app.tasks.improve import BestPart
-from warpspace.app.tasks.understand import VolumePart, WorstPart
+from warpspace.app.tasks.understand import DistancePart, VolumePart, WorstPart
 from warpspace.kinematics.model import Loop
 from warpspace.picture.words import spell_at, spell_axes, spell_point
 from warpspace.scene.library import load_scene, scene_names
@@ -241,3 +247,68 @@ def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     wait(part)
     assert "X 275, Y −225, Z −480" in html_of(part, asked)
     assert np.isfinite(part._answer[1].gains[0].norm)
+
+
+# --- A distance, picked on the map ----------------------------------------------------------------
+
+
+def measuring(**points):
+    entry = next(one for one in entries() if one.name == "distance")
+    state = replace(
+        START,
+        page=replace(START.page, open=START.page.open | {"distance"}),
+        forms={point_form(name): text for name, text in points.items()},
+    )
+    return Alone(DistancePart, state, entry, take_picked=with_picked)
+
+
+def click(alone, at, **more):
+    picked = Picked(at, **more)
+    alone.store.apply(lambda state: alone.context.take_picked(state, picked))
+    return alone.store.state
+
+
+def test_clicks_set_start_end_and_corner_in_turn_and_then_ask_about_a_point_again():
+    alone = measuring(exact="1")
+    alone.do("pick")
+    assert "first point" in alone.html
+    assert click(alone, {"X": 1.0}, point_mm=(0.0, 0.0, 0.0)).forms == {"distance.exact": "1"}
+    assert "a trace was clicked" in alone.said[0][1]
+    for x in (-200.0, 200.0, 0.0):
+        state = click(alone, {"X": x, "Y": 0.0 if x else 200.0})
+    assert state.forms["distance.start"] == "X=-200,Y=0"
+    assert state.forms["distance.corner"] == "X=0,Y=200"
+    assert state.picked is None
+    assert click(alone, {"X": 7.0}).picked == Picked({"X": 7.0})
+    assert alone.do("clear").forms == {"distance.exact": "1"}
+
+
+def test_a_folded_section_takes_no_clicks():
+    alone = measuring()
+    alone.do("pick")
+    alone.store.apply(lambda state: replace(state, page=replace(state.page, open=frozenset())))
+    assert click(alone, {"X": 7.0}).picked == Picked({"X": 7.0})
+    assert alone.store.state.forms == {}
+
+
+def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_numbers():
+    state = measuring(start="X=-200,Y=0", end="X=200,Y=0", corner="X=-200,Y=200").store.state
+    picture = LIVE.evaluate(state)
+    words = [label.text for label in point_labels(picture) if label.kind == "measured"]
+    found = Distance(
+        start={"X": -200, "Y": 0}, end={"X": 200, "Y": 0}, corner={"X": -200, "Y": 200}
+    ).run(FIRST, silent)
+    assert words == measured_words(found)
+    assert words[0].startswith("400.000 → ")
+    assert words[1].count("Δ") == 3
+    shapes = around(picture)
+    drawn = [answer(state, Picked(at), picture.exaggeration).drawn_mm for at in found.at]
+    ends = shapes["/measured/actual"].follows["points"]
+    np.testing.assert_allclose(ends[0], drawn[:2], atol=1e-3)
+    assert len(ends) == len(shapes["/measured/nominal"].follows["points"]) == 3
+
+
+@pytest.mark.parametrize("text", ["", "Q=1", "X=200,Y=0", "X=1e99", "<b>"])
+def test_points_that_measure_nothing_draw_nothing(text):
+    state = measuring(start=text, end="X=200,Y=0").store.state
+    assert "/measured/actual" not in around(LIVE.evaluate(state))

@@ -172,8 +172,8 @@
       const w = widthOf(text, kind === "worst"), h = 17;
       const own = Math.atan2(p.y - middle.y, p.x - middle.x);
       let best = null;
-      // the name of a path within the box would hide the map there
-      for (const far of kind === "name" ? BESIDE : FAR) for (const turn of WAYS) {
+      // the name of a path or a measured length within the box would hide the map there
+      for (const far of ["name", "measured"].includes(kind) ? BESIDE : FAR) for (const turn of WAYS) {
         const u = Math.cos(own + turn), v = Math.sin(own + turn);
         const box = { x: p.x + u * (far + w / 2) - w / 2, y: p.y + v * (far + h / 2) - h / 2, w, h };
         let cost = far + 12 * Math.abs(turn);
@@ -182,7 +182,7 @@
         if (touches(shape, box)) cost += 300;
         if (!best || cost < best.cost) best = { cost, box };
       }
-      if (best.cost >= 1000 && !["worst", "asked"].includes(kind)) continue;
+      if (best.cost >= 1000 && !["worst", "asked", "measured"].includes(kind)) continue;
       put({ text, kind }, best.box);
       const { box } = best;
       const x = Math.min(Math.max(p.x, box.x), box.x + w), y = Math.min(Math.max(p.y, box.y), box.y + h);
@@ -231,9 +231,10 @@
     if (changed) view().requestRender?.();
   };
 
-  // the trace that is looked at is seen whole, also where the box lies before it
+  // the trace that is looked at and what is measured are seen whole, also where the box lies before them
+  const FORWARD = ["/traces/actual", "/traces/nominal", "/measured/nominal", "/measured/actual", "/measured/points"];
   const bringForward = () => {
-    for (const name of ["/traces/actual", "/traces/nominal"])
+    for (const name of FORWARD)
       view().nodeRefFromName[name]?.traverse(piece => {
         if (!piece.material?.depthTest) return;
         piece.material.depthTest = false;

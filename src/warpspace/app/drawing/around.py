@@ -19,6 +19,7 @@ from warpspace.app.drawing.shapes import (
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
+from warpspace.app.evaluation.measuring import measured
 from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.mesh import outline_pieces
 from warpspace.units import Array
@@ -42,7 +43,7 @@ STROKES, SLANT = 12, 0.3  # lines of a head, and how far they slant, as a part o
 
 def around(picture: LivePicture) -> Shapes:
     """Draw all that follows the picture beside the box and the machine."""
-    draws = (_axes, _traces, _path, _other_side, _asked, _marks)
+    draws = (_axes, _traces, _path, _other_side, _asked, _measured, _marks)
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
 
 
@@ -119,6 +120,19 @@ def _asked(picture: LivePicture) -> Shapes:
             shapes["/why/axis"] = lines(axis, ACCENT, 3.5)
             shapes["/why/lever"] = lines(dashes(lever, DASH * size, 0.6 * DASH * size), ACCENT, 2.0)
     return shapes
+
+
+def _measured(picture: LivePicture) -> Shapes:
+    found = measured(picture)
+    if found is None:
+        return {}
+    # start to end, and both edges of the angle
+    ends = [[0, 1]] if len(found.drawn_mm) == 2 else [[0, 1], [2, 0], [2, 1]]
+    return {
+        "/measured/nominal": lines(found.nominal_mm[ends], colour(picture, "edge"), 1.5),
+        "/measured/actual": lines(found.drawn_mm[ends], ACCENT, 3.0),
+        "/measured/points": dots(found.drawn_mm, ASKED * picture.size_mm, ACCENT),
+    }
 
 
 def _marks(picture: LivePicture) -> Shapes:

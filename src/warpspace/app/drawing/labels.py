@@ -9,9 +9,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from warpspace.analysis.distance import DistanceResult
 from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, tool_point
+from warpspace.app.evaluation.measuring import measured
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
@@ -33,7 +35,7 @@ class Label:
 
     text: str
     at_mm: Array
-    kind: str = "name"  # "tick", "axis" (its name), "worst", "corner", "asked", "name"
+    kind: str = "name"  # "tick", "axis" (its name), "worst", "corner", "asked", "measured", "name"
     from_mm: Array | None = None  # of axes: a point that the words stand away from
     axis: int = 0
 
@@ -126,7 +128,7 @@ def point_labels(picture: LivePicture) -> list[Label]:
         apart = np.linalg.norm(one.at_mm - other.at_mm)
         if apart < TICK * picture.size_mm and other.text.startswith(one.text.removeprefix("max ")):
             worst = []  # one place, said once
-    return [*worst, *asked, *_names(picture), *_corners(picture)]
+    return [*worst, *asked, *_measured(picture), *_names(picture), *_corners(picture)]
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:
@@ -165,6 +167,29 @@ def _asked(picture: LivePicture) -> Iterator[Label]:
         yield Label(f"{part.key} {way} this axis", origin, "asked")
         lever = float(np.linalg.norm(part.lever_mm))
         yield Label(f"lever {lever:.0f} mm", point + LEVER_AT * (origin - point), "asked")
+
+
+def _measured(picture: LivePicture) -> Iterator[Label]:
+    drawn = measured(picture)
+    if drawn is None:
+        return
+    found, middle = drawn.found, drawn.drawn_mm[:2].mean(axis=0)
+    for words in measured_words(found):
+        yield Label(words, drawn.drawn_mm[2] if words.startswith("angle") else middle, "measured")
+
+
+def measured_words(found: DistanceResult) -> list[str]:
+    """Say a measured distance, its parts along the axes, and the angle where there is one."""
+    nominal, actual = found.distance_mm
+    parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", found.along_um, strict=True))
+    words = [
+        f"{nominal:.3f} → {actual:.3f} mm, {found.difference_um:+.1f} µm",
+        f"{'  '.join(parts)} µm",
+    ]
+    if found.angle_deg is not None:
+        nominal, actual = found.angle_deg
+        words.append(f"angle {nominal:.4f} → {actual:.4f}°, {found.deviation_urad:+.1f} µrad")
+    return [one.replace("-", MINUS) for one in words]
 
 
 def _names(picture: LivePicture) -> Iterator[Label]:

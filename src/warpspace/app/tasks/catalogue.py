@@ -24,11 +24,11 @@ from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart, RoomPart
 from warpspace.app.tasks.parts import Part, Section
 from warpspace.app.tasks.story import StoryPart
 from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
-from warpspace.app.tasks.understand import VolumePart, WorstPart
+from warpspace.app.tasks.understand import DistancePart, VolumePart, WorstPart
 
 HOOKS: dict[str, type[AnalysisPart]] = {
     "calibrate": CalibratePart, "repair": RepairPart, "compensate": CompensatePart,
-    "allocate": TolerancesPart, "concepts": ConceptsPart,
+    "allocate": TolerancesPart, "concepts": ConceptsPart, "distance": DistancePart,
 }  # fmt: skip
 """Parts of analyses that do more than their description says, by name."""
 FIRST = ("compensate", "concepts", "allocate")
