@@ -51,6 +51,7 @@ MAX_NOTES = 500  # review notes of a scene
 MAX_NOTE_TEXT = 2000  # characters of a note, and of a reply
 MAX_NOTE_VIEW = 20_000  # characters of what was on the screen, as in a link
 MAX_REPLIES = 200  # of one note, and versions of it
+MAX_REPLACED = 1000  # earlier versions that an edit of a note names
 
 # --- meshes and robots: what is counted before anything is built ----------------------------------
 

@@ -237,6 +237,8 @@ def _review(raw: object, machine: Machine, problems: Problems) -> tuple[Note, ..
         if note.on and note.on.body and note.on.body not in frames:
             problems.unknown(f"{where}.on.body", note.on.body, frames, "body")
         for one in (note, *note.versions):
+            if one.id != note.id:
+                problems.add(f"{where}.versions", f"expected versions of {note.id}", one.id)
             for axis in one.at:
                 if axis not in machine.axes and machine is not STAND_IN:
                     problems.unknown(f"{where}.at", axis, machine.axes, "axis of this machine")

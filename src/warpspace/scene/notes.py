@@ -16,7 +16,7 @@ from typing import Any
 from warpspace.exceptions import OptionError
 from warpspace.machine.axes import PARAMETERS
 from warpspace.machine.description import Vector
-from warpspace.machine.limits import MAX_NOTES
+from warpspace.machine.limits import MAX_NOTES, MAX_REPLACED, MAX_REPLIES
 
 KINDS = ("note", "question", "decision")
 STATUSES = ("open", "done")
@@ -76,16 +76,21 @@ class Note:
     def version(self) -> str:
         """What this version is known by: a digest of what it says and of what it replaces."""
         said = note_to_toml(replace(self, replies=(), versions=()))
-        text = json.dumps(said, sort_keys=True, default=datetime.isoformat)
+        # 275 and 275.0 are one number, as which of them a file gives is not for sure
+        same = json.loads(json.dumps(said, default=datetime.isoformat), parse_int=float)
+        text = json.dumps(same, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
     def edited(self, **changes: Any) -> "Note":
         """Give the version after an edit; it replaces this one and those beside it."""
         heads = (self, *self.versions)
-        known = {digest for one in heads for digest in (*one.replaces, one.version)}
-        return replace(self, **changes, replaces=tuple(sorted(known)), versions=())
+        known = dict.fromkeys(digest for one in heads for digest in (*one.replaces, one.version))
+        # a copy that is older than these is kept beside the note when they are merged
+        return replace(self, **changes, replaces=(*known,)[-MAX_REPLACED:], versions=())
 
     def answered(self, reply: Reply) -> "Note":
+        if len(self.replies) >= MAX_REPLIES:
+            raise OptionError(f"{self.id} has {MAX_REPLIES} replies already; expected no more")
         return replace(self, replies=(*self.replies, reply))
 
 
@@ -145,6 +150,11 @@ def _merged(same: Sequence[Note]) -> Note:
     first, *others = [left[digest] for digest in sorted(left)]
     replies = {reply for one in same for reply in one.replies}
     answered = sorted(replies, key=lambda one: (one.date, one.author, one.text))
+    if max(len(answered), len(others)) > MAX_REPLIES:
+        raise OptionError(
+            f"{first.id}: together {len(answered)} replies and {len(others)} other versions;"
+            f" expected at most {MAX_REPLIES} of each"
+        )
     return replace(first, replies=tuple(answered), versions=tuple(others))
 
 

@@ -16,6 +16,7 @@ from warpspace.machine.curves.curve import Span
 from warpspace.machine.description import ORIGIN, BodySource, Machine, Vector, default_travel
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
+from warpspace.scene.files import spell_key
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note, note_to_toml
@@ -234,7 +235,11 @@ def _section(
 def _inline(value: object) -> str:
     if isinstance(value, Mapping):
         table = cast("Mapping[str, object]", value)
-        return "{ " + ", ".join(f"{key} = {_inline(entry)}" for key, entry in table.items()) + " }"
+        return (
+            "{ "
+            + ", ".join(f"{spell_key(key)} = {_inline(entry)}" for key, entry in table.items())
+            + " }"
+        )
     if isinstance(value, (list, tuple)):
         entries = [_inline(entry) for entry in cast("Sequence[object]", value)]
         if len(entries) <= _WRAP:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, cast
+from unicodedata import category
 
 from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.kinematics.conversion import SquarenessSign
@@ -162,7 +163,7 @@ def _said(longest: int, least: int = 0) -> Kind:
 
     def read(reader: ValueReader, value: Any, path: Path) -> str:
         found = reader.text(value, path, longest, least)
-        if any(ord(sign) < ord(" ") and sign not in "\n\t" for sign in found):
+        if any(category(sign) in ("Cc", "Cs") and sign not in "\n\t" for sign in found):
             reader.note(path, "expected a text without control characters", value)
         return found
 
@@ -301,7 +302,7 @@ _NOTE: dict[str, tuple[Kind, Any]] = {
     "change": (_by_name(_PAIR), {}),
     "step": (_number(0.0, limits.MAX_NOTES), 0),
     "view": (_text(limits.MAX_NOTE_VIEW), ""),
-    "replaces": (_list(_word(16), limits.MAX_REPLIES), ()),
+    "replaces": (_list(_word(16), limits.MAX_REPLACED), ()),
 }
 _REPLY = Section(
     {

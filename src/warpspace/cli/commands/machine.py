@@ -338,7 +338,7 @@ def _write_note(scene: "Scene", name: str, path: str, *, force: bool) -> None:
 
     file = scene_path(name)
     text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_notes(scene.review[-1:])}"
-    parse_scene(text, scene.name, path, file.parent)
+    parse_scene(text, scene.name, path, Path(path).parent)
     write_text(path, text, force=force or file == Path(path))
     note = scene.review[-1]
     echo(f"{path}: {note.kind} {note.id} added", err=True)
@@ -355,13 +355,15 @@ def merge(first: str, second: str, output: str, *, force: bool) -> None:
     Notes are matched by their id and replies united. A note that both have edited is kept in both
     versions, side by side. Everything else of the scene is that of FIRST.
     """
-    from warpspace.scene.library import load_scene
+    from warpspace.scene.library import load_scene, parse_scene
     from warpspace.scene.notes import merge_notes
     from warpspace.scene.save import scene_to_toml
 
     a, b = load_scene(first), load_scene(second)
     merged = merge_notes(a.review, b.review)
-    write_text(output, scene_to_toml(replace(a, review=merged)), force=force)
+    text = scene_to_toml(replace(a, review=merged))
+    parse_scene(text, a.name, output, None)  # a note of SECOND may name an axis FIRST has not
+    write_text(output, text, force=force)
     print_text(f"{output}: {len(merged)} notes of {len(a.review)} and {len(b.review)}")
     for note in merged:
         if note.versions:
