@@ -124,3 +124,28 @@ def test_a_story_in_the_app_goes_from_step_to_step_and_back_to_before(browser):
         tab.until(lambda: np.allclose(place_of(tab), camera_before, atol=1e-6))
         assert tab.page.locator("#ws-left").is_visible()
         assert tab.errors == []
+
+
+def test_tabs_of_a_shared_review_see_each_others_pointer(browser):
+    with Viewer(START.scene, shared=True) as viewer:
+        one, other = open_page(viewer, browser), open_page(viewer, browser)
+        one.page.evaluate("name => localStorage.setItem('warpspace-author', name)", EVIL)
+        dots = other.page.locator(".ws-pointer")
+        one.page.mouse.move(700, 480)
+        one.page.mouse.move(705, 482)
+        dots.wait_for()
+        assert dots.inner_text() == EVIL[:24]
+        box = dots.bounding_box()  # both look from the same side
+        assert (box["x"], box["y"]) == pytest.approx((700, 477), abs=8)
+        assert one.page.locator(".ws-pointer").count() == 0
+        dots.wait_for(state="detached", timeout=10_000)  # after three seconds without a move
+        for hostile in ("1,2,3", "nan,0,0,0,0,1", "0,0,0,0,0,0", "x" * 5000, "1e300,0,0,1,1,1"):
+            one.send("pointer:at", hostile)
+            one.page.wait_for_timeout(120)
+        one.page.mouse.move(700, 470)
+        one.page.mouse.move(720, 480)
+        dots.wait_for()
+        one.page.close()
+        dots.wait_for(state="detached", timeout=2_500)
+        assert other.page.evaluate("window.hacked") is None
+        assert other.errors == []

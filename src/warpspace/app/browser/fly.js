@@ -45,4 +45,5 @@
     });
     return true;
   };
+  Object.assign(window.warpspaceFly, { out, back });
 })();

@@ -12,7 +12,16 @@ from viser import ClientHandle, ViserServer
 from warpspace.app.browser.viser_private import send_at_once, send_script
 from warpspace.exceptions import WarpspaceError
 
-SCRIPTS = ("page.js", "room.js", "mesh.js", "fly.js", "server.js", "tour.js", "story.js")
+SCRIPTS = (
+    "page.js",
+    "room.js",
+    "mesh.js",
+    "fly.js",
+    "server.js",
+    "tour.js",
+    "story.js",
+    "together.js",
+)
 
 
 class Page:

@@ -58,6 +58,14 @@ class Answer:
 
 def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | None:
     """Find the point of a drawn trace or surface that a click means."""
+    found = pick_drawn(picture, origin_mm, direction)
+    return found and found[0]
+
+
+def pick_drawn(
+    picture: LivePicture, origin_mm: Array, direction: Array
+) -> tuple[Picked, Array] | None:
+    """Find the point of a drawn trace or surface that a ray meets, and where it is drawn, [3]."""
     ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
     if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
         return None
@@ -67,7 +75,10 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | N
     origin, unit = ray[:3], ray[3:] / length
     traces = _on_traces(picture, origin, unit) if picture.state.shown.traces else ()
     found = [*traces, *_on_surfaces(picture, origin, unit)]
-    return min(found, key=lambda one: one[1])[0] if found else None
+    if not found:
+        return None
+    picked, distance = min(found, key=lambda one: one[1])
+    return picked, origin + distance * unit
 
 
 def pick_worst(picture: LivePicture) -> Picked:

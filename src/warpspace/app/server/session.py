@@ -39,6 +39,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.together import PointerPart, Together
 from warpspace.exceptions import WarpspaceError
 
 logger = logging.getLogger(__name__)
@@ -76,12 +77,13 @@ class Session:
         live: LiveModel,
         claim: "Callable[[Session, str], TabRecord | None]",
         *,
-        shared: bool = False,
+        together: Together | None = None,
     ) -> None:
         self.context, self._live, self._claim = context, live, claim
         self._client = context.client
         self.token = new_token()
-        self._keeper = TabKeeper(context, shared=shared)
+        self._together = together
+        self._keeper = TabKeeper(context, shared=together is not None)
         self.display = Display(context)
         self._is_known = False  # whether the page has said which tab it is
         self._around_at: float | None = None  # when what lies around the map is drawn at the latest
@@ -124,6 +126,8 @@ class Session:
                 self._turn()
         finally:
             self.context.store.unsubscribe(self.context.changed)
+            if self._together:
+                self._together.leave(self.context)
 
     def _turn(self) -> None:
         left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
@@ -173,7 +177,8 @@ class Session:
             context.camera.place(picture)
             context.page.call("stage", "opening")
             layers = [BoxLayer(self._client.scene, context.page, picture)]
-            self.display.add(picture, layers, [*build_parts(context), self._keeper])
+            pointer = [PointerPart(context, self._together)] if self._together else []
+            self.display.add(picture, layers, [*build_parts(context), self._keeper, *pointer])
             context.page.call("drawn")
         self._around_at = time.monotonic() + ANSWER_S
 

@@ -38,6 +38,7 @@ from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.together import Together
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
@@ -83,6 +84,7 @@ class Viewer:
         self._lock = threading.Lock()
         self._memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
+        self._together = Together() if shared else None
         self._server = _serve(self.address, self.port, Guard(doors))
         light_scene(self._server.scene)
         send_script_to_all(self._server, f"{page_script()}\nwarpspacePage.arrive();")
@@ -128,7 +130,7 @@ class Viewer:
             return  # it has gone meanwhile
         store, scenes = self._shared or StateStore(self._start), SceneList(self._scenes)
         context = Context(self._server, client, store, scenes, self._services)
-        session = Session(context, self._live, self._claim, shared=self._shared is not None)
+        session = Session(context, self._live, self._claim, together=self._together)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.take)
