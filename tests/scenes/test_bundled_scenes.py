@@ -1,16 +1,21 @@
 """Every bundled scene loads and evaluates, and what its description says is true of its numbers."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from warpspace import evaluate, load_scene
+from warpspace.analysis.reviewing import note_numbers, said_stale
 from warpspace.analysis.statistics import statistics
+from warpspace.app.documents.scene_file import reopened
+from warpspace.app.state.app_state import start_state
 from warpspace.kinematics.chain import branch_pose, columns
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.scene.library import scene_names, scene_path
 from warpspace.scene.model import second_order
+from warpspace.scene.notes import KINDS, story
 
 SCENES = scene_names()
 
@@ -99,6 +104,25 @@ def test_pitching_axis_has_a_lever_of_more_than_a_metre_and_abbe_s_error():
     stretch = error[0, -1, :, 1] - error[0, 0, :, 1]
     slope = np.diff(stretch) / 100.0 * 1e3
     np.testing.assert_allclose(slope, -40.0, atol=1e-9)
+
+
+def test_the_review_tells_the_measured_machine_in_six_steps_whose_numbers_hold():
+    scene = load_scene("review_dvf5000")
+    assert scene.errors == load_scene("dvf5000_first").errors
+    steps = story(scene.review)
+    assert [one.step for one in steps] == [1, 2, 3, 4, 5, 6]
+    assert {one.kind for one in steps} == set(KINDS)
+    assert not any(map(said_stale, steps, note_numbers(scene, steps)))
+    errors = scene.errors.with_amplitude("EA0Z", 20.2, (-480.0, -80.0))
+    (shimmed,) = note_numbers(replace(scene, errors=errors), steps[2:3])
+    said = re.findall(r"to ([\d.]+) µm", steps[2].text)
+    assert said == [f"{shimmed[name]:.1f}" for name in ("mean_um", "here_um", "max_um")]
+    start = start_state(scene)
+    for one in steps:
+        found, camera = reopened(start, one)
+        assert found.notes == ()
+        assert camera is not None
+        assert found.amplitudes["EA0Z"] == (20.2 if "EA0Z=20.2" in one.view else 33.9)
 
 
 def test_wobbling_table_leaves_the_tool_loop_straight_and_bends_the_relative_one():
