@@ -36,15 +36,15 @@ def point_form(name: str) -> str:
 
 def measured(picture: LivePicture) -> Measured | None:
     """Measure between the points that were chosen; None where there are not two."""
-    return None if picture.is_difference else _measured(Identity(picture))
+    values = _values(picture.state)
+    has_two = values.get("start") and values.get("end")
+    return _measured(Identity(picture)) if has_two and not picture.is_difference else None
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=1)  # lines and words of one picture ask; it keeps the picture
 def _measured(of: Identity) -> Measured | None:
     picture: LivePicture = of.thing
     values = _values(picture.state)
-    if not (values.get("start") and values.get("end")):
-        return None
     state = picture.drawn_state
     scene = state.active_scene()
     loop, placed = state.seen

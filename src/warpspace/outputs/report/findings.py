@@ -3,13 +3,11 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from warpspace.analysis.blocks import Column, Mark, Table
 from warpspace.analysis.reviewing import (
-    Numbers,
     note_numbers,
     said_stale,
     spell_change,
@@ -28,7 +26,7 @@ from warpspace.scene.files import parse_number
 from warpspace.scene.library import parse_scene
 from warpspace.scene.links import CAMERA, PACKED, read_settings, settings_of, unpack_scene
 from warpspace.scene.model import Scene
-from warpspace.scene.notes import MEASURES, Note, story
+from warpspace.scene.notes import MEASURES, Note, Reply, story
 
 HEADING = "Findings and decisions"
 AS_NOW = "What was on the screen cannot be read: the scene is shown as it is now."
@@ -45,13 +43,6 @@ class Shown:
     component: str = "norm"
     view: str = "iso"
     remarks: tuple[str, ...] = ()  # what a reader must know of it
-
-
-class Step(NamedTuple):
-    """One step of the story: its caption and what is drawn."""
-
-    caption: str
-    shown: Shown
 
 
 def _flat(text: str) -> str:
@@ -91,7 +82,7 @@ def tables(scene: Scene) -> Iterator[Block]:
         )  # fmt: skip
         yield Table(columns, decided, "Decisions: from → to, and what it did.")
     replies = [
-        (str(number), _flat(one.text), f"{_flat(one.author)} {one.date:%Y-%m-%d}".strip())
+        (str(number), _flat(one.text), _signature(one))
         for number, note in enumerate(notes, 1)
         for one in note.replies
     ]
@@ -113,7 +104,7 @@ def _all_texts(note: Note) -> str:
     return " / ".join(_flat(one.text) for one in (note, *note.versions))
 
 
-def _signature(note: Note) -> str:
+def _signature(note: Note | Reply) -> str:
     return f"{_flat(note.author)} {note.date:%Y-%m-%d}".strip()
 
 
@@ -128,24 +119,20 @@ def _before_after(note: Note) -> str:
 # --- The story ------------------------------------------------------------------------------------
 
 
-def steps(scene: Scene) -> Iterator[Step]:
-    """Give the steps of the story in their order."""
+def steps(scene: Scene) -> Iterator[tuple[str, Shown]]:
+    """Give captions and what is drawn of the steps of the story, in their order."""
     told = story(scene.review)
-    now: dict[str, Numbers] = dict(
-        zip((one.id for one in told), note_numbers(scene, told), strict=True)
-    )
-    for number, note in enumerate(told, 1):
+    for number, (note, now) in enumerate(zip(told, note_numbers(scene, told), strict=True), 1):
         shown = shown_by(scene, note)
         how = f"{LOOP_WORDS[Loop(shown.loop)]}, {VIEW_WORDS.get(shown.view, 'oblique view')}"
         if shown.component != "norm":
             how = f"{shown.component} component, {how}"
-        said = (
-            spell_numbers(note), said_stale(note, now[note.id]), spell_change(note),
-            _signature(note),
-        )  # fmt: skip
-        facts = " · ".join(filter(None, said))
-        remarks = " ".join((f"Drawn: {how}.", *shown.remarks))
-        yield Step(f"Step {number} of {len(told)}: {_flat(note.text)} ({facts}) {remarks}", shown)
+        said = spell_numbers(note), said_stale(note, now), spell_change(note), _signature(note)
+        facts, remarks = (
+            " · ".join(filter(None, said)),
+            " ".join((f"Drawn: {how}.", *shown.remarks)),
+        )
+        yield f"Step {number} of {len(told)}: {_flat(note.text)} ({facts}) {remarks}", shown
 
 
 def shown_by(scene: Scene, note: Note) -> Shown:

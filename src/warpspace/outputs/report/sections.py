@@ -117,13 +117,12 @@ class ReportFigures:
         settings = FigureSettings(loop=str(plan.loop), grid=self._grid, concepts=plan)
         return self._begin("concepts", scenes, caption, settings=settings)()
 
-    def step(self, step: findings.Step) -> Drawn:
-        shown = step.shown
+    def step(self, caption: str, shown: findings.Shown) -> Drawn:
         settings = FigureSettings(
             exaggeration=self._factor, loop=shown.loop, grid=self._grid,
             component=shown.component, view=shown.view,
         )  # fmt: skip
-        return self._begin("error-map", [shown.scene], step.caption, settings=settings)
+        return self._begin("error-map", [shown.scene], caption, settings=settings)
 
     def chart(self, chart: Chart) -> Block:
         data = self._worker.begin_chart("chart", CHART, self._form, chart)()
@@ -313,7 +312,7 @@ def notes(review: Review, painter: ReportFigures) -> Iterator[Block]:
         if reviewed.letter:
             yield Text(reviewed.titled(reviewed.scene.title), "heading")
         yield from findings.tables(reviewed.scene)
-        drawn = [painter.step(step) for step in findings.steps(reviewed.scene)]
+        drawn = [painter.step(*step) for step in findings.steps(reviewed.scene)]
         if drawn:
             yield Text(reviewed.titled("The story"), "heading")
         yield from (wait() for wait in drawn)
