@@ -24,6 +24,7 @@
       <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div></div></div></div>
     <section id="ws-story" aria-label="Story" aria-live="polite" data-piece="story"></section>
     <aside id="ws-right" aria-label="Tasks" data-piece="tasks"></aside>
+    <aside id="ws-notes" aria-label="Notes" data-piece="notes"></aside>
     <dialog id="ws-window" aria-labelledby="ws-window-title" data-piece="window"></dialog>
     <div id="ws-toasts" role="status" aria-live="polite" popover="manual"></div>`;
 
@@ -76,6 +77,19 @@
     for (const { dataset, childNodes } of place.querySelectorAll("[data-piece]"))
       if (!childNodes.length && texts.get(dataset.piece)) write(dataset.piece, texts.get(dataset.piece));
     if (name === "window") showWindow(place);
+    if (name === "notes") prepareNotes(place);
+  };
+
+  // --- review notes: the form takes the focus when it opens, [data-kept] stays in this browser ------
+  const prepareNotes = place => {
+    const first = place.querySelector("[data-focus]");
+    if (first && known.focused !== first.dataset.focus) first.focus();
+    known.focused = first?.dataset.focus;
+    for (const box of place.querySelectorAll("[data-kept]")) {
+      let own = "";
+      try { own = localStorage.getItem(box.dataset.kept) ?? ""; } catch { /* nothing may be kept */ }
+      if (own && !box.value && !typing(box)) { box.value = own; send(box.dataset.set, own); }
+    }
   };
 
   // --- a window: keeps the focus, closes with its cross, Esc, or a click beside it ------------------
@@ -140,6 +154,7 @@
     const node = event.target;
     delete node.dataset?.dirty;
     if (node.dataset?.set) send(node.dataset.set, valueOf(node));
+    if (node.dataset?.kept) try { localStorage.setItem(node.dataset.kept, node.value); } catch { /* likewise */ }
   });
   for (const [what, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]])
     addEventListener(what, event => {
@@ -241,6 +256,8 @@
   // a box with data-enter sends it with Enter only; arrows go from it through the list below it
   shell.addEventListener("keydown", event => {
     const node = event.target;
+    if (event.key === "Escape" && !node.dataset?.dirty && node.closest("#ws-notes"))
+      shell.querySelector("[data-do='notes:close']").click();
     if (node.dataset?.enter && event.key === "Enter") send(node.dataset.enter, node.value);
     const list = node.closest("[data-list]"), step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
     if (!list || !step) return;
@@ -382,6 +399,8 @@
       copyText(address.href, "Link copied", words);
     },
     keys(events) { known.keys = events; },
+    // brings a note into sight, once its list is there
+    reveal(id) { setTimeout(() => document.getElementById(id)?.focus(), 300); },
     show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },
     title(words) { document.title = `${words} · warpspace`; },
     dark(on) { document.documentElement.classList.toggle("ws-dark", on); },

@@ -4,7 +4,7 @@
   if (window.warpspaceRoom) return;
   const MOST_LABELS = 12, LABEL_APART = 52, BAR_PX = 130, BAR_PART = 0.22;
   const SETTLED_MS = 160, LEAST_FACING = 0.12, PLATE_MS = 250;
-  const state = { labels: [], slices: [], axes: [], marks: [], corners: [], triad: [],
+  const state = { labels: [], slices: [], axes: [], marks: [], corners: [], triad: [], stale: [],
     centre: [0, 0, 0], factor: 1, perMm: 0.01 };
   let told = "", seen = "", plates = 0, timer = 0;
 
@@ -182,7 +182,7 @@
         if (touches(shape, box)) cost += 300;
         if (!best || cost < best.cost) best = { cost, box };
       }
-      if (best.cost >= 1000 && !["worst", "asked", "measured"].includes(kind)) continue;
+      if (best.cost >= 1000 && !["worst", "asked", "measured", "note"].includes(kind)) continue;
       put({ text, kind }, best.box);
       const { box } = best;
       const x = Math.min(Math.max(p.x, box.x), box.x + w), y = Math.min(Math.max(p.y, box.y), box.y + h);
@@ -194,6 +194,11 @@
       const label = home.children[number] ?? home.appendChild(document.createElement("span"));
       if (label.textContent !== text) label.textContent = text;
       if (label.dataset.kind !== kind) label.dataset.kind = kind;
+      if (kind === "note") {  // a click on a flag opens the list there
+        label.dataset.do = "notes:at";
+        label.dataset.value = text.replace(/\D/g, "");
+        label.classList.toggle("ws-changed", state.stale.includes(label.dataset.value));
+      } else if (label.dataset.do) { delete label.dataset.do; label.classList.remove("ws-changed"); }
       label.style.transform = `translate(${x.toFixed(1)}px,${y.toFixed(1)}px)`;
     });
     lines.innerHTML = leaders.map(([a, b, c, d, kind]) =>

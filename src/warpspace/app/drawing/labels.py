@@ -14,10 +14,12 @@ from warpspace.app.evaluation.budget import answer
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, tool_point
 from warpspace.app.evaluation.measuring import measured
+from warpspace.app.state.app_state import Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
+from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.picture.words import list_axes, own_axes, spell_coordinate, spell_factor
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
@@ -35,7 +37,8 @@ class Label:
 
     text: str
     at_mm: Array
-    kind: str = "name"  # "tick", "axis" (its name), "worst", "corner", "asked", "measured", "name"
+    # "tick", "axis" (its name), "worst", "corner", "asked", "measured", "name", "note"
+    kind: str = "name"
     from_mm: Array | None = None  # of axes: a point that the words stand away from
     axis: int = 0
 
@@ -210,3 +213,16 @@ def _names(picture: LivePicture) -> Iterator[Label]:
         drawn_mm, error_um = tool_point(picture)
         length = float(np.linalg.norm(error_um))
         yield Label(f"tool point: {_spell(length)}", drawn_mm, "asked")
+
+
+def note_labels(picture: LivePicture) -> Iterator[Label]:
+    """Give the flags of review notes: their numbers, where their points are drawn at present."""
+    state = picture.drawn_state
+    for number, note in enumerate(picture.state.review, 1):
+        mark = note.on
+        if picture.is_difference or not note.at or (mark and mark.body):
+            continue
+        at = {axis: where for axis, where in note.at.items() if axis in state.scene.machine.axes}
+        traced = mark is not None and mark.loop and mark.point_mm
+        picked = Picked(at, Loop(mark.loop), mark.point_mm) if mark and traced else Picked(at)
+        yield Label(f"⚑ {number}", answer(state, picked, picture.exaggeration).drawn_mm, "note")

@@ -166,6 +166,8 @@ class PageLook:
     query: str = described("", "Search of errors", linked="")
     command: str = described("", "Search of commands", linked="")
     window: str = described("", "Open window", linked="")
+    # "list", "new", or the note that is edited; empty where the tasks stand there
+    notes: str = described("", "Notes", linked="")
 
 
 @dataclass(frozen=True)

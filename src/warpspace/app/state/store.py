@@ -138,7 +138,8 @@ class StateStore:
         if not what:
             self.state = _on_page(self.state, state)
             return
-        same = self.past and not self.future and self.past[-1].what == what and "scene" not in what
+        alone = {"scene", "review"} & what.keys()
+        same = self.past and not self.future and self.past[-1].what == what and not alone
         if not same or at - self._changed_at >= SAME_STEP_S:
             self.past = (*self.past, Step(self.state, what))[-STEPS:]
         self.state, self.future, self._changed_at = state, (), at

@@ -182,6 +182,8 @@ class AnalysisPart(Section):
             if question == self._applied:
                 words = "Applied: this is what is shown now. Undo takes it back."
                 parts.append(tag("p", words, role="status"))
+                hint = "Keep what was changed, and why, among the notes"
+                parts.append(button("Record decision", "notes:decide", hint=hint))
             elif stale and not is_quick:
                 words = "Something has changed since: run it again."
                 parts.append(tag("p", words, class_="ws-stale"))
@@ -255,6 +257,7 @@ class AnalysisPart(Section):
                 return with_proposal(state, change.scene, words)
             found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
+            self.context.decided = state, f"{self.title}: {change.words}"
             return found
         return state
 
@@ -333,7 +336,7 @@ class AnalysisPart(Section):
     def _into_report(self) -> None:
         if self._answer is not None:
             self.context.reported.append((self.title, self._answer.found))
-            self.context.notify("Added to the report", f"{self.title}; see Report at the top")
+            self.context.notify("Added to the report", f"{self.title}; see Save at the top")
 
 
 def _endings(found: Result) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from warpspace.app.tasks.improve import BestPart, CompensatePart, RepairPart
 from warpspace.app.tasks.machine import PositionsSection, RotarySection
 from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.app.tasks.measure import CalibratePart, TestsPart
+from warpspace.app.tasks.notes import NoteNumbersPart, NotesPart
 from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart, RoomPart
 from warpspace.app.tasks.parts import Part, Section
 from warpspace.app.tasks.story import StoryPart
@@ -92,8 +93,8 @@ def build_parts(context: Context) -> list[Part]:
     ]
     kinds = (
         TopPart, HeadPart, LegendPart, OrderPart, ControlsPart, ComparePart, ErrorsPart, RoomPart,
-        StatePart, PagePart, ScenesWindow, MachinesWindow, FilesWindow, ReportWindow, HelpWindow,
-        StoryPart,
+        StatePart, PagePart, NotesPart, NoteNumbersPart, ScenesWindow, MachinesWindow,
+        FilesWindow, ReportWindow, HelpWindow, StoryPart,
     )  # fmt: skip
     others = [kind(context) for kind in kinds]
     return [*others, TasksPart(context, found), *found, BestPart(context)]

@@ -62,6 +62,8 @@ class Context:
         self.reported: list[tuple[str, Result]] = []  # what is to stand in the report
         # what a click on the drawing means; a section that has points picked says otherwise
         self.take_picked: Callable[[AppState, Picked], AppState] = with_picked
+        # what has been applied last: the state before it, and what it was in words
+        self.decided: tuple[AppState, str] | None = None
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
         self.changed_at = time.monotonic()
         self.unfolded = store.state.page  # of this page, also where the state is shared

@@ -109,6 +109,7 @@ class TolerancesPart(AnalysisPart):
             if self.question(state) != answer.question:
                 note = "tolerances or limit were changed meanwhile: allocate again"
                 return state.noted(note)
+            self.context.decided = state, f"{self.title}: allocated for the limit"
             state = edits.with_half_widths(state, found.tolerances)
             self._applied = self.question(state)
             return state

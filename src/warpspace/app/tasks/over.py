@@ -16,7 +16,7 @@ from warpspace.app.documents.legend import (
     place_words,
     subject_words,
 )
-from warpspace.app.drawing.labels import Label, axis_labels, point_labels
+from warpspace.app.drawing.labels import Label, axis_labels, note_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
@@ -40,7 +40,8 @@ class HeadPart(Part):
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         words, place = subject_words(picture), place_words(picture)
         head = fill(
-            '<h1>{numbers}</h1><div>{place}<span data-piece="head.kept"></span>'
+            '<div data-piece="reopened"></div><h1>{numbers}</h1>'
+            '<div>{place}<span data-piece="head.kept"></span>'
             '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
             numbers=numbers_words(picture), place=place,
@@ -136,7 +137,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
         "factor": picture.exaggeration,
         "spelt": spell_factor(picture.exaggeration),
         "corners": [_scene(at) for at in picture.drawn_mm.reshape(-1, 3)[corners(picture.shape)]],
-        "marks": list(map(_word, point_labels(picture))),
+        "marks": list(map(_word, (*point_labels(picture), *note_labels(picture)))),
         "labels": [
             {"at": _scene(label.at_mm), "out": label.outward.tolist(),
              "text": f"{spell_short(label.value)} {picture.scale.unit}"}

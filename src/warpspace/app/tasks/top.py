@@ -30,7 +30,7 @@ class StatePart(Part):
 
 
 class TopPart(Part):
-    """Scene, open, save, share, report, help; undo and redo where there is something to undo."""
+    """Scene, open, save, share, notes, help; undo and redo where there is something to undo."""
 
     name = "top"
 
@@ -44,6 +44,7 @@ class TopPart(Part):
         )  # fmt: skip
         hint = "Open a scene, measured errors, or a controller's table (Ctrl+O)"
         title = picture.state.origin.title or picture.state.origin.name
+        count = sum(note.status == "open" for note in picture.state.review)
         return {
             "top": join((
                 tag("strong", "warpspace", class_="ws-brand"),
@@ -52,9 +53,10 @@ class TopPart(Part):
                 upload_button("Open", "files", MAX_SCENE_BYTES, accepted_endings(), kind="quiet",
                               hint=hint),
                 button("Save", "page:open", "files", kind="quiet",
-                       hint="Save the scene, pictures, exports"),
+                       hint="Save the scene, pictures, exports, a report"),
                 button("Share", "files:share", kind="quiet", hint="Copy a link to what is shown"),
-                button("Report", "page:open", "report", kind="quiet"),
+                button(f"Notes ({count})" if count else "Notes", "notes:open", kind="quiet",
+                       data_key="notes", hint="Notes (N)"),
                 tag("span", "", class_="ws-fill"),
                 *travel,
                 button("?", "page:open", "help", kind="quiet", aria_label="Help", hint="Help (H)"),
@@ -123,6 +125,8 @@ COMMANDS = (
     Command("Copy a link to what is shown", "files:share"),
     Command("Write a report", "page:open", "report"),
     Command("Tell the story", "story:start"),
+    Command("Pin a note", "notes:pin", keys=("n",)),
+    Command("Notes", "notes:open"),
     Command("Find an error", "find", keys=("/",)),
     Command("Fit the view", "page:fit", keys=("f",)),
     Command("Component: length of the error", "state:set.component", "norm", ("1",)),

@@ -1,0 +1,147 @@
+"""Review notes in the app: pinned, shown again, answered, decided, taken back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.frames import new_visitor
+from app.page_tab import SCENES, Tab
+from app.parts import Alone
+from warpspace.analysis.reviewing import note_numbers
+from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.server.viewer import Viewer
+from warpspace.app.state.app_state import start_state
+from warpspace.app.tasks.notes import NotesPart
+from warpspace.scene.notes import Note, is_stale
+
+START = start_state(SCENES[0])
+EVIL = "<img src=x onerror='window.taken=1'>"
+CAMERA = CameraMemory((9.0, -12.0, 8.0), (0.5, 0.0, -2.5), (0.0, 0.0, 1.0), 0.4)
+
+
+def alone(state=START):
+    """A notes part on a page that is not there, and the cameras it was put to."""
+    cameras: list[CameraMemory] = []
+    found = Alone(NotesPart, state, look_from=cameras.append, decided=None)
+    found.context.camera.remember = lambda: CAMERA
+    return found, cameras
+
+
+def pin(part, text="Look", kind="note"):
+    part.do("pin")
+    part.do("set.text", text)
+    part.do("set.kind", kind)
+    return part.do("keep").review[-1]
+
+
+def test_a_note_is_shown_again_as_it_was_and_back_leads_to_where_one_was():
+    part, cameras = alone()
+    first = pin(part)
+    part.store.apply(lambda state: state.with_amplitude("EA0Z", 0.0))
+    second = pin(part)
+    present = part.store.apply(lambda state: state.with_amplitude("EA0Z", 5.0)) or part.store.state
+    assert part.do("show", first.id).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
+    assert "Note 1 as it was" in part.part.pieces(part.context.shown)["reopened"]
+    assert part.do("show", second.id).amplitudes["EA0Z"] == 0.0
+    part.do("reply." + second.id, "seen")  # is not lost
+    back = part.do("back")
+    assert replace(back, review=present.review) == present
+    assert back.review[1].replies[0].text == "seen"
+    assert cameras == [CAMERA] * 3
+    assert part.part.pieces(part.context.shown)["reopened"] == ""
+
+
+def test_numbers_of_a_note_are_those_of_check_and_grow_stale():
+    part, _ = alone()
+    note = pin(part)
+    scene = part.store.state.resulting_scene()
+    assert note.numbers == note_numbers(scene, [note])[0]
+    assert note.numbers["here_um"] == note.numbers["max_um"]  # nothing was asked: the worst point
+    moved = part.store.state.with_amplitude("EA0Z", 0.0).resulting_scene()
+    assert is_stale(note.numbers, note_numbers(moved, [note])[0])
+
+
+def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_holds():
+    part, _ = alone()
+    part.context.decided = START, "Repair: EA0Z to 20"
+    part.store.apply(lambda state: state.with_amplitude("EA0Z", 20.0).with_amplitude("EB0Z", 1.5))
+    part.do("decide")
+    note = part.do("keep").review[0]
+    assert note.kind == "decision"
+    assert note.text == "Repair: EA0Z to 20\nReason:"
+    was = START.amplitudes
+    assert note.change == {"EA0Z": (was["EA0Z"], 20.0), "EB0Z": (was["EB0Z"], 1.5)}
+    assert note.before != note.numbers
+    part.store.apply(lambda state: state.with_amplitude("EB0Z", 2.0))
+    found = part.do("take-back", note.id)
+    assert (found.amplitudes["EA0Z"], found.amplitudes["EB0Z"]) == (was["EA0Z"], 2.0)
+    assert "EB0Z is 2 now, not 1.5: it stays" in found.review[0].replies[0].text
+
+
+def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
+    base = Note(id="a1", text="old")
+    mine, yours = base.edited(text="mine"), base.edited(text="yours")
+    part, _ = alone(replace(START, review=(replace(mine, versions=(yours,)),)))
+    kept = part.do("choose", "a1 1").review[0]
+    assert (kept.text, kept.versions) == ("yours", ())
+    assert {mine.version, yours.version} <= set(kept.replaces)
+    part.do("delete", "a1")
+    part.do("set.step.a1", "1")  # of a note that has gone
+    assert part.store.state.review == ()
+    part.store.undo()
+    assert part.store.state.review == (kept,)
+
+
+@pytest.mark.parametrize("word", ["show", "status", "choose", "keep", "at", "set.step.a1"])
+def test_hostile_events_change_nothing(word):
+    part, _ = alone(replace(START, review=(Note(id="a1", text=EVIL, author=EVIL),)))
+    for value in (EVIL, "a1 9", "99999999", "-1"):
+        state = part.store.state
+        if word != "status":
+            assert part.do(word, value).review == state.review
+    part.do("open")
+    assert "<img" not in str(part.part.pieces(part.context.shown))
+
+
+def stands(tab):
+    """Give where the camera of a tab stands, as ten numbers."""
+    one = tab.session.context.camera.remember()
+    return [*one.position, *one.look_at, *one.up, one.fov_rad]
+
+
+def test_a_note_in_the_browser(browser):
+    with Viewer(SCENES[0]) as own, new_visitor(browser) as context:
+        tab = Tab(context.new_page(), own)
+        page = tab.page
+        tab.press("n")
+        page.locator("#ws-notes-set-text:focus").wait_for()
+        page.keyboard.type("Why here? http://a.b/c")
+        tab.type("Your name", "Ada")
+        tab.click("Keep")
+        tab.until(lambda: len(tab.state.review) == 1)
+        note = tab.state.review[0]
+        assert note.author == "Ada"
+        page.locator(".ws-words [data-kind=note]").wait_for()
+        page.reload()
+        page.wait_for_selector("html[data-warpspace=open]")
+        tab.send("state:set.amplitudes.EA0Z", "3")
+        tab.send("controls:view", "front")
+        tab.until(lambda: tab.state.amplitudes["EA0Z"] == 3.0)
+        page.locator(".ws-words [data-kind=note]").click()
+        page.locator("#ws-notes").get_by_text("changed: ").wait_for()
+        before = stands(tab)
+        tab.click("Show")
+        tab.until(lambda: tab.state.amplitudes == START.amplitudes)
+        scene = tab.state.resulting_scene()
+        assert note_numbers(scene, [note])[0] == note.numbers
+        wanted = [float(x) for x in note.view.partition("camera=")[2].split("&")[0].split("%2C")]
+        tab.until(lambda: np.allclose(stands(tab), wanted, rtol=0.0, atol=1e-6))
+        tab.click("Back")
+        tab.until(lambda: tab.state.amplitudes["EA0Z"] == 3.0)
+        tab.until(lambda: np.allclose(stands(tab), before, rtol=0.0, atol=1e-6))
+        page.locator("#ws-notes [data-do='notes:show']").focus()
+        page.keyboard.press("Escape")
+        tab.until(lambda: page.locator("#ws-notes > *").count() == 0)
+        assert page.evaluate("document.activeElement.dataset.do") == "notes:open"
+        assert tab.errors == []
