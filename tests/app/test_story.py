@@ -108,6 +108,9 @@ def test_a_story_in_the_app_goes_from_step_to_step_and_back_to_before(browser):
         tab.send("state:set.component", "y")
         tab.until(lambda: tab.state.component == "y")
         before = tab.state
+        with tab.page.expect_download() as file:
+            tab.send("files:story")
+        assert file.value.suggested_filename == "dvf5000_first_story.html"
         tab.send("story:start")
         tab.says("1 of 8", "#ws-story")
         tab.page.keyboard.press("ArrowRight")

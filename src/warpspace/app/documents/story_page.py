@@ -62,12 +62,9 @@ class Step:
         note, on = self.note, self.note.on
         if self.problem or not note.at or (on and on.body) or self.picture.is_difference:
             return np.array(AWAY_MM)
-        traced = bool(on and on.loop)
-        picked = Picked(
-            note.at,
-            Loop(on.loop) if on and traced else None,
-            on.point_mm if on and traced else None,
-        )
+        picked = Picked(note.at)
+        if on and on.loop:
+            picked = Picked(note.at, Loop(on.loop), on.point_mm)
         try:
             return answer(self.picture.drawn_state, picked, self.picture.exaggeration).drawn_mm
         except WarpspaceError:  # of a machine with other axes
@@ -125,7 +122,7 @@ def build_story_html(
             tag("button", "← Back", id="back", disabled=True),
             tag("button", "On →", id="on", disabled=len(steps) == 1),
         ))),
-        numbers=join(_words(i, steps, one) for i, one in enumerate(stale)),
+        numbers=join(_section(i, steps, one) for i, one in enumerate(stale)),
         scripts=f'<script type="application/json" id="story">{data}</script>'
         f"<script>{page_script}</script>",
     )  # fmt: skip
@@ -137,23 +134,29 @@ def _deflated(whole: Array) -> str:
     return b64encode(zlib.compress(changes.T.tobytes(), 9)).decode("ascii")
 
 
-def _words(number: int, steps: Sequence[Step], stale: str) -> Markup:
-    step = steps[number]
-    note, picture = step.note, step.picture
-    numbers = [part for part in (spell_place(note), spell_numbers(note)) if part]
+def step_words(note: Note, number: int, count: int, stale: str, problem: str) -> Markup:
+    """Say what a step of a story says, from its number to why its drawing is another's."""
     heads = (note.kind.capitalize(), note.author, f"{note.date:%Y-%m-%d}", note.status)
-    said = [
-        tag("h2", f"{number + 1} of {len(steps)}"),
-        tag("p", " · ".join(filter(None, heads))),
-        tag("p", linked(note.text), class_="said"),
-        *(tag("p", linked(f"{one.author}: {one.text}"), class_="said") for one in note.replies),
-        tag("p", " · ".join(numbers)),
-        tag("p", stale, class_="changed") if stale else "",
-        tag("p", STILL + step.problem, class_="changed") if step.problem else "",
-        tag("p", f"{picture.title} · {legend.look_words(picture)[0]}"),
-        legend.legend_html(picture), numbers_html(picture),
-    ]  # fmt: skip
-    said += [tag("p", one, class_="changed") for one in picture.state.notes]
+    return join((
+        tag("h2", f"{number + 1} of {count}"),
+        tag("p", " · ".join(filter(None, heads)), class_="ws-quiet"),
+        tag("p", linked(note.text), class_="ws-said"),
+        *(tag("p", linked(f"{one.author}: {one.text}")) for one in note.replies),
+        tag("p", " · ".join(filter(None, (spell_place(note), spell_numbers(note)))),
+            class_="ws-quiet"),
+        *(tag("p", words, class_="ws-warn") for words in (stale, problem and STILL + problem)
+          if words),
+    ))  # fmt: skip
+
+
+def _section(number: int, steps: Sequence[Step], stale: str) -> Markup:
+    step = steps[number]
+    said = (
+        step_words(step.note, number, len(steps), stale, step.problem),
+        tag("p", f"{step.picture.title} · {legend.look_words(step.picture)[0]}"),
+        legend.legend_html(step.picture), numbers_html(step.picture),
+        *(tag("p", one, class_="ws-warn") for one in step.picture.state.notes),
+    )  # fmt: skip
     return tag("section", join(said), class_="story", data_step=number, hidden=number > 0)
 
 

@@ -6,9 +6,10 @@ from functools import partial
 
 from markupsafe import Markup
 
-from warpspace.analysis.reviewing import note_numbers, said_stale, spell_numbers, spell_place
-from warpspace.app.browser.html import button, join, linked, tag
+from warpspace.analysis.reviewing import note_numbers, said_stale
+from warpspace.app.browser.html import button
 from warpspace.app.documents.scene_file import reopened
+from warpspace.app.documents.story_page import step_words
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
@@ -18,7 +19,6 @@ from warpspace.exceptions import WarpspaceError
 from warpspace.scene.notes import Note, story
 
 GLIDE_MS = 600  # from step to step
-STILL = "The drawing of the step before stays: "
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class StoryPart(Part):
         return (id(self._told),)
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        return {"story": step_html(self._told) if self._told else ""}
+        return {"story": _html(self._told) if self._told else ""}
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         doing = {"start": self._start, "on": partial(self._go, 1), "back": partial(self._go, -1),
@@ -96,23 +96,12 @@ class StoryPart(Part):
         self.context.fly(camera, 0)
 
 
-def step_html(told: Told) -> Markup:
-    """Write the words of a step, and the buttons to the others."""
-    note, number, count = told.notes[told.number], told.number, len(told.notes)
-    heads = (note.kind.capitalize(), note.author, f"{note.date:%Y-%m-%d}", note.status)
-    numbers = (spell_place(note), spell_numbers(note))
-    return join((
-        tag("h2", f"{number + 1} of {count}"),
-        tag("p", " · ".join(filter(None, heads)), class_="ws-quiet"),
-        tag("p", linked(note.text), class_="ws-said"),
-        *(tag("p", linked(f"{one.author}: {one.text}")) for one in note.replies),
-        tag("p", " · ".join(filter(None, numbers)), class_="ws-quiet"),
-        *(tag("p", words, class_="ws-warn")
-          for words in (told.stale[number], told.problem and STILL + told.problem) if words),
-        actions(
-            button("←", "story:back", hint="Back (←)", aria_label="Back", disabled=number == 0),
-            button("→", "story:on", kind="main", hint="On (→)", aria_label="On",
-                   disabled=number == count - 1),
-            button("End", "story:end", hint="Back to what was shown before (Esc)"),
-        ),
-    ))  # fmt: skip
+def _html(told: Told) -> Markup:
+    number, count = told.number, len(told.notes)
+    words = step_words(told.notes[number], number, count, told.stale[number], told.problem)
+    return words + actions(
+        button("←", "story:back", hint="Back (←)", aria_label="Back", disabled=number == 0),
+        button("→", "story:on", kind="main", hint="On (→)", aria_label="On",
+               disabled=number == count - 1),
+        button("End", "story:end", hint="Back to what was shown before (Esc)"),
+    )  # fmt: skip
