@@ -127,7 +127,9 @@ def steps(scene: Scene) -> Iterator[tuple[str, Shown]]:
         how = f"{LOOP_WORDS[Loop(shown.loop)]}, {VIEW_WORDS.get(shown.view, 'oblique view')}"
         if shown.component != "norm":
             how = f"{shown.component} component, {how}"
-        said = spell_numbers(note), said_stale(note, now), spell_change(note), _signature(note)
+        # those of the scene when it was noted; the figure may show other errors
+        noted = f"noted: {spell_numbers(note)}" if note.numbers else ""
+        said = noted, said_stale(note, now), spell_change(note), _signature(note)
         facts, remarks = (
             " · ".join(filter(None, said)),
             " ".join((f"Drawn: {how}.", *shown.remarks)),
