@@ -350,7 +350,7 @@ def _write_note(scene: "Scene", name: str, path: str, *, force: bool) -> None:
 @output_option("Scene file to write: .toml.", *SCENES)
 @force_option
 def merge(first: str, second: str, output: str, *, force: bool) -> None:
-    """Unite the review notes of two copies of a scene, FIRST and SECOND.
+    """Unite the review notes of two copies of a scene.
 
     Notes are matched by their id and replies united. A note that both have edited is kept in both
     versions, side by side. Everything else of the scene is that of FIRST.
