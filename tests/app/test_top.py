@@ -1,9 +1,11 @@
 """The bar at the top and its windows: scenes, files, report, commands and keys."""
 
+import random
 from dataclasses import replace
 
 from app.parts import Alone, wait
-from warpspace.app.documents.scene_file import SceneList
+from warpspace.app.documents.files import unpack
+from warpspace.app.documents.scene_file import SceneList, open_link
 from warpspace.app.documents.services import Services
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
@@ -18,6 +20,7 @@ from warpspace.app.tasks.top import (
     key_events,
 )
 from warpspace.scene.library import load_scene
+from warpspace.scene.notes import Note
 
 FIRST, SECOND = load_scene("dvf5000_first"), load_scene("dvf5000_second")
 STATE = start_state(FIRST, nodes=5)
@@ -80,6 +83,18 @@ def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
     assert asking.called[-1][2] == "secret"
     assert "Copy link with token" in asking.html
     assert "secret" not in asking.html
+
+
+def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
+    texts = random.Random(1).choices("abcdefghijklmnopqrstuvwxyz0123456789", k=8000)
+    notes = [Note(id=f"n{at}", text="".join(texts[at : at + 2000])) for at in range(0, 8000, 2000)]
+    for count, expected in ((1, 1), (4, 0)):
+        window = Alone(FilesWindow, replace(STATE, review=tuple(notes[:count])))
+        window.do("share")
+        opened, _ = open_link(unpack(window.called[-1][1]), None)
+        assert len(opened.review) == expected
+        assert ["Without the notes" in one[0] for one in window.said] == [True] * (1 - expected)
+        assert len(window.store.state.review) == count
 
 
 def test_files_that_a_page_refuses_or_invents_are_said_or_left():

@@ -162,7 +162,17 @@ class FilesWindow(JobWindow):
     def _share(self, *, with_token: bool) -> None:
         context = self.context
         scenes, camera = context.scenes.fixed, context.camera.remember()
-        link = self._alone_if_large(lambda one: scene_file.state_to_link(one, camera, scenes))
+        state = without_table(context.state)
+        try:
+            link = scene_file.state_to_link(state, camera, scenes)
+        except OptionError:
+            # notes are in the scene file; what is on the screen is what a link is for
+            link = self._alone_if_large(
+                lambda one: scene_file.state_to_link(replace(one, review=()), camera, scenes)
+            )
+            if state.review:
+                said = "the link would be too large with them; save the scene to hand them on"
+                context.notify("Without the notes", said, "warning")
         token = context.services.token if with_token else None
         edited = len(context.state.changed_keys)
         edits = f" {edited} changed error{'s' if edited > 1 else ''}," if edited else ""
