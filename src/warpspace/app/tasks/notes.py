@@ -151,6 +151,9 @@ class NotesPart(Part):
             return _opened(state, "")
         if do in ("pin", "decide"):
             return self._begin(state, is_decision=do == "decide")
+        if do == NEW:  # what somebody has measured, say, is its text
+            self._draft = Draft(text=value[:MAX_NOTE_TEXT], where="whole")
+            return _opened(state, NEW)
         if do == "back" and self._before is not None:
             (before, camera), self._before = self._before, None
             self.context.look_from(camera)

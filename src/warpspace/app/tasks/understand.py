@@ -212,7 +212,7 @@ class DistancePart(AnalysisPart):
         self._again()
 
     def _take_point(self, state: AppState, picked: Picked) -> AppState:
-        if not (self.is_open(state) and self.is_seen(state)):
+        if state.page.notes or not (self.is_open(state) and self.is_seen(state)):
             self._wait_for("")
             return with_picked(state, picked)
         if picked.point_mm is not None:
