@@ -1,6 +1,7 @@
 """Review notes in the app: pinned, shown again, answered, decided, taken back."""
 
 from dataclasses import replace
+from secrets import token_urlsafe
 
 import numpy as np
 import pytest
@@ -9,9 +10,16 @@ from app.frames import new_visitor
 from app.page_tab import SCENES, Tab
 from app.parts import Alone
 from warpspace.analysis.reviewing import note_numbers
+from warpspace.app.documents.scene_file import (
+    open_link,
+    open_text,
+    state_to_link,
+    state_to_toml,
+)
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
+from warpspace.app.tasks.files import FilesWindow
 from warpspace.app.tasks.notes import NotesPart
 from warpspace.scene.notes import Note, is_stale
 
@@ -91,6 +99,32 @@ def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
     assert part.store.state.review == ()
     part.store.undo()
     assert part.store.state.review == (kept,)
+
+
+def test_notes_survive_file_link_and_undo():
+    part, _ = alone()
+    note = pin(part)
+    state = part.store.state
+    found, camera = open_text(state_to_toml(state, CAMERA), START.scene.name, "a file")
+    assert found.review == state.review
+    assert camera == CAMERA
+    found, _ = open_link(state_to_link(state, CAMERA, None), None)
+    assert found.review == (note,)
+    part.store.undo()
+    assert part.store.state.review == ()
+    part.store.redo()
+    assert part.store.state.review == (note,)
+
+
+def test_a_link_that_would_be_too_long_leaves_the_notes_out_and_says_so():
+    notes = tuple(Note(text=token_urlsafe(1200)) for _ in range(8))
+    files = Alone(FilesWindow, replace(START, review=notes))
+    files.context.scenes.fixed = tuple(SCENES)
+    files.do("share")
+    (called,) = [one for one in files.called if one[0] == "share"]
+    assert ("Without the notes", "this is too large for a link; save it as a file instead",
+            "warning") in files.said  # fmt: skip
+    assert len(called[1]) < 200
 
 
 @pytest.mark.parametrize("word", ["show", "status", "choose", "keep", "at", "set.step.a1"])
