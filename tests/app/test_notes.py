@@ -17,10 +17,13 @@ from warpspace.app.documents.scene_file import (
     state_to_toml,
 )
 from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.evaluation.budget import answer, drawn_places
 from warpspace.app.server.viewer import Viewer
-from warpspace.app.state.app_state import start_state
+from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.tasks.files import FilesWindow
 from warpspace.app.tasks.notes import NotesPart
+from warpspace.kinematics.model import Loop
+from warpspace.scene.library import load_scene
 from warpspace.scene.notes import Note, is_stale
 
 START = start_state(SCENES[0])
@@ -99,6 +102,19 @@ def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
     assert part.store.state.review == ()
     part.store.undo()
     assert part.store.state.review == (kept,)
+
+
+@pytest.mark.parametrize("name", ["dvf5000_first", "fork_head_bc", "teach_tilted_c"])
+def test_flags_stand_where_the_points_asked_about_are_drawn(name):
+    state = start_state(load_scene(name))
+    for loop in Loop:
+        spans = state.scene.machine.axes
+        points = [{a: 0.3 * one.travel[0] for a, one in spans.items()}, dict.fromkeys(spans, 1.0)]
+        shown = replace(state, loop=loop)
+        found = drawn_places(shown, points, 100.0)
+        wanted = [answer(shown, Picked(at), 100.0).drawn_mm for at in points]
+        # the box is drawn to first order, a point asked about exactly
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-3)
 
 
 def test_notes_survive_file_link_and_undo():

@@ -3,14 +3,14 @@
 The page places them as the camera moves (`browser/room.js`); an offline page has them in 3-D.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from warpspace.analysis.distance import DistanceResult
-from warpspace.app.evaluation.budget import answer
+from warpspace.app.evaluation.budget import answer, drawn_places
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, tool_point
 from warpspace.app.evaluation.measuring import measured
@@ -22,6 +22,7 @@ from warpspace.geometry.surfaces import corners, is_thin
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.picture.words import list_axes, own_axes, spell_coordinate, spell_factor
+from warpspace.scene.notes import Mark
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
@@ -215,14 +216,18 @@ def _names(picture: LivePicture) -> Iterator[Label]:
         yield Label(f"tool point: {_spell(length)}", drawn_mm, "asked")
 
 
-def note_labels(picture: LivePicture) -> Iterator[Label]:
+def note_labels(picture: LivePicture) -> list[Label]:
     """Give the flags of review notes: their numbers, where their points are drawn at present."""
-    state = picture.drawn_state
+    if picture.is_difference or not picture.state.review:
+        return []
+    state, own = picture.drawn_state, dict[str, Mapping[str, float]]()
+    found: list[Label] = []
     for number, note in enumerate(picture.state.review, 1):
-        mark = note.on
-        if picture.is_difference or not note.at or (mark and mark.body):
-            continue
-        at = {axis: where for axis, where in note.at.items() if axis in state.scene.machine.axes}
-        traced = mark is not None and mark.loop and mark.point_mm
-        picked = Picked(at, Loop(mark.loop), mark.point_mm) if mark and traced else Picked(at)
-        yield Label(f"⚑ {number}", answer(state, picked, picture.exaggeration).drawn_mm, "note")
+        mark, words = note.on or Mark(), f"⚑ {number}"
+        if mark.loop and mark.point_mm and note.at:
+            picked = Picked(note.at, Loop(mark.loop), mark.point_mm)
+            found.append(Label(words, answer(state, picked, picture.exaggeration).drawn_mm, "note"))
+        elif note.at and not mark.body:
+            own[words] = note.at
+    places = drawn_places(state, [*own.values()], picture.exaggeration) if own else ()
+    return [*found, *(Label(words, at, "note") for words, at in zip(own, places, strict=True))]

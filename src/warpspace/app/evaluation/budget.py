@@ -1,6 +1,6 @@
 """Why a point is where it is: which point a click means, and what its error is made of."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpspace.analysis.contributions import Contribution, Explanation, explain
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Picked
+from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import seen_from_workpiece
 from warpspace.geometry.surfaces import deform, is_thin
 from warpspace.kinematics import transforms
@@ -156,6 +157,26 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
     drawn = deform(found.nominal_mm + shift, drawn_um, exaggeration)
     return Answer(at, loop, found, shift, drawn, drawn_um)
+
+
+def drawn_places(
+    state: AppState, points: Sequence[Mapping[str, float]], exaggeration: float
+) -> Array:
+    """Tell where points of the surface are drawn, [n, 3], mm; all at once, as a drag needs it."""
+    scene, model = state.active_scene(), state.scene.model
+    stands = {**state.scene.workspace.positions, **state.positions}
+    coordinates = {
+        name: np.array([at.get(name, stands.get(name, 0.0)) for at in points])
+        for name in model.machine.axes
+    }
+    nominal = nominal_point(model, Loop.TOOL, coordinates)
+    volume = state.scene.workspace.moved(state.positions)
+    seen = seen_from_workpiece(model, coordinates, volume, nominal)
+    if state.controller is not None:
+        field = state.controller.field(coordinates, nominal, scene, state.loop, nominal)
+    else:
+        field = evaluate_first_order(model, scene.errors, coordinates, state.view(), nominal)
+    return deform(seen, field.error_um, exaggeration)
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
