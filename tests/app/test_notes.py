@@ -1,7 +1,6 @@
 """Review notes in the app: pinned, shown again, answered, decided, taken back."""
 
 from dataclasses import replace
-from secrets import token_urlsafe
 
 import numpy as np
 import pytest
@@ -20,7 +19,6 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.budget import answer, drawn_places
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import Picked, start_state
-from warpspace.app.tasks.files import FilesWindow
 from warpspace.app.tasks.notes import NotesPart
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene
@@ -130,17 +128,6 @@ def test_notes_survive_file_link_and_undo():
     assert part.store.state.review == ()
     part.store.redo()
     assert part.store.state.review == (note,)
-
-
-def test_a_link_that_would_be_too_long_leaves_the_notes_out_and_says_so():
-    notes = tuple(Note(text=token_urlsafe(1200)) for _ in range(8))
-    files = Alone(FilesWindow, replace(START, review=notes))
-    files.context.scenes.fixed = tuple(SCENES)
-    files.do("share")
-    (called,) = [one for one in files.called if one[0] == "share"]
-    assert ("Without the notes", "this is too large for a link; save it as a file instead",
-            "warning") in files.said  # fmt: skip
-    assert len(called[1]) < 200
 
 
 @pytest.mark.parametrize("word", ["show", "status", "choose", "keep", "at", "set.step.a1"])
