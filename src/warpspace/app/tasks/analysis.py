@@ -52,6 +52,8 @@ OF_STATE = frozenset({"loop", "placed"})
 QUICK_S = 0.4  # what is answered within that time is answered anew with every change
 MOST_STEPS = 4  # errors that a card names one by one
 SAME = 1e-3  # µm or µrad; an error that moves by less stays
+RECORD = button("Record decision", "notes:decide",
+                hint="Keep what was changed, and why, among the notes")  # fmt: skip
 T = TypeVar("T")
 Question = tuple[object, ...]
 
@@ -182,8 +184,7 @@ class AnalysisPart(Section):
             if question == self._applied:
                 words = "Applied: this is what is shown now. Undo takes it back."
                 parts.append(tag("p", words, role="status"))
-                hint = "Keep what was changed, and why, among the notes"
-                parts.append(button("Record decision", "notes:decide", hint=hint))
+                parts.append(RECORD)
             elif stale and not is_quick:
                 words = "Something has changed since: run it again."
                 parts.append(tag("p", words, class_="ws-stale"))

@@ -20,7 +20,7 @@ from warpspace.app.evaluation.compare import pinned_side, with_before
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import without_table
-from warpspace.app.tasks.analysis import AnalysisPart, Question
+from warpspace.app.tasks.analysis import RECORD, AnalysisPart, Question
 from warpspace.app.tasks.charts import details_html, result_html
 from warpspace.app.tasks.context import Context
 from warpspace.exceptions import OptionError
@@ -211,6 +211,7 @@ class CompensatePart(AnalysisPart):
                 button("Save maps", f"{self.name}:maps", "save", hint="One sheet for a report"),
             ]
         row.append(button("Add to report", f"{self.name}:report", kind="quiet"))
+        row += [RECORD] if box_of(state) != MACHINE else []
         shown = tag("div", tag("span", "The box shows", class_="ws-quiet") + boxes,
                     class_="ws-actions", role="group", aria_label="The box shows")  # fmt: skip
         return tag("div", join(row), class_="ws-actions") + shown
@@ -228,6 +229,8 @@ class CompensatePart(AnalysisPart):
             self.context.act(partial(self.context.save_file, *packed(found)))
         if not holds_for(state, found.controller):
             return state
+        left = f"{found.after_statistics.max_um:.1f} µm"
+        self.context.decided = without_table(state), f"{self.title}: a table leaves at most {left}"
         return with_box(state, BOTH if word == "table" else value, found.controller)
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
