@@ -258,7 +258,8 @@ class AnalysisPart(Section):
                 return with_proposal(state, change.scene, words)
             found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
-            self.context.decided = state, f"{self.title}: {change.words}"
+            done = change.words.removeprefix(f"after {what}: ")
+            self.context.decided = state, f"{self.title}: {done}"
             return found
         return state
 

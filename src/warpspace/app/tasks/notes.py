@@ -355,7 +355,7 @@ def _entry(number: int, note: Note) -> Markup:
         *(tag("blockquote", one) for one in replies),
         text_box(reply, "", label=f"Reply to note {number}", placeholder="Reply",
                  data_enter=f"notes:reply.{note.id}", maxlength=MAX_NOTE_TEXT),
-        actions(button("Done" if is_done else "Open", "notes:status", note.id, pressed=is_done,
+        actions(button("Done", "notes:status", note.id, pressed=is_done,
                        hint="Mark as open" if is_done else "Mark as done"),
                 *(button(words, f"notes:{do}", note.id, kind="link", hint=hint)
                   for words, do, hint in does)),
