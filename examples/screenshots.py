@@ -25,7 +25,10 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 
-SCENES = ("dvf5000_first", "dvf5000_second", "teach_wobbling_table", "fork_head_bc")
+SCENES = (
+    *("dvf5000_first", "dvf5000_second", "teach_wobbling_table", "fork_head_bc"),
+    "review_dvf5000",
+)
 SIZE = (1440, 900)
 """Width and height of the page, CSS pixels."""
 CHROMIUM = [
@@ -157,7 +160,32 @@ def imported(page: Page) -> None:
 
 def reported(page: Page) -> None:
     """Open the window of the report, with a result put into it."""
-    press(page, "Report")
+    press(page, "Save")
+    press(page, "Write a report …")
+
+
+def noted(page: Page) -> None:
+    """Open the list of review notes."""
+    page.locator("[data-do='notes:open']").first.click()
+
+
+def told(page: Page) -> None:
+    """Tell the story up to its second step, which shows the lever of an error."""
+    noted(page)
+    press(page, "Tell the story")
+    page.locator("[data-do='story:on']").click()
+
+
+def measured(page: Page) -> None:
+    """Measure between two points of the map."""
+    unfold(page, "More analyses")
+    unfold(page, "Distance and angle")
+    press(page, "Pick points")
+    box = page.locator("#root canvas").first.bounding_box()
+    for part in (0.42, 0.58):
+        page.mouse.click(box["x"] + part * box["width"], box["y"] + 0.5 * box["height"])
+        page.wait_for_timeout(SETTLED_MS)
+    press(page, "Stop")
 
 
 VISITS = {
@@ -174,6 +202,9 @@ VISITS = {
     "task_machine": Visit(turned, "teach_wobbling_table"),
     "task_import": Visit(imported),
     "window_report": Visit(reported),
+    "review_notes": Visit(noted, "review_dvf5000"),
+    "review_story": Visit(told, "review_dvf5000"),
+    "review_distance": Visit(measured),
     "errors_row": Visit(opened_row, part="#ws-left"),
 }
 """File name to visit."""
