@@ -30,7 +30,7 @@ class StatePart(Part):
 
 
 class TopPart(Part):
-    """Scene, open, save, share, notes, help; undo and redo where there is something to undo."""
+    """Scene, open, save, share, report, help; notes, undo and redo where there are any."""
 
     name = "top"
 
@@ -44,7 +44,12 @@ class TopPart(Part):
         )  # fmt: skip
         hint = "Open a scene, measured errors, or a controller's table (Ctrl+O)"
         title = picture.state.origin.title or picture.state.origin.name
-        count = sum(note.status == "open" for note in picture.state.review)
+        state = picture.state
+        count = sum(note.status == "open" for note in state.review)
+        notes = [
+            button(f"Notes ({count})" if count else "Notes", "notes:open", kind="quiet",
+                   data_key="notes", hint="Notes of the review; N pins one")
+        ] if state.review or state.page.notes else []  # fmt: skip
         return {
             "top": join((
                 tag("strong", "warpspace", class_="ws-brand"),
@@ -53,10 +58,10 @@ class TopPart(Part):
                 upload_button("Open", "files", MAX_SCENE_BYTES, accepted_endings(), kind="quiet",
                               hint=hint),
                 button("Save", "page:open", "files", kind="quiet",
-                       hint="Save the scene, pictures, exports, a report"),
+                       hint="Save the scene, pictures, exports"),
                 button("Share", "files:share", kind="quiet", hint="Copy a link to what is shown"),
-                button(f"Notes ({count})" if count else "Notes", "notes:open", kind="quiet",
-                       data_key="notes", hint="Notes (N)"),
+                button("Report", "page:open", "report", kind="quiet"),
+                *notes,
                 tag("span", "", class_="ws-fill"),
                 *travel,
                 button("?", "page:open", "help", kind="quiet", aria_label="Help", hint="Help (H)"),

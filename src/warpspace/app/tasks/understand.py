@@ -73,7 +73,8 @@ class WorstPart(Section):
         if picture.state.picked is not None:
             back = button("Worst point", "worst:forget", kind="link",
                           hint="Back to the worst point")  # fmt: skip
-            asked = tag("p", join((_axes(found), " ", back)))
+            pin = button("Pin a note", "notes:pin", kind="link", hint="Pin a note here (N)")
+            asked = tag("p", join((_axes(found), " ", back, " ", pin)))
         best = tag("div", "", data_piece="best")
         details = tag("summary", "Details") + _details(found, picture.state.lever)
         details = tag("details", details, class_="ws-details", data_key="worst.details")
