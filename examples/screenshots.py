@@ -160,8 +160,7 @@ def imported(page: Page) -> None:
 
 def reported(page: Page) -> None:
     """Open the window of the report, with a result put into it."""
-    press(page, "Save")
-    press(page, "Write a report …")
+    press(page, "Report")
 
 
 def noted(page: Page) -> None:
