@@ -8,7 +8,7 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.line import complete_ends
-from warpspace.analysis.options import LOOP_HELP, Place, option, outside_travel, place_words
+from warpspace.analysis.options import LOOP_HELP, Place, option, place_words, travel_warnings
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
@@ -73,10 +73,7 @@ class Distance(Analysis):
         return point, field.error_um
 
     def warnings(self, scene: Scene) -> Iterator[str]:
-        given = {"start": self.start, "end": self.end, "corner": self.corner}
-        for name, place in given.items():
-            for words in outside_travel(scene.machine, dict(place)):
-                yield f"{{{name}}} {words}"
+        return travel_warnings(scene.machine, start=self.start, end=self.end, corner=self.corner)
 
 
 @dataclass(frozen=True, kw_only=True)

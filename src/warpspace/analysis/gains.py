@@ -18,8 +18,8 @@ from warpspace.analysis.options import (
     Place,
     error_words,
     option,
-    outside_travel,
     place_words,
+    travel_warnings,
 )
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -291,7 +291,7 @@ class Gains(Analysis):
         return GainsResult(gains=found, asked=self, machine=scene.machine)
 
     def warnings(self, scene: Scene) -> Iterable[str]:
-        return (f"{{at}} {words}" for words in outside_travel(scene.machine, dict(self.at)))
+        return travel_warnings(scene.machine, at=self.at)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.options import LOOP_HELP, Place, option, outside_travel, place_words
+from warpspace.analysis.options import LOOP_HELP, Place, option, place_words, travel_warnings
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.axes import is_linear
@@ -60,9 +60,7 @@ class Line(Analysis):
         )
 
     def warnings(self, scene: Scene) -> Iterator[str]:
-        for name, place in (("start", self.start), ("end", self.end)):
-            for words in outside_travel(scene.machine, dict(place)):
-                yield f"{{{name}}} {words}"
+        return travel_warnings(scene.machine, start=self.start, end=self.end)
 
 
 def complete_ends(scene: Scene, start: Place, end: Place) -> tuple[dict[str, float], ...]:

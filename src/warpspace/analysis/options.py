@@ -2,7 +2,7 @@
 
 import math
 import types
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cache
@@ -339,6 +339,13 @@ def outside_travel(machine: "Machine", place: Mapping[str, float]) -> list[str]:
                 " its errors are continued beyond it"
             )
     return said
+
+
+def travel_warnings(machine: "Machine", **places: Place) -> Iterator[str]:
+    """Warn of places beyond the travel, each by the name of its option."""
+    for name, place in places.items():
+        for words in outside_travel(machine, dict(place)):
+            yield f"{{{name}}} {words}"
 
 
 def error_words(key: str) -> str:
