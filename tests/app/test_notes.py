@@ -22,7 +22,7 @@ from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.tasks.notes import NotesPart
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene
-from warpspace.scene.notes import Note, is_stale
+from warpspace.scene.notes import Note, told
 
 START = start_state(SCENES[0])
 EVIL = "<img src=x onerror='window.taken=1'>"
@@ -68,7 +68,7 @@ def test_numbers_of_a_note_are_those_of_check_and_grow_stale():
     assert note.numbers == note_numbers(scene, [note])[0]
     assert note.numbers["here_um"] == note.numbers["max_um"]  # nothing was asked: the worst point
     moved = part.store.state.with_amplitude("EA0Z", 0.0).resulting_scene()
-    assert is_stale(note.numbers, note_numbers(moved, [note])[0])
+    assert told(note.numbers, note_numbers(moved, [note])[0])
 
 
 def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_holds():

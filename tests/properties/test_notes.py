@@ -19,7 +19,6 @@ from warpspace.scene.notes import (
     STATUSES,
     Note,
     Reply,
-    is_stale,
     merge_notes,
     story,
     told,
@@ -173,10 +172,10 @@ def test_the_longest_text_is_kept_and_one_character_more_is_refused():
 
 def test_numbers_hold_until_they_are_off_by_more_than_the_printed_digit():
     then = {"max_um": 51.72, "here_um": 46.0}
-    assert not is_stale(then, {"max_um": 51.73, "here_um": 45.99, "mean_um": 1.0})
-    assert not is_stale({}, {})
-    assert is_stale(then, {"max_um": 51.74, "here_um": 46.0})
-    assert is_stale(then, {"max_um": 51.72})
+    assert not told(then, {"max_um": 51.73, "here_um": 45.99, "mean_um": 1.0})
+    assert not told({}, {})
+    assert told(then, {"max_um": 51.74, "here_um": 46.0})
+    assert told(then, {"max_um": 51.72})
     assert told(then, {"max_um": 46.11, "here_um": 46.0}) == "51.7 → 46.1 µm"
     assert told(then, {"max_um": 51.74, "here_um": 46.0}) == "51.72 → 51.74 µm"
     assert told(then, {"max_um": 51.72}) == "46.0 → nothing µm"

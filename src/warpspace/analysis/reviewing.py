@@ -11,7 +11,7 @@ from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import PARAMETERS, parameter
 from warpspace.scene.model import Scene, evaluate, evaluate_grid
-from warpspace.scene.notes import TOLERANCES, Note, is_stale, told
+from warpspace.scene.notes import TOLERANCES, Note, told
 from warpspace.units import spell_short
 
 Numbers = Mapping[str, float]
@@ -61,7 +61,8 @@ def _printed(value: float) -> float:
 
 def said_stale(note: Note, found: Numbers) -> str:
     """Say that the numbers of a note no longer hold: "changed: 51.7 → 46.1 µm"."""
-    return f"changed: {told(note.numbers, found)}" if is_stale(note.numbers, found) else ""
+    said = told(note.numbers, found)
+    return f"changed: {said}" if said else ""
 
 
 def spell_change(note: Note) -> str:
@@ -112,14 +113,8 @@ def notes_table(notes: Sequence[Note], found: Sequence[Numbers], title: str = ""
             spell_numbers(note), said_stale(note, now) or "holds", note.author,
             f"{note.date:%Y-%m-%d}", spell_change(note), replies,
         )  # fmt: skip
-        rows.append(tuple(map(_harmless, cells)))
+        rows.append(tuple(" ".join(cell.split()) for cell in cells))
     return Table(columns, rows, title, empty="No notes.")
-
-
-def _harmless(cell: str) -> str:
-    """Keep a spreadsheet from reading what somebody has written as a formula."""
-    flat = " ".join(cell.split())
-    return f"'{flat}" if flat[:1] in ("=", "+", "-", "@") else flat
 
 
 def notes_markdown(scene: Scene, notes: Sequence[Note], found: Sequence[Numbers]) -> str:

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -182,7 +183,8 @@ def print_json(value: Mapping[str, object]) -> None:
 
 def spell_json(value: object) -> str:
     """Spell a value as JSON; numbers that are not finite are refused rather than misspelt."""
-    return escape_json(json.dumps(value, ensure_ascii=False, allow_nan=False))
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, default=datetime.isoformat)
+    return escape_json(text)
 
 
 FIGURES = (".png", ".svg", ".pdf")

@@ -35,7 +35,7 @@ from warpspace.scene.machines import (
     read_bodies,
 )
 from warpspace.scene.model import Scene, scene_notes
-from warpspace.scene.notes import Note, is_changeable
+from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.save import Notation, read_errors
 from warpspace.scene.schema import Problems
 
@@ -225,25 +225,22 @@ def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str,
 
 def _review(raw: object, machine: Machine, problems: Problems) -> tuple[Note, ...]:
     notes: tuple[Note, ...] = problems.read(schema.NOTES, "notes", raw) or ()
-    seen: set[str] = set()
+    ids, bodies = [note.id for note in notes], ("", *machine.axes, *BODY_FRAMES)
     for index, note in enumerate(notes):
         where = f"notes[{index}]"
-        if note.id in seen:
-            problems.add(
-                f"{where}.id", "another note has this id; expected one of its own", note.id
-            )
-        seen.add(note.id)
-        frames = (*machine.axes, *BODY_FRAMES)
-        if note.on and note.on.body and note.on.body not in frames:
-            problems.unknown(f"{where}.on.body", note.on.body, frames, "body")
+        if note.id in ids[:index]:
+            expected = "another note has this id; expected one of its own"
+            problems.add(f"{where}.id", expected, note.id)
         for one in (note, *note.versions):
             if one.id != note.id:
                 problems.add(f"{where}.versions", f"expected versions of {note.id}", one.id)
+            if one.on and one.on.body not in bodies:
+                problems.unknown(f"{where}.on.body", one.on.body, bodies, "body")
             for axis in one.at:
                 if axis not in machine.axes and machine is not STAND_IN:
                     problems.unknown(f"{where}.at", axis, machine.axes, "axis of this machine")
             for key in one.change:
-                if not is_changeable(key):
+                if key.removeprefix(TOLERANCES) not in PARAMETERS:
                     problems.unknown(f"{where}.change", key, PARAMETERS, "error parameter")
     return notes
 
@@ -370,12 +367,11 @@ class _Document:
         problems, table, default = self.problems, self.raw.get("tolerances"), None
         if isinstance(table, dict) and "default" in table:
             default = problems.read(schema.DEFAULTS, "tolerances.default", table["default"])
-        given = {name: value for name, value in (default or {}).items() if value is not None}
         own: dict[str, Tolerance] = {}
         for key, value in self.known("tolerances").items():
             if valid := problems.read(schema.tolerance, f"tolerances.{key}", value):
                 own[key] = valid
-        return ToleranceSet(given, own)
+        return ToleranceSet(default or {}, own)
 
     def uncertainties(self) -> dict[str, ErrorFunction]:
         found: dict[str, ErrorFunction] = {}

@@ -5,16 +5,14 @@ people's files merge without a loss. Where both have edited a note, the versions
 until somebody chooses one.
 """
 
-import hashlib
 import json
-import secrets
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
 
 from warpspace.exceptions import OptionError
-from warpspace.machine.axes import PARAMETERS
 from warpspace.machine.description import Vector
 from warpspace.machine.limits import MAX_NOTES, MAX_REPLACED, MAX_REPLIES
 
@@ -52,7 +50,7 @@ class Mark:
 class Note:
     """One note, question or decision."""
 
-    id: str = field(default_factory=lambda: secrets.token_hex(3))
+    id: str = field(default_factory=lambda: os.urandom(3).hex())
     kind: str = "note"
     # mm or degrees; where the axes stand at the point it is about; empty: about the whole
     at: Mapping[str, float] = field(default_factory=dict[str, float])
@@ -75,11 +73,13 @@ class Note:
     @property
     def version(self) -> str:
         """What this version is known by: a digest of what it says and of what it replaces."""
+        from hashlib import sha256  # slow to import, and few scenes have notes
+
         said = note_to_toml(replace(self, replies=(), versions=()))
         # 275 and 275.0 are one number, as which of them a file gives is not for sure
         same = json.loads(json.dumps(said, default=datetime.isoformat), parse_int=float)
         text = json.dumps(same, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
+        return sha256(text.encode()).hexdigest()[:12]
 
     def edited(self, **changes: Any) -> "Note":
         """Give the version after an edit; it replaces this one and those beside it."""
@@ -94,20 +94,17 @@ class Note:
         return replace(self, replies=(*self.replies, reply))
 
 
-def is_stale(then: Mapping[str, float], found: Mapping[str, float]) -> bool:
-    """Tell whether numbers of a note no longer hold: off by more than the printed digit."""
-    slack = PRINTED_UM * (1.0 + 1e-9)
-    return any(name not in found or abs(found[name] - at) > slack for name, at in then.items())
-
-
 def told(then: Mapping[str, float], found: Mapping[str, float]) -> str:
-    """Say what has become of the first number that no longer holds: "51.7 → 46.1 µm"."""
+    """Say which number of a note no longer holds, if any: "51.7 → 46.1 µm"."""
     for name in reversed(MEASURES):
-        if name in then and is_stale({name: then[name]}, found):
-            after = f"{found[name]:.1f}" if name in found else "nothing"
-            digits = 1 if f"{then[name]:.1f}" != after else 2
-            after = f"{found[name]:.{digits}f}" if name in found else after
-            return f"{then[name]:.{digits}f} → {after} µm"
+        was, now = then.get(name), found.get(name)
+        if was is None:
+            continue
+        if now is None:
+            return f"{was:.1f} → nothing µm"
+        if abs(now - was) > PRINTED_UM * (1.0 + 1e-9):
+            digits = 1 if f"{was:.1f}" != f"{now:.1f}" else 2
+            return f"{was:.{digits}f} → {now:.{digits}f} µm"
     return ""
 
 
@@ -158,42 +155,14 @@ def _merged(same: Sequence[Note]) -> Note:
     return replace(first, replies=tuple(answered), versions=tuple(others))
 
 
-# --- As in a file ---------------------------------------------------------------------------------
+def note_to_toml(note: Note) -> dict[str, Any]:
+    """Give the entries of a note in a file; what says nothing is left out."""
+    entries = asdict(note, dict_factory=_filled)
+    for one in (entries, *entries.get("versions", ())):
+        if one["loop"] == "tool":
+            del one["loop"]
+    return entries
 
 
-def is_changeable(key: str) -> bool:
-    """Tell whether a decision may name this: an error, or the tolerance of one."""
-    return key.removeprefix(TOLERANCES) in PARAMETERS
-
-
-def note_to_toml(note: Note) -> dict[str, object]:
-    """Give the entries of a note; what says nothing is left out."""
-    mark = note.on or Mark()
-    on = {"loop": mark.loop, "body": mark.body}
-    entries: dict[str, object] = {
-        "id": note.id,
-        "kind": note.kind,
-        "at": dict(note.at),
-        "on": {
-            **{name: value for name, value in on.items() if value},
-            **({} if mark.point_mm is None else {"point_mm": list(mark.point_mm)}),
-        },
-        "text": note.text,
-        "author": note.author,
-        "date": note.date,
-        "status": note.status,
-        "loop": "" if note.loop == "tool" else note.loop,
-        "numbers": dict(note.numbers),
-        "before": dict(note.before),
-        "change": {key: list(pair) for key, pair in note.change.items()},
-        "step": note.step,
-        "view": note.view,
-        "replies": [_filled(asdict(one)) for one in note.replies],
-        "replaces": list(note.replaces),
-        "versions": [note_to_toml(one) for one in note.versions],
-    }
-    return _filled(entries)
-
-
-def _filled(entries: Mapping[str, object]) -> dict[str, object]:
-    return {name: value for name, value in entries.items() if value not in ("", 0, {}, [])}
+def _filled(entries: Iterable[tuple[str, object]]) -> dict[str, Any]:
+    return {name: value for name, value in entries if value not in ("", 0, None, {}, ())}

@@ -152,11 +152,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
 
 def spell_notes(notes: Iterable[Note]) -> str:
     """Spell notes as tables of a scene file, an entry a line."""
-    return "\n".join(
-        "[[notes]]\n"
-        + "".join(f"{name} = {_inline(value)}\n" for name, value in note_to_toml(one).items())
-        for one in notes
-    )
+    return "\n".join(_section("[notes]", note_to_toml(one)) for one in notes)
 
 
 def _bundled(machine: Machine) -> Machine | None:
@@ -235,11 +231,8 @@ def _section(
 def _inline(value: object) -> str:
     if isinstance(value, Mapping):
         table = cast("Mapping[str, object]", value)
-        return (
-            "{ "
-            + ", ".join(f"{spell_key(key)} = {_inline(entry)}" for key, entry in table.items())
-            + " }"
-        )
+        pairs = ", ".join(f"{spell_key(key)} = {_inline(entry)}" for key, entry in table.items())
+        return f"{{ {pairs} }}"
     if isinstance(value, (list, tuple)):
         entries = [_inline(entry) for entry in cast("Sequence[object]", value)]
         if len(entries) <= _WRAP:

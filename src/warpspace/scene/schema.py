@@ -1,11 +1,10 @@
 """What each section of a scene or machine file may hold, and the list that its problems go to."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any, cast
-from unicodedata import category
 
 from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.kinematics.conversion import SquarenessSign
@@ -75,16 +74,28 @@ def _span(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     return low, high
 
 
-def _by_name(kind: Kind) -> Kind:
+def _by_name(kind: Kind, known: Collection[str] = ()) -> Kind:
+    """Take a table of any names, or of those that are known."""
+
     def read(reader: ValueReader, value: Any, path: Path) -> dict[str, Any]:
         table = reader.dictionary(value, path)
-        return {name: kind(reader, entry, (*path, name)) for name, entry in table.items()}
+        names = known or table
+        reader.only(table, path, names)
+        return {name: kind(reader, table[name], (*path, name)) for name in names if name in table}
 
     return read
 
 
-def _text(longest: int) -> Kind:
-    return lambda reader, value, path: reader.text(value, path, longest, least=0)
+def _text(longest: int, least: int = 0, only: str = "", words: str = "") -> Kind:
+    """Take a text; `only` is an expression that it must fit, `words` say it."""
+
+    def read(reader: ValueReader, value: Any, path: Path) -> str:
+        found = reader.text(value, path, longest, least)
+        if only and not re.fullmatch(only, found):
+            reader.note(path, f"expected {words}", value)
+        return found
+
+    return read
 
 
 def _choice(names: Callable[[], Iterable[object]], words: str = "{} or {}") -> Kind:
@@ -141,33 +152,17 @@ def _placed(reader: ValueReader, value: Any, path: Path) -> bool:
     return value is True
 
 
-def _date(reader: ValueReader, value: Any, path: Path) -> datetime:
-    if isinstance(value, datetime) and value.tzinfo is not None:
-        return value
-    reader.note(path, "expected a time with its zone, for instance 2026-11-22T10:00:00Z", value)
-    return datetime.min.replace(tzinfo=UTC)
+def _date(reader: ValueReader, value: Any, path: Path) -> Any:
+    if not isinstance(value, datetime) or value.tzinfo is None:
+        reader.note(path, "expected a time with its zone, for instance 2026-11-22T10:00:00Z", value)
+    return value
 
 
-def _word(longest: int) -> Kind:
-    def read(reader: ValueReader, value: Any, path: Path) -> str:
-        found = reader.text(value, path, longest)
-        if not re.fullmatch(r"[a-z0-9]*", found):
-            reader.note(path, "expected small letters and digits", value)
-        return found
-
-    return read
-
-
-def _said(longest: int, least: int = 0) -> Kind:
-    """Take a text of people: of several lines, without other control characters."""
-
-    def read(reader: ValueReader, value: Any, path: Path) -> str:
-        found = reader.text(value, path, longest, least)
-        if any(category(sign) in ("Cc", "Cs") and sign not in "\n\t" for sign in found):
-            reader.note(path, "expected a text without control characters", value)
-        return found
-
-    return read
+def _step(reader: ValueReader, value: Any, path: Path) -> int:
+    number = reader.number(value, path, 0.0, limits.MAX_NOTES)
+    if number % 1.0 > 0.0:
+        reader.note(path, "expected a whole number", value)
+    return int(number) if number % 1.0 == 0.0 else 0
 
 
 def _list(kind: Kind, most: int) -> Kind:
@@ -197,14 +192,6 @@ class Section:
             found[name] = kind(reader, entry, (*path, name)) if name in table else entry
         reader.only(table, path, self.fields)
         return self.build(**found)
-
-
-def _given(**entries: float | None) -> dict[str, float]:
-    return {name: value for name, value in entries.items() if value is not None}
-
-
-def _note(step: float, **entries: Any) -> Note:
-    return Note(step=int(step), **entries)
 
 
 LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
@@ -269,7 +256,7 @@ VIEW = Section(
         "limit_um": (_number(*limits.LIMIT_UM), None),
     }
 )
-DEFAULTS = Section({name: (_number(*_HALF_WIDTH), None) for name in TOLERANCE_CLASSES})
+DEFAULTS = _by_name(_number(*_HALF_WIDTH), TOLERANCE_CLASSES)
 _RANGE = Section(
     {
         "centre": (_number(-limits.MAX_ERROR, limits.MAX_ERROR), 0.0),
@@ -279,50 +266,36 @@ _RANGE = Section(
 )
 _WIDTH = _number(*_HALF_WIDTH, "a half width or { centre = , half_width = }")
 _PLACE = _number(*LIMIT, expected="a number or [lower, upper]")
-_MOST_UM = _number(0.0, limits.MAX_ERROR * 10.0)
-_PAIR = _numbers("[from, to]", limits.MAX_ERROR)
-_MEASURES = Section(dict.fromkeys(MEASURES, (_MOST_UM, None)), _given)
+_MEASURED = _by_name(_number(0.0, limits.MAX_ERROR * 10.0), MEASURES)
+_VERSION = _text(16, 1, r"[a-z0-9]*", "small letters and digits")
+# what people write has lines and tabulators, but no other control characters
+_PLAIN = r"[^\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]*", "a text without control characters"
+_MARK = Section(
+    {"loop": (_one_of(Loop), ""), "point_mm": (POINT, None), "body": (_text(8), "")}, Mark
+)
 _NOTE: dict[str, tuple[Kind, Any]] = {
-    "id": (_word(16), MISSING),
+    "id": (_VERSION, MISSING),
     "kind": (_one_of(KINDS), "note"),
     "at": (_by_name(LENGTH), {}),
-    "on": (
-        Section(
-            {"loop": (_one_of(Loop), ""), "point_mm": (POINT, None), "body": (_text(8), "")}, Mark
-        ),
-        None,
-    ),
-    "text": (_said(limits.MAX_NOTE_TEXT, 1), MISSING),
-    "author": (_said(100), ""),
+    "on": (_MARK, None),
+    "text": (_text(limits.MAX_NOTE_TEXT, 1, *_PLAIN), MISSING),
+    "author": (_text(100, 0, *_PLAIN), ""),
     "date": (_date, MISSING),
     "status": (_one_of(STATUSES), "open"),
     "loop": (_one_of(Loop), Loop.TOOL.value),
-    "numbers": (_MEASURES, {}),
-    "before": (_MEASURES, {}),
-    "change": (_by_name(_PAIR), {}),
-    "step": (_number(0.0, limits.MAX_NOTES), 0),
+    "numbers": (_MEASURED, {}),
+    "before": (_MEASURED, {}),
+    "change": (_by_name(_numbers("[from, to]", limits.MAX_ERROR)), {}),
+    "step": (_step, 0),
     "view": (_text(limits.MAX_NOTE_VIEW), ""),
-    "replaces": (_list(_word(16), limits.MAX_REPLACED), ()),
+    "replaces": (_list(_VERSION, limits.MAX_REPLACED), ()),
 }
-_REPLY = Section(
-    {
-        "text": (_said(limits.MAX_NOTE_TEXT, 1), MISSING),
-        "author": (_said(100), ""),
-        "date": (_date, MISSING),
-    },
-    Reply,
-)
-NOTES = _list(
-    Section(
-        {
-            **_NOTE,
-            "replies": (_list(_REPLY, limits.MAX_REPLIES), ()),
-            "versions": (_list(Section(_NOTE, _note), limits.MAX_REPLIES), ()),
-        },
-        _note,
-    ),
-    limits.MAX_NOTES,
-)
+_REPLY = Section({name: _NOTE[name] for name in ("text", "author", "date")}, Reply)
+_BESIDE: dict[str, tuple[Kind, Any]] = {
+    "replies": (_list(_REPLY, limits.MAX_REPLIES), ()),
+    "versions": (_list(Section(_NOTE, Note), limits.MAX_REPLIES), ()),
+}
+NOTES = _list(Section(_NOTE | _BESIDE, Note), limits.MAX_NOTES)
 
 
 def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:

@@ -1,8 +1,5 @@
 """Commands about scenes and machines: what there is, what is right, what the thesis prints."""
 
-import csv
-import io
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -35,11 +32,12 @@ from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.measured import Check, Measured
+    from warpspace.analysis.reviewing import Numbers
     from warpspace.analysis.thesis import Row
     from warpspace.scene.model import Scene
-    from warpspace.scene.notes import Note
 
 OWN = "own"
+CHECKED = ("id", "kind", "stale", "numbers", "now")  # what `check` tells of a note
 Kind = Literal["scenes", "machines"]
 
 
@@ -174,11 +172,12 @@ def check(
 
 
 def _check(scene: "Scene", *, as_json: bool) -> None:
+    from warpspace.analysis.reviewing import note_numbers, notes_table
     from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.model import second_order
 
     remarks = (*scene.notes, *check_meshes(scene.machine))
-    found = second_order(scene)
+    found, now = second_order(scene), note_numbers(scene, scene.review)
     say_second_order(found)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
     if as_json:
@@ -192,7 +191,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
                 "non_zero": non_zero,
                 "linearisation_error_um": found.um,
                 "remarks": list(remarks),
-                "notes": notes_json(scene),
+                "notes": [{key: one[key] for key in CHECKED} for one in notes_json(scene, now)],
             }
         )
         return
@@ -207,25 +206,21 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     columns = (Column(leads=True), Column(wraps=True))
     print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts)))
     if scene.review:
-        from warpspace.analysis.reviewing import note_numbers, notes_table
-
-        print_blocks([notes_table(scene.review, note_numbers(scene, scene.review), "notes")])
+        print_blocks([notes_table(scene.review, now, "notes")])
 
 
-def notes_json(scene: "Scene") -> list[dict[str, object]]:
-    """List the notes of a scene with their numbers, then and now."""
-    from warpspace.analysis.reviewing import note_numbers
-    from warpspace.scene.notes import is_stale
+def notes_json(scene: "Scene", found: "Sequence[Numbers]") -> list[dict[str, Any]]:
+    """List the notes of a scene as its file has them, and what their numbers are now."""
+    from warpspace.scene.notes import note_to_toml, told
 
     return [
         {
-            "id": note.id,
-            "kind": note.kind,
-            "stale": is_stale(note.numbers, now),
-            "numbers": dict(note.numbers),
+            **note_to_toml(note),
+            "stale": told(note.numbers, now) != "",
+            "numbers": note.numbers,
             "now": {name: now[name] for name in note.numbers if name in now},
         }
-        for note, now in zip(scene.review, note_numbers(scene, scene.review), strict=True)
+        for note, now in zip(scene.review, found, strict=True)
     ]
 
 
@@ -271,77 +266,55 @@ def notes(
     A note whose numbers no longer hold is marked "changed" with its number then and now.
     """
     from warpspace.analysis.reviewing import note_numbers, notes_markdown, notes_table
+    from warpspace.scene.files import spell_row
     from warpspace.scene.library import load_scene
 
     loaded = load_scene(scene)
-    if text is None:
-        if point is not None or (output or "").endswith(".toml"):
-            raise OptionError("--at and an .toml file belong to --add; there is no text to add")
-    else:
-        loaded, path = _with_note(loaded, scene, text, point, output, about)
-        _write_note(loaded, scene, path, force=force)
+    if text is not None:
+        at = {} if point is None else parse_point(point, loaded.machine.axes)
+        loaded = _add_note(loaded, scene, output, force=force, text=text, at=at, **about)
         output = None
-    if as_json:
-        print_json({"notes": [{**one, **_said(note)} for one, note in
-                              zip(notes_json(loaded), loaded.review, strict=True)]})  # fmt: skip
-        return
+    elif point is not None or (output or "").endswith(".toml"):
+        raise OptionError("--at and an .toml file belong to --add; there is no text to add")
     found = note_numbers(loaded, loaded.review)
     table = notes_table(loaded.review, found)
-    if output is None:
+    if output is not None:
+        spelled = (
+            notes_markdown(loaded, loaded.review, found)
+            if output.endswith(".md")
+            else "".join(map(spell_row, table.csv_rows()))
+        )
+        write_text(output, spelled, force=force)
+    if as_json:
+        print_json({"notes": notes_json(loaded, found)})
+    elif output is None:
         print_blocks([f"{loaded.name}: {loaded.title}", table])
-    elif output.endswith(".md"):
-        write_text(output, notes_markdown(loaded, loaded.review, found), force=force)
-    else:
-        content = io.StringIO()
-        csv.writer(content, lineterminator="\n").writerows(table.csv_rows())
-        write_text(output, content.getvalue(), force=force)
 
 
-def _said(note: "Note") -> dict[str, object]:
-    from warpspace.scene.notes import note_to_toml
-
-    said = note_to_toml(note)
-    del said["id"], said["kind"]
-    said.pop("numbers", None)
-    return json.loads(json.dumps(said, default=str))
-
-
-def _with_note(
-    scene: "Scene",
-    name: str,
-    text: str,
-    point: str | None,
-    output: str | None,
-    about: dict[str, Any],
-) -> "tuple[Scene, str]":
+def _add_note(
+    scene: "Scene", name: str, output: str | None, *, force: bool, **about: Any
+) -> "Scene":
+    """Add a note to the file of a scene; what its author has written besides stays."""
     from warpspace.analysis.reviewing import note_numbers
-    from warpspace.scene.library import scene_names
-    from warpspace.scene.notes import Note, with_note
+    from warpspace.machine.limits import MAX_SCENE_BYTES
+    from warpspace.scene.files import read_text
+    from warpspace.scene.library import parse_scene, scene_names, scene_path
+    from warpspace.scene.notes import Note
+    from warpspace.scene.save import spell_notes
 
     if output is None and name in scene_names():
         raise OptionError(f"{name} is bundled and stays as it is; expected -o FILE.toml")
     if output is not None and not output.endswith(".toml"):
         raise OptionError(f"-o {output}: expected a .toml file with --add")
-    at = {} if point is None else parse_point(point, scene.machine.axes)
-    warn_outside_travel(scene.machine, at)
-    note = Note(text=text, at=at, **about)
+    note = Note(**about)
+    warn_outside_travel(scene.machine, note.at)
     note = replace(note, numbers=note_numbers(scene, [note])[0])
-    return replace(scene, review=with_note(scene.review, note)), output or name
-
-
-def _write_note(scene: "Scene", name: str, path: str, *, force: bool) -> None:
-    """Write a scene whose last note is new; what its author has written besides stays."""
-    from warpspace.machine.limits import MAX_SCENE_BYTES
-    from warpspace.scene.files import read_text
-    from warpspace.scene.library import parse_scene, scene_path
-    from warpspace.scene.save import spell_notes
-
-    file = scene_path(name)
-    text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_notes(scene.review[-1:])}"
-    parse_scene(text, scene.name, path, Path(path).parent)
+    file, path = scene_path(name), output or name
+    text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_notes([note])}"
+    added = parse_scene(text, scene.name, path, Path(path).parent)
     write_text(path, text, force=force or file == Path(path))
-    note = scene.review[-1]
     echo(f"{path}: {note.kind} {note.id} added", err=True)
+    return added
 
 
 @click.command()
@@ -368,10 +341,10 @@ def merge(first: str, second: str, output: str, *, force: bool) -> None:
     for note in merged:
         if note.versions:
             print_text(f"  {note.id}: {1 + len(note.versions)} versions kept side by side")
-    other = [key for key in {**a.errors.functions, **b.errors.functions}
-             if a.errors.functions.get(key) != b.errors.functions.get(key)]  # fmt: skip
-    if other or replace(b, name=a.name, errors=a.errors, review=()) != replace(a, review=()):
-        said = f", among them the errors {', '.join(other)}" if other else ""
+    if replace(b, name=a.name, review=a.review) != a:
+        functions, others = a.errors.functions, b.errors.functions
+        keys = [key for key in {**functions, **others} if functions.get(key) != others.get(key)]
+        said = f", among them the errors {', '.join(keys)}" if keys else ""
         warn(f"the scenes differ beside their notes{said}; those of {first} are kept")
 
 
