@@ -8,7 +8,7 @@ import pytest
 
 from app.frames import draw
 from app.page_tab import SCENES, Tab, open_page
-from warpspace.app.server import network
+from warpspace.app.server import viewer
 from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 # two workers that look for a free port from the same one on may both find it
-network.DEFAULT_PORT += 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+viewer.DEFAULT_PORT += 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 
 
 @pytest.fixture(scope="session")

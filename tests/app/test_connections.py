@@ -11,8 +11,7 @@ import pytest
 
 from app.wire import Wire, dial, end_work
 from warpspace.app.browser.incoming import LONGEST_VALUE, Events
-from warpspace.app.server import network, viewer
-from warpspace.app.server.network import free_port, is_local, page_url, resolve_host
+from warpspace.app.server import viewer
 from warpspace.app.server.tab_keeper import (
     KEPT_SECONDS,
     KEPT_TABS,
@@ -21,6 +20,7 @@ from warpspace.app.server.tab_keeper import (
     is_token,
     new_token,
 )
+from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_host
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.context import MOST_FILES, Context
@@ -35,7 +35,7 @@ def test_a_busy_port_is_an_error_where_it_was_asked_for_else_the_next_is_taken(m
         busy = taken.getsockname()[1]
         with pytest.raises(OptionError, match=f"--port {busy} is in use"):
             free_port("127.0.0.1", busy)
-        monkeypatch.setattr(network, "DEFAULT_PORT", busy)
+        monkeypatch.setattr(viewer, "DEFAULT_PORT", busy)
         assert free_port("127.0.0.1", None) > busy
 
 
@@ -51,7 +51,7 @@ def test_a_busy_port_is_an_error_where_it_was_asked_for_else_the_next_is_taken(m
 )  # fmt: skip
 def test_host_and_port_that_cannot_be(monkeypatch, host, port, problem):
     if port == 80:
-        monkeypatch.setattr(network, "_bind_error", lambda *_: errno.EACCES)
+        monkeypatch.setattr(viewer, "_bind_error", lambda *_: errno.EACCES)
     with pytest.raises(OptionError, match=problem):
         free_port(resolve_host(host), port)
 

@@ -19,11 +19,10 @@ from app.wire import dial
 from page_client import pack, said
 from reliability import doors
 from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN, UPGRADE
-from warpspace.app.server import guard, network, viewer
+from warpspace.app.server import guard, viewer
 from warpspace.app.server.doors import Access, Doors, Place, read_place
 from warpspace.app.server.guard import Limits, Rate
-from warpspace.app.server.network import served_names
-from warpspace.app.server.viewer import Viewer
+from warpspace.app.server.viewer import Viewer, served_names
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
@@ -153,9 +152,9 @@ def test_the_cookie_of_the_page_is_enough_for_its_websocket(guarded):
 def test_other_users_of_the_machine_are_known(monkeypatch, uid, shell, logged_in, others):
     entry = SimpleNamespace(pw_uid=uid, pw_shell=shell)
     monkeypatch.setattr("pwd.getpwall", lambda: [entry])
-    monkeypatch.setattr(network.Path, "iterdir", lambda _: map(Path, logged_in))
+    monkeypatch.setattr(viewer.Path, "iterdir", lambda _: map(Path, logged_in))
     monkeypatch.setattr("os.getuid", lambda: 1000)
-    assert network.has_other_users() is others
+    assert viewer.has_other_users() is others
 
 
 @pytest.mark.parametrize(("token", "said"), [(None, 1), (TOKEN, 0)])
@@ -186,9 +185,9 @@ def test_all_addresses_of_a_machine_are_served_but_not_all_names():
 
 
 def test_one_address_of_a_machine_is_served_under_its_name(monkeypatch):
-    monkeypatch.setattr(network.socket, "gethostname", lambda: "Lathe")
+    monkeypatch.setattr(viewer.socket, "gethostname", lambda: "Lathe")
     found = [(0, 0, 0, "", ("192.0.2.7", 0))]
-    monkeypatch.setattr(network.socket, "getaddrinfo", lambda *_: found)
+    monkeypatch.setattr(viewer.socket, "getaddrinfo", lambda *_: found)
     assert served_names("192.0.2.7", "192.0.2.7") == {"192.0.2.7", "lathe"}
     assert served_names("192.0.2.8", "192.0.2.8") == {"192.0.2.8"}
 

@@ -21,9 +21,8 @@ from warpspace.app.browser.page import Page
 from warpspace.app.browser.viser_private import connection_of, send_at_once
 from warpspace.app.server import session
 from warpspace.app.server.guard import TabConnection
-from warpspace.app.server.network import RepeatedLines
 from warpspace.app.server.session import turn
-from warpspace.app.server.viewer import Viewer
+from warpspace.app.server.viewer import RepeatedLines, Viewer
 from warpspace.cli.services import build_services
 from warpspace.scene.library import load_scene
 

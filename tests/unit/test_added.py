@@ -27,7 +27,7 @@ from warpspace.app.tasks.conventions import (
     effects_of,
     with_choice,
 )
-from warpspace.app.tasks.error_curve import kind_titles, read_curve, spell_rows
+from warpspace.app.tasks.errors import kind_titles, read_curve, spell_rows
 from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
 from warpspace.bench.data import DataColumn
 from warpspace.bench.plan import Outcome, Quantity, build_plan

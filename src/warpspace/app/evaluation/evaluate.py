@@ -20,7 +20,6 @@ from warpspace.app.state.look import slice_positions
 from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid, build_slice
 from warpspace.geometry.colour import ColourScale
-from warpspace.geometry.traces import TraceGroup, build_traces
 from warpspace.picture.model import (
     Slice,
     choose_exaggeration,
@@ -29,7 +28,7 @@ from warpspace.picture.model import (
     coloured_values,
     picture_size_mm,
 )
-from warpspace.picture.traces import TraceLines
+from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
 from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 

@@ -114,7 +114,7 @@ class RotaryLook:
         linked="rotary.own",
         hint="x, y and z in the workpiece frame; empty for none.",
     )
-    # degrees; an axis not given where `warpspace.geometry.traces` puts it
+    # degrees; an axis not given where `warpspace.picture.traces` puts it
     held: Mapping[str, tuple[float, ...]] = described(
         dict[str, tuple[float, ...]](),
         "Positions that rotary axes are held at",
