@@ -238,12 +238,10 @@ def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> N
         loop=picture.view.loop,
         component=picture.component,
     )
-    told = story(live.state.review)
-    page = (
-        build_story_html(live.state, picture.provenance)
-        if told
-        else build_offline_html(live, picture.provenance)
-    )
+    if story(live.state.review):
+        page = build_story_html(live.state, picture.provenance)
+    else:
+        page = build_offline_html(live, picture.provenance)
     write_text(target, page, force=overwrite)
 
 

@@ -260,9 +260,7 @@ class CurveReader:
             self.problems.add(where, f"expected {spell_forms()}", raw)
             return None
         self.problems.take(where, reader)
-        for key in table:
-            if key not in form:
-                self.problems.unknown(where, key, form, "key")
+        self.problems.only(where, table, form, "key")
         return curve
 
     def _column(self, file: str, column: str) -> Points:
@@ -291,9 +289,7 @@ class CurveReader:
         if gantry.rotation_key in given:
             found = f"follows from the guides of {key}; expected one of the two"
             problems.add(f"errors.{gantry.rotation_key}", found)
-        for name in raw:
-            if name != GUIDES:
-                problems.unknown(where, name, (GUIDES,), "key")
+        problems.only(where, raw, (GUIDES,), "key")
         pair = raw[GUIDES]
         entries = cast("list[object]", pair) if isinstance(pair, list) else []
         if len(entries) != 2:

@@ -10,13 +10,11 @@ from warpspace.field.grid import Workspace, find_volume_axes
 from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine import limits
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, sort_axes
-from warpspace.machine.curves.curve import MISSING, ErrorFunction, ValueReader
+from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Constant
-from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME, Table
+from warpspace.machine.curves.table import Table
 from warpspace.machine.description import BODY_FRAMES, Machine, Range, build_machine
 from warpspace.machine.errors import (
-    RUN_DIRECTIONS,
-    UNKNOWN,
     ErrorSet,
     Measurement,
     Run,
@@ -106,6 +104,7 @@ SECTIONS = (
     "view",
     "notes",
 )
+OF_MACHINE = "axis of this machine"  # what a name is that is not known
 STAND_IN = build_machine("wFXYZABCt")
 """Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
 
@@ -116,18 +115,11 @@ def parse_scene(
     source = source or name
     raw, problems = parse_toml(text, source), Problems()
     machine = _machine(raw, name, folder, problems)
-    texts = [
-        problems.read(schema.TEXT, key, raw[key]) if key in raw else ""
-        for key in ("title", "description")
-    ]
-    convention, points, view = (
-        problems.read(kind, key, raw.get(key, {}))
-        for key, kind in (
-            ("convention", schema.CONVENTION),
-            ("points_mm", schema.POINTS),
-            ("view", schema.VIEW),
-        )
-    )
+    title = problems.read(schema.TEXT, "title", raw.get("title", ""))
+    description = problems.read(schema.TEXT, "description", raw.get("description", ""))
+    convention = problems.read(schema.CONVENTION, "convention", raw.get("convention", {}))
+    points = problems.read(schema.POINTS, "points_mm", raw.get("points_mm", {}))
+    view = problems.read(schema.VIEW, "view", raw.get("view", {}))
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     fixed = (convention or {}).get("reference_axis") == "fixed"
     document = _Document(raw, machine, workspace, machine.reference_keys * fixed, folder, problems)
@@ -146,7 +138,7 @@ def parse_scene(
     )
     return Scene(
         name=name,
-        title=texts[0] or name,
+        title=title or name,
         model=model,
         workspace=workspace,
         errors=errors,
@@ -156,7 +148,7 @@ def parse_scene(
         reference=reference,
         placed=view["placed"],
         limit_um=view["limit_um"],
-        description=texts[1],
+        description=description,
         notes=(*scene_notes(machine, workspace, errors), *body_notes(machine)),
         uncertainty=uncertainty,
         measured=measured,
@@ -174,9 +166,7 @@ def _machine(
         machine = load_machine(given)
     else:
         problems.add("machine", f"unknown machine{near_miss(given, machine_names())}", given)
-    for key in raw:
-        if key not in SECTIONS:
-            problems.unknown("", key, SECTIONS, "key")
+    problems.only("", raw, SECTIONS, "key")
     if machine is not None and "bodies" in raw:
         own = read_bodies(raw["bodies"], machine, folder, problems)
         machine = replace(machine, bodies={**machine.bodies, **own})
@@ -189,15 +179,10 @@ def _conventions(
     kinds, default = ("linear", "rotary"), str(ComponentErrors.AFTER_MOTION)
     asked = convention.get("component_errors", default)
     table: Mapping[str, str] = {} if isinstance(asked, str) else asked
-    for key in table:
-        if key not in (*kinds, *machine.axes):
-            known = (*kinds, *machine.axes)
-            problems.unknown("convention.component_errors", key, known, "kind or axis")
+    known = (*kinds, *machine.axes)
+    problems.only("convention.component_errors", table, known, "kind or axis")
     lines = dict(convention.get("measuring_line_mm", {}))
-    for axis in lines:
-        if axis not in machine.axes:
-            where = "convention.measuring_line_mm"
-            problems.unknown(where, axis, machine.axes, "axis of this machine")
+    problems.only("convention.measuring_line_mm", lines, machine.axes, OF_MACHINE)
     if isinstance(asked, str):
         return (asked, ()), lines
     found = {
@@ -213,9 +198,7 @@ def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str,
     given = None if view is None else view["reference"]
     if given is None:
         return None
-    for axis in given:
-        if axis not in workspace.ranges:
-            problems.unknown("view.reference", axis, workspace.ranges, "axis of this machine")
+    problems.only("view.reference", given, workspace.ranges, OF_MACHINE)
     spanning = workspace.volume_axes
     middle = {
         name: q for name, q in workspace.positions.items() if is_linear(name) or name in spanning
@@ -234,14 +217,12 @@ def _review(raw: object, machine: Machine, problems: Problems) -> tuple[Note, ..
         for one in (note, *note.versions):
             if one.id != note.id:
                 problems.add(f"{where}.versions", f"expected versions of {note.id}", one.id)
-            if one.on and one.on.body not in bodies:
-                problems.unknown(f"{where}.on.body", one.on.body, bodies, "body")
-            for axis in one.at:
-                if axis not in machine.axes and machine is not STAND_IN:
-                    problems.unknown(f"{where}.at", axis, machine.axes, "axis of this machine")
-            for key in one.change:
-                if key.removeprefix(TOLERANCES) not in PARAMETERS:
-                    problems.unknown(f"{where}.change", key, PARAMETERS, "error parameter")
+            if one.on:
+                problems.only(f"{where}.on.body", [one.on.body], bodies, "body")
+            if machine is not STAND_IN:
+                problems.only(f"{where}.at", one.at, machine.axes, OF_MACHINE)
+            keys = [key.removeprefix(TOLERANCES) for key in one.change]
+            problems.only(f"{where}.change", keys, PARAMETERS, "error parameter")
     return notes
 
 
@@ -249,7 +230,7 @@ def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) 
     given: dict[str, Range] = {}
     for name, value in raw.items():
         if name not in machine.axes:
-            problems.unknown("workspace", name, machine.axes, "axis of this machine")
+            problems.only("workspace", [name], machine.axes, OF_MACHINE)
         elif valid := problems.read(schema.workspace_range, f"workspace.{name}", value):
             given[name] = valid
     ranges = _complete(given, machine)
@@ -292,10 +273,6 @@ def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
     return found
 
 
-LIMITS = ((-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM), (-limits.MAX_ERROR, limits.MAX_ERROR))
-"""Of position and reading."""
-
-
 @dataclass(frozen=True)
 class _Document:
     """A document whose machine and working volume are known."""
@@ -314,7 +291,7 @@ class _Document:
             if section == "tolerances" and key == "default":
                 continue
             if key not in PARAMETERS:
-                problems.unknown(section, key, machine.allowed_keys, "error parameter")
+                problems.only(section, [key], machine.allowed_keys, "error parameter")
             elif key not in machine.allowed_keys:
                 axis = PARAMETERS[key].axis
                 problems.add(f"{section}.{key}", f"the machine {machine.chain} has no axis {axis}")
@@ -393,54 +370,28 @@ class _Document:
     def measurements(self) -> dict[str, Measurement]:
         found: dict[str, Measurement] = {}
         for key, raw in self.known("measured").items():
-            reader = ValueReader()
+            where = f"measured.{key}"
             if isinstance(raw, dict) and "csv" in raw:
-                runs = _csv_runs(cast("dict[str, object]", raw), self.folder, reader)
+                named = self.problems.read(schema.CSV_RUNS, where, raw)
+                runs = self._csv_runs(where, **named) if named else ()
             else:
-                entries = reader.table(raw, (), ("runs",))
-                runs = _runs(entries["runs"], reader) if entries else ()
-            if self.problems.take(f"measured.{key}", reader):
-                found[key] = Measurement(runs)
+                table = self.problems.read(schema.RUNS, where, raw)
+                runs: tuple[Run, ...] = table["runs"] if table else ()
+            count, most = sum(len(run.points) for run in runs), limits.MAX_POINTS
+            if count > most:
+                expected = f"expected at most {most:,}"
+                self.problems.add(f"{where}.runs", f"have {count:,} readings; {expected}")
+            found[key] = Measurement(runs)
         return found
 
-
-def _runs(raw: object, reader: ValueReader) -> tuple[Run, ...]:
-    found: list[Run] = []
-    count = 0
-    for index, entry in enumerate(reader.entries(raw, ("runs",), limits.MAX_RUNS)):
-        place = ("runs", index)
-        table = reader.table(entry, place, ("direction", "points"))
-        if not table:
-            continue
-        way = UNKNOWN if table["direction"] is MISSING else table["direction"]
-        if way not in RUN_DIRECTIONS:
-            reader.note((*place, "direction"), 'expected "+", "-" or "" (not known)', way)
-        points: list[tuple[float, float]] = []
-        for at, point in enumerate(
-            reader.entries(table["points"], (*place, "points"), limits.MAX_POINTS)
-        ):
-            where = (*place, "points", at)
-            position, value = reader.row(point, where, "[position, value]", LIMITS)
-            points.append((position, value))
-        found.append(Run(str(way), tuple(points)))
-        count += len(points)
-    if count > limits.MAX_POINTS:
-        reader.note(("runs",), f"have {count:,} readings; expected at most {limits.MAX_POINTS:,}")
-    return tuple(found)
-
-
-def _csv_runs(raw: dict[str, object], folder: Path | None, reader: ValueReader) -> tuple[Run, ...]:
-    entries = reader.table(raw, (), ("csv", "column"))
-    file = reader.text(entries["csv"], ("csv",), MAX_FILE_NAME)
-    column = reader.text(entries["column"], ("column",), MAX_COLUMN_NAME)
-    if reader.findings:
-        return ()
-    if folder is None:
-        reader.note((), "CSV files are not read here; expected the readings as runs = [ … ]")
-        return ()
-    try:
-        return read_csv_runs(folder / file, column)
-    except SceneError as error:
-        for problem in error.problems:
-            reader.note((), f"{error.source}: {problem}")
-        return ()
+    def _csv_runs(self, where: str, csv: str, column: str) -> tuple[Run, ...]:
+        if self.folder is None:
+            expected = "expected the readings as runs = [ … ]"
+            self.problems.add(where, f"CSV files are not read here; {expected}")
+            return ()
+        try:
+            return read_csv_runs(self.folder / csv, column)
+        except SceneError as error:
+            for problem in error.problems:
+                self.problems.add(where, f"{error.source}: {problem}")
+            return ()

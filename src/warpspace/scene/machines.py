@@ -31,7 +31,7 @@ def read_bodies(
     frames = (*machine.axes, *BODY_FRAMES)
     for frame, value in problems.table("bodies", raw).items():
         if frame not in frames:
-            problems.unknown("bodies", frame, frames, "frame of this machine")
+            problems.only("bodies", [frame], frames, "frame of this machine")
             continue
         where = f"bodies.{frame}"
         body: BodySource | None = problems.read(
@@ -134,9 +134,7 @@ def machine_of(
     tables = {part: section[part] for part in ("offset_mm", "rotation_deg", "travel", "direction")}
     for part, entries in {**tables, "gantry": section["gantry"]}.items():
         known = (*chain.axes, *(FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()))
-        for axis in entries:
-            if axis not in known:
-                problems.unknown(f"{prefix}{part}", axis, known, "frame of this machine")
+        problems.only(f"{prefix}{part}", entries, known, "frame of this machine")
     machine = build_machine(
         chain,
         **tables,

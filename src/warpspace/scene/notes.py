@@ -113,9 +113,6 @@ def story(notes: Iterable[Note]) -> list[Note]:
     return sorted((one for one in notes if one.step), key=lambda one: (one.step, one.date, one.id))
 
 
-# --- Many notes -----------------------------------------------------------------------------------
-
-
 def with_note(notes: Sequence[Note], note: Note) -> tuple[Note, ...]:
     """Add a note, or put it in the place of the one with its identity."""
     if any(one.id == note.id for one in notes):

@@ -1,6 +1,6 @@
 """Scenes back into the file format: the text reloads to the identical scene, in any notation."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from typing import cast
@@ -146,13 +146,13 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         **({} if scene.limit_um is None else {"limit_um": scene.limit_um}),
     }
     parts.append(_section("view", view))
-    parts.append(spell_notes(scene.review))
+    parts += map(spell_note, scene.review)
     return "\n".join(part for part in parts if part)
 
 
-def spell_notes(notes: Iterable[Note]) -> str:
-    """Spell notes as tables of a scene file, an entry a line."""
-    return "\n".join(_section("[notes]", note_to_toml(one)) for one in notes)
+def spell_note(note: Note) -> str:
+    """Spell a note as a table of a scene file, an entry a line."""
+    return _section("[notes]", note_to_toml(note))
 
 
 def _bundled(machine: Machine) -> Machine | None:

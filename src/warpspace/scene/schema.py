@@ -12,9 +12,9 @@ from warpspace.kinematics.model import ComponentErrors, Loop, convention_names
 from warpspace.machine import limits
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import MISSING, Path, ValueReader
-from warpspace.machine.curves.table import MAX_FILE_NAME
+from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME
 from warpspace.machine.description import MESH_UNITS, ORIGIN, TOOL_SHAPES, BodySource
-from warpspace.machine.errors import TOLERANCE_CLASSES, Tolerance
+from warpspace.machine.errors import RUN_DIRECTIONS, TOLERANCE_CLASSES, UNKNOWN, Run, Tolerance
 from warpspace.scene.files import location, spell_value
 from warpspace.scene.notes import KINDS, MEASURES, STATUSES, Mark, Note, Reply
 
@@ -32,9 +32,12 @@ class Problems:
         shown = "" if value is ... else f" = {spell_value(value)}"
         self.lines.append(f"{key}{shown}: {text}" if key else text)
 
-    def unknown(self, section: str, name: str, known: Iterable[str], what: str) -> None:
-        hint = near_miss(name, known) if len(self.lines) < SHOWN_PROBLEMS else ""
-        self.lines.append(f"{location(section, [name])}: unknown {what}{hint}")
+    def only(self, section: str, names: Iterable[str], known: Collection[str], what: str) -> None:
+        """Note each name of a section that is not known."""
+        for name in names:
+            if name not in known:
+                hint = near_miss(name, known) if len(self.lines) < SHOWN_PROBLEMS else ""
+                self.lines.append(f"{location(section, [name])}: unknown {what}{hint}")
 
     def take(self, key: str, reader: ValueReader) -> bool:
         """Note what a reader has found below a key; tell whether that is nothing."""
@@ -61,8 +64,8 @@ def _number(
     return lambda reader, value, path: reader.number(value, path, low, high, least, expected)
 
 
-def _numbers(spelling: str, limit: float) -> Kind:
-    limits = ((-limit, limit),) * (spelling.count(",") + 1)
+def _numbers(spelling: str, *most: float) -> Kind:
+    limits = [(-one, one) for one in most]
     return lambda reader, value, path: reader.row(value, path, spelling, limits)
 
 
@@ -165,9 +168,9 @@ def _step(reader: ValueReader, value: Any, path: Path) -> int:
     return int(number) if number % 1.0 == 0.0 else 0
 
 
-def _list(kind: Kind, most: int) -> Kind:
+def _list(kind: Kind, most: int, least: int = 0) -> Kind:
     def read(reader: ValueReader, value: Any, path: Path) -> tuple[Any, ...]:
-        entries = reader.entries(value, path, most, least=0)
+        entries = reader.entries(value, path, most, least)
         return tuple(kind(reader, entry, (*path, index)) for index, entry in enumerate(entries))
 
     return read
@@ -196,10 +199,8 @@ class Section:
 
 LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
 LENGTH = _number(*LIMIT)
-POINT, TURN = (
-    _numbers("[x, y, z]", limits.MAX_LENGTH_MM),
-    _numbers("[x, y, z]", limits.FULL_TURN_DEG),
-)
+POINT = _numbers("[x, y, z]", *[limits.MAX_LENGTH_MM] * 3)
+TURN = _numbers("[x, y, z]", *[limits.FULL_TURN_DEG] * 3)
 TEXT = _text(limits.MAX_TEXT)
 _HALF_WIDTH = 0.0, limits.MAX_ERROR, limits.MIN_HALF_WIDTH
 GANTRY = Section(
@@ -266,6 +267,18 @@ _RANGE = Section(
 )
 _WIDTH = _number(*_HALF_WIDTH, "a half width or { centre = , half_width = }")
 _PLACE = _number(*LIMIT, expected="a number or [lower, upper]")
+_READING = _numbers("[position, value]", limits.MAX_LENGTH_MM, limits.MAX_ERROR)
+_RUN = Section(
+    {
+        "direction": (_choice(lambda: RUN_DIRECTIONS, "{} or {} (not known)"), UNKNOWN),
+        "points": (_list(_READING, limits.MAX_POINTS, least=1), MISSING),
+    },
+    Run,
+)
+RUNS = Section({"runs": (_list(_RUN, limits.MAX_RUNS, least=1), MISSING)})
+CSV_RUNS = Section(
+    {"csv": (_text(MAX_FILE_NAME, 1), MISSING), "column": (_text(MAX_COLUMN_NAME, 1), MISSING)}
+)
 _MEASURED = _by_name(_number(0.0, limits.MAX_ERROR * 10.0), MEASURES)
 _VERSION = _text(16, 1, r"[a-z0-9]*", "small letters and digits")
 # what people write has lines and tabulators, but no other control characters
@@ -285,7 +298,7 @@ _NOTE: dict[str, tuple[Kind, Any]] = {
     "loop": (_one_of(Loop), Loop.TOOL.value),
     "numbers": (_MEASURED, {}),
     "before": (_MEASURED, {}),
-    "change": (_by_name(_numbers("[from, to]", limits.MAX_ERROR)), {}),
+    "change": (_by_name(_numbers("[from, to]", *[limits.MAX_ERROR] * 2)), {}),
     "step": (_step, 0),
     "view": (_text(limits.MAX_NOTE_VIEW), ""),
     "replaces": (_list(_VERSION, limits.MAX_REPLACED), ()),

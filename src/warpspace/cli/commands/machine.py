@@ -298,19 +298,17 @@ def _add_note(
     from warpspace.analysis.reviewing import note_numbers
     from warpspace.machine.limits import MAX_SCENE_BYTES
     from warpspace.scene.files import read_text
-    from warpspace.scene.library import parse_scene, scene_names, scene_path
+    from warpspace.scene.library import parse_scene, scene_path
     from warpspace.scene.notes import Note
-    from warpspace.scene.save import spell_notes
+    from warpspace.scene.save import spell_note
 
-    if output is None and name in scene_names():
-        raise OptionError(f"{name} is bundled and stays as it is; expected -o FILE.toml")
-    if output is not None and not output.endswith(".toml"):
-        raise OptionError(f"-o {output}: expected a .toml file with --add")
+    file, path = scene_path(name), output or name
+    if not path.endswith(".toml"):
+        raise OptionError(f"{path}: expected a .toml file (-o FILE.toml); bundled scenes stay")
     note = Note(**about)
     warn_outside_travel(scene.machine, note.at)
     note = replace(note, numbers=note_numbers(scene, [note])[0])
-    file, path = scene_path(name), output or name
-    text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_notes([note])}"
+    text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_note(note)}"
     added = parse_scene(text, scene.name, path, Path(path).parent)
     write_text(path, text, force=force or file == Path(path))
     echo(f"{path}: {note.kind} {note.id} added", err=True)
