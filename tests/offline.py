@@ -12,7 +12,7 @@ EVIL = "</script><script>window.hacked=1</script><img src=x onerror='window.hack
 
 @contextmanager
 def opened_offline(browser, path):
-    context = browser.new_context(viewport={"width": 1200, "height": 900}, offline=True)
+    context = browser.new_context(viewport={"width": 1440, "height": 900}, offline=True)
     page = context.new_page()
     requests: list[str] = []
     problems: list[str] = []

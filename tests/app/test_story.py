@@ -8,8 +8,8 @@ import pytest
 from app.page_tab import open_page
 from offline import EVIL, opened_offline, wait_for_the_map
 from warpspace.app.browser.html import linked
+from warpspace.app.documents.offline_page import build_story_html
 from warpspace.app.documents.scene_file import view_of
-from warpspace.app.documents.story_page import build_story_html
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.viewer import Viewer

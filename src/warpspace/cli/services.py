@@ -226,8 +226,11 @@ BYTES_PER_RESPONSE = 48  # position and orientation error of one node to one par
 
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
-    from warpspace.app.documents.offline_page import build_offline_html, offline_picture
-    from warpspace.app.documents.story_page import build_story_html
+    from warpspace.app.documents.offline_page import (
+        build_offline_html,
+        build_story_html,
+        offline_picture,
+    )
     from warpspace.scene.notes import story
 
     _check_size(picture)

@@ -1,5 +1,4 @@
-// The camera of a story: it flies around what it looks at. Numbers as in a link: position, point that
-// is looked at, up, field of view.
+// The camera of a story: it flies around what it looks at.
 (() => {
   if (window.warpspaceFly) return;
   let turn = 0;
@@ -27,10 +26,10 @@
     requestRender?.();
   };
 
-  window.warpspaceFly = (numbers, long) => {
+  window.warpspaceFly = ({ position, look_at, up, fov_rad }, long) => {
     const view = window.__viserMutable;
     if (!view?.cameraControl || !world()) return false;
-    const end = { at: numbers.slice(0, 3), to: numbers.slice(3, 6), up: numbers.slice(6, 9), fov: numbers[9] };
+    const end = { at: position, to: look_at, up, fov: fov_rad };
     const start = now(view), own = ++turn;
     const from = less(start.at, start.to), way = less(end.at, end.to);
     const one = from.map(x => x / length(from)), other = way.map(x => x / length(way));

@@ -12,16 +12,7 @@ from viser import ClientHandle, ViserServer
 from warpspace.app.browser.viser_private import send_at_once, send_script
 from warpspace.exceptions import WarpspaceError
 
-SCRIPTS = (
-    "page.js",
-    "room.js",
-    "mesh.js",
-    "fly.js",
-    "server.js",
-    "tour.js",
-    "story.js",
-    "together.js",
-)
+SCRIPTS = ("page", "room", "mesh", "fly", "server", "tour", "story", "together")
 
 
 class Page:
@@ -98,7 +89,7 @@ def _spelt(value: object) -> str:
 def page_script() -> str:
     """Write the script that lays out a page."""
     sheet = f"warpspacePage.style({json.dumps(script_source('page.css'))});"
-    return "\n".join((*map(script_source, SCRIPTS), sheet))
+    return "\n".join((*(script_source(f"{name}.js") for name in SCRIPTS), sheet))
 
 
 def error_words(error: Exception) -> str:

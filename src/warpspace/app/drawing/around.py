@@ -197,16 +197,15 @@ def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
     return np.concatenate([np.stack([start_mm, end_mm], axis=1), strokes])
 
 
-def words(picture: LivePicture, *, points: bool = True) -> Shapes:
-    """Draw all words in 3-D, or those of the axes, for a page that cannot place them."""
+def words(picture: LivePicture) -> Shapes:
+    """Draw all words in 3-D, for a page that cannot place them."""
     away, middle = 0.03 * picture.size_mm, picture.grid.bounds_mm.mean(axis=0)
     shapes: dict[str, Shape | None] = {}
-    labels = [*axis_labels(picture), *(point_labels(picture) if points else ())]
-    for number, label in enumerate(labels):
+    for number, label in enumerate((*axis_labels(picture), *point_labels(picture))):
         way = label.at_mm - (middle if label.from_mm is None else label.from_mm)
         out = away * way / max(float(np.linalg.norm(way)), 1e-9)
-        at = label.at_mm + (3.0 if label.kind == "axis" else 1.0) * out
+        at = label.at_mm + (5.0 if label.kind == "axis" else 1.0) * out
         looks = {"font_screen_scale": 0.8, "anchor": "center-center"}
         follows = {"text": label.text, "position": at * SCENE_PER_MM}
-        shapes[f"/words/{number}"] = Shape("add_label", looks, follows)
+        shapes[f"/words/{label.kind}{number}"] = Shape("add_label", looks, follows)
     return shapes

@@ -27,6 +27,7 @@ from warpspace.picture.mesh import (
     isoline_pieces,
     line_mesh,
     map_mesh,
+    map_parts,
 )
 from warpspace.units import Array
 
@@ -133,8 +134,8 @@ def _open_script(picture: LivePicture, vertices_mm: Array) -> str:
 
 def line_facts(picture: LivePicture, vertices_mm: Array) -> dict[str, object]:
     """Say which points the lines of a box end at, how far they are lifted: for `mesh.js`."""
-    nodes, of = picture.drawn_mm.reshape(-1, 3), picture.topology
-    number = np.zeros(len(nodes), "<u4")
+    of = map_parts(picture)[0].drawn_of
+    number = np.zeros(of.surface.nodes.max() + 1, "<u4")
     number[of.surface.nodes] = np.arange(len(of.surface.nodes))
     lines: dict[str, tuple[str, str]] = {}
     for name, segments, ends in (

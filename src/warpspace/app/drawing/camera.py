@@ -122,7 +122,9 @@ class TabCamera:
         ratio = float(np.tan(now.fov_rad / 2.0) / np.tan(fov / 2.0))
         look_at = np.array(now.look_at)
         x, y, z = (look_at + ratio * (now.position - look_at)).tolist()
-        self._stand_at(CameraMemory((x, y, z), now.look_at, now.up, fov), self._room_mm(picture))
+        place = CameraMemory((x, y, z), now.look_at, now.up, fov)
+        self._clip(place, self._room_mm(picture))
+        self._stand_at(place)
 
     def _room_mm(self, picture: LivePicture) -> Array:
         room = [axes_room_mm(picture)]
@@ -148,22 +150,15 @@ class TabCamera:
         memory, self.wanted = self.wanted, None
         if memory is None:
             self.fit(picture)
-            return
-        self._note(memory)
-        self._stand_at(memory, np.array([memory.look_at]) / SCENE_PER_MM)
+        else:
+            self.expect(memory)
+            self._stand_at(memory)
 
-    def _note(self, memory: CameraMemory) -> None:
+    def expect(self, memory: CameraMemory) -> None:
+        """Get ready for a place that the page itself moves to."""
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
         self.orthographic, self._puts = bool(telephoto), ()
-
-    def take(self, memory: CameraMemory) -> list[float]:
-        """Get ready for a place that the page itself moves to; give its numbers."""
-        self._note(memory)
-        points = np.array([memory.look_at])
-        self._camera.near, self._camera.far = clipping(
-            np.array(memory.position), points, orthographic=self.orthographic
-        )
-        return [*memory.position, *memory.look_at, *memory.up, memory.fov_rad]
+        self._clip(memory, np.array([memory.look_at]) / SCENE_PER_MM)
 
     def fit(self, picture: LivePicture) -> None:
         """Fill the room between the panels with the box, its traces and axes."""
@@ -172,7 +167,8 @@ class TabCamera:
             points, room.aspect, VIEWS[self.view], self._fov_deg, margins=room.margins
         )
         before = self.remember()
-        self._stand_at(found, points)
+        self._clip(found, points)
+        self._stand_at(found)
         self._puts = (*self._puts[-1:], before, self.remember())
 
     def remember(self) -> CameraMemory:
@@ -184,11 +180,13 @@ class TabCamera:
             camera.fov,
         )
 
-    def _stand_at(self, place: CameraMemory, points_mm: Array) -> None:
-        camera, points = self._camera, points_mm * SCENE_PER_MM
-        camera.near, camera.far = clipping(
-            np.array(place.position), points, orthographic=self.orthographic
+    def _clip(self, place: CameraMemory, points_mm: Array) -> None:
+        self._camera.near, self._camera.far = clipping(
+            np.array(place.position), points_mm * SCENE_PER_MM, orthographic=self.orthographic
         )
+
+    def _stand_at(self, place: CameraMemory) -> None:
+        camera = self._camera
         camera.up_direction, camera.fov = place.up, place.fov_rad
         camera.position = place.position
         camera.look_at = place.look_at  # the former takes it along

@@ -39,7 +39,7 @@ from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
-from warpspace.app.tasks.together import PointerPart, Together
+from warpspace.app.tasks.together import PointerPart, Tabs
 from warpspace.exceptions import WarpspaceError
 
 OFTEN_S = 0.4  # between two writings of what follows often
@@ -201,13 +201,13 @@ class Session:
         live: LiveModel,
         claim: "Callable[[Session, str], TabRecord | None]",
         *,
-        together: Together | None = None,
+        others: Tabs | None = None,  # the tabs of a shared review
     ) -> None:
         self.context, self._live, self._claim = context, live, claim
         self._client = context.client
         self.token = new_token()
-        self._together = together
-        self._keeper = TabKeeper(context, shared=together is not None)
+        self._others = others
+        self._keeper = TabKeeper(context, shared=others is not None)
         self.display = Display(context)
         self._is_known = False  # whether the page has said which tab it is
         self._around_at: float | None = None  # when what lies around the map is drawn at the latest
@@ -250,8 +250,8 @@ class Session:
                 self._turn()
         finally:
             self.context.store.unsubscribe(self.context.changed)
-            if self._together:
-                self._together.leave(self.context)
+            if pointer := self.display.parts.get(PointerPart.name):
+                pointer.take(self.state, "gone", "")
 
     def _turn(self) -> None:
         left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
@@ -301,7 +301,7 @@ class Session:
             context.camera.place(picture)
             context.page.call("stage", "opening")
             layers = [BoxLayer(self._client.scene, context.page, picture)]
-            pointer = [PointerPart(context, self._together)] if self._together else []
+            pointer = [PointerPart(context, self._others)] if self._others else []
             self.display.add(picture, layers, [*build_parts(context), self._keeper, *pointer])
             context.page.call("drawn")
         self._around_at = time.monotonic() + ANSWER_S

@@ -33,7 +33,6 @@ from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.together import Together
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
@@ -254,7 +253,6 @@ class Viewer:
         self._lock = threading.Lock()
         self._memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
-        self._together = Together() if shared else None
         self._server = _serve(self.address, self.port, Guard(doors))
         light_scene(self._server.scene)
         send_script_to_all(self._server, f"{page_script()}\nwarpspacePage.arrive();")
@@ -290,6 +288,9 @@ class Viewer:
         with self._lock:
             return tuple(self._sessions.values())
 
+    def _contexts(self) -> list[Context]:
+        return [session.context for session in self.sessions]
+
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
         surface_glb(self._live.evaluate(self._start))
@@ -300,7 +301,8 @@ class Viewer:
             return  # it has gone meanwhile
         store, scenes = self._shared or StateStore(self._start), SceneList(self._scenes)
         context = Context(self._server, client, store, scenes, self._services)
-        session = Session(context, self._live, self._claim, together=self._together)
+        others = None if self._shared is None else self._contexts
+        session = Session(context, self._live, self._claim, others=others)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.take)

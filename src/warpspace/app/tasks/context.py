@@ -8,7 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -154,8 +154,9 @@ class Context:
         """Have camera and box go to what is shown next in a time, on the page."""
         if memory and self.shown and focus(self.shown.state) != focus(self.state):
             memory, self.camera.wanted = None, memory  # of another machine: at once, with it
-        numbers = None if memory is None else self.camera.take(memory)
-        self.page.call("step", long_ms, numbers)
+        if memory is not None:
+            self.camera.expect(memory)
+        self.page.call("step", long_ms, memory and asdict(memory))
         self._wake.set()
 
     def show_opened(

@@ -217,15 +217,13 @@ class FilesWindow(JobWindow):
         self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
 
     def _story(self) -> None:
-        from warpspace.app.documents.story_page import build_story_html
+        from warpspace.app.documents.offline_page import build_story_html
 
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         state, known = without_table(self.context.state), self.context.scenes.fixed
 
-        def write(*_: object) -> bytes:
-            return build_story_html(state, toml, known).encode()
-
-        self.make("Story", "_story.html", write, as_drawn=True)
+        build = partial(build_story_html, state, toml, known)
+        self.make("Story", "_story.html", lambda *_: build().encode(), as_drawn=True)
 
     def _export(self, ending: str) -> None:
         services = self.context.services

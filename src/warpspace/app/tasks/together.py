@@ -1,8 +1,7 @@
 """A shared review: each tab sees where the others point."""
 
-import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -16,31 +15,7 @@ from warpspace.app.tasks.parts import Part
 OFTEN_S = 0.08  # between two places of one pointer; a page sends one each tenth of a second
 LONGEST_NAME, LONGEST_RAY = 24, 200  # characters
 MOST_QUEUED = 8  # messages that wait for a page; one that takes none is sent no pointers
-
-
-class Together:
-    """The tabs of a shared review; usable from any thread."""
-
-    def __init__(self) -> None:
-        self._contexts: set[Context] = set()
-        self._lock = threading.Lock()
-
-    def join(self, context: Context) -> None:
-        with self._lock:
-            self._contexts.add(context)
-
-    def leave(self, context: Context) -> None:
-        with self._lock:
-            self._contexts.discard(context)
-        self.tell(context, "", None)
-
-    def tell(self, own: Context, name: str, at: Sequence[float] | None) -> None:
-        """Tell all others where somebody points, in the drawing's units; None for nowhere."""
-        with self._lock:
-            others = [one for one in self._contexts if one is not own]
-        for one in others:
-            if one.telling is None and queued(one.client) <= MOST_QUEUED:
-                one.page.call("pointer", own.client.client_id, name, at)
+Tabs = Callable[[], Iterable[Context]]
 
 
 class PointerPart(Part):
@@ -48,26 +23,26 @@ class PointerPart(Part):
 
     name = "pointer"
 
-    def __init__(self, context: Context, together: Together) -> None:
+    def __init__(self, context: Context, tabs: Tabs) -> None:
         super().__init__(context)
-        self._together, self._last = together, 0.0
-        together.join(context)
+        self._tabs, self._last = tabs, 0.0
         context.page.call("together")
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        now, picture = time.monotonic(), self.context.shown
+        now, picture, at = time.monotonic(), self.context.shown, None
         spelt, _, name = value.partition("\n")
-        if word == "gone":
-            self._together.tell(self.context, "", None)
-        if word != "at" or len(spelt) > LONGEST_RAY or now - self._last < OFTEN_S:
-            return state
-        try:
-            ray = np.array([float(one) for one in spelt.split(",")]).reshape(2, 3)
-        except ValueError:  # not six numbers; what is not finite or too far meets nothing
-            return state
-        if picture is not None and self.context.telling is None:
+        if word == "at":
+            if len(spelt) > LONGEST_RAY or now - self._last < OFTEN_S or self.context.telling:
+                return state
+            try:
+                ray = np.array([float(one) for one in spelt.split(",")]).reshape(2, 3)
+            except ValueError:  # not six numbers; what is not finite or too far meets nothing
+                return state
             self._last = now
-            found = pick_drawn(picture, ray[0] / SCENE_PER_MM, ray[1])
-            at = None if found is None else (found[1] * SCENE_PER_MM).round(4).tolist()
-            self._together.tell(self.context, " ".join(name[:LONGEST_NAME].split()), at)
+            found = picture and pick_drawn(picture, ray[0] / SCENE_PER_MM, ray[1])
+            at = found and (found[1] * SCENE_PER_MM).round(4).tolist()
+        for one in self._tabs():
+            if one is not self.context and not one.telling and queued(one.client) <= MOST_QUEUED:
+                said = " ".join(name[:LONGEST_NAME].split())
+                one.page.call("pointer", self.context.client.client_id, said, at)
         return state

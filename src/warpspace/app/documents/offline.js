@@ -1,0 +1,52 @@
+// Steps of a page that needs nothing but itself: words around the drawing, which follows.
+(async () => {
+  const WIDTH = 1.25;  // of a window, as a part of its height, that a camera is left where it was
+  const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
+  const packed = new Blob([bytes(document.getElementById("steps").textContent)]);
+  const stream = packed.stream().pipeThrough(new DecompressionStream("deflate"));
+  const { steps, start, unit, count, lines } = await new Response(stream).json();
+  const frame = document.querySelector("iframe"), said = [...document.querySelectorAll("[data-step]")];
+  const back = document.getElementById("back"), on = document.getElementById("on");
+  const from = start && new Float32Array(bytes(start).buffer);  // one step alone is drawn already
+  let at = 0, timer = 0;
+
+  // what a camera sees from side to side is seen in a narrow window, too
+  const fitted = ({ position, look_at, ...more }) => {
+    const far = Math.max(1, WIDTH * frame.clientHeight / frame.clientWidth);
+    return { ...more, look_at, position: position.map((x, i) => look_at[i] + far * (x - look_at[i])) };
+  };
+  const draw = long => {
+    clearTimeout(timer);
+    const { warpspaceMesh: mesh, warpspaceFly: fly, __viserMutable: view } = frame.contentWindow;
+    const { camera, point, shifts, levels, palette } = steps[at];
+    const wait = () => { timer = setTimeout(draw, 100, long); };  // the drawing is not there yet
+    if (!view?.nodeRefFromName?.["/box/surface"] || !fly(fitted(camera), long)) { wait(); return; }
+    if (!from) return;
+    mesh.move("/story/point", point);
+    mesh.open({ count, lines, palette });
+    mesh.glide = long;
+    if (!mesh.bend(from.map((x, i) => x + unit * shifts[i]), levels)) wait();
+  };
+  const go = to => {
+    at = to;
+    said.forEach(one => { one.hidden = Number(one.dataset.step) !== at; });
+    document.querySelector("aside").scrollTop = 0;
+    back.disabled = at === 0;
+    on.disabled = at === steps.length - 1;
+    draw(600);
+  };
+  const key = event => {
+    const way = { ArrowRight: 1, " ": 1, ArrowLeft: -1 }[event.key];
+    if (!(at + way in steps) || event.key === " " && event.target.closest?.("button, summary, a")) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    go(at + way);
+  };
+  const listen = () => frame.contentWindow.addEventListener("keydown", key, true);
+  addEventListener("keydown", key, true);
+  frame.addEventListener("load", listen);
+  listen();
+  back.onclick = () => go(at - 1);
+  on.onclick = () => go(at + 1);
+  draw(0);
+})();
