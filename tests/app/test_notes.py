@@ -7,7 +7,7 @@ import pytest
 
 from app.frames import new_visitor
 from app.page_tab import SCENES, Tab
-from app.parts import Alone
+from app.parts import LIVE, Alone
 from warpspace.analysis.reviewing import note_numbers
 from warpspace.app.documents.scene_file import (
     open_link,
@@ -16,13 +16,16 @@ from warpspace.app.documents.scene_file import (
     state_to_toml,
 )
 from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.drawing.labels import note_labels
 from warpspace.app.evaluation.budget import answer, drawn_places
+from warpspace.app.evaluation.machine import drawn_bodies
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import Picked, start_state
+from warpspace.app.state.tree import put
 from warpspace.app.tasks.notes import NotesPart
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene
-from warpspace.scene.notes import Note, told
+from warpspace.scene.notes import Mark, Note, story, told
 
 START = start_state(SCENES[0])
 EVIL = "<img src=x onerror='window.taken=1'>"
@@ -39,8 +42,7 @@ def alone(state=START):
 
 def pin(part, text="Look", kind="note"):
     part.do("pin")
-    part.do("set.text", text)
-    part.do("set.kind", kind)
+    part.store.apply(lambda state: put(put(state, "page.note_text", text), "page.note_kind", kind))
     return part.do("keep").review[-1]
 
 
@@ -50,9 +52,9 @@ def test_a_note_is_shown_again_as_it_was_and_back_leads_to_where_one_was():
     part.store.apply(lambda state: state.with_amplitude("EA0Z", 0.0))
     second = pin(part)
     present = part.store.apply(lambda state: state.with_amplitude("EA0Z", 5.0)) or part.store.state
-    assert part.do("show", first.id).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
+    assert part.do("show." + first.id).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
     assert "Note 1 as it was" in part.part.pieces(part.context.shown)["reopened"]
-    assert part.do("show", second.id).amplitudes["EA0Z"] == 0.0
+    assert part.do("show." + second.id).amplitudes["EA0Z"] == 0.0
     part.do("reply." + second.id, "seen")  # is not lost
     back = part.do("back")
     assert replace(back, review=present.review) == present
@@ -83,7 +85,7 @@ def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_hold
     assert note.change == {"EA0Z": (was["EA0Z"], 20.0), "EB0Z": (was["EB0Z"], 1.5)}
     assert note.before != note.numbers
     part.store.apply(lambda state: state.with_amplitude("EB0Z", 2.0))
-    found = part.do("take-back", note.id)
+    found = part.do("take-back." + note.id)
     assert (found.amplitudes["EA0Z"], found.amplitudes["EB0Z"]) == (was["EA0Z"], 2.0)
     assert "EB0Z is 2 now, not 1.5: it stays" in found.review[0].replies[0].text
 
@@ -92,14 +94,55 @@ def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
     base = Note(id="a1", text="old")
     mine, yours = base.edited(text="mine"), base.edited(text="yours")
     part, _ = alone(replace(START, review=(replace(mine, versions=(yours,)),)))
-    kept = part.do("choose", "a1 1").review[0]
+    kept = part.do("choose.a1", "1").review[0]
     assert (kept.text, kept.versions) == ("yours", ())
     assert {mine.version, yours.version} <= set(kept.replaces)
-    part.do("delete", "a1")
-    part.do("set.step.a1", "1")  # of a note that has gone
+    part.do("delete.a1")
+    part.do("step.a1", "add")  # of a note that has gone
     assert part.store.state.review == ()
     part.store.undo()
     assert part.store.state.review == (kept,)
+
+
+def test_a_story_is_put_in_order_and_what_two_have_edited_waits_for_a_choice():
+    one, two, three = (Note(id=name, text=name) for name in ("a", "b", "c"))
+    part, _ = alone(replace(START, review=(one, two, three)))
+    for word, value, wanted in (
+        ("step.b", "add", "b"), ("step.c", "add", "bc"), ("step.a", "add", "bca"),
+        ("step.b", "up", "bca"), ("step.a", "up", "bac"), ("step.b", "down", "abc"),
+        ("step.a", "out", "bc"),
+    ):  # fmt: skip
+        found = story(part.do(word, value).review)
+        assert "".join(note.id for note in found) == wanted
+        assert [note.step for note in found] == [*range(1, len(wanted) + 1)]
+    two = part.store.state.review[1]
+    torn = replace(two.edited(text="mine"), versions=(two.edited(text="yours"),))
+    part.store.apply(lambda state: replace(state, review=(one, torn, three)))
+    assert part.do("step.a", "add").review == (one, torn, three)
+
+
+def test_a_note_on_a_trace_or_a_body_is_pinned_where_that_is_drawn():
+    point = Picked({"X": 0.0, "B": 20.0}, Loop.WORKPIECE, (0.0, 275.0, 450.0))
+    part, _ = alone(replace(START, picked=point))
+    traced = pin(part)
+    assert traced.on == Mark("workpiece", point.point_mm)
+    assert (traced.at["B"], {*traced.at}) == (20.0, {*START.scene.machine.axes})
+    found = answer(START, point, 1.0)
+    assert traced.numbers["here_um"] == pytest.approx(np.linalg.norm(found.drawn_um), abs=0.02)
+    assert part.do("show." + replace(traced, view="").id).picked.point_mm == point.point_mm
+    part.store.apply(lambda state: put(state, "page.note_place", "Z"))
+    part.store.apply(lambda state: put(state, "page.note_text", "Column"))
+    body = part.do("keep").review[-1]
+    assert (body.on, dict(body.at)) == (Mark(body="Z"), {})
+    state = replace(START, review=(traced, body))
+    (flag,) = note_labels(LIVE.evaluate(state))  # no body is drawn
+    drawn = LIVE.evaluate(put(state, "machine.shown", "1"))
+    shown, middle = note_labels(drawn)
+    np.testing.assert_allclose(flag.at_mm, shown.at_mm)
+    np.testing.assert_allclose(shown.at_mm, answer(state, point, drawn.exaggeration).drawn_mm)
+    points = np.concatenate([b.vertices_mm for b in drawn_bodies(drawn) if b.body.frame == "Z"])
+    assert (middle.text, (points.min(axis=0) < middle.at_mm).all()) == ("⚑ 2", True)
+    assert (middle.at_mm < points.max(axis=0)).all()
 
 
 @pytest.mark.parametrize("name", ["dvf5000_first", "fork_head_bc", "teach_tilted_c"])
@@ -130,13 +173,12 @@ def test_notes_survive_file_link_and_undo():
     assert part.store.state.review == (note,)
 
 
-@pytest.mark.parametrize("word", ["show", "status", "choose", "keep", "at", "set.step.a1"])
+@pytest.mark.parametrize("word", ["show", "choose.a1", "keep.a1", "at", "step.b2", "back"])
 def test_hostile_events_change_nothing(word):
     part, _ = alone(replace(START, review=(Note(id="a1", text=EVIL, author=EVIL),)))
-    for value in (EVIL, "a1 9", "99999999", "-1"):
-        state = part.store.state
-        if word != "status":
-            assert part.do(word, value).review == state.review
+    for value in (EVIL, "9", "99999999", "-1"):
+        review = part.store.state.review
+        assert part.do(word, value).review == review
     part.do("open")
     assert "<img" not in str(part.part.pieces(part.context.shown))
 
@@ -152,7 +194,7 @@ def test_a_note_in_the_browser(browser):
         tab = Tab(context.new_page(), own)
         page = tab.page
         tab.press("n")
-        page.locator("#ws-notes-set-text:focus").wait_for()
+        page.locator("#ws-notes textarea:focus").wait_for()
         page.keyboard.type("Why here? http://a.b/c")
         tab.type("Your name", "Ada")
         tab.click("Keep")
@@ -177,7 +219,7 @@ def test_a_note_in_the_browser(browser):
         tab.click("Back")
         tab.until(lambda: tab.state.amplitudes["EA0Z"] == 3.0)
         tab.until(lambda: np.allclose(stands(tab), before, rtol=0.0, atol=1e-6))
-        page.locator("#ws-notes [data-do='notes:show']").focus()
+        page.locator("#ws-notes [data-do^='notes:show']").focus()
         page.keyboard.press("Escape")
         tab.until(lambda: page.locator("#ws-notes > *").count() == 0)
         assert page.evaluate("document.activeElement.dataset.do") == "notes:open"

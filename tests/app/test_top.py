@@ -114,8 +114,8 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
     write = Services(write_report=lambda _, *about: asked.append(about) or done)
     window = Alone(ReportWindow, STATE, services=write)
     window.context.reported[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
-    window.do("set.author", HOSTILE)
-    window.do("set.questions", "one\n\n two ")
+    page = replace(STATE.page, author=HOSTILE, questions="one\n\n two ")
+    window.store.apply(lambda state: replace(state, page=page))
     assert "<img" not in window.html
     window.do("remove", "2")
     window.do("remove", "7")

@@ -1,22 +1,27 @@
 """States made of random values of every leaf come back from links, files and undo."""
 
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from warpspace.app.documents.scene_file import (
+    kept_views,
+    named_link,
     open_text,
     settings_line,
     state_to_toml,
+    view_of,
     with_settings,
 )
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import default_of, description
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import leaves, put, spell, stored, value
+from warpspace.app.tasks.notes import clean
 from warpspace.scene.library import load_scene
+from warpspace.scene.notes import Note, with_note
 
 SCENES = ("dvf5000_first", "fork_head_bc", "machine_c_frame_mill", "teach_tilted_c")
 STARTS = [start_state(load_scene(name)) for name in SCENES]
@@ -27,6 +32,8 @@ TEXTS = {
     "picked": ["X 1,5 Y -200", "Z=-300 B 10", ""],
     "picked.trace": ["tool,1.0,2.0,3.0", "relative,0.0,0.0,-1e-05"],
 }
+
+NOTE = "review"  # what is sent for a note that somebody pins
 
 SPELT: set[tuple[str, str, object]] = set()
 """Scenes and leaves with values that were read back from their own spelling."""
@@ -52,6 +59,8 @@ def events(draw):
     number = draw(st.integers(0, len(STARTS) - 1))
     state, sent = STARTS[number], []
     for _ in range(draw(st.integers(1, 12))):
+        if draw(st.integers(0, 9)) == 0:
+            sent.append((NOTE, draw(HOSTILE)))
         known = leaves(state)
         groups = {path: path.rpartition(".")[0] or path for path in known}
         group = draw(st.sampled_from(sorted({*groups.values()})))
@@ -62,16 +71,27 @@ def events(draw):
     return SCENES[number], sent
 
 
+def done(state, path, text):
+    if path != NOTE:
+        return put(state, path, text).without_notes()
+    at = dict.fromkeys(state.scene.machine.axes, 1.5)
+    note = Note(text=clean(text) or "?", author=clean(text), at=at, view=view_of(state, None))
+    return replace(state, review=with_note(state.review, note))
+
+
 def survives(scene, sent):
     state = start = STARTS[SCENES.index(scene)]
     steps = StateStore(start)
     for number, (path, text) in enumerate(sent):
-        state = put(state, path, text).without_notes()
+        state = done(state, path, text)
         steps.apply(lambda _, state=state: state, at=10.0 * number)
     linked = with_settings(start_state(state.scene), settings_line(state))
     opened, _ = open_text(state_to_toml(state), scene, "x.toml")
     assert linked.notes == opened.notes == ()
     assert opened.tolerances == state.tolerances
+    # a link by name has none: with notes the whole file is packed, or it is said that they are out
+    assert (linked.review, opened.review) == ((), kept_views(state))
+    assert not state.review or not named_link(state, None, None)
     for path, leaf in leaves(state).items():
         found = value(state, path)
         if leaf.span and isinstance(found, float):

@@ -78,18 +78,20 @@
       if (!childNodes.length && texts.get(dataset.piece)) write(dataset.piece, texts.get(dataset.piece));
     if (name === "window") showWindow(place);
     if (name === "notes") prepareNotes(place);
+    place.querySelectorAll(`[data-set="${AUTHOR}"]`).forEach(fillAuthor);
   };
 
-  // --- review notes: the form takes the focus when it opens, [data-kept] stays in this browser ------
+  // --- review notes: the form takes the focus when it opens; one's name stays in this browser ------
+  const AUTHOR = "state:set.page.author", AUTHOR_KEY = "warpspace-author";
   const prepareNotes = place => {
-    const first = place.querySelector("[data-focus]");
-    if (first && known.focused !== first.dataset.focus) first.focus();
-    known.focused = first?.dataset.focus;
-    for (const box of place.querySelectorAll("[data-kept]")) {
-      let own = "";
-      try { own = localStorage.getItem(box.dataset.kept) ?? ""; } catch { /* nothing may be kept */ }
-      if (own && !box.value && !typing(box)) { box.value = own; send(box.dataset.set, own); }
-    }
+    const first = place.querySelector("textarea"), form = first?.closest("[data-key]").dataset.key;
+    if (first && known.form !== form) first.focus();
+    known.form = form;
+  };
+  const fillAuthor = box => {
+    let own = "";
+    try { own = localStorage.getItem(AUTHOR_KEY) ?? ""; } catch { /* nothing may be kept */ }
+    if (own && !box.value && !typing(box)) { box.value = own; send(AUTHOR, own); }
   };
 
   // --- a window: keeps the focus, closes with its cross, Esc, or a click beside it ------------------
@@ -154,7 +156,7 @@
     const node = event.target;
     delete node.dataset?.dirty;
     if (node.dataset?.set) send(node.dataset.set, valueOf(node));
-    if (node.dataset?.kept) try { localStorage.setItem(node.dataset.kept, node.value); } catch { /* likewise */ }
+    if (node.dataset?.set === AUTHOR) try { localStorage.setItem(AUTHOR_KEY, node.value); } catch { /* likewise */ }
   });
   for (const [what, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]])
     addEventListener(what, event => {

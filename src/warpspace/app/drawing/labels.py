@@ -12,17 +12,15 @@ import numpy as np
 from warpspace.analysis.distance import DistanceResult
 from warpspace.app.evaluation.budget import answer, drawn_places
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import chosen_trace, tool_point
+from warpspace.app.evaluation.machine import chosen_trace, drawn_bodies, tool_point
 from warpspace.app.evaluation.measuring import measured
 from warpspace.app.state.app_state import Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
-from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.picture.words import list_axes, own_axes, spell_coordinate, spell_factor
-from warpspace.scene.notes import Mark
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
@@ -217,17 +215,20 @@ def _names(picture: LivePicture) -> Iterator[Label]:
 
 
 def note_labels(picture: LivePicture) -> list[Label]:
-    """Give the flags of review notes: their numbers, where their points are drawn at present."""
+    """Give the flags of review notes: their numbers, where what they are about is drawn now."""
     if picture.is_difference or not picture.state.review:
         return []
     state, own = picture.drawn_state, dict[str, Mapping[str, float]]()
+    bodies = drawn_bodies(picture) if picture.state.machine.shown else ()
     found: list[Label] = []
     for number, note in enumerate(picture.state.review, 1):
-        mark, words = note.on or Mark(), f"⚑ {number}"
-        if mark.loop and mark.point_mm and note.at:
-            picked = Picked(note.at, Loop(mark.loop), mark.point_mm)
+        words, picked = f"⚑ {number}", Picked.of_note(note)
+        if picked and picked.point_mm:
             found.append(Label(words, answer(state, picked, picture.exaggeration).drawn_mm, "note"))
-        elif note.at and not mark.body:
-            own[words] = note.at
+        elif picked:
+            own[words] = picked.at
+        elif own_mm := [b.vertices_mm for b in bodies if note.on and b.body.frame == note.on.body]:
+            points = np.concatenate(own_mm)
+            found.append(Label(words, (points.min(axis=0) + points.max(axis=0)) / 2.0, "note"))
     places = drawn_places(state, [*own.values()], picture.exaggeration) if own else ()
     return [*found, *(Label(words, at, "note") for words, at in zip(own, places, strict=True))]

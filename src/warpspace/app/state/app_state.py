@@ -27,7 +27,7 @@ from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Toleranc
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, PROBABILITY
 from warpspace.scene.model import Scene
-from warpspace.scene.notes import Note
+from warpspace.scene.notes import KINDS, Note
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
@@ -150,6 +150,15 @@ class Picked:
     # or None; the traced point in the workpiece (or tool) frame; None for the surface
     point_mm: Vector | None = None
 
+    @classmethod
+    def of_note(cls, note: Note) -> "Picked | None":
+        """Give the point that a note is pinned to; none for the whole or a body."""
+        mark = note.on
+        if not note.at or (mark and mark.body):
+            return None
+        is_traced = mark and mark.loop and mark.point_mm
+        return cls(note.at, Loop(mark.loop), mark.point_mm) if mark and is_traced else cls(note.at)
+
 
 @dataclass(frozen=True, slots=True)
 class PageLook:
@@ -168,6 +177,16 @@ class PageLook:
     window: str = described("", "Open window", linked="")
     # "list", "new", or the note that is edited; empty where the tasks stand there
     notes: str = described("", "Notes", linked="")
+    figure: str = described("", "Figure", linked="")
+    # what has been typed of a note that is not kept yet
+    note_kind: str = described("note", "Kind", choices={k: k for k in KINDS}, linked="")
+    note_place: str = described("point", "About", choices=lambda state: {
+        "point": "the point asked about, or the worst", "whole": "the whole",
+        **{axis: f"body {axis}" for axis in state.scene.machine.axes},
+    }, linked="")  # fmt: skip
+    note_text: str = described("", "Text", kind="lines", hint="What is to be seen here?", linked="")
+    author: str = described("", "Your name", hint="Kept in this browser", linked="")
+    questions: str = described("", "Open questions", kind="lines", hint="One per line", linked="")
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,8 @@ class Leaf:
     path: str  # "look.surface", "amplitudes.EA0Z"; of a field that describes itself empty
     label: str  # what a user reads, also beside a step that is undone
     # "switch", "choice", "number", "text", "keys" (some of its choices), "names" (a set of any
-    # words), "point" (three numbers or none), "numbers"; empty where only changes have a name
+    # words), "point" (three numbers or none), "numbers", "lines" (of text); empty where only
+    # changes have a name
     kind: str = ""
     # values with their words; of a number the one that stands in place of it, "auto"
     choices: Choices = field(default_factory=dict[str, str])

@@ -291,6 +291,8 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
             return (type(old)(text) if isinstance(old, StrEnum) else text), ""
         case "keys" | "names":
             return _read_keys(leaf, text, old)
+        case "lines":
+            return text, ""
         case _:
             return text[:MOST_TYPED], ""
 

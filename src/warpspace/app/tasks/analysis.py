@@ -338,7 +338,7 @@ class AnalysisPart(Section):
     def _into_report(self) -> None:
         if self._answer is not None:
             self.context.reported.append((self.title, self._answer.found))
-            self.context.notify("Added to the report", f"{self.title}; see Save at the top")
+            self.context.notify("Added to the report", f"{self.title}; see Report at the top")
 
 
 def _endings(found: Result) -> tuple[str, ...]:

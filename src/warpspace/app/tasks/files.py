@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.description import Result
-from warpspace.app.browser.html import button, choice, field, join, tag, text_box
+from warpspace.app.browser.html import button, choice, field, join, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents import files, scene_file
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -17,13 +17,13 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.jobs import Job, Jobs
 from warpspace.app.tasks.parts import Window, actions
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
 from warpspace.scene.notes import story
 
-LONGEST = 4000  # characters of what is set in a window
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
 Write = Callable[[LivePicture, Job], bytes]
@@ -42,7 +42,6 @@ class JobWindow(Window):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._jobs = Jobs(self, partial(context.renew, self), context.page.report)
-        self.said: dict[str, str] = dict.fromkeys(("figure", "author", "questions"), "")
 
     def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
         """Make a file of what is drawn beside the session, and have the browser save it."""
@@ -64,9 +63,6 @@ class JobWindow(Window):
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "cancel":
             self._jobs.cancel()
-        elif word.startswith("set.") and word[4:] in self.said:
-            self.said[word[4:]] = value[:LONGEST]
-            self.context.act(partial(self.context.renew, self))
         return state
 
 
@@ -79,7 +75,7 @@ class FilesWindow(JobWindow):
         services = self.context.services
         figures = {"": "as the drawing is coloured"}
         figures |= {one: one.replace("-", " ") for one, _ in services.figures}
-        kinds = choice("files:set.figure", self.said["figure"], figures)
+        kinds = choice("state:set.page.figure", picture.state.page.figure, figures)
         exports = (
             button(f"{end[1:].upper()}", "files:export", end, hint=words)
             for end, words in services.exports
@@ -98,7 +94,7 @@ class FilesWindow(JobWindow):
             *(link if services.token else ()),
             tag("h3", "Picture"), tag("p", files.exported_words(picture), class_="ws-quiet"),
             actions(button("Save what is on the screen (PNG)", "files:view")),
-            field("Figure", kinds, "files:set.figure"),
+            field("Figure", kinds, "state:set.page.figure"),
             actions(button("Save figure (PNG)", "files:figure")),
             tag("h3", "Export"),
             actions(button("Interactive page (HTML)", "files:page",
@@ -159,17 +155,19 @@ class FilesWindow(JobWindow):
     def _share(self, *, with_token: bool) -> None:
         context = self.context
         scenes, camera = context.scenes.fixed, context.camera.remember()
-        state = without_table(context.state)
-        try:
-            link = scene_file.state_to_link(state, camera, scenes)
-        except OptionError:
-            # notes are in the scene file; what is on the screen is what a link is for
-            link = self._alone_if_large(
-                lambda one: scene_file.state_to_link(replace(one, review=()), camera, scenes)
-            )
-            if state.review:
-                said = "the link would be too large with them; save the scene to hand them on"
-                context.notify("Without the notes", said, "warning")
+
+        def write(state: AppState) -> str:
+            try:
+                return scene_file.state_to_link(state, camera, scenes)
+            except OptionError as error:
+                if not state.review:
+                    raise
+                # notes are in the scene file; what is on the screen is what a link is for
+                link = scene_file.state_to_link(replace(state, review=()), camera, scenes)
+                context.notify("Without the notes", str(error), "warning")
+                return link
+
+        link = self._alone_if_large(write)
         token = context.services.token if with_token else None
         edited = len(context.state.changed_keys)
         edits = f" {edited} changed error{'s' if edited > 1 else ''}," if edited else ""
@@ -191,7 +189,7 @@ class FilesWindow(JobWindow):
             return text
 
     def _draw(self) -> None:
-        draw, kind = self.context.services.draw_figure, self.said["figure"]
+        draw, kind = self.context.services.draw_figure, self.context.state.page.figure
         kind = kind if kind in dict(self.context.services.figures) else ""
         ending = f"_{kind or 'figure'}.png"
         self.make("Figure", ending, lambda picture, job: draw(picture, kind, job))
@@ -220,10 +218,9 @@ class FilesWindow(JobWindow):
         from warpspace.app.documents.offline_page import build_story_html
 
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
-        state, known = without_table(self.context.state), self.context.scenes.fixed
-
-        build = partial(build_story_html, state, toml, known)
-        self.make("Story", "_story.html", lambda *_: build().encode(), as_drawn=True)
+        about = without_table(self.context.state), toml, self.context.scenes.fixed
+        self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
+                  as_drawn=True)  # fmt: skip
 
     def _export(self, ending: str) -> None:
         services = self.context.services
@@ -264,10 +261,6 @@ class ReportWindow(JobWindow):
             else f"It is about {picture.title}, as drawn now."
         )
         limit = f"{picture.state.specification.limit_um:g} µm"
-        author = text_box("report:set.author", self.said["author"], placeholder="Name")
-        questions = tag("textarea", self.said["questions"], class_="ws-box",
-                        id="ws-report-set-questions", data_set="report:set.questions",
-                        placeholder="One per line")  # fmt: skip
         put = [
             tag("li", join((f"{title} ", button("remove", "report:remove", index, kind="link"))))
             for index, (title, _) in enumerate(self.context.reported)
@@ -275,8 +268,7 @@ class ReportWindow(JobWindow):
         hint = "More results are added with the button “Add to report” below each of them."
         return join((
             tag("p", f"{subject} Limit: {limit}."),
-            field("Author", author, "report:set.author"),
-            field("Open questions", questions, "report:set.questions"),
+            setting(picture.state, "page.author"), setting(picture.state, "page.questions"),
             actions(button("Write HTML", "report:write", ".html", kind="main",
                            hint="One page with a rotatable view; needs no network"),
                     button("Write PDF", "report:write", ".pdf", hint="For paper")),
@@ -300,8 +292,9 @@ class ReportWindow(JobWindow):
         results: dict[str, Result] = {}
         for index, (title, found) in enumerate(self.context.reported):
             results[f"{title} ({index + 1})" if title in results else title] = found
-        questions = tuple(filter(None, map(str.strip, self.said["questions"].splitlines())))
-        about = self.said["author"].strip(), questions, results, ending
+        page = self.context.state.page
+        questions = tuple(filter(None, map(str.strip, page.questions.splitlines())))
+        about = page.author.strip(), questions, results, ending
 
         def write(picture: LivePicture, job: Job) -> bytes:
             content, missing = self.context.services.write_report(picture, *about, job)

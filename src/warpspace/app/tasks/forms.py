@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from markupsafe import Markup
 
 from warpspace.analysis.options import Option
-from warpspace.app.browser.html import choice, field, join, slider, switch, text_box
+from warpspace.app.browser.html import choice, field, ident, join, slider, switch, tag, text_box
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.tree import leaves, spell, value
+from warpspace.app.state.tree import LONGEST, leaves, spell, value
 from warpspace.scene.model import Scene
 
 OWN = ""  # what stands for an option that is left to the analysis
@@ -52,6 +52,9 @@ def setting(state: AppState, path: str, *, shown: str = "", bar: bool = False) -
     label, control = leaf.label, text_box(name, spell(state, path))
     if leaf.kind == "choice":
         control = choice(name, str(at), leaf.choices)
+    elif leaf.kind == "lines":
+        control = tag("textarea", str(at), class_="ws-box", id=ident(name), rows=3, data_set=name,
+                      maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
     elif leaf.kind == "number":
         shown = shown or f"{at:.6g}"
         control = text_box(name, shown, size="short", inputmode="decimal")

@@ -206,7 +206,7 @@ class TestsPart(FilesPart):
     def _into_report(self) -> None:
         if self._answer is not None and isinstance(found := self._answer.found, BenchResult):
             self.context.reported.append((found.test.title, found))
-            self.context.notify("Added to the report", f"{found.test.title}; see Save at the top")
+            self.context.notify("Added to the report", f"{found.test.title}; see Report at the top")
 
 
 # --- Calibration ----------------------------------------------------------------------------------

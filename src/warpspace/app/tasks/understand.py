@@ -194,7 +194,7 @@ class DistancePart(AnalysisPart):
     def actions(self, found: Result, *, stale: bool) -> Markup:
         if not isinstance(found, DistanceResult):
             return super().actions(found, stale=stale)
-        pin = button("Pin", "notes:new", "\n".join(measured_words(found)),
+        pin = button("Pin", "notes:pin", "\n".join(measured_words(found)),
                      hint="Write a note with these numbers", disabled=stale)  # fmt: skip
         return actions(pin) + super().actions(found, stale=stale)
 
