@@ -1,5 +1,6 @@
 """What an analysis says, in order: sentences, tables and charts in numbers, drawn nowhere yet."""
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -224,6 +225,19 @@ def table_html(table: Table) -> str:
     left = len(table.rows) - MOST_ROWS
     more = f"<p>… and {left:,} more rows</p>" if left > 0 else ""
     return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+
+
+def table_markdown(table: Table) -> str:
+    """Give a table in Markdown; nothing that a user wrote acts as a mark of it."""
+    heads = [column.head for column in table.shown]
+    rule = ["---:" if column.is_number else "---" for column in table.shown]
+    rows = [rule, *([*map(_escaped, row)] for row in table.cells())]
+    lines = [f"| {' | '.join(row)} |" for row in (heads, *rows)] if table.rows else [table.empty]
+    return "\n".join((f"# {_escaped(table.title)}", "", *lines, ""))
+
+
+def _escaped(text: str) -> str:
+    return re.sub(r"([\\`*_{}\[\]<>#|~&!])", r"\\\1", " ".join(text.split()))
 
 
 def _bars_html(bars: Bars) -> str:

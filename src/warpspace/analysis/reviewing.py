@@ -1,10 +1,10 @@
 """Review notes held against their scene: what their numbers are now, and a table of them."""
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import cache
 
-from warpspace.analysis.blocks import Column, Table
+from warpspace.analysis.blocks import Column, Mark, Table
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.grid import DEFAULT_NODES, build_grid
@@ -15,6 +15,16 @@ from warpspace.scene.notes import TOLERANCES, Note, told
 from warpspace.units import spell_short
 
 Numbers = Mapping[str, float]
+_COLUMNS = (
+    Column("no.", key="no", leads=True),
+    *(Column(key=key, shows=False) for key in ("id", "kind", "status")),
+    Column("what", wraps=True),  # kind and status
+    Column("text", key="text", wraps=True),
+    *(Column(key=key, shows=False) for key in ("author", "date")),
+    Column("by", wraps=True),
+    Column("where", key="where", wraps=True),
+    Column("numbers", key="numbers", wraps=True),
+)
 
 
 def note_numbers(scene: Scene, notes: Iterable[Note]) -> list[Numbers]:
@@ -23,40 +33,33 @@ def note_numbers(scene: Scene, notes: Iterable[Note]) -> list[Numbers]:
     They are those of the scene's own evaluation: mean and max over the working volume where the
     rotary axes stand as in the note, and the length of the error at its point.
     """
-    volumes: dict[object, Numbers] = {}
+
+    @cache
+    def of_volume(loop: str, still: tuple[tuple[str, float], ...]) -> Numbers:
+        moved = replace(scene, workspace=scene.workspace.moved(dict(still))) if still else scene
+        grid = build_grid(moved.model, moved.workspace, DEFAULT_NODES)
+        found = volume_statistics(evaluate_grid(moved, grid, moved.view(Loop(loop))), grid)
+        return {"mean_um": round(found.mean_um, 2), "max_um": round(found.max_um, 2)}
+
     found: list[Numbers] = []
     for note in notes:
         still = {q: at for q, at in note.at.items() if q not in scene.workspace.volume_axes}
-        key = note.loop, tuple(sorted(still.items()))
         try:
-            if key not in volumes:
-                volumes[key] = _of_volume(scene, note.loop, still)
-            found.append({**volumes[key], **_here(scene, note)})
+            whole = of_volume(note.loop, tuple(sorted(still.items())))
+            found.append({**whole, **_here(scene, note)})
         except WarpspaceError:  # its axes are no longer there
             found.append({})
     return found
 
 
-def _of_volume(scene: Scene, loop: str, still: Mapping[str, float]) -> Numbers:
-    moved = replace(scene, workspace=scene.workspace.moved(still)) if still else scene
-    grid = build_grid(moved.model, moved.workspace, DEFAULT_NODES)
-    found = volume_statistics(evaluate_grid(moved, grid, moved.view(Loop(loop))), grid)
-    return {"mean_um": _printed(found.mean_um), "max_um": _printed(found.max_um)}
-
-
 def _here(scene: Scene, note: Note) -> Numbers:
-    mark = note.on
+    mark, loop = note.on, note.loop
     if not note.at or (mark and mark.body):
         return {}
-    loop = note.loop
     if mark and mark.loop and mark.point_mm:
         model = replace(scene.model, workpiece_point_mm=mark.point_mm)
         scene, loop = replace(scene, model=model), mark.loop
-    return {"here_um": _printed(float(evaluate(scene, at=note.at, loop=loop).norm_um))}
-
-
-def _printed(value: float) -> float:
-    return round(value, 2)
+    return {"here_um": round(float(evaluate(scene, at=note.at, loop=loop).norm_um), 2)}
 
 
 def said_stale(note: Note, found: Numbers) -> str:
@@ -84,56 +87,31 @@ def spell_place(note: Note) -> str:
 
 
 def spell_numbers(note: Note) -> str:
-    """Spell the numbers of a note: "mean 30.88, max 51.72, here 51.72 µm"."""
-    said = [f"{name.removesuffix('_um')} {at:.2f}" for name, at in note.numbers.items()]
+    """Spell the numbers of a note: "mean 30.88, max 60.00 → 51.72, here 51.72 µm"."""
+    said = [
+        f"{name.removesuffix('_um')} "
+        + (f"{note.before[name]:.2f} → {at:.2f}" if name in note.before else f"{at:.2f}")
+        for name, at in note.numbers.items()
+    ]
     return f"{', '.join(said)} µm" if said else ""
 
 
-def notes_table(notes: Sequence[Note], found: Sequence[Numbers], title: str = "") -> Table:
-    """Set notes in a table, with what their numbers are now."""
-    columns = (
-        Column("id", key="id", leads=True),
-        Column("kind", key="kind"),
-        Column("status", key="status"),
-        Column("where", key="where", wraps=True),
-        Column("text", key="text", wraps=True),
-        Column("numbers", key="numbers", wraps=True),
-        Column("now", key="now", wraps=True),
-        Column("by", key="author", wraps=True),
-        Column("date", key="date"),
-        Column(key="change", shows=False),
-        Column(key="replies", shows=False),
-    )
-    rows: list[tuple[str, ...]] = []
-    for note, now in zip(notes, found, strict=True):
-        replies = "; ".join(f"{one.author}: {one.text}" for one in note.replies)
-        versions = "".join(f" / {one.text}" for one in note.versions)
-        cells = (
-            note.id, note.kind, note.status, spell_place(note), note.text + versions,
-            spell_numbers(note), said_stale(note, now) or "holds", note.author,
-            f"{note.date:%Y-%m-%d}", spell_change(note), replies,
-        )  # fmt: skip
-        rows.append(tuple(" ".join(cell.split()) for cell in cells))
-    return Table(columns, rows, title, empty="No notes.")
-
-
-def notes_markdown(scene: Scene, notes: Sequence[Note], found: Sequence[Numbers]) -> str:
-    """Write notes as Markdown; nothing that somebody has written acts as a mark of it."""
-    lines = [f"# {_escaped(scene.title)}: findings and decisions", ""]
-    for note, now in zip(notes, found, strict=True):
-        lines.append(f"## {note.kind.capitalize()} {note.id}, {note.status}")
-        facts = (
-            spell_place(note), spell_numbers(note), said_stale(note, now), spell_change(note),
-            note.author, f"{note.date:%Y-%m-%d}",
-        )  # fmt: skip
-        lines += ["", " · ".join(_escaped(one) for one in facts if one), ""]
-        texts = [note.text, *(f"Also: {one.text}" for one in note.versions)]
-        lines += [_escaped(line) for text in texts for line in (*text.splitlines(), "")]
-        lines += [f"- {_escaped(f'{one.author}: {one.text}')}" for one in note.replies]
-        lines.append("")
-    return "\n".join(lines)
-
-
-def _escaped(text: str) -> str:
-    flat = re.sub(r"([\\`*_{}\[\]<>#|~&!])", r"\\\1", " ".join(text.split()))
-    return re.sub(r"^(\d*)([-+.)=])", r"\1\\\2", flat)  # no list and no heading begins there
+def notes_table(scene: Scene, title: str = "") -> Table:
+    """List the notes of a scene, other versions of them, and replies, with what holds now."""
+    rows: list[tuple[object, ...]] = []
+    marks: list[Mark] = []
+    heads = [(number, one) for number, note in enumerate(scene.review, 1)
+             for one in (note, *note.versions)]  # fmt: skip
+    found = note_numbers(scene, [note for _, note in heads])
+    for (number, note), now in zip(heads, found, strict=True):
+        stale = said_stale(note, now)
+        facts = "; ".join(filter(None, (spell_change(note), spell_numbers(note), stale)))
+        kinds = (note.kind, note.status), *(("reply", "") for _ in note.replies)
+        for one, (kind, status) in zip((note, *note.replies), kinds, strict=True):
+            text, author = (" ".join(words.split()) for words in (one.text, one.author))
+            date, what = f"{one.date:%Y-%m-%d}", f"{kind}{status and f', {status}'}"
+            about = (spell_place(note), facts) if one is note else ("", "")
+            by = f"{author} {date}".strip()
+            rows.append((number, note.id, kind, status, what, text, author, date, by, *about))
+            marks.append("worse" if stale and one is note else "")
+    return Table(_COLUMNS, rows, title, empty="No notes.", marks=marks)

@@ -3,10 +3,11 @@
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from warpspace.cli.options import write_text
-from warpspace.exceptions import OptionError
+from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.outputs.exports.formats import ExportFormat, export_formats, register_format
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.catalogue import figure_kinds
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from warpspace.formats.compensation.compensate import Compensation
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.outputs.processes import FigureWorker
+    from warpspace.outputs.report.sections import Step
     from warpspace.picture.model import ScenePicture
     from warpspace.scene.model import Scene
 
@@ -50,7 +52,14 @@ def build_services() -> "Services":
 
 
 def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event) -> bytes:
-    """Draw a figure of what a page shows as a PNG; of a comparison both sides and the difference.
+    """Draw a figure of what a page shows as a PNG."""
+    return _render(*_figure_of(picture, figure), cancelled)
+
+
+def _figure_of(
+    picture: "LivePicture", figure: str = ""
+) -> "tuple[str, Sequence[Scene], FigureSettings]":
+    """Choose a figure of what a page shows; of a comparison both sides and the difference.
 
     Where tilts are coloured it is the orientation map; a comparison is always of position errors.
     """
@@ -87,7 +96,7 @@ def draw_figure(picture: "LivePicture", figure: str, cancelled: threading.Event)
         range_fixed=fixed,
         conditions=conditions,
     )
-    return _render(name, [side.active_scene() for side in sides], settings, cancelled)
+    return name, [side.active_scene() for side in sides], settings
 
 
 def draw_view(
@@ -206,6 +215,7 @@ def write_report(
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; give the file, and which figures are missing."""
     from warpspace.app.documents.files import shown_sides
+    from warpspace.app.documents.scene_file import kept_views
     from warpspace.outputs.files import temporary_folder
     from warpspace.outputs.report import ReportSettings
     from warpspace.outputs.report import write_report as write
@@ -215,10 +225,13 @@ def write_report(
         loop=sides[0].loop, grid=state.nodes, exaggeration=picture.exaggeration,
         spec_um=state.specification.limit_um, author=author, questions=tuple(questions),
     )  # fmt: skip
-    scenes = [one.active_scene() for one in sides if one.loop == sides[0].loop]
+    alike = [one for one in sides if one.loop == sides[0].loop]
+    scenes = [replace(one.active_scene(), review=kept_views(one)) for one in alike]
     with _turn(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
-        written = write(scenes, target, settings, embed=embed_view, results=results)
+        written = write(
+            scenes, target, settings, embed=embed_view, tell=tell_story, results=results
+        )
         return target.read_bytes(), written.missing
 
 
@@ -280,3 +293,47 @@ def embed_view(
         scene, exaggeration=exaggeration, nodes=nodes, loop=Loop(loop), largest=largest
     )
     return build_offline_html(live)
+
+
+def tell_story(scene: "Scene", nodes: int) -> "list[Step]":
+    """Give the steps of a story for a report; colours of the same thing end alike."""
+    import numpy as np
+
+    from warpspace.app.documents.legend import look_words, numbers_words, picture_conditions
+    from warpspace.app.documents.scene_file import reopened
+    from warpspace.app.evaluation.evaluate import LiveModel
+    from warpspace.app.state.app_state import start_state
+    from warpspace.kinematics.model import Loop
+    from warpspace.picture.model import VIEW_WORDS, VIEWS
+    from warpspace.scene.notes import story
+
+    notes, live = story(scene.review), LiveModel()
+    steps: list[Step] = []
+    ends: dict[tuple[str, str], float] = {}
+    for note in notes:
+        start = start_state(scene, loop=Loop(note.loop), nodes=nodes)
+        try:
+            state, camera = reopened(start, note)
+            picture = live.evaluate(replace(state, nodes=nodes))
+            name, scenes, settings = _figure_of(picture)
+        except WarpspaceError as error:
+            picture, camera = live.evaluate(start.noted(f"the scene as it is now: {error}")), None
+            name, scenes, settings = _figure_of(picture)
+        view = "iso"
+        if camera is not None:
+            towards = np.subtract(camera.position, camera.look_at)
+            view = max(VIEWS, key=lambda one: towards @ VIEWS[one] / np.linalg.norm(VIEWS[one]))
+        said = (
+            picture.compared.title if picture.compared else "", picture.scale.label,
+            *look_words(picture)[:2], VIEW_WORDS.get(view, "oblique view"),
+            numbers_words(picture), *picture_conditions(picture), *picture.state.notes,
+        )  # fmt: skip
+        caption = f"Step {len(steps) + 1} of {len(notes)}: {' '.join(note.text.split())}"
+        caption += f" (note {scene.review.index(note) + 1}; {' · '.join(filter(None, said))})"
+        key, end = (name, settings.component), settings.range_top or 0.0
+        ends[key] = max(ends.get(key, 0.0), end)
+        steps.append((caption, name, scenes, replace(settings, view=view, dark=False)))
+    return [
+        (caption, name, scenes, replace(one, range_top=ends[name, one.component] or None))
+        for caption, name, scenes, one in steps
+    ]

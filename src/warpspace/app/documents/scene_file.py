@@ -10,10 +10,14 @@ Reading trusts nothing: every value passes the pure updates of the state, what c
 left out and named.
 """
 
+import base64
+import binascii
 import math
+import re
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from urllib.parse import urlencode
+from urllib.parse import parse_qsl, urlencode
 
 from warpspace.app.documents.files import LONGEST_NAME, safe_name
 from warpspace.app.drawing.camera import CameraMemory
@@ -24,26 +28,22 @@ from warpspace.app.state.forms import linked_forms, with_form
 from warpspace.app.state.leaf import Unreadable
 from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
 from warpspace.exceptions import OptionError
-from warpspace.machine.limits import MAX_NOTE_VIEW
+from warpspace.machine.limits import MAX_NOTE_VIEW, MAX_PACKED_TEXT
 from warpspace.resources import __version__
 from warpspace.scene.files import parse_number
 from warpspace.scene.library import load_scene, parse_scene, scene_names
-from warpspace.scene.links import (
-    CAMERA,
-    MARK,
-    MAX_LINE,
-    PACKED,
-    pack_scene,
-    read_settings,
-    settings_of,
-    unpack_scene,
-)
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note
 from warpspace.scene.save import scene_to_toml
 
+MARK = "# warpspace-view: "
 MAX_LINK = 5_500  # characters of a link before it is packed: servers take request lines of 8 kB
-SCENE, NAME = "scene", "name"
+MAX_LINE = 400_000  # characters of a line of settings in a file
+MAX_FIELDS = 400
+SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
+_HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
+# what was compared had a line of its own in files of earlier versions
+_LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
 Known = Sequence[Scene] | None
 """Scenes that whoever opens a file or a link also has; None for those of the program."""
 Opened = tuple[AppState, CameraMemory | None]
@@ -61,12 +61,17 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
 def open_text(text: str, name: str, source: str, *, alone: bool = False) -> Opened:
     """Build the state of a scene file that somebody has uploaded; `alone` with no comparison."""
     scene = _recognised(parse_scene(text, name, source, folder=None))
-    line = settings_of(text)
+    line = _settings(text)
     return with_settings(start_state(scene), line, alone=alone), camera_of(line)
 
 
 def is_looked_at(text: str) -> bool:
-    return bool(settings_of(text))
+    return bool(_settings(text))
+
+
+def _settings(text: str) -> str:
+    head = _HEAD.match(text)
+    return "&".join(filter(None, _LINES.findall(head[0] if head else "")))
 
 
 def _find(name: str, known: Known) -> Scene | None:
@@ -100,21 +105,24 @@ def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
 
 
 def _packed(state: AppState, camera: CameraMemory | None) -> str:
-    word = pack_scene(state_to_toml(state, camera))
+    text = zlib.compress(state_to_toml(state, camera).encode(), 9)
+    word = base64.urlsafe_b64encode(text).decode().rstrip("=")
     return urlencode({NAME: state.scene.name, PACKED: word})
 
 
 def named_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
     """Spell a state of a scene that others have as a link of any length; any other as nothing."""
     scene = state.scene
-    plain = state.loaded is None and (state.tolerances, state.review) == (
-        scene.tolerances,
-        scene.review,
-    )
+    plain = _is_plain(state) and state.review == scene.review
     if not plain or _find(scene.name, known) != scene:
         return ""
     line = settings_line(state, camera, known)
     return "&".join(filter(None, (urlencode({SCENE: scene.name}), line)))
+
+
+def _is_plain(state: AppState) -> bool:
+    """Tell whether a line of settings spells all in which a state differs from its scene."""
+    return state.loaded is None and state.tolerances == state.scene.tolerances
 
 
 def open_link(link: str, known: Known) -> Opened:
@@ -126,16 +134,28 @@ def open_link(link: str, known: Known) -> Opened:
 
 
 def _read_link(link: str, known: Known, *, alone: bool = False) -> Opened:
-    pairs = dict(read_settings(link))
+    pairs = dict(_pairs(link))
     if PACKED in pairs:
         name = safe_name(pairs.get(NAME, ""), "link")
-        return open_text(unpack_scene(pairs[PACKED]), name, "the scene in the link", alone=alone)
+        return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", alone=alone)
     name = pairs.pop(SCENE, "")
     scene = _find(name, known)
     if scene is None:
         raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
     line = urlencode(pairs)
     return with_settings(start_state(scene), line, known, alone=alone), camera_of(line)
+
+
+def _unpack(packed: str) -> str:
+    try:
+        data = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))
+        reader = zlib.decompressobj()
+        text = reader.decompress(data, MAX_PACKED_TEXT)
+        if reader.unconsumed_tail or not reader.eof:
+            raise OptionError("the scene in the link is cut off or too large")
+        return text.decode("utf-8")
+    except (binascii.Error, zlib.error, ValueError):
+        raise OptionError("the scene in the link cannot be read; was the link cut?") from None
 
 
 # --- The line of settings -------------------------------------------------------------------------
@@ -172,7 +192,7 @@ def with_settings(
     state: AppState, line: str, known: Known = None, *, alone: bool = False
 ) -> AppState:
     """Apply a line of settings to a state; `alone` without a comparison."""
-    pairs = [pair for pair in read_settings(line) if not (alone and pair[0].startswith(PREFIX))]
+    pairs = [pair for pair in _pairs(line) if not (alone and pair[0].startswith(PREFIX))]
     state, unread = _with_sides(state, dict(pairs), known), list[str]()
     for name, text in pairs:
         if name == CAMERA or name in SIDES:
@@ -190,6 +210,15 @@ def with_settings(
     return state
 
 
+def _pairs(line: str) -> list[tuple[str, str]]:
+    if len(line) > MAX_LINE:
+        raise OptionError(f"{len(line):,} characters of settings; expected at most {MAX_LINE:,}")
+    try:
+        return parse_qsl(line, keep_blank_values=True, max_num_fields=MAX_FIELDS)
+    except ValueError:
+        raise OptionError("there are too many settings; this program did not write them") from None
+
+
 CAMERA_NUMBERS = 10
 FARTHEST = 1000.0  # farthest place of a camera, in units of the drawing
 FOV_RAD = (0.01, 2.5)
@@ -198,9 +227,7 @@ FOV_RAD = (0.01, 2.5)
 def camera_of(line: str) -> CameraMemory | None:
     """Read the camera of a line of settings; None where there is none that can be used."""
     try:
-        numbers = [
-            parse_number(word) for word in dict(read_settings(line)).get(CAMERA, "").split(",")
-        ]
+        numbers = [parse_number(word) for word in dict(_pairs(line)).get(CAMERA, "").split(",")]
     except ValueError:
         return None
     if len(numbers) != CAMERA_NUMBERS:
@@ -219,38 +246,31 @@ def camera_of(line: str) -> CameraMemory | None:
 def view_of(state: AppState, camera: CameraMemory | None) -> str:
     """Spell what is on the screen, for a note: relative to the scene as opened where that does."""
     shown = replace(state, review=())
-    if state.loaded is None and state.tolerances == state.scene.tolerances:
-        return settings_line(shown, camera, whole=True)
-    link = _packed(shown, camera)
+    link = "" if _is_plain(state) else _packed(shown, camera)
     # curves of thousands of points are left to the scene
-    return link if len(link) <= MAX_NOTE_VIEW else settings_line(shown, camera, whole=True)
+    fits = 0 < len(link) <= MAX_NOTE_VIEW
+    return link if fits else settings_line(shown, camera, whole=True)
 
 
 def kept_views(state: AppState) -> tuple[Note, ...]:
     """Give the notes as a file keeps them, whose scene may differ from the one as opened."""
-    opened, scene = start_state(state.origin), state.resulting_scene()
-    as_opened = replace(
-        opened.resulting_scene(), errors=scene.errors, workspace=scene.workspace,
-        exaggeration=scene.exaggeration, placed=scene.placed, limit_um=scene.limit_um,
-        review=state.review,
-    )  # fmt: skip
-    if state.loaded is None and as_opened == scene:
-        return state.review
-    found: list[Note] = []
-    for note in state.review:
-        if note.view and PACKED not in dict(read_settings(note.view)):
-            shown = with_settings(replace(opened.at_rest(), review=()), note.view)
-            link = _packed(shown, camera_of(note.view))
-            found.append(replace(note, view=link) if len(link) <= MAX_NOTE_VIEW else note)
-        else:
-            found.append(note)
-    return tuple(found)
+    opened = start_state(replace(state.origin, review=()))
+
+    def kept(note: Note) -> Note:
+        if not note.view or PACKED in dict(_pairs(note.view)):
+            return note
+        link = _packed(*reopened(opened, note))
+        return replace(note, view=link) if len(link) <= MAX_NOTE_VIEW else note
+
+    return state.review if _is_plain(state) else tuple(map(kept, state.review))
 
 
 def reopened(state: AppState, note: Note, known: Known = None) -> Opened:
     """Give what was on the screen when a note was made; what cannot be restored is named."""
+    if not note.view:
+        return state, None
     origin = state.origin
-    if PACKED in dict(read_settings(note.view)):
+    if PACKED in dict(_pairs(note.view)):
         found, camera = _read_link(note.view, known)
         same = found.scene.machine.axes == origin.machine.axes
         found = replace(found, loaded=None if found.scene == origin else origin,

@@ -32,7 +32,6 @@ from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
     from warpspace.analysis.measured import Check, Measured
-    from warpspace.analysis.reviewing import Numbers
     from warpspace.analysis.thesis import Row
     from warpspace.scene.model import Scene
 
@@ -172,12 +171,11 @@ def check(
 
 
 def _check(scene: "Scene", *, as_json: bool) -> None:
-    from warpspace.analysis.reviewing import note_numbers, notes_table
     from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.model import second_order
 
     remarks = (*scene.notes, *check_meshes(scene.machine))
-    found, now = second_order(scene), note_numbers(scene, scene.review)
+    found = second_order(scene)
     say_second_order(found)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
     if as_json:
@@ -191,7 +189,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
                 "non_zero": non_zero,
                 "linearisation_error_um": found.um,
                 "remarks": list(remarks),
-                "notes": [{key: one[key] for key in CHECKED} for one in notes_json(scene, now)],
+                "notes": [{key: one[key] for key in CHECKED} for one in notes_json(scene)],
             }
         )
         return
@@ -206,11 +204,14 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     columns = (Column(leads=True), Column(wraps=True))
     print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts)))
     if scene.review:
-        print_blocks([notes_table(scene.review, now, "notes")])
+        from warpspace.analysis.reviewing import notes_table
+
+        print_blocks([notes_table(scene, "notes")])
 
 
-def notes_json(scene: "Scene", found: "Sequence[Numbers]") -> list[dict[str, Any]]:
+def notes_json(scene: "Scene") -> list[dict[str, Any]]:
     """List the notes of a scene as its file has them, and what their numbers are now."""
+    from warpspace.analysis.reviewing import note_numbers
     from warpspace.scene.notes import note_to_toml, told
 
     return [
@@ -220,7 +221,7 @@ def notes_json(scene: "Scene", found: "Sequence[Numbers]") -> list[dict[str, Any
             "numbers": note.numbers,
             "now": {name: now[name] for name in note.numbers if name in now},
         }
-        for note, now in zip(scene.review, found, strict=True)
+        for note, now in zip(scene.review, note_numbers(scene, scene.review), strict=True)
     ]
 
 
@@ -265,7 +266,8 @@ def notes(
 
     A note whose numbers no longer hold is marked "changed" with its number then and now.
     """
-    from warpspace.analysis.reviewing import note_numbers, notes_markdown, notes_table
+    from warpspace.analysis.blocks import table_markdown
+    from warpspace.analysis.reviewing import notes_table
     from warpspace.scene.files import spell_row
     from warpspace.scene.library import load_scene
 
@@ -276,19 +278,15 @@ def notes(
         output = None
     elif point is not None or (output or "").endswith(".toml"):
         raise OptionError("--at and an .toml file belong to --add; there is no text to add")
-    found = note_numbers(loaded, loaded.review)
-    table = notes_table(loaded.review, found)
+    table = notes_table(loaded, f"{loaded.name}: {loaded.title}")
     if output is not None:
-        spelled = (
-            notes_markdown(loaded, loaded.review, found)
-            if output.endswith(".md")
-            else "".join(map(spell_row, table.csv_rows()))
-        )
-        write_text(output, spelled, force=force)
+        rows = table.csv_rows()
+        text = table_markdown(table) if output.endswith(".md") else "".join(map(spell_row, rows))
+        write_text(output, text, force=force)
     if as_json:
-        print_json({"notes": notes_json(loaded, found)})
+        print_json({"notes": notes_json(loaded)})
     elif output is None:
-        print_blocks([f"{loaded.name}: {loaded.title}", table])
+        print_blocks([table])
 
 
 def _add_note(

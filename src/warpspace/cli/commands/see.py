@@ -30,7 +30,7 @@ from warpspace.cli.options import (
     scene_argument,
     size_text,
 )
-from warpspace.cli.services import build_services, embed_view
+from warpspace.cli.services import build_services, embed_view, tell_story
 from warpspace.cli.tables import echo, print_text, progress
 from warpspace.exceptions import OptionError, RenderError, UnknownNameError
 from warpspace.outputs.exports.formats import export_formats, write_export
@@ -386,6 +386,7 @@ def report(
             output,
             settings,
             embed=embed_view,
+            tell=tell_story,
             concepts=beside,
             results={
                 f"{heading}: {scene.title}": analysis.run(scene, silent)

@@ -19,7 +19,6 @@ from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
-from warpspace.outputs.report.findings import open_questions
 from warpspace.outputs.report.render import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
@@ -288,7 +287,12 @@ def first_page(review: Review, picture: Block) -> list[Block]:
         marks: list[Mark] = ["" if one.keeps else "worse" for one in review.scenes]
         numbered = [(title, *row) for title, row in zip(titles, rows, strict=True)]
         said = Table(columns, numbered, marks=marks)
-    noted = (one.titled(text) for one in review.scenes for text in open_questions(one.scene))
+    noted = (
+        one.titled(f"{note.text} (note {number}{note.author and f', {note.author}'})")
+        for one in review.scenes
+        for number, note in enumerate(one.scene.review, 1)
+        if (note.kind, note.status) == ("question", "open")
+    )
     asked = (*review.settings.questions, *noted)
     return [
         Text(verdict(review), "lead"),

@@ -15,6 +15,7 @@ from warpspace.analysis.blocks import Block as AnyBlock
 from warpspace.analysis.concepts import Concepts, ConceptsResult
 from warpspace.analysis.description import Result, silent
 from warpspace.analysis.distribution import choose_distribution
+from warpspace.analysis.reviewing import notes_table
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MOST_CONCEPTS
@@ -22,7 +23,6 @@ from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
 from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import FigureWorker
-from warpspace.outputs.report import findings
 from warpspace.outputs.report.render import (
     Block,
     Embedded,
@@ -66,6 +66,10 @@ LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they 
 Chart = Bars | Lines | Histogram
 Drawn = Callable[[], Block]
 """Waits for a figure; gives what stands in its place where it cannot be drawn."""
+Step = tuple[str, str, Sequence[Scene], FigureSettings]
+Tell = Callable[[Scene, int], Iterable[Step]]
+"""Gives the steps of a scene's story at so many nodes per axis, what was on the screen each time:
+caption, name of a figure, what it is of, its settings. It needs the app."""
 
 
 class ReportFigures:
@@ -117,12 +121,9 @@ class ReportFigures:
         settings = FigureSettings(loop=str(plan.loop), grid=self._grid, concepts=plan)
         return self._begin("concepts", scenes, caption, settings=settings)()
 
-    def step(self, caption: str, shown: findings.Shown) -> Drawn:
-        settings = FigureSettings(
-            exaggeration=self._factor, loop=shown.loop, grid=self._grid,
-            component=shown.component, view=shown.view,
-        )  # fmt: skip
-        return self._begin("error-map", [shown.scene], caption, settings=settings)
+    def story(self, steps: Iterable[Step]) -> Iterator[Block]:
+        begun = [self._begin(name, scenes, caption, one) for caption, name, scenes, one in steps]
+        yield from (drawn() for drawn in begun)
 
     def chart(self, chart: Chart) -> Block:
         data = self._worker.begin_chart("chart", CHART, self._form, chart)()
@@ -204,6 +205,7 @@ def build_report(
     *,
     form: str = "svg",
     embed: Embed | None = None,
+    tell: Tell | None = None,
     concepts: Sequence[Scene] = (),
     results: Mapping[str, Result] | None = None,
     files: Sequence[Path] = (),
@@ -229,13 +231,10 @@ def build_report(
             "Conventions": [conventions(review)],
             "Provenance": provenance(review, files),
         }
+        noted = tuple(notes(review, painter, tell))
         parts = (
             Section("", tuple(first_page(review, painter.first()))),
-            *(
-                [Section(findings.HEADING, noted)]
-                if (noted := tuple(notes(review, painter)))
-                else []
-            ),
+            *([Section("Findings and decisions", noted)] if noted else []),
             *(
                 Section(f"Appendix {_letters(number)} · {heading}", tuple(blocks))
                 for number, (heading, blocks) in enumerate(found.items(), 1)
@@ -306,16 +305,14 @@ def _first_bars(bars: Bars) -> Bars:
     return replace(bars, rows=rows, keys=keys, panels=tuple(panels))
 
 
-def notes(review: Review, painter: ReportFigures) -> Iterator[Block]:
+def notes(review: Review, painter: ReportFigures, tell: Tell | None) -> Iterator[Block]:
     """Give what people have noted of each scene, and the story that they tell; a figure a step."""
     for reviewed in (one for one in review.scenes if one.scene.review):
-        if reviewed.letter:
-            yield Text(reviewed.titled(reviewed.scene.title), "heading")
-        yield from findings.tables(reviewed.scene)
-        drawn = [painter.step(*step) for step in findings.steps(reviewed.scene)]
-        if drawn:
+        title = reviewed.titled("Red where the numbers of a note no longer hold.")
+        yield notes_table(reviewed.scene, title)
+        if tell and (steps := tell(reviewed.scene, review.settings.grid)):
             yield Text(reviewed.titled("The story"), "heading")
-        yield from (wait() for wait in drawn)
+            yield from painter.story(steps)
 
 
 def told(review: Review, painter: ReportFigures, *names: str) -> Iterator[Block]:
@@ -497,8 +494,8 @@ def conventions(review: Review) -> Items:
             f"Loop: {loop}. {LOOPS[loop]}",
             *own,
             (
-                f"In all pictures: displacement drawn {spell_factor(review.exaggeration)}; the"
-                " dashed box is nominal."
+                f"Displacement is drawn {spell_factor(review.exaggeration)} unless a picture says"
+                " otherwise; the dashed box is nominal."
             ),
             (
                 "First order in the errors; over a 5 × 5 × 5 grid the exact chain (full rotations,"
