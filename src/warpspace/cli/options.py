@@ -135,13 +135,13 @@ def grid_option(default: int | None = 21, of: str = "of the working volume") -> 
     )
 
 
-def parse_point(text: str, axes: Collection[str], option: str = "--at") -> dict[str, float]:
+def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
     from warpspace.analysis.options import read_place
 
     try:
         return read_place(text, axes)
     except ValueError as error:
-        raise OptionError(f"{option} {text!r}: {error}") from None
+        raise OptionError(f"--at {text!r}: {error}") from None
 
 
 def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:

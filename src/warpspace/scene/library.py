@@ -318,11 +318,10 @@ class _Document:
     def errors(self) -> ErrorSet:
         found: dict[str, ErrorFunction] = {}
         problems, known = self.problems, self.known("errors")
-        known_names = cast("dict[str, object]", self.raw.get("errors") or {})
+        given = cast("dict[str, object]", self.raw.get("errors") or {})
         for key, value in known.items():
             where, row, reader = f"errors.{key}", PARAMETERS[key], self.curves(key)
             if isinstance(value, dict) and GUIDES in value:
-                given = {name for name in known_names if name != key}
                 gantry, raw = self.machine.gantries.get(row.axis), cast("dict[str, object]", value)
                 curves = reader.guides(key, raw, where, gantry, given)
             else:

@@ -115,11 +115,10 @@ def story(notes: Iterable[Note]) -> list[Note]:
 
 def with_note(notes: Sequence[Note], note: Note) -> tuple[Note, ...]:
     """Add a note, or put it in the place of the one with its identity."""
-    if any(one.id == note.id for one in notes):
-        return tuple(note if one.id == note.id else one for one in notes)
-    if len(notes) >= MAX_NOTES:
+    found = {one.id: one for one in (*notes, note)}
+    if len(found) > MAX_NOTES:
         raise OptionError(f"there are {len(notes)} notes already; expected at most {MAX_NOTES}")
-    return (*notes, note)
+    return tuple(found.values())
 
 
 def merge_notes(*lists: Iterable[Note]) -> tuple[Note, ...]:
@@ -140,8 +139,7 @@ def _merged(same: Sequence[Note]) -> Note:
     heads = [head for one in same for head in (one, *one.versions)]
     by_version = {one.version: replace(one, replies=(), versions=()) for one in heads}
     gone = {digest for one in heads for digest in one.replaces}
-    left = {digest: one for digest, one in by_version.items() if digest not in gone}
-    first, *others = [left[digest] for digest in sorted(left)]
+    first, *others = [by_version[digest] for digest in sorted(by_version.keys() - gone)]
     replies = {reply for one in same for reply in one.replies}
     answered = sorted(replies, key=lambda one: (one.date, one.author, one.text))
     if max(len(answered), len(others)) > MAX_REPLIES:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, cast
+from typing import Any
 
 from warpspace.exceptions import SHOWN_PROBLEMS, near_miss
 from warpspace.kinematics.conversion import SquarenessSign
@@ -53,9 +53,7 @@ class Problems:
 
     def table(self, key: str, value: object) -> dict[str, object]:
         """Give a table as a dictionary; note a problem and give an empty one for anything else."""
-        if value is not None and not isinstance(value, dict):
-            self.add(key, "expected a table", value)
-        return dict(cast("dict[str, object]", value)) if isinstance(value, dict) else {}
+        return self.read(ValueReader.dictionary, key, {} if value is None else value) or {}
 
 
 def _number(

@@ -1,7 +1,7 @@
 """Commands about scenes and machines: what there is, what is right, what the thesis prints."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -134,8 +134,6 @@ def check(
     stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
     affine fit to the predicted map: which plane became a rhombus.
     """
-    from dataclasses import asdict
-
     from warpspace.analysis.measured import measured
     from warpspace.scene.library import load_scene
 
@@ -146,9 +144,8 @@ def check(
         _check(*loaded, as_json=as_json)
         return
     limits = None if against == OWN else load_scene(against).tolerances
-    found = [measured(scene, tolerances=limits, loop=loop, grid=grid) for scene in loaded]
+    pairs = [(one, measured(one, tolerances=limits, loop=loop, grid=grid)) for one in loaded]
     say_first_order(loop, *loaded)
-    pairs = list(zip(loaded, found, strict=True))
     if as_json:
         print_json(
             {
@@ -171,6 +168,7 @@ def check(
 
 
 def _check(scene: "Scene", *, as_json: bool) -> None:
+    from warpspace.analysis.reviewing import notes_table
     from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.model import second_order
 
@@ -202,11 +200,8 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     facts.append(("first order", f"differs from the exact chain by at most {found.um:.2g} µm"))
     facts.extend(("remark", remark) for remark in remarks)
     columns = (Column(leads=True), Column(wraps=True))
-    print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts)))
-    if scene.review:
-        from warpspace.analysis.reviewing import notes_table
-
-        print_blocks([notes_table(scene, "notes")])
+    review = [notes_table(scene, "notes")] if scene.review else []
+    print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts), *review))
 
 
 def notes_json(scene: "Scene") -> list[dict[str, Any]]:
@@ -278,15 +273,16 @@ def notes(
         output = None
     elif point is not None or (output or "").endswith(".toml"):
         raise OptionError("--at and an .toml file belong to --add; there is no text to add")
-    table = notes_table(loaded, f"{loaded.name}: {loaded.title}")
+    title = f"{loaded.name}: {loaded.title}"
     if output is not None:
+        table = notes_table(loaded, title)
         rows = table.csv_rows()
         text = table_markdown(table) if output.endswith(".md") else "".join(map(spell_row, rows))
         write_text(output, text, force=force)
     if as_json:
         print_json({"notes": notes_json(loaded)})
     elif output is None:
-        print_blocks([table])
+        print_blocks([notes_table(loaded, title)])
 
 
 def _add_note(
@@ -302,7 +298,8 @@ def _add_note(
 
     file, path = scene_path(name), output or name
     if not path.endswith(".toml"):
-        raise OptionError(f"{path}: expected a .toml file (-o FILE.toml); bundled scenes stay")
+        expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
+        raise OptionError(f"{path}: {expected}")
     note = Note(**about)
     warn_outside_travel(scene.machine, note.at)
     note = replace(note, numbers=note_numbers(scene, [note])[0])
@@ -401,9 +398,9 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
         write_text(markdown, thesis_markdown(rows), force=force)
     if as_json:
         keys = ("source", "key", "printed", "computed", "agrees")
-        noted = [{"note": row.note} if row.note else {} for row in rows]
-        told = [{key: getattr(row, key) for key in keys} for row in rows]
-        print_json({"rows": [one | note for one, note in zip(told, noted, strict=True)]})
+        noted = [(*keys, "note") if row.note else keys for row in rows]
+        print_json({"rows": [{key: getattr(row, key) for key in own}
+                             for row, own in zip(rows, noted, strict=True)]})  # fmt: skip
         return
     _print(rows)
 

@@ -144,16 +144,6 @@ class ValueReader:
                 hint = near_miss(key, known) if len(self.findings) < SHOWN_PROBLEMS else ""
                 self.note((*path, key), f"unknown key{hint}")
 
-    def table(self, value: object, path: Path, known: Collection[str]) -> dict[str, object]:
-        """Read a table with exactly so many keys; what is missing stands as `MISSING`."""
-        if not isinstance(value, dict):
-            return self.dictionary(value, path)
-        found = cast("dict[str, object]", value)
-        for key in found:
-            if key not in known:
-                self.note((*path, key), f"unknown key; expected {', '.join(known)}")
-        return {**dict.fromkeys(known, MISSING), **found}
-
     def ascending(
         self, value: object, path: Path, most: int, limit: tuple[float, float]
     ) -> tuple[float, ...]:

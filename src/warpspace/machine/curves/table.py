@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpspace.exceptions import OptionError
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import (
+    MISSING,
     ErrorFunction,
     Path,
     Rows,
@@ -290,7 +291,9 @@ class TwoArguments(ErrorFunction):
             if not isinstance(inner, dict):
                 reader.note(place, "expected a table", inner)
             return empty
-        table = reader.table(inner, place, ("axes", *axes, "values"))
+        known = ("axes", *axes, "values")
+        reader.only(inner, place, known)
+        table = {**dict.fromkeys(known, MISSING), **inner}
         at = tuple(
             reader.ascending(table[axis], (*place, axis), MAX_POINTS, POSITIONS) for axis in axes
         )
