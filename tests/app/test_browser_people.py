@@ -172,6 +172,18 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab):
             tab.page.wait_for_selector(f"[data-key=window-{window}]")
             assert serious(tab) == [], window
             tab.page.keyboard.press("Escape")
+        tab.send("page:close")
+        tab.page.wait_for_selector("#ws-window:not([open])", state="attached")
+        for text in ("Why here?", "") if not dark else ("",):
+            tab.send("notes:pin")
+            tab.page.locator("#ws-notes textarea:focus").wait_for()
+            if text:
+                tab.page.keyboard.type(text)
+                tab.click("Keep")
+                tab.click("Add to the story")
+                tab.page.locator("#ws-notes textarea").wait_for(state="detached")
+        assert serious(tab) == []
+        tab.send("notes:close")
     for landmark in ("banner", "navigation", "main", "complementary"):
         assert tab.page.get_by_role(landmark).count() == 1, landmark
     for role, name in (("heading", "^mean .* max 51.7 µm"), ("slider", "^EAX roll of X$")):

@@ -151,6 +151,22 @@ def test_a_distance_is_measured_between_two_clicks_and_stands_in_the_drawing(tab
     tab.until(lambda: tab.page.locator(".ws-words span", has_text="Δx").count() == 0)
 
 
+def test_an_adjustment_is_decided_on_and_taken_back(tab):
+    start = start_state(SCENES[0]).amplitudes
+    tab.says("51.7 → 46.1 µm")
+    tab.click("Apply")
+    tab.click("Record decision")
+    tab.until(lambda: "EA0Z" in tab.page.locator("#ws-notes textarea").input_value())
+    tab.click("Keep")
+    tab.says("max 51.7 → 46.1 µm", within="#ws-notes .ws-note")
+    (note,) = tab.state.review
+    assert (note.kind, note.change["EA0Z"][0]) == ("decision", start["EA0Z"])
+    tab.click("Take back")
+    tab.says("Taken back")
+    tab.says("changed: ", within="#ws-notes .ws-note")
+    assert tab.state.amplitudes == start
+
+
 def test_a_click_asks_why_and_a_saved_scene_holds_what_was_changed(tab):
     draw(tab.page)
     box = tab.page.locator("#root canvas").first.bounding_box()

@@ -181,7 +181,7 @@ class PageLook:
     # what has been typed of a note that is not kept yet
     note_kind: str = described("note", "Kind", choices={k: k for k in KINDS}, linked="")
     note_place: str = described("point", "About", choices=lambda state: {
-        "point": "the point asked about, or the worst", "whole": "the whole",
+        "point": "clicked or worst point", "whole": "the whole",
         **{axis: f"body {axis}" for axis in state.scene.machine.axes},
     }, linked="")  # fmt: skip
     note_text: str = described("", "Text", kind="lines", hint="What is to be seen here?", linked="")

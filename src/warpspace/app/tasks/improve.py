@@ -121,6 +121,7 @@ class BestPart(RepairPart):
         words = "No adjustment helps." if is_known else "Searching …"
         body = self.problem_html(state) or self.cards_html(question)
         body = body or tag("p", words, class_="ws-quiet")
+        body += RECORD if question == self._applied else EMPTY
         return {self.name: tag("h4", "Best single adjustment") + body}
 
 

@@ -296,20 +296,21 @@ def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
     is_done, free = note.status == "done", not note.versions
     place = steps.index(note) if note.step else 0
     rows = (
-        ("Show", "show", "", "As it was on the screen, errors and camera too", True),
         ("Done", "status", "", "Mark as open" if is_done else "Mark as done", free),
+        ("Show", "show", "", "As it was on the screen, errors and camera too", True),
         ("Edit", "edit", "", "", free),
         ("Delete", "delete", "", "Undo brings it back", True),
         ("Take back", "take-back", "", "Set what it changed back", free and note.change),
         ("Add to the story", "step", "add", "", free and not note.step),
         ("↑", "step", "up", "Earlier in the story", free and place > 0),
         ("↓", "step", "down", "Later in the story", free and note.step and note != steps[-1]),
-        ("Take out", "step", "out", "Take out of the story", free and note.step),
+        ("Take out of the story", "step", "out", "", free and note.step),
     )
     return actions(*(
-        button(words, f"notes:{do}.{note.id}", value, kind="link", hint=hint,
+        button(words, f"notes:{do}.{note.id}", value, hint=hint,
+               kind="" if do == "status" else "link",
                pressed=is_done if do == "status" else None,
-               aria_label=hint or None if do == "step" else None)
+               aria_label=hint if words in "↑↓" else None)
         for words, do, value, hint, can_be_done in rows if can_be_done
     ))  # fmt: skip
 
