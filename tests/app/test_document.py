@@ -24,10 +24,10 @@ from warpspace.app.documents.scene_file import (
     SIDES,
     SceneList,
     camera_of,
-    is_looked_at,
     open_link,
     open_text,
     settings_line,
+    settings_of,
     state_to_link,
     state_to_toml,
     with_settings,
@@ -386,7 +386,7 @@ def test_a_trace_that_means_nothing_is_left_out_and_named(text):
 def test_remarks_at_the_head_of_a_file_take_little_memory(text):
     tracemalloc.start()
     try:
-        is_looked_at(text)
+        settings_of(text)
         assert tracemalloc.get_traced_memory()[1] < 5e6
     finally:
         tracemalloc.stop()

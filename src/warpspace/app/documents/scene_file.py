@@ -61,15 +61,12 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
 def open_text(text: str, name: str, source: str, *, alone: bool = False) -> Opened:
     """Build the state of a scene file that somebody has uploaded; `alone` with no comparison."""
     scene = _recognised(parse_scene(text, name, source, folder=None))
-    line = _settings(text)
+    line = settings_of(text)
     return with_settings(start_state(scene), line, alone=alone), camera_of(line)
 
 
-def is_looked_at(text: str) -> bool:
-    return bool(_settings(text))
-
-
-def _settings(text: str) -> str:
+def settings_of(text: str) -> str:
+    """Give the line of settings at the head of a scene file; empty where there is none."""
     head = _HEAD.match(text)
     return "&".join(filter(None, _LINES.findall(head[0] if head else "")))
 
@@ -99,9 +96,7 @@ def state_to_link(state: AppState, camera: CameraMemory | None, known: Known) ->
 
 
 def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
-    if link := named_link(state, camera, known):
-        return link
-    return _packed(state, camera)
+    return named_link(state, camera, known) or _packed(state, camera)
 
 
 def _packed(state: AppState, camera: CameraMemory | None) -> str:
@@ -161,26 +156,15 @@ def _unpack(packed: str) -> str:
 # --- The line of settings -------------------------------------------------------------------------
 
 
-SAVED = ("amplitudes.", "positions.", "exaggeration", "loop", "placed", "specification.limit_um")
-
-
 def settings_line(
-    state: AppState,
-    camera: CameraMemory | None = None,
-    known: Known = None,
-    *,
-    whole: bool = False,
+    state: AppState, camera: CameraMemory | None = None, known: Known = None, *, rest: bool = False
 ) -> str:
-    """Spell what differs from the scene as opened; `whole` all that saving changes of a scene."""
-    opened = start_state(state.scene)
+    """Spell what differs from the scene as opened; `rest` from that scene at rest."""
+    opened = start_state(state.scene).at_rest() if rest else start_state(state.scene)
     pairs = [
         (leaf.linked, spell_value(leaf, now))
         for leaf in leaves(state).values()
-        if leaf.linked
-        and (
-            (now := stored(state, leaf.path)) != stored(opened, leaf.path)
-            or (whole and leaf.path.startswith(SAVED) and now != 0.0)
-        )
+        if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
     ]
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
@@ -249,7 +233,7 @@ def view_of(state: AppState, camera: CameraMemory | None) -> str:
     link = "" if _is_plain(state) else _packed(shown, camera)
     # curves of thousands of points are left to the scene
     fits = 0 < len(link) <= MAX_NOTE_VIEW
-    return link if fits else settings_line(shown, camera, whole=True)
+    return link if fits else settings_line(shown, camera, rest=True)
 
 
 def kept_views(state: AppState) -> tuple[Note, ...]:

@@ -424,9 +424,11 @@ class AppState:
         return replace(self.with_edited(changed), amplitudes=self.start)
 
     def at_rest(self) -> "AppState":
-        """Give the state from which a line that spells all that is not zero is read."""
-        positions = dict.fromkeys(self.positions, 0.0)
-        return replace(self.zeroed(), positions=positions, placed=False)
+        """Give what the view of a note is spelled from: nothing that is saved with the scene."""
+        at_zero = dict.fromkeys(self.positions, 0.0)
+        limit = replace(self.specification, limit_um=START_UM)
+        return replace(self.zeroed(), positions=at_zero, exaggeration=None, loop=Loop.TOOL,
+                       placed=False, specification=limit)  # fmt: skip
 
     def zeroed(self) -> "AppState":
         return replace(self, amplitudes=dict.fromkeys(self.amplitudes, 0.0))

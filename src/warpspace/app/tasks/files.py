@@ -137,7 +137,7 @@ class FilesWindow(JobWindow):
             self.context.offer_import(name, content)
             return
         opened, camera = scene_file.open_text(text, files.safe_name(name), name)
-        whole = is_robot or scene_file.is_looked_at(text)
+        whole = is_robot or scene_file.settings_of(text) != ""
         self.context.show_opened(opened, camera, whole=whole)
         self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 

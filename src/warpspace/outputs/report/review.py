@@ -24,7 +24,7 @@ from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
 from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r
 from warpspace.scene.model import Scene, second_order
-from warpspace.units import MINUS, spell, spell_short
+from warpspace.units import spell, spell_short, spell_signed
 
 UM, PERCENT = "\N{NO-BREAK SPACE}µm", "\N{NO-BREAK SPACE}%"
 _WORTH = 0.01  # share of the largest error that an adjustment must gain to be named
@@ -185,18 +185,9 @@ def _difference(first: ScenePicture, second: ScenePicture | None = None) -> Stat
     return scene_change(first, second).statistics
 
 
-def signed(value: float, digits: int = 3) -> str:
-    """Spell a computed number with its sign."""
-    return _signed(spell(value, digits))
-
-
 def given(value: float) -> str:
     """Spell a number that somebody has chosen, with its sign and without trailing zeros."""
-    return _signed(spell_short(value))
-
-
-def _signed(text: str) -> str:
-    return text if text == "0" or text.startswith(MINUS) else f"+{text}"
+    return ("+" if value > 0.0 else "") + spell_short(value)
 
 
 def volume_share(share: float) -> str:
@@ -261,8 +252,8 @@ def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings
             else f", and {share} of the volume is within the limit"
         )
     return (
-        f"Adjust {key} ({row.name}) from {given(found.present[key])} to {signed(value)} {row.unit}:"
-        f" the largest error falls from {spell(before)} to {spell(largest)}{UM}{then}."
+        f"Adjust {key} ({row.name}) from {given(found.present[key])} to {spell_signed(value)}"
+        f" {row.unit}: the largest error falls from {spell(before)} to {spell(largest)}{UM}{then}."
     )
 
 

@@ -41,7 +41,6 @@ from warpspace.outputs.report.review import (
     first_page,
     given,
     share_pictures,
-    signed,
 )
 from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.model import ScenePicture
@@ -57,7 +56,7 @@ from warpspace.picture.words import (
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
-from warpspace.units import spell, spell_short
+from warpspace.units import spell, spell_short, spell_signed
 
 HEIGHT_PX = 400
 OTHER_PX = {"comparison": 490, "slices": 490, "error-curves": 490, "concepts": 490, "repair": 490}
@@ -368,15 +367,15 @@ def explanation(reviewed: Reviewed) -> Table:
     for part in ranked[:MOST_ROWS]:
         row = parameter(part.key)
         value = f"{given(part.value)} {row.unit}"
-        numbers = map(signed, (*part.error_um, part.along_um))
+        numbers = map(spell_signed, (*part.error_um, part.along_um))
         rows.append((part.key, row.name, value, *numbers))
     if rest := ranked[MOST_ROWS:]:
         vector = np.sum([part.error_um for part in rest], axis=0)
         along = sum(part.along_um for part in rest)
-        rows.append((f"{len(rest)} more", "", "", *map(signed, (*vector, along))))
-    remainder = (signed(value, 2) for value in found.remainder_um)
+        rows.append((f"{len(rest)} more", "", "", *map(spell_signed, (*vector, along))))
+    remainder = (spell_signed(value, 2) for value in found.remainder_um)
     rows.append(("remainder", "second order", "", *remainder, ""))
-    rows.append(("total", "exact chain", "", *map(signed, found.error_um), ""))
+    rows.append(("total", "exact chain", "", *map(spell_signed, found.error_um), ""))
     worst = reviewed.statistics
     place = spell_point(own_axes(reviewed.scene, worst.max_at_axes), worst.max_at_mm)
     title = (
