@@ -42,6 +42,11 @@ class Volume:
         return np.tensordot(self.amplitudes, self.response, 1)
 
     @cached_property
+    def square_um2(self) -> Array:
+        """Present squared length of every node's error, [N], µm²."""
+        return np.einsum("nc,nc->n", self.error_um, self.error_um)
+
+    @cached_property
     def acting(self) -> tuple[int, ...]:
         """Indices of the errors that move any node at all in this loop."""
         largest = np.abs(self.response).max(axis=(1, 2), initial=0.0)
@@ -237,10 +242,10 @@ def _least_max_of_one(
     volume: Volume, index: int, bounds: Array, give_up_um: float
 ) -> Solution | None:
     """Do the same along one error: the planes are lines, and two of them give the next place."""
-    error, way = volume.error_um, volume.response[index]
+    way = volume.response[index]
     low, high = map(float, bounds)
-    products = np.stack([np.einsum("nc,nc->n", a, b) for a, b in
-                         ((error, error), (error, way), (way, way))])  # fmt: skip
+    along = (np.einsum("nc,nc->n", other, way) for other in (volume.error_um, way))
+    products = np.stack([volume.square_um2, *along])
     ends: dict[bool, tuple[float, float, float]] = {}  # place, value, slope where it falls, rises
     at, best, best_um = 0.0, 0.0, np.inf
     for _ in range(MOST_STEPS):

@@ -46,12 +46,14 @@ class Reach(Analysis):
         if not any(axes):
             raise OptionError("{limit_um}: the working volume of the scene is a point")
         keeps = field.norm_um <= self.limit_um
-        found = largest_box(keeps, [_lengths(scene.workspace.ranges, axis) for axis in axes])
+        ranges = scene.workspace.ranges
+        lengths = [float(np.ptp(ranges[axis])) if axis else 0.0 for axis in axes]
+        found = largest_box(keeps, lengths)
         watch(0.9)
         box = None
         if found is not None:
             box = {
-                axis: _span(scene.workspace.ranges[axis], ends, count)
+                axis: _span(ranges[axis], ends, count)
                 for axis, ends, count in zip(axes, found, keeps.shape, strict=True)
                 if axis
             }
@@ -61,7 +63,7 @@ class Reach(Analysis):
             box=box,
             keeps_um={f"{part:.0%}": share_within(field, part) for part in SHARES},
             title=scene.title,
-            ranges={axis: scene.workspace.ranges[axis] for axis in axes if axis},
+            ranges={axis: ranges[axis] for axis in axes if axis},
         )
 
 
@@ -129,10 +131,6 @@ def _longest_run(row: NDArray[np.bool_]) -> tuple[int, int] | None:
 
 def _extent(ends: tuple[int, int], step: float) -> float:
     return (ends[1] - ends[0]) * step or 1.0
-
-
-def _lengths(ranges: Mapping[str, tuple[float, float]], axis: str) -> float:
-    return float(np.ptp(ranges[axis])) if axis else 0.0
 
 
 def _span(ends: tuple[float, float], nodes: tuple[int, int], count: int) -> tuple[float, float]:

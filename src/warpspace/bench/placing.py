@@ -10,7 +10,7 @@ from warpspace.bench.plan import Plan, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import AxisFrames, branch_frames, branch_pose, nominal_point
-from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import direction_index, parameter
 from warpspace.machine.description import Machine
 from warpspace.scene.model import Scene
@@ -107,8 +107,8 @@ def following_axes(model: Model) -> tuple[str, str, str]:
 
 def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> dict[str, Array]:
     """Hold the nominal tool point on points of the workpiece frame, [..., 3], as TCP does."""
-    names = following_axes(model)
-    start = dict(coordinates)
+    names, shape = following_axes(model), batch_shape(coordinates)
+    start = {name: np.broadcast_to(values, shape) for name, values in coordinates.items()}
 
     def gap(at: Coordinates) -> Array:
         target = transforms.apply(branch_pose(model, "workpiece", at), target_mm)
@@ -242,11 +242,7 @@ def default_ball(
 def followed(
     scene: Scene, model: Model, axis: str, angle_deg: Array, ball_mm: Array, stand: Coordinates
 ) -> dict[str, Array]:
-    coordinates = {
-        name: np.broadcast_to(values, angle_deg.shape)
-        for name, values in {**stand, axis: angle_deg}.items()
-    }
-    coordinates = follow(model, coordinates, ball_mm)
+    coordinates = follow(model, {**stand, axis: angle_deg}, ball_mm)
     check_travel(scene, coordinates, f"the path about {axis}")
     return coordinates
 
@@ -273,12 +269,7 @@ def reachable(
             raise OptionError(f"{axis} from {first:g} to {last:g}°; expected start below end")
         return np.linspace(first, last, points)
     fine = np.unique(np.append(np.linspace(low, high, 721), here))
-    coordinates = {
-        name: np.broadcast_to(values, fine.shape) for name, values in {**stand, axis: fine}.items()
-    }
-    inside = np.broadcast_to(
-        within_travel(scene.machine, follow(model, coordinates, ball_mm)), fine.shape
-    )
+    inside = within_travel(scene.machine, follow(model, {**stand, axis: fine}, ball_mm))
     at_here = int(np.searchsorted(fine, here))
     if not inside[at_here]:
         spelled = ", ".join(f"{value:.4g}" for value in ball_mm)

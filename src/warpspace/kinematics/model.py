@@ -72,10 +72,6 @@ class Convention(ABC):
         """
 
     @property
-    def short_words(self) -> str:
-        return f"component errors {self.place}"
-
-    @property
     def sentence(self) -> str:
         return f"Component errors {self.meaning} ({self.place})."
 

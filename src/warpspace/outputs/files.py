@@ -134,7 +134,10 @@ def clear_leftovers(folder: Path) -> None:
         for path in found:
             with suppress(OSError):
                 if _is_left_over(path):
-                    _remove(path)
+                    if stat.S_ISDIR(path.lstat().st_mode):
+                        shutil.rmtree(path, ignore_errors=True)
+                    else:
+                        path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -164,13 +167,6 @@ def _runs(process: int) -> bool:
     except (OSError, OverflowError):
         return True
     return True
-
-
-def _remove(path: Path) -> None:
-    if stat.S_ISDIR(path.lstat().st_mode):
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
 
 
 def _machine() -> str:

@@ -74,14 +74,6 @@ class DifferencePicture(ScenePicture):
         }
 
 
-def check_same_nodes(first: ScenePicture, second: ScenePicture) -> None:
-    if not same_nodes(first.field.nominal_mm, second.field.nominal_mm):
-        raise OptionError(
-            f"{first.scene.name} and {second.scene.name} cannot be compared: their working volumes"
-            " differ ([workspace] of both must give the same box)"
-        )
-
-
 def statistics_change(a: Statistics, b: Statistics) -> dict[str, float]:
     """Subtract each statistic of A from that of B, µm, by the names of their attributes."""
     return {name: getattr(b, name) - getattr(a, name) for name in STATISTICS.values()}
@@ -125,7 +117,11 @@ def conditions_of_both(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
 
 def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
     """Subtract the errors of evaluated scene A from those of B, B − A."""
-    check_same_nodes(a, b)
+    if not same_nodes(a.field.nominal_mm, b.field.nominal_mm):
+        raise OptionError(
+            f"{a.scene.name} and {b.scene.name} cannot be compared: their working volumes"
+            " differ ([workspace] of both must give the same box)"
+        )
     scene = replace(
         a.scene,
         name=f"{b.scene.name} minus {a.scene.name}",

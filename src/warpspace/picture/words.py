@@ -124,7 +124,7 @@ def convention_groups(model: Model) -> tuple[tuple[Convention, tuple[str, ...]],
 def convention_words(scene: Scene) -> str:
     groups = convention_groups(scene.model)
     if len(groups) == 1:
-        return groups[0][0].short_words
+        return f"component errors {groups[0][0].place}"
     parts = [f"{convention.place} of {' '.join(axes)}" for convention, axes in groups]
     return f"component errors {', '.join(parts)}"
 

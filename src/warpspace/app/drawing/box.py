@@ -96,7 +96,9 @@ class BoxLayer:
         opened = Identity(mesh.triangles), scale.diverging, Identity(picture.grid.nominal_mm)
         if opened != self._opened:
             self._opened = opened
-            self._page.run_script(_open_script(picture, mesh.vertices_mm))
+            colours = packed(level_colours(diverging=scale.diverging))
+            facts = {"palette": colours, **line_facts(picture, mesh.vertices_mm)}
+            self._page.run_script(f"warpspaceMesh.open({json.dumps(facts)});")
         points = packed(mesh.vertices_mm.astype("<f4"))
         self._page.run_script(
             f'warpspaceMesh.bend("{points}","{packed(colour_levels(scale, mesh.values))}");'
@@ -124,12 +126,6 @@ def only_bent(held: LivePicture, picture: LivePicture) -> bool:
         and not after.look.isolines and not after.look.pass_fail
         and after.look.surface in ("surface", "cut")
     )  # fmt: skip
-
-
-def _open_script(picture: LivePicture, vertices_mm: Array) -> str:
-    colours = packed(level_colours(diverging=picture.scale.diverging))
-    facts = {"palette": colours, **line_facts(picture, vertices_mm)}
-    return f"warpspaceMesh.open({json.dumps(facts)});"
 
 
 def line_facts(picture: LivePicture, vertices_mm: Array) -> dict[str, object]:

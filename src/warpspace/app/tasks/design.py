@@ -338,7 +338,8 @@ class ConceptsPart(AnalysisPart):
         elif word == "remove" and value in chosen:
             chosen.remove(value)
         elif word == "open" and value in offers and value != PRESENT:
-            self.context.act(partial(self._open, offers[value]))
+            opened = start_state(offers[value])
+            self.context.act(partial(self.context.show_opened, opened, None, whole=False))
             return state
         elif word == "sheet":
             self._draw(state)
@@ -347,9 +348,6 @@ class ConceptsPart(AnalysisPart):
             return super().take(state, word, value)
         self._answer = None  # other machines are compared
         return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
-
-    def _open(self, scene: Scene) -> None:
-        self.context.show_opened(start_state(scene), None, whole=False)
 
     def _draw(self, state: AppState) -> None:
         draw, found = self.context.services.draw_concepts, self._answer

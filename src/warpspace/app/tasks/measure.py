@@ -112,16 +112,13 @@ class FilesPart(AnalysisPart):
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "file":
-            self.attempt(partial(self._receive, value))
+            self.attempt(lambda: self.received(*read_upload(value, MOST_BYTES, WHAT)))
         elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
             self.context.act(self._again)
         else:
             return super().take(state, word, value)
         return state
-
-    def _receive(self, value: str) -> None:
-        self.received(*read_upload(value, MOST_BYTES, WHAT))
 
 
 # --- Standard tests -------------------------------------------------------------------------------

@@ -51,15 +51,9 @@ class BallPlate(BenchTest):
     positions: int = option(3, "Positions of the plate along the third axis", low=1, high=10)
 
     def plan(self, scene: Scene) -> Plan:
-        number, row, column = self._grid()
-        return self._lay(scene, number, row, column)
-
-    def _grid(self) -> tuple[Array, Array, Array]:
-        grid = np.meshgrid(
-            np.arange(self.positions), np.arange(self.balls), np.arange(self.balls), indexing="ij"
-        )
-        number, row, column = (part.reshape(-1).astype(float) for part in grid)
-        return number, row, column
+        balls = np.arange(self.balls)
+        grid = np.meshgrid(np.arange(self.positions), balls, balls, indexing="ij")
+        return self._lay(scene, *(part.reshape(-1).astype(float) for part in grid))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
         problems: list[str] = []

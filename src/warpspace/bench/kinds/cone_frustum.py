@@ -75,9 +75,7 @@ def orient(
     for column, (low, high) in enumerate(limits):
         if high - low >= 360.0 - 1e-9:
             found[:, column] = low + np.mod(found[:, column] - low, 360.0)
-    shape = (len(wanted),)
-    coordinates = {name: np.broadcast_to(values, shape) for name, values in stand.items()}
-    return {**coordinates, names[0]: found[:, 0], names[1]: found[:, 1]}
+    return {**stand, names[0]: found[:, 0], names[1]: found[:, 1]}
 
 
 def _newton(direction: Callable[[Array], Array], start: Array, target: Array) -> Array:

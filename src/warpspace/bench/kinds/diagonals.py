@@ -51,12 +51,6 @@ def means_along(position: Array, way: Array, readings: Array) -> dict[str, Array
     return found
 
 
-def steps_by_axis(axis: Array, readings: Array) -> dict[str, float]:
-    """Add up what the steps of each axis contribute along a step diagonal, µm."""
-    steps = np.diff(readings, prepend=readings[:1])
-    return {name: float(steps[axis == index].sum()) for index, name in enumerate("XYZ")}
-
-
 def squareness_of_diagonals(plan: Plan, names: Sequence[str], lengths: Array) -> dict[str, float]:
     """Squareness errors that the lengths of diagonals look like, µrad.
 
@@ -275,7 +269,10 @@ class Diagonals(BenchTest):
             if "reversal" in there:
                 row["B_um"] = float(np.abs(there["reversal"]).max())
             if self.kind == "step":
-                row["by_axis_um"] = steps_by_axis(plan.marks["axis"][chosen], readings[chosen])
+                # what the steps of each axis contribute
+                steps = np.diff(readings[chosen], prepend=readings[chosen][:1])
+                axis = plan.marks["axis"][chosen]
+                row["by_axis_um"] = {x: float(steps[axis == i].sum()) for i, x in enumerate("XYZ")}
             rows.append(row)
         quantities = [
             Quantity("E_um", "largest systematic deviation E", _largest(rows, "E_um"), "µm"),

@@ -162,9 +162,10 @@ def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
     return merge([_read_one(source, options) for source in sources])
 
 
-FORMAT = Format(
-    **described(NAME),
-    recognise=has(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
-    read=read,
+FORMATS = (
+    Format(
+        **described(NAME),
+        recognise=has(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
+        read=read,
+    ),
 )
-FORMATS = (FORMAT,)

@@ -197,7 +197,9 @@ def _draw(
         for body in bodies:
             _add_body(plotter, body)
         if any(body.shaded for body in bodies):
-            _add_light(plotter, projection)
+            way = projection.towards + 1.1 * projection.up - 0.7 * projection.right
+            light = {"focal_point": (0.0, 0.0, 0.0), "light_type": "scene light"}
+            plotter.add_light(pv.Light(position=tuple(way), **light))
         camera = plotter.camera
         camera.parallel_projection = True
         camera.position = focus + (1.0 - near) * projection.towards
@@ -263,15 +265,6 @@ def _add_body(plotter: "pv.Plotter", body: Body) -> None:
             "show_scalar_bar": False,
         }
     plotter.add_mesh(mesh, copy_mesh=False, reset_camera=False, render=False, **look)
-
-
-def _add_light(plotter: "pv.Plotter", projection: Projection) -> None:
-    import pyvista as pv
-
-    direction = projection.towards + 1.1 * projection.up - 0.7 * projection.right
-    plotter.add_light(
-        pv.Light(position=tuple(direction), focal_point=(0.0, 0.0, 0.0), light_type="scene light")
-    )
 
 
 STEP_PX = 1.5
