@@ -13,16 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError
-from warpspace.machine.limits import (
-    MAX_MESH_DEPTH,
-    MAX_MESH_HEADER,
-    MAX_MESH_LISTS,
-    MAX_MESH_MB,
-    MAX_MESH_PARTS,
-    MAX_MESH_WORDS,
-    MAX_SOLIDS,
-    MAX_TRIANGLES,
-)
+from warpspace.machine import limits
 from warpspace.units import Array
 
 # A small file can ask for much.
@@ -58,12 +49,12 @@ def _limit(count: int, limit: int, what: str) -> None:
 
 def _count_stl(data: bytes) -> None:
     if _is_binary(data):
-        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, MAX_TRIANGLES, "triangles")
+        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, limits.MAX_TRIANGLES, "triangles")
         return
     _count_text(data)
     text = data.lower()
-    _limit(text.count(b"endsolid"), MAX_SOLIDS, "solids")
-    _limit(text.count(b"vertex") // 3, MAX_TRIANGLES, "triangles")
+    _limit(text.count(b"endsolid"), limits.MAX_SOLIDS, "solids")
+    _limit(text.count(b"vertex") // 3, limits.MAX_TRIANGLES, "triangles")
 
 
 def _is_binary(data: bytes) -> bool:
@@ -72,10 +63,10 @@ def _is_binary(data: bytes) -> bool:
 
 
 def _count_text(data: bytes) -> int:
-    _limit(data.count(b"\n"), MAX_MESH_LISTS, "lines")
+    _limit(data.count(b"\n"), limits.MAX_MESH_LISTS, "lines")
     blank = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
     words = int(np.count_nonzero(blank[:-1] & ~blank[1:]))
-    _limit(words, MAX_MESH_WORDS, "words")
+    _limit(words, limits.MAX_MESH_WORDS, "words")
     return words
 
 
@@ -83,7 +74,7 @@ def _count_obj(data: bytes) -> None:
     _count_text(data)
     faces = _FACE.finditer(data.decode())
     triangles = sum(max(len(face[1].split()) - 2, 0) for face in faces)
-    _limit(triangles, MAX_TRIANGLES, "triangles")
+    _limit(triangles, limits.MAX_TRIANGLES, "triangles")
 
 
 def _count_ply(data: bytes) -> None:
@@ -91,7 +82,7 @@ def _count_ply(data: bytes) -> None:
     is_text = b"ascii" in data[:100].lower()
     while at < len(data):
         end = data.find(b"\n", at) + 1 or len(data)
-        _limit(end, MAX_MESH_HEADER[".ply"], "bytes of header")
+        _limit(end, limits.MAX_MESH_HEADER[".ply"], "bytes of header")
         words = data[at:end].decode("utf-8", "replace").split()
         at = end
         if "end_header" in words:
@@ -99,7 +90,7 @@ def _count_ply(data: bytes) -> None:
         if len(words) == 3 and "element" in words[0]:
             rows = max(int(words[2]), 0)
             total += rows
-            _limit(rows, 3 * MAX_TRIANGLES, f"rows of {words[1][:40]!r}")
+            _limit(rows, 3 * limits.MAX_TRIANGLES, f"rows of {words[1][:40]!r}")
         elif len(words) == 3 and "property" in words[0]:
             scalars += rows * (1 if is_text else _PLY_BYTES.get(words[1], 4))
         elif len(words) == 5 and "property" in words[0]:
@@ -108,36 +99,36 @@ def _count_ply(data: bytes) -> None:
         _limit(data.count(b"\n", at), total + 100, "lines")
     held = _count_text(data[at:]) if is_text else (len(data) - at) // smallest
     scalars //= 1 if is_text else smallest
-    _limit(held - scalars, MAX_MESH_LISTS, "numbers in lists")
+    _limit(held - scalars, limits.MAX_MESH_LISTS, "numbers in lists")
 
 
 def _count_glb(data: bytes) -> None:
     size = int.from_bytes(data[12:16], "little")
     if data[:4] != b"glTF" or size > len(data):
         return  # whoever reads it says what it is not
-    _limit(size, MAX_MESH_HEADER[".glb"], "bytes of description")
+    _limit(size, limits.MAX_MESH_HEADER[".glb"], "bytes of description")
     rest, chunks = 20 + size, 0
-    while rest + 8 <= len(data) and chunks <= MAX_MESH_PARTS:
+    while rest + 8 <= len(data) and chunks <= limits.MAX_MESH_PARTS:
         rest += 8 + int.from_bytes(data[rest : rest + 4], "little")
         chunks += 1
-    _limit(chunks, MAX_MESH_PARTS, "chunks")
+    _limit(chunks, limits.MAX_MESH_PARTS, "chunks")
     held = json.loads(data[20 : 20 + size])
     for name, entries in held.items():
         if isinstance(entries, list):
-            _limit(len(entries), MAX_MESH_PARTS, name)  # pyright: ignore[reportUnknownArgumentType]
+            _limit(len(entries), limits.MAX_MESH_PARTS, name)  # pyright: ignore[reportUnknownArgumentType]
     primitives = [mesh["primitives"] for mesh in held.get("meshes", [])]
-    _limit(sum(map(len, primitives)), MAX_MESH_PARTS, "primitives")
+    _limit(sum(map(len, primitives)), limits.MAX_MESH_PARTS, "primitives")
     accessors = [max(int(accessor["count"]), 0) for accessor in held.get("accessors", [])]
-    _limit(sum(accessors), MAX_MESH_LISTS, "points and indices")
+    _limit(sum(accessors), limits.MAX_MESH_LISTS, "points and indices")
     stored = sum(max(int(view["byteLength"]), 0) for view in held.get("bufferViews", []))
-    _limit(stored, MAX_MESH_MB * 1_000_000, "bytes in views of its data")
+    _limit(stored, limits.MAX_MESH_MB * 1_000_000, "bytes in views of its data")
     placed = [primitive for mesh in _placed(held) for primitive in primitives[mesh]]
-    _limit(len(placed), MAX_MESH_PARTS, "primitives, each placing counted")
+    _limit(len(placed), limits.MAX_MESH_PARTS, "primitives, each placing counted")
     corners = sum(
         accessors[part["indices"] if "indices" in part else part["attributes"]["POSITION"]]
         for part in placed
     )
-    _limit(corners // 3, MAX_TRIANGLES, "triangles, each placing counted")
+    _limit(corners // 3, limits.MAX_TRIANGLES, "triangles, each placing counted")
 
 
 def _placed(held: Any) -> Iterator[int]:
@@ -152,14 +143,14 @@ def _placed(held: Any) -> Iterator[int]:
         if node in seen:
             raise OptionError(f"it holds node {node} twice in its scene; expected a tree of nodes")
         seen.add(node)
-        _limit(depth, MAX_MESH_DEPTH, "nodes below each other")
+        _limit(depth, limits.MAX_MESH_DEPTH, "nodes below each other")
         waiting += [(child, depth + 1) for child in nodes[node].get("children", [])]
         if "mesh" in nodes[node]:
             yield nodes[node]["mesh"]
 
 
 def _count_dae(data: bytes) -> None:
-    _limit(data.count(b"<"), 2 * MAX_MESH_PARTS, "XML tags")
+    _limit(data.count(b"<"), 2 * limits.MAX_MESH_PARTS, "XML tags")
     _limit(data.count(b"<instance_node"), _DAE_REFERENCES, "nodes by reference")
     _count_text(data)
 
@@ -217,16 +208,16 @@ def _check_geometry(scene: Any) -> None:
         faces = np.asarray(getattr(mesh, "faces", ()))
         if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(mesh.vertices)):
             raise ValueError("a triangle names a vertex that is not there")
-        if len(faces) > MAX_TRIANGLES:
-            raise ValueError(f"{len(faces):,} triangles; expected at most {MAX_TRIANGLES:,}")
+        if len(faces) > limits.MAX_TRIANGLES:
+            raise ValueError(f"{len(faces):,} triangles; expected at most {limits.MAX_TRIANGLES:,}")
 
 
 def open_meshes(path: Path, what: str) -> Any:
     try:
         size = path.stat().st_size
-        if size > MAX_MESH_MB * 1_000_000:
+        if size > limits.MAX_MESH_MB * 1_000_000:
             raise OptionError(
-                f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {MAX_MESH_MB} MB. "
+                f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {limits.MAX_MESH_MB} MB. "
                 "Reduce its triangles before"
             )
         data = path.read_bytes()

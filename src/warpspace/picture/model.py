@@ -16,17 +16,6 @@ from warpspace.field.evaluate import ErrorField, View, placed_words, second_orde
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.geometry import surfaces
 from warpspace.geometry.colour import SYMBOLS, ColourScale, build_scale, component_values
-from warpspace.geometry.surfaces import (
-    MIN_CUT_NODES,
-    Shape,
-    auto_exaggeration,
-    crease_lines,
-    cut_faces,
-    deform,
-    face_axis,
-    face_lines,
-    outer_faces,
-)
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import EXAGGERATION
@@ -47,7 +36,7 @@ CUT_CORNER = (1, 0, 1)
 
 def map_faces(shape: surfaces.Shape, *, cut: bool = False) -> list[surfaces.Index]:
     """List the patches of the surface that is drawn, whole or without the octant cut away."""
-    return cut_faces(shape, CUT_CORNER) if cut else outer_faces(shape)
+    return surfaces.cut_faces(shape, CUT_CORNER) if cut else surfaces.outer_faces(shape)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +66,8 @@ def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
             if on:
                 outwards[np.unique(np.concatenate([f.ravel() for f in on])), axis] += sign
     every = tuple(map(surfaces.line_spacing, shape))
-    lines = face_lines(faces, shape, (every[0], every[1], every[2]))
-    grid, edges = surfaces.segments(lines), surfaces.segments(crease_lines(faces, shape))
+    lines = surfaces.face_lines(faces, shape, (every[0], every[1], every[2]))
+    grid, edges = surfaces.segments(lines), surfaces.segments(surfaces.crease_lines(faces, shape))
     return Topology(
         surfaces.triangulate(faces),
         grid,
@@ -96,7 +85,7 @@ def _normal(face: surfaces.Index, shape: surfaces.Shape) -> Array:
         for index in (face[0, 0], face[-1, 0], face[0, -1])
     )
     normal = np.zeros(3)
-    normal[face_axis(face, shape)] = 1.0
+    normal[surfaces.face_axis(face, shape)] = 1.0
     return normal * np.sign(np.cross(down - corner, right - corner) @ normal)
 
 
@@ -138,7 +127,7 @@ class Picture:
         return self.quantity == "orientation"
 
     @property
-    def shape(self) -> Shape:
+    def shape(self) -> surfaces.Shape:
         return self.grid.shape
 
     @property
@@ -170,7 +159,7 @@ class Picture:
     @cached_property
     def drawn_mm(self) -> Array:
         """Where the nodes are drawn, [nx, ny, nz, 3], mm."""
-        return deform(self.grid.nominal_mm, self.field.error_um, self.exaggeration)
+        return surfaces.deform(self.grid.nominal_mm, self.field.error_um, self.exaggeration)
 
 
 P = TypeVar("P", bound=Picture)
@@ -259,10 +248,14 @@ VIEW_WORDS = {
 }
 
 
-def view_words(view: str, shape: Shape) -> str:
+def view_words(view: str, shape: surfaces.Shape) -> str:
     """Say where the volume is looked at from, and what of it is cut away."""
     if view == "iso":
-        return "octant towards the viewer cut away" if min(shape) >= MIN_CUT_NODES else "iso view"
+        return (
+            "octant towards the viewer cut away"
+            if min(shape) >= surfaces.MIN_CUT_NODES
+            else "iso view"
+        )
     return VIEW_WORDS[view]
 
 
@@ -289,7 +282,7 @@ def choose_exaggeration(
 ) -> float:
     """Choose the display factor of a picture, or of several that share one."""
     given = given_exaggeration(wanted, own)
-    return auto_exaggeration(largest_um, size_mm) if given is None else given
+    return surfaces.auto_exaggeration(largest_um, size_mm) if given is None else given
 
 
 LEAST_SIZE_MM = 100.0  # of a single point without traces, on a machine without linear axes

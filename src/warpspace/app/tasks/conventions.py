@@ -22,17 +22,9 @@ from warpspace.app.tasks.parts import Section
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, evaluate_first_order
 from warpspace.field.grid import build_grid
-from warpspace.kinematics import transforms
+from warpspace.kinematics import conversion, transforms
 from warpspace.kinematics.axis_errors import AxisErrors
 from warpspace.kinematics.chain import branch_frames, nominal_point
-from warpspace.kinematics.conversion import (
-    ReferenceLine,
-    SquarenessSign,
-    convert_squareness,
-    fit_line,
-    line_positions,
-    move_measuring_line,
-)
 from warpspace.kinematics.model import Loop, Model, convention_names, find_convention
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
 from warpspace.machine.description import Vector
@@ -190,8 +182,8 @@ def convention_costs(scene: Scene, view: View, nodes: int = 21) -> dict[str, Eff
         name: field_of(ErrorSet(changes), TravelDirection.MEAN)
         for name, changes in _changes(scene).items()
     }
-    for sign in SquarenessSign:
-        read = convert_squareness(scene.machine, scene.errors, sign)
+    for sign in conversion.SquarenessSign:
+        read = conversion.convert_squareness(scene.machine, scene.errors, sign)
         found[f"squareness={sign}"] = field_of(read) - own
     with suppress(OptionError):
         found["measuring_line"] = field_of(_measured_in_the_middle(scene)) - own
@@ -202,16 +194,21 @@ def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
     """Give by how much curves differ whose lines or values in the middle were taken out."""
     errors, axes = scene.errors, scene.machine.axes
     middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
-    found = {name: dict[str, ErrorFunction]() for name in ("zero_at", *map(str, ReferenceLine))}
+    found = {
+        name: dict[str, ErrorFunction]()
+        for name in ("zero_at", *map(str, conversion.ReferenceLine))
+    }
     for row in map(parameter, errors):
         axis, span = axes[row.axis], scene.axis_span(row.axis)
         if not row.is_constant:
             there = errors.evaluate_at(row.key, middle, scene.model.direction)
             found["zero_at"][row.key] = Constant(span, -float(there))
             if axis.is_linear and not row.is_rotation and row.direction != axis.index:
-                at = line_positions(AxisErrors(scene.model, errors, row.axis, span), row.key)
-                for line in ReferenceLine:
-                    offset, slope = fit_line(at, errors.evaluate(row.key, at), line)
+                at = conversion.line_positions(
+                    AxisErrors(scene.model, errors, row.axis, span), row.key
+                )
+                for line in conversion.ReferenceLine:
+                    offset, slope = conversion.fit_line(at, errors.evaluate(row.key, at), line)
                     found[line][row.key] = Poly(span, (-offset, -slope))
     return found
 
@@ -230,7 +227,7 @@ def _measured_in_the_middle(scene: Scene) -> ErrorSet:
             x, y, z = transforms.apply(transforms.inverse(frames.after), point).tolist()
             lines[frames.axis.name] = (x, y, z)
     spans = covered_spans(model, scene.workspace)
-    return move_measuring_line(model, scene.errors, spans, lines, to_origin=True)
+    return conversion.move_measuring_line(model, scene.errors, spans, lines, to_origin=True)
 
 
 # --- The section ----------------------------------------------------------------------------------

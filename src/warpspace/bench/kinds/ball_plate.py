@@ -8,17 +8,9 @@ import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
+from warpspace.bench import placing
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import XYZ, DataColumn, Table
-from warpspace.bench.placing import (
-    PLANES,
-    axis_vector,
-    find_plane,
-    following_axes,
-    plane_axes,
-    relative_point,
-    tool_points,
-)
 from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan, fit_setup
 from warpspace.exceptions import OptionError
 from warpspace.geometry.surfaces import round_down
@@ -81,8 +73,8 @@ class BallPlate(BenchTest):
         return self._lay(scene, given["position"], given["row"], given["column"]), readings
 
     def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> Plan:
-        first, second, _ = plane_axes(scene.machine, self.plane)
-        names = following_axes(scene.model)
+        first, second, _ = placing.plane_axes(scene.machine, self.plane)
+        names = placing.following_axes(scene.model)
         third = next(name for name in names if name not in (first, second))
         stand, model = self.stand(scene), self.model(scene)
         low, high = scene.workspace.ranges[third]
@@ -96,10 +88,10 @@ class BallPlate(BenchTest):
             third: heights[number.astype(int)],
         }
         count = len(number)
-        point = tool_points(model, coordinates, count)
-        axes = np.stack([axis_vector(model, stand, name) for name in names], -1)
-        seen = np.broadcast_to(relative_point(model, coordinates), (count, 3)) @ axes
-        sign = find_plane(model, stand, self.plane).sign
+        point = placing.tool_points(model, coordinates, count)
+        axes = np.stack([placing.axis_vector(model, stand, name) for name in names], -1)
+        seen = np.broadcast_to(placing.relative_point(model, coordinates), (count, 3)) @ axes
+        sign = placing.find_plane(model, stand, self.plane).sign
         marks = {"position": number, "row": row, "column": column}
         marks["gain_sign"] = np.full(count, sign)
         marks |= {f"seen_{axis}_mm": seen[:, index] for index, axis in enumerate("xyz")}
@@ -130,7 +122,7 @@ class BallPlate(BenchTest):
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
         rest = left_over(plan, readings)
-        first, second, key = PLANES[self.plane]
+        first, second, key = placing.PLANES[self.plane]
         sign = float(plan.marks["gain_sign"][0])
         seen = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[: len(rest)]
         number = plan.marks["position"][: len(rest)]
@@ -173,7 +165,7 @@ class BallPlate(BenchTest):
         return Outcome(quantities, {"positions": rows, "squareness_key": key})
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        first, second = PLANES[self.plane][:2]
+        first, second = placing.PLANES[self.plane][:2]
         columns = ["XYZ".index(name) for name in (first, second)]
         largest = max(float(np.abs(left_over(run.plan, run.readings)).max()) for run in runs)
         marks = runs[0].plan.marks

@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.description import Watch
 from warpspace.analysis.options import Axis, option
+from warpspace.bench import placing
 from warpspace.bench.base import BenchResult, BenchTest, Run, run_test
 from warpspace.bench.data import ANGLE, DIRECTION, DataColumn, Table
-from warpspace.bench.placing import (
-    PLANES,
-    find_plane,
-    lay_followed,
-    plane_axes,
-    relative_point,
-    tool_points,
-)
 from warpspace.bench.plan import RELATIVE, Outcome, Plan, Quantity, build_plan, simulate
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
@@ -191,14 +184,14 @@ class Circular(BenchTest):
     def _lay(self, scene: Scene, angle_deg: Array, sense: Array) -> Plan:
         if self.rotary:
             how = self.rotary, self.radius_mm, self.bar, self.stand(scene)
-            return lay_followed(scene, self.model(scene), *how, angle_deg, sense)
-        first, second, _ = plane_axes(scene.machine, self.plane)
+            return placing.lay_followed(scene, self.model(scene), *how, angle_deg, sense)
+        first, second, _ = placing.plane_axes(scene.machine, self.plane)
         if not 0.0 < self.radius_mm < np.inf:
             raise OptionError(f"radius: {self.radius_mm:g} mm; expected above 0")
         model, stand = self.model(scene), self.stand(scene)
         middle = {name: float(value) for name, value in stand.items()}
         check_circle(scene.workspace, middle, (first, second), self.radius_mm, angle_deg)
-        plane = find_plane(model, stand, self.plane)
+        plane = placing.find_plane(model, stand, self.plane)
         theta = np.deg2rad(angle_deg)
         coordinates = {
             **stand,
@@ -206,10 +199,10 @@ class Circular(BenchTest):
             second: middle[second] + self.radius_mm * np.sin(theta),
         }
         count = len(theta)
-        outward = relative_point(model, coordinates) - relative_point(model, stand)
+        outward = placing.relative_point(model, coordinates) - placing.relative_point(model, stand)
         outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
-        points = tool_points(model, coordinates, count)
-        centre = tool_points(model, stand, 1)
+        points = placing.tool_points(model, coordinates, count)
+        centre = placing.tool_points(model, stand, 1)
         # A little further on: at a point of reversal an axis is about to move.
         ahead = theta + sense * 1e-6
         return build_plan(
@@ -266,7 +259,7 @@ class Circular(BenchTest):
         quantities.append(Quantity("radius_um", "mean radius − nominal", radius, "µm"))
         details: dict[str, object] = {}
         if fit.squareness_urad is not None and not self.rotary:
-            first, second, key = PLANES[self.plane]
+            first, second, key = placing.PLANES[self.plane]
             quantities += [
                 Quantity("squareness_urad", f"squareness {key}", fit.squareness_urad, "µrad"),
                 Quantity(
@@ -421,14 +414,14 @@ def ballbar(
     >>> round(result.circular_deviation_um, 2), round(result.squareness_urad, 2)
     (6.86, 2.94)
     """
-    key = plane_axes(scene.machine, plane)[2]
+    key = placing.plane_axes(scene.machine, plane)[2]
     at = tuple((centre or {}).items())
     test = Circular(plane=cast("Any", plane), radius_mm=radius_mm, at=at, points=points)
     plan = test.plan(scene)
     fit = fit_circle_readings(plan, simulate(scene, plan, exact=False))
     stand = test.stand(scene)
     middle = evaluate_first_order(scene.model, scene.errors, stand, RELATIVE).error_um
-    found = find_plane(scene.model, stand, plane)
+    found = placing.find_plane(scene.model, stand, plane)
     there = [float(middle @ vector) for vector in (found.along, found.up)]
     back = fit.radial_um[points:][::-1]
     return Ballbar(

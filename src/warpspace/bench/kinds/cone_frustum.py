@@ -7,17 +7,10 @@ import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Vector, option
+from warpspace.bench import placing
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import ANGLE, DataColumn, Table
 from warpspace.bench.kinds.circular import fit_circle_readings
-from warpspace.bench.placing import (
-    ball_columns,
-    ball_point,
-    check_travel,
-    follow,
-    tool_points,
-    travels,
-)
 from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -141,7 +134,7 @@ class ConeFrustum(BenchTest):
             )
         model, stand = self.model(scene), self.stand(scene)
         middle = (
-            np.asarray(ball_point(model, stand))
+            np.asarray(placing.ball_point(model, stand))
             if self.centre is None
             else np.asarray(self.centre, dtype=float)
         )
@@ -152,8 +145,8 @@ class ConeFrustum(BenchTest):
         half = np.deg2rad(self.half_apex_deg)
         flank = np.cos(half) * leaning[:, 2] - np.sin(half) * outward
         coordinates = orient(scene.machine, model, stand, flank)
-        coordinates = follow(model, coordinates, middle + self.radius_mm * outward)
-        check_travel(scene, coordinates, "the cone")
+        coordinates = placing.follow(model, coordinates, middle + self.radius_mm * outward)
+        placing.check_travel(scene, coordinates, "the cone")
         pose = np.asarray(branch_pose(model, "workpiece", coordinates))
         direction = transforms.rotate(
             np.broadcast_to(pose, (len(theta), 4, 4))[..., :3, :3], outward
@@ -161,7 +154,7 @@ class ConeFrustum(BenchTest):
         spelled = ", ".join(f"{value:.4g}" for value in middle)
         return build_plan(
             coordinates,
-            tool_points(model, coordinates, len(theta)),
+            placing.tool_points(model, coordinates, len(theta)),
             direction,
             place=f"cone {2 * self.half_apex_deg:g}° tilted by {self.tilt_deg:g}° · radius"
             f" {self.radius_mm:g} mm about ({spelled}) mm",
@@ -172,9 +165,9 @@ class ConeFrustum(BenchTest):
                 "gain_sign": np.ones(len(theta)),
             },
             length_mm=self.radius_mm,
-            travel=travels(coordinates, np.ones(len(theta))),
+            travel=placing.travels(coordinates, np.ones(len(theta))),
             setup={
-                **ball_columns(model, coordinates, direction), "bar_um": np.ones(len(theta)),
+                **placing.ball_columns(model, coordinates, direction), "bar_um": np.ones(len(theta)),
             },
         )  # fmt: skip
 

@@ -8,20 +8,10 @@ import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, Vector, option
+from warpspace.bench import placing
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import ANGLE, XYZ, DataColumn, Table
 from warpspace.bench.kinds.circular import is_full
-from warpspace.bench.placing import (
-    axis_line,
-    ball_columns,
-    ball_point,
-    default_ball,
-    followed,
-    reachable,
-    rotary_axis,
-    tool_points,
-    travels,
-)
 from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan, fit_setup
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
@@ -76,7 +66,7 @@ class RotaryAxis(BenchTest):
     points: int = option(72, "Positions along the turn", low=8, high=3_600)
 
     def plan(self, scene: Scene) -> Plan:
-        axis = rotary_axis(scene.machine, self.axis)
+        axis = placing.rotary_axis(scene.machine, self.axis)
         low, high = scene.machine.axes[axis].travel
         full = high - low >= 360.0
         end = low + 360.0 if full else high
@@ -88,13 +78,13 @@ class RotaryAxis(BenchTest):
         return self._lay(scene, table["angle_deg"]), readings
 
     def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
-        axis, model = rotary_axis(scene.machine, self.axis), self.model(scene)
+        axis, model = placing.rotary_axis(scene.machine, self.axis), self.model(scene)
         stand = self.stand(scene)
-        line = axis_line(model, stand, axis)
+        line = placing.axis_line(model, stand, axis)
         height = self.height_mm
         if height is None:
             tool = transforms.apply(
-                branch_pose(model, "workpiece", stand), ball_point(model, stand)
+                branch_pose(model, "workpiece", stand), placing.ball_point(model, stand)
             )
             height = float((tool - line.origin_mm) @ line.direction)
         count = len(angle_deg)
@@ -252,7 +242,7 @@ class Sphere(BenchTest):
     def plan(self, scene: Scene) -> Plan:
         axis, ball = self._set_up(scene)
         where = scene, self.model(scene), axis, ball, self.stand(scene)
-        return self._lay(scene, reachable(*where, self.start, self.end, self.points))
+        return self._lay(scene, placing.reachable(*where, self.start, self.end, self.points))
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
         table.check_angles(4, "way")
@@ -260,15 +250,15 @@ class Sphere(BenchTest):
         return self._lay(scene, table["angle_deg"]), readings
 
     def _set_up(self, scene: Scene) -> tuple[str, Array]:
-        axis = rotary_axis(scene.machine, self.axis)
+        axis = placing.rotary_axis(scene.machine, self.axis)
         if self.ball is not None:
             return axis, np.asarray(self.ball, dtype=float)
-        return axis, default_ball(scene, self.model(scene), axis, self.stand(scene), None)
+        return axis, placing.default_ball(scene, self.model(scene), axis, self.stand(scene), None)
 
     def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
         axis, ball = self._set_up(scene)
         model = self.model(scene)
-        coordinates = followed(scene, model, axis, angle_deg, ball, self.stand(scene))
+        coordinates = placing.followed(scene, model, axis, angle_deg, ball, self.stand(scene))
         count = len(angle_deg)
         turned = np.broadcast_to(np.eye(3), (count, 3, 3))
         if self.frame == "workpiece":
@@ -278,7 +268,7 @@ class Sphere(BenchTest):
         spelled = ", ".join(f"{value:.4g}" for value in ball)
         return build_plan(
             coordinates,
-            tool_points(model, coordinates, count),
+            placing.tool_points(model, coordinates, count),
             direction,
             place=f"{axis} turns · ball at ({spelled}) mm of the workpiece · readings in"
             f" {'R' if self.frame == 'machine' else 'the workpiece frame'}",
@@ -287,8 +277,8 @@ class Sphere(BenchTest):
                 "channel": np.repeat(np.arange(3.0), count),
             },
             site=np.tile(np.arange(count), 3),
-            travel=travels(coordinates, np.ones(count)),
-            setup=ball_columns(model, coordinates, direction),
+            travel=placing.travels(coordinates, np.ones(count)),
+            setup=placing.ball_columns(model, coordinates, direction),
         )
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:

@@ -8,17 +8,9 @@ import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, option
+from warpspace.bench import placing
 from warpspace.bench.base import BenchTest, Run
 from warpspace.bench.data import ALONG, DataColumn, Table
-from warpspace.bench.placing import (
-    PLANES,
-    axis_vector,
-    find_plane,
-    linear_axis,
-    motion_direction,
-    plane_axes,
-    tool_points,
-)
 from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.conversion import fit_line
@@ -76,7 +68,7 @@ def lay_lines(
     coordinates, travel = dict(stand), dict[str, Array]()
     along, across = np.zeros(len(position)), np.zeros((len(position), 3))
     for number, (axis, direction) in enumerate(lines.items()):
-        forth = motion_direction(model, stand, axis)
+        forth = placing.motion_direction(model, stand, axis)
         if np.sort(np.abs(forth))[-2] > 1e-6:
             spelled = ", ".join(f"{value:.3f}" for value in np.abs(forth))
             raise OptionError(
@@ -85,13 +77,13 @@ def lay_lines(
         own = which == number
         coordinates[axis] = np.where(own, position, stand[axis])
         travel[axis] = np.where(own, way, 0.0)
-        sign = np.sign(forth @ axis_vector(model, stand, axis))
+        sign = np.sign(forth @ placing.axis_vector(model, stand, axis))
         along[own], across[own] = sign * position[own], direction
     zeros = [(which == number).astype(float) for number in range(len(lines))]
     first = next(iter(lines))
     return build_plan(
         coordinates,
-        tool_points(model, coordinates, len(position)),
+        placing.tool_points(model, coordinates, len(position)),
         across,
         place=f"{first} · {test.place_words(scene, [first])}",
         marks={"position_mm": position, "along_mm": along, "way": way},
@@ -130,8 +122,8 @@ class Straightness(BenchTest):
     points: int = option(21, "Positions along the axis", low=3, high=2_000)
 
     def directions(self, scene: Scene) -> tuple[str, int]:
-        axis = linear_axis(scene.machine, self.axis)
-        vector = axis_vector(scene.model, self.stand(scene), axis)
+        axis = placing.linear_axis(scene.machine, self.axis)
+        vector = placing.axis_vector(scene.model, self.stand(scene), axis)
         own = int(np.argmax(np.abs(vector)))
         if self.across and "xyz".index(self.across) == own:
             raise OptionError(
@@ -223,7 +215,7 @@ class Squareness(BenchTest):
     points: int = option(21, "Positions along each axis", low=3, high=2_000)
 
     def plan(self, scene: Scene) -> Plan:
-        axes = plane_axes(scene.machine, self.plane)[:2]
+        axes = placing.plane_axes(scene.machine, self.plane)[:2]
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
             scene,
@@ -233,7 +225,7 @@ class Squareness(BenchTest):
         )
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        axes = plane_axes(scene.machine, self.plane)[:2]
+        axes = placing.plane_axes(scene.machine, self.plane)[:2]
         expected = f"{axes[0]} or {axes[1]} (--plane {self.plane})"
         problems = table.unknown_words("line", axes, expected)
         which = np.array([float(word == axes[1]) for word in table.words["line"]])
@@ -250,7 +242,7 @@ class Squareness(BenchTest):
         return plan, table["deviation_um"][order]
 
     def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> Plan:
-        plane = find_plane(self.model(scene), self.stand(scene), self.plane)
+        plane = placing.find_plane(self.model(scene), self.stand(scene), self.plane)
         lines = {plane.first: plane.up, plane.second: plane.along}
         unknowns = (*(f"zero_{axis}_um" for axis in lines), "turned_urad")
         plan = lay_lines(self, scene, lines, which, position, way, unknowns)
@@ -258,7 +250,7 @@ class Squareness(BenchTest):
         return replace(plan, place=f"{self.plane} · {plan.place}", marks=marks)
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        key, sign = PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
+        key, sign = placing.PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
         lines = [found for _, _, found in _arms(plan, readings)]
         quantities: list[Quantity] = []
         for name in REFERENCES:

@@ -6,19 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpspace.geometry import surfaces
 from warpspace.geometry.colour import tick_values
-from warpspace.geometry.surfaces import (
-    Index,
-    box_edges,
-    corners,
-    crease_lines,
-    face_lines,
-    is_thin,
-    isoline_levels,
-    isolines,
-    line_spacing,
-    triangulate,
-)
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.drawing.canvas import (
     LEADER_FROM,
@@ -121,7 +110,7 @@ def draw_corners(stage: Stage) -> None:
     nominal, drawn = picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)
     length = np.linalg.norm(picture.field.error_um.reshape(-1, 3), axis=-1)
     worst = int(np.argmax(length))
-    found = corners(picture.shape).tolist()
+    found = surfaces.corners(picture.shape).tolist()
     depth = projection.depth_mm(nominal[found])
     front = float(depth.min()) + 0.02 * float(np.ptp(depth)) + 1.0
     wanted: list[tuple[str, Array, Array]] = []
@@ -196,9 +185,9 @@ def draw_map(
     return DrawnMap(projection, picture, raster)
 
 
-def surface_bodies(picture: Picture, faces: list[Index]) -> list[Body]:
+def surface_bodies(picture: Picture, faces: list[surfaces.Index]) -> list[Body]:
     """Give the coloured surface where it is drawn; nothing where a volume has none."""
-    surface = triangulate(faces)
+    surface = surfaces.triangulate(faces)
     if not len(surface.triangles):
         return []
     nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
@@ -267,27 +256,27 @@ def map_room_mm(picture: Picture) -> Array:
     return np.concatenate(points)
 
 
-def _draw_surface_lines(stage: Stage, faces: list[Index]) -> None:
+def _draw_surface_lines(stage: Stage, faces: list[surfaces.Index]) -> None:
     if not faces:
         return
     canvas, picture, taken = stage.canvas, stage.picture, stage.taken
     theme, shape = canvas.theme, picture.shape
     nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
-    nx, ny, nz = (line_spacing(count) for count in shape)
+    nx, ny, nz = (surfaces.line_spacing(count) for count in shape)
 
-    def visible(lines: Iterable[Index]) -> list[Array]:
+    def visible(lines: Iterable[surfaces.Index]) -> list[Array]:
         return stage.split(nodes[line] for line in lines)[0]
 
-    grid = visible(face_lines(faces, shape, (nx, ny, nz)))
+    grid = visible(surfaces.face_lines(faces, shape, (nx, ny, nz)))
     canvas.lines(grid, width=SIZES.hair, colour=theme.grid, alpha=0.42, zorder=2.0)
-    creases = visible(crease_lines(faces, shape))
+    creases = visible(surfaces.crease_lines(faces, shape))
     canvas.lines(creases, width=SIZES.line, colour=theme.grid, zorder=3.0)
     taken.add_lines(creases, LINE_COST)
     diverging = picture.scale.diverging
-    levels = isoline_levels(picture.scale)
+    levels = surfaces.isoline_levels(picture.scale)
     by_level: dict[float, list[Array]] = {}
     for face in faces:
-        for level, line in isolines(face, nodes, values, levels):
+        for level, line in surfaces.isolines(face, nodes, values, levels):
             by_level.setdefault(level, []).extend(stage.split([line])[0])
     colour = theme.grid if diverging else theme.isoline
     for level, lines in by_level.items():
@@ -301,7 +290,7 @@ def draw_lone_line(
     canvas: Canvas, picture: Picture, projection: Projection, taken: Occupancy | None = None
 ) -> None:
     """Draw a volume without area (one axis, or none that is linear) as a coloured line or point."""
-    if not is_thin(picture.shape):
+    if not surfaces.is_thin(picture.shape):
         return
     spots = projection.project(picture.drawn_mm.reshape(-1, 3))
     values = picture.values.reshape(-1)
@@ -321,7 +310,7 @@ def draw_lone_line(
 def _draw_ghost(stage: Stage) -> None:
     canvas, taken, theme = stage.canvas, stage.taken, stage.canvas.theme
     nodes = stage.picture.grid.nominal_mm.reshape(-1, 3)
-    seen, hidden = stage.split(nodes[edge] for edge in box_edges(stage.picture.shape))
+    seen, hidden = stage.split(nodes[edge] for edge in surfaces.box_edges(stage.picture.shape))
     canvas.lines(
         hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.6, dashes=GHOST_DASHES, zorder=3.2
     )

@@ -198,8 +198,7 @@ def _draw(
             _add_body(plotter, body)
         if any(body.shaded for body in bodies):
             way = projection.towards + 1.1 * projection.up - 0.7 * projection.right
-            light = {"focal_point": (0.0, 0.0, 0.0), "light_type": "scene light"}
-            plotter.add_light(pv.Light(position=tuple(way), **light))
+            plotter.add_light(pv.Light(position=tuple(way), focal_point=(0.0, 0.0, 0.0)))
         camera = plotter.camera
         camera.parallel_projection = True
         camera.position = focus + (1.0 - near) * projection.towards

@@ -9,17 +9,8 @@ import numpy as np
 from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
 from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
 from warpspace.field.grid import DEFAULT_NODES
+from warpspace.geometry import surfaces
 from warpspace.geometry.colour import srgb_to_linear
-from warpspace.geometry.surfaces import (
-    box_edges,
-    deform,
-    grid_lines,
-    is_thin,
-    line_spacing,
-    outer_surface,
-    segments,
-    spread_nodes,
-)
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.exports.fields import structured_grid
 from warpspace.outputs.files import write_atomically
@@ -69,16 +60,16 @@ def build_glb(picture: ScenePicture) -> bytes:
 def _placed(
     nominal_mm: Array, error_um: Array, exaggeration: float
 ) -> tuple[Array, dict[str, Array]]:
-    position = to_gltf(deform(nominal_mm, error_um, exaggeration))
+    position = to_gltf(surfaces.deform(nominal_mm, error_um, exaggeration))
     return position, {"nominal": to_gltf(error_um * (-exaggeration * MM_PER_UM))}
 
 
 def _surface(picture: ScenePicture) -> list[Part]:
     field = picture.field
     nominal = thick_nodes(picture, picture.grid.nominal_mm)
-    surface = outer_surface(nominal.shape[:3])
-    thin = is_thin(picture.shape)
-    at = spread_nodes(picture.shape)[surface.nodes] if thin else surface.nodes
+    surface = surfaces.outer_surface(nominal.shape[:3])
+    thin = surfaces.is_thin(picture.shape)
+    at = surfaces.spread_nodes(picture.shape)[surface.nodes] if thin else surface.nodes
     error = field.error_um.reshape(-1, 3)[at]
     position, back = _placed(nominal.reshape(-1, 3)[surface.nodes], error, picture.exaggeration)
     colours = picture.scale.colours(picture.values.reshape(-1)[at])
@@ -102,12 +93,17 @@ def _lines(picture: ScenePicture) -> list[Part]:
     grid = picture.grid
     nominal = grid.nominal_mm.reshape(-1, 3)
     error = picture.field.error_um.reshape(-1, 3)
-    x, y, z = (line_spacing(count) for count in grid.shape)
-    edges = segments(box_edges(grid.shape))
+    x, y, z = (surfaces.line_spacing(count) for count in grid.shape)
+    edges = surfaces.segments(surfaces.box_edges(grid.shape))
     ink, ghost = Material("line", INK), Material("ghost", GHOST)
     found: list[Part] = []
     for name, pairs, material, displaced in (
-        ("deformed_grid", segments(grid_lines(grid.shape, (x, y, z))), ink, error),
+        (
+            "deformed_grid",
+            surfaces.segments(surfaces.grid_lines(grid.shape, (x, y, z))),
+            ink,
+            error,
+        ),
         ("deformed_edges", edges, ink, error),
         ("ghost", edges, ghost, None),
     ):
@@ -256,12 +252,12 @@ def _surface_block(picture: ScenePicture, arrays: Mapping[str, Array]) -> "pv.Po
     import pyvista as pv
 
     drawn = picture.drawn_mm.reshape(-1, 3)
-    if is_thin(picture.shape):
+    if surfaces.is_thin(picture.shape):
         nodes = np.arange(len(drawn))
         # PyVista makes one vertex of a single point
         mesh = pv.PolyData(drawn) if len(nodes) == 1 else pv.MultipleLines(drawn)
     else:
-        surface = outer_surface(picture.grid.shape)
+        surface = surfaces.outer_surface(picture.grid.shape)
         nodes = surface.nodes
         mesh = pv.PolyData.from_regular_faces(drawn[nodes], surface.triangles)
     for name, values in arrays.items():

@@ -7,14 +7,8 @@ import numpy as np
 
 from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
 from warpspace.exceptions import OptionError
+from warpspace.geometry import surfaces
 from warpspace.geometry.colour import ColourScale, component_values
-from warpspace.geometry.surfaces import (
-    box_edges,
-    crease_lines,
-    face_lines,
-    line_spacing,
-    outer_faces,
-)
 from warpspace.kinematics.chain import BASE
 from warpspace.machine.description import Vector
 from warpspace.outputs.drawing.canvas import Canvas, Occupancy, draw_leader, write_label
@@ -95,7 +89,7 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     room = (left + side, bottom + side, right - canvas.px(150.0), top - side)
     projection = fit_projection(settings.view, np.concatenate(points), room)
     machine = draw_bodies(canvas, placed, projection)
-    volume = render_bodies(surface_bodies(picture, outer_faces(picture.shape)), projection)
+    volume = render_bodies(surface_bodies(picture, surfaces.outer_faces(picture.shape)), projection)
     if volume is not None:
         _overlay(canvas, volume, machine)
     _draw_volume_lines(canvas, picture, projection, volume, machine)
@@ -155,15 +149,17 @@ def _draw_volume_lines(
 ) -> None:
     theme, shape = canvas.theme, picture.shape
     nodes, nominal = picture.drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
-    faces = outer_faces(shape)
-    nx, ny, nz = (2 * line_spacing(count) for count in shape)
+    faces = surfaces.outer_faces(shape)
+    nx, ny, nz = (2 * surfaces.line_spacing(count) for count in shape)
     for lines, width, alpha in (
-        (face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
-        (crease_lines(faces, shape) or box_edges(shape), SIZES.line, 0.95),
+        (surfaces.face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
+        (surfaces.crease_lines(faces, shape) or surfaces.box_edges(shape), SIZES.line, 0.95),
     ):
         seen, _ = split_visible((nodes[line] for line in lines), projection, volume)
         canvas.lines(seen, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
-    parts = split_visible((nominal[edge] for edge in box_edges(shape)), projection, machine)
+    parts = split_visible(
+        (nominal[edge] for edge in surfaces.box_edges(shape)), projection, machine
+    )
     for lines, width, alpha in zip(parts, (SIZES.thin, SIZES.hair), (0.6, 0.3), strict=True):
         canvas.lines(
             lines, width=width, colour=theme.ink, alpha=alpha, dashes=GHOST_DASHES, zorder=2.2

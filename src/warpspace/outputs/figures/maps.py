@@ -10,17 +10,8 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import PLANES, build_slice, slice_ranges
+from warpspace.geometry import surfaces
 from warpspace.geometry.colour import ColourScale
-from warpspace.geometry.surfaces import (
-    Index,
-    box_edges,
-    corners,
-    crease_lines,
-    isoline_levels,
-    outer_faces,
-    round_down,
-    triangulate,
-)
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
 from warpspace.machine.axes import is_linear
@@ -100,7 +91,7 @@ def say_statistics(
 
 def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
     """Say how far apart isolines are; empty where there are none among the values."""
-    levels = isoline_levels(scale)
+    levels = surfaces.isoline_levels(scale)
     if values is not None:
         volume = sum(count > 1 for count in values.shape) > 1
         low, high = float(values.min()), float(values.max())
@@ -206,17 +197,17 @@ def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], re
     bodies: list[Body] = []
     creases: list[Array] = []
     for part in slices:
-        faces = outer_faces(part.shape)
+        faces = surfaces.outer_faces(part.shape)
         bodies += surface_bodies(replace(part, exaggeration=0.0), faces)
         points = part.grid.nominal_mm.reshape(-1, 3)
-        creases += [points[line] for line in crease_lines(faces, part.shape)]
+        creases += [points[line] for line in surfaces.crease_lines(faces, part.shape)]
     raster = render_bodies(bodies, projection)
     if raster is not None:
         draw_raster(canvas, raster)
     theme = canvas.theme
     seen, _ = split_visible(creases, projection, raster)
     canvas.lines(seen, width=SIZES.thin, colour=theme.grid, zorder=2.0)
-    edges = (nodes[edge] for edge in box_edges(picture.grid.shape))
+    edges = (nodes[edge] for edge in surfaces.box_edges(picture.grid.shape))
     seen, hidden = split_visible(edges, projection, raster)
     canvas.lines(seen, width=SIZES.thin, colour=theme.ghost, dashes=GHOST_DASHES)
     canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=GHOST_DASHES)
@@ -240,9 +231,9 @@ class Needles:
     lean: Array  # [N, 3]; exaggerated lean of its end, per length of the needle
     length_mm: float
     tilt_urad: Array  # [N]
-    feet: Index  # [n]; nodes where they stand
+    feet: surfaces.Index  # [n]; nodes where they stand
 
-    def ends_mm(self, nodes_mm: Array, at: Index) -> tuple[Array, Array]:
+    def ends_mm(self, nodes_mm: Array, at: surfaces.Index) -> tuple[Array, Array]:
         """Give nominal and drawn ends of needles, [n, 2, 3] each, mm."""
         foot = nodes_mm[at]
         nominal = np.stack([foot, foot + self.length_mm * self.axis[at]], 1)
@@ -303,7 +294,7 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
 def _lean_factor(largest_urad: float) -> float:
     if not largest_urad > 0.0:
         return 1000.0
-    return round_down(max(LEAN_RAD / (largest_urad * RAD_PER_URAD), 1.0))
+    return surfaces.round_down(max(LEAN_RAD / (largest_urad * RAD_PER_URAD), 1.0))
 
 
 def _needles(picture: ScenePicture, factor: float, view: str) -> Needles:
@@ -326,16 +317,16 @@ def _draw_needles(needles: Needles, stage: Stage) -> None:
         lines, _ = stage.split(ends)
         stage.canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
         stage.taken.add_lines(lines)
-    found = corners(stage.picture.shape)
+    found = surfaces.corners(stage.picture.shape)
     for corner, ends in zip(found, needles.ends_mm(nodes, found)[1], strict=True):
         if stage.split([ends])[0]:
             text = f"{spell(float(needles.tilt_urad[corner]))} {MICRORADIAN}"
             stage.label(text, [stage.projection.project(ends[1])])
 
 
-def _feet(content: Picture, view: str) -> Index:
+def _feet(content: Picture, view: str) -> surfaces.Index:
     shape = content.shape
-    surface = triangulate(map_faces(shape, cut=view == "iso")).nodes
+    surface = surfaces.triangulate(map_faces(shape, cut=view == "iso")).nodes
     surface = surface if len(surface) else np.arange(np.prod(shape))
     at = np.stack(np.unravel_index(surface, shape), -1)
     step = [max(1, (count - 1) // (NEEDLES - 1)) for count in shape]
