@@ -8,19 +8,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.allocating import (
-    MOST_STEPS,
-    SAMPLES,
-    Ensemble,
-    ScaleOf,
-    Task,
-    build_ensemble,
-    largest_scale,
-    refuse_many_points,
-    scaled,
-    scales_within,
-    search_widths,
-)
+from warpspace.analysis import allocating
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.cases import Case, Over, both_orders
 from warpspace.analysis.description import Change, Result, Watch, counting
@@ -246,7 +234,7 @@ def allocate(
     if plan.over == Over.MEAN:
         raise OptionError("{over} mean: expected sampled or max")
     if plan.over == Over.MAX:
-        refuse_many_points(case.view.loop)
+        allocating.refuse_many_points(case.view.loop)
     needed = machines_needed(plan.samples, asked.probability)
     if needed > plan.samples:
         raise OptionError(
@@ -256,18 +244,18 @@ def allocate(
     case = replace(case, plan=plan)
     # the search has machines of its own
     seed = int(np.random.SeedSequence((plan.seed, 1)).generate_state(1)[0])
-    few = replace(plan, samples=SAMPLES, seed=seed)
-    task = _task(draws, asked, build_ensemble(replace(case, plan=few)), widest)
+    few = replace(plan, samples=allocating.SAMPLES, seed=seed)
+    task = _task(draws, asked, allocating.build_ensemble(replace(case, plan=few)), widest)
     steps: list[None] = []
 
     def step() -> None:
         steps.append(None)
-        report(SEARCHED / MOST_STEPS)
+        report(SEARCHED / allocating.MOST_STEPS)
 
-    found = search_widths(task, step)
-    report(SEARCHED * (1.0 - len(steps) / MOST_STEPS))
+    found = allocating.search_widths(task, step)
+    report(SEARCHED * (1.0 - len(steps) / allocating.MOST_STEPS))
     scale = _new_scales(case, asked.limit_um, needed / plan.samples, report)
-    found = None if found is None else scaled(task, found, scale)
+    found = None if found is None else allocating.scaled(task, found, scale)
 
     def probability(half: Array, share: float) -> Probability:
         drawn = replace(case, draws=replace(draws, half_width=half))
@@ -321,7 +309,9 @@ def round_down(widths: Array) -> Array:
     return found
 
 
-def _task(draws: Draws, asked: Allocate, ensemble: Ensemble, widest: float) -> Task:
+def _task(
+    draws: Draws, asked: Allocate, ensemble: allocating.Ensemble, widest: float
+) -> allocating.Task:
     moves = ensemble.mean_square_gain > NO_EFFECT
     fixed = np.array([key in asked.fixed for key in draws.keys])
     free = moves & (draws.half_width > 0.0) & ~fixed
@@ -331,7 +321,7 @@ def _task(draws: Draws, asked: Allocate, ensemble: Ensemble, widest: float) -> T
             " this loop; expected one or more that are free"
         )
     costs = dict(asked.costs)
-    return Task(
+    return allocating.Task(
         ensemble,
         draws.centre,
         draws.half_width,
@@ -343,7 +333,7 @@ def _task(draws: Draws, asked: Allocate, ensemble: Ensemble, widest: float) -> T
     )
 
 
-def _new_scales(case: Case, limit_um: float, share: float, report: Progress) -> ScaleOf:
+def _new_scales(case: Case, limit_um: float, share: float, report: Progress) -> allocating.ScaleOf:
     draws, common = case.draws, None
     if case.plan.over == Over.MAX:
         common = case.responses(case.common_places())
@@ -356,21 +346,21 @@ def _new_scales(case: Case, limit_um: float, share: float, report: Progress) -> 
             base = np.where(moving, draws.centre, amplitudes)
             move = amplitudes - base
             if common is not None:
-                return scales_within(base @ common, move @ common, limit_um)
+                return allocating.scales_within(base @ common, move @ common, limit_um)
             gains = case.responses(case.site.random(rng, count))
             base_um = np.einsum("nk,ckn->cn", base, gains)
-            return scales_within(base_um, np.einsum("nk,ckn->cn", move, gains), limit_um)
+            return allocating.scales_within(base_um, np.einsum("nk,ckn->cn", move, gains), limit_um)
 
         found: list[Array] = []
         for part in sample_chunks(chunk, case.plan):
             found.append(part)
             report(WIDENED * len(part) / case.plan.samples)
-        return largest_scale(np.concatenate(found), share)
+        return allocating.largest_scale(np.concatenate(found), share)
 
     return scale
 
 
-def _why_not(task: Task) -> str:
+def _why_not(task: allocating.Task) -> str:
     held = np.where(task.free, 0.0, task.half_width)
     norm = task.ensemble.norm_um(task.centre, held)
     share = float(np.mean(norm <= task.limit_um))

@@ -23,16 +23,7 @@ from warpspace.field.grid import (
     is_small,
     pieces,
 )
-from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import (
-    LoopLinks,
-    branch_pose,
-    build_links,
-    jacobian,
-    nominal_point,
-    solve_links,
-    tool_axis,
-)
+from warpspace.kinematics import chain, transforms
 from warpspace.kinematics.components import join, rotate, split, split_rows, subtract
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import TravelDirection, is_linear, parameter
@@ -149,8 +140,8 @@ def placement_effect(
     """
     columns = _columns(model, coordinates, point_mm)
     turned = {name: np.zeros(()) if is_linear(name) else at for name, at in coordinates.items()}
-    aim = tool_axis(model, turned)
-    own = branch_pose(model, "workpiece", turned)[..., :3, :3]
+    aim = chain.tool_axis(model, turned)
+    own = chain.branch_pose(model, "workpiece", turned)[..., :3, :3]
     tilt = own - aim[..., None] * (aim[..., None, :] @ own)
     return (
         np.tensordot(placement, columns, (-1, -1)),
@@ -159,7 +150,7 @@ def placement_effect(
 
 
 def _columns(model: Model, coordinates: Coordinates, point_mm: Array) -> Array:
-    pose = branch_pose(model, "workpiece", coordinates)
+    pose = chain.branch_pose(model, "workpiece", coordinates)
     own = pose[..., :3, :3]
     about = transforms.skew(pose[..., :3, 3] - point_mm) @ own * UM_PER_MM_URAD
     return np.concatenate([np.broadcast_to(own, about.shape), about], axis=-1)
@@ -222,7 +213,7 @@ def error_values(model: Model, errors: ErrorSet, coordinates: Coordinates) -> di
 def _result_rotation(model: Model, view: View, coordinates: Coordinates) -> Array | None:
     if view.frame == "machine":
         return None
-    pose = branch_pose(model, "workpiece", coordinates)[..., :3, :3]
+    pose = chain.branch_pose(model, "workpiece", coordinates)[..., :3, :3]
     return np.swapaxes(pose, -1, -2)
 
 
@@ -236,7 +227,7 @@ def reference_point(
         name: np.asarray(view.reference[name]) if name in view.reference else values
         for name, values in coordinates.items()
     }
-    return held, nominal_point(model, Loop.TOOL, held)
+    return held, chain.nominal_point(model, Loop.TOOL, held)
 
 
 def build_basis(
@@ -253,7 +244,7 @@ def build_basis(
     amplitudes of the set are not used.
     """
     view = view or View()
-    point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
+    point = chain.nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     placement = None
     if view.placed_over is not None:
         volume = build_grid(model, view.placed_over)
@@ -290,7 +281,7 @@ def _shaped_jacobian(
     view: View,
     point: Array,
 ) -> tuple[Array, Array]:
-    position, orientation = jacobian(model, view.loop, keys, coordinates, point)
+    position, orientation = chain.jacobian(model, view.loop, keys, coordinates, point)
     for index, key in enumerate(keys):
         if key in errors.functions or model.direction == TravelDirection.DIFFERENCE:
             shape = errors.shape_at(key, coordinates, model.direction)[..., None]
@@ -342,7 +333,7 @@ def _evaluate(
             there.error_um - back.error_um,
             there.orientation_urad - back.orientation_urad,
         )
-    point = nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
+    point = chain.nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
     error, orientation = np.empty(shape), np.empty(shape)
     reference = reference_point(model, view, coordinates)
@@ -354,8 +345,8 @@ def _evaluate(
         fixed = _evaluate(model, errors, held, still, held_point, exact=exact).error_um
     placement = find_placement(model, errors, view, exact=exact)
 
-    def steps(at: Coordinates) -> LoopLinks:
-        return build_links(model, at, error_values(model, errors, at), exact=exact)
+    def steps(at: Coordinates) -> chain.LoopLinks:
+        return chain.build_links(model, at, error_values(model, errors, at), exact=exact)
 
     # A grid has few positions of each axis: what depends on these alone is worked out once.
     links = steps(coordinates) if is_small(coordinates.values()) else None
@@ -363,7 +354,7 @@ def _evaluate(
         at = {name: cut(values, piece) for name, values in coordinates.items()}
         here = steps(at) if links is None else cut_all(links, piece)
         nodes = (*piece, slice(None))
-        found, tilt = solve_links(here, view.loop, split(cut(point, nodes)), exact=exact)
+        found, tilt = chain.solve_links(here, view.loop, split(cut(point, nodes)), exact=exact)
         if placement is not None:
             less = map(split, placement_effect(model, placement, at, cut(point, nodes)))
             found, tilt = map(subtract, (found, tilt), less)

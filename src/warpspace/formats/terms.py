@@ -12,16 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.formats.measured import (
-    BACKWARD,
-    BOTH,
-    FORWARD,
-    Imported,
-    Plane,
-    Run,
-    Series,
-    plane_by_direction,
-)
+from warpspace.formats import measured
 from warpspace.formats.source import DEG_TO_URAD, MM_TO_UM, RAD_TO_URAD, Source
 from warpspace.kinematics.model import Coordinates
 from warpspace.machine.axes import direction_index, is_linear
@@ -207,13 +198,13 @@ class Tables:
 
 SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
 """Squareness that an error of the first axis in proportion to the second one is, and its sign."""
-WAYS: tuple[int, ...] = (FORWARD, BACKWARD)
+WAYS: tuple[int, ...] = (measured.FORWARD, measured.BACKWARD)
 NEGLIGIBLE = 1e-9  # µm or µrad
 
 
 def errors_of(
     tables: Tables, name: str, source: Source, machine: Machine | None = None
-) -> Imported:
+) -> measured.Imported:
     lines = [term for term in tables.terms if isinstance(term, Line)]
     series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
     planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]
@@ -235,7 +226,7 @@ def errors_of(
             _affine(term, machine, constants, curves)
     side = "" if machine is not None else " (all axes taken to carry the tool)"
     assumed = (*tables.assumed, f"what the table corrects is taken for the whole error{side}")
-    return Imported(
+    return measured.Imported(
         name,
         tuple(
             one
@@ -287,19 +278,19 @@ def _by_key(lines: Sequence[Line], source: Source) -> dict[str, list[Line]]:
     return found
 
 
-def _series(key: str, parts: Sequence[Line], machine: Machine | None) -> Series:
+def _series(key: str, parts: Sequence[Line], machine: Machine | None) -> measured.Series:
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
         ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
-    if np.array_equal(ways[FORWARD], ways[BACKWARD]):
-        runs = (Run(1, BOTH, tuple(ways[FORWARD].tolist())),)
+    if np.array_equal(ways[measured.FORWARD], ways[measured.BACKWARD]):
+        runs = (measured.Run(1, measured.BOTH, tuple(ways[measured.FORWARD].tolist())),)
     else:
-        runs = tuple(Run(1, way, tuple(values.tolist())) for way, values in ways.items())
-    return Series(key, tuple(at.tolist()), runs)
+        runs = tuple(measured.Run(1, way, tuple(values.tolist())) for way, values in ways.items())
+    return measured.Series(key, tuple(at.tolist()), runs)
 
 
-def _plane(term: Product, machine: Machine | None, source: Source) -> Plane:
+def _plane(term: Product, machine: Machine | None, source: Source) -> measured.Plane:
     one, other = term.first, term.second
     if one.source == other.source or not is_linear(one.target):
         source.refuse(
@@ -310,13 +301,13 @@ def _plane(term: Product, machine: Machine | None, source: Source) -> Plane:
     first, second = np.meshgrid(one.positions, other.positions, indexing="ij")
     tables = {way: factor * term.at(first, second, way) for way in WAYS}
     key = error_key(one.source, one.target)
-    return plane_by_direction(
+    return measured.plane_by_direction(
         key, (one.source, other.source), (one.positions, other.positions), tables
     )
 
 
-def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[Plane], float]:
-    planes: list[Plane] = []
+def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.Plane], float]:
+    planes: list[measured.Plane] = []
     left = 0.0
     for index, target in enumerate(term.axes):
         values = term.values[..., index]
@@ -338,21 +329,23 @@ def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[Plane], flo
             scaled: Array = _factor(machine, axes[0], target) * table
             places = (term.positions[first], term.positions[second])
             tables = dict.fromkeys(WAYS, scaled)
-            planes.append(plane_by_direction(error_key(axes[0], target), axes, places, tables))
+            planes.append(
+                measured.plane_by_direction(error_key(axes[0], target), axes, places, tables)
+            )
     return [plane for plane in planes if np.abs(plane.values).max() > NEGLIGIBLE], left
 
 
 def _joined(
-    series: list[Series], planes: list[Plane], source: Source
-) -> tuple[list[Series], list[Plane]]:
-    joined: dict[tuple[str, tuple[str, str]], Plane] = {}
+    series: list[measured.Series], planes: list[measured.Plane], source: Source
+) -> tuple[list[measured.Series], list[measured.Plane]]:
+    joined: dict[tuple[str, tuple[str, str]], measured.Plane] = {}
     for plane in planes:
         place = (plane.key, plane.axes)
         joined[place] = _added(joined[place], plane) if place in joined else plane
     keys = [key for key, _ in joined]
     if twice := next((key for key in keys if keys.count(key) > 1), ""):
         source.refuse(f"has products of {twice} with two other axes", "one for each error")
-    left: list[Series] = []
+    left: list[measured.Series] = []
     for one in series:
         place = next((place for place in joined if place[0] == one.key), None)
         if place is None:
@@ -360,22 +353,22 @@ def _joined(
             continue
         ends = (joined[place].second[0], joined[place].second[-1])
         columns = {way: np.repeat(one.toward(way)[:, None], 2, axis=1) for way in WAYS}
-        own = plane_by_direction(one.key, place[1], (one.positions, ends), columns)
+        own = measured.plane_by_direction(one.key, place[1], (one.positions, ends), columns)
         joined[place] = _added(joined[place], own)
     return left, list(joined.values())
 
 
-def _added(one: Plane, other: Plane) -> Plane:
+def _added(one: measured.Plane, other: measured.Plane) -> measured.Plane:
     first = np.union1d(one.first, other.first)
     second = np.union1d(one.second, other.second)
     totals = {
         way: _resampled(one, way, first, second) + _resampled(other, way, first, second)
         for way in WAYS
     }
-    return plane_by_direction(one.key, one.axes, (first.tolist(), second.tolist()), totals)
+    return measured.plane_by_direction(one.key, one.axes, (first.tolist(), second.tolist()), totals)
 
 
-def _resampled(plane: Plane, direction: int, first: Array, second: Array) -> Array:
+def _resampled(plane: measured.Plane, direction: int, first: Array, second: Array) -> Array:
     rows = np.array([np.interp(second, plane.second, row) for row in plane.table(direction)])
     return np.array([np.interp(first, plane.first, column) for column in rows.T]).T
 

@@ -15,14 +15,7 @@ from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Po
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.description import Gantry, default_across
 from warpspace.machine.errors import RUN_DIRECTIONS, UNKNOWN, Run
-from warpspace.scene.files import (
-    CsvRows,
-    check_file,
-    location,
-    read_text,
-    spell_value,
-    unguard_cell,
-)
+from warpspace.scene import files
 from warpspace.scene.schema import Problems
 from warpspace.units import Array
 
@@ -160,23 +153,23 @@ def read_csv_runs(path: Path, column: str) -> tuple[Run, ...]:
     return _read_csv(path, limits.MAX_POINTS, lambda rows: _runs(rows, column))
 
 
-def _read_csv(path: Path, max_rows: int, read: Callable[[CsvRows], T]) -> T:
+def _read_csv(path: Path, max_rows: int, read: Callable[[files.CsvRows], T]) -> T:
     source = str(path)
-    check_file(path, limits.MAX_CSV_BYTES, source)
+    files.check_file(path, limits.MAX_CSV_BYTES, source)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = CsvRows(file, source, max_rows)
+            rows = files.CsvRows(file, source, max_rows)
             found = read(rows)
             rows.check()
             return found
     except UnicodeDecodeError:
-        read_text(path, limits.MAX_CSV_BYTES)  # names the byte
+        files.read_text(path, limits.MAX_CSV_BYTES)  # names the byte
         raise
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
 
 
-def _column(rows: CsvRows, column: str) -> int:
+def _column(rows: files.CsvRows, column: str) -> int:
     behind = rows.header[1:]
     if behind.count(column) == 1:
         return behind.index(column) + 1
@@ -185,7 +178,7 @@ def _column(rows: CsvRows, column: str) -> int:
     raise SceneError(rows.source, [f"column {column!r} {found}{hint}"])
 
 
-def _points(rows: CsvRows, column: str, limit: float) -> list[tuple[float, float]]:
+def _points(rows: files.CsvRows, column: str, limit: float) -> list[tuple[float, float]]:
     points: list[tuple[float, float]] = []
     index = _column(rows, column) if rows.header else 0
     for line, row in rows:
@@ -199,19 +192,19 @@ def _points(rows: CsvRows, column: str, limit: float) -> list[tuple[float, float
     return points
 
 
-def _runs(rows: CsvRows, column: str) -> tuple[Run, ...]:
+def _runs(rows: files.CsvRows, column: str) -> tuple[Run, ...]:
     value_at = _column(rows, column)
     run_at, way_at = (
         rows.header.index(name) if name in rows.header else None for name in (RUN, DIRECTION)
     )
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for line, row in rows:
-        way = UNKNOWN if way_at is None else unguard_cell(row[way_at])
+        way = UNKNOWN if way_at is None else files.unguard_cell(row[way_at])
         if way not in RUN_DIRECTIONS:
-            rows.note(f"line {line}: direction {spell_value(way)}; expected +, - or nothing")
+            rows.note(f"line {line}: direction {files.spell_value(way)}; expected +, - or nothing")
         position = rows.number(row[0], line, limit=limits.MAX_LENGTH_MM)
         value = rows.number(row[value_at], line, limit=limits.MAX_ERROR)
-        run = "" if run_at is None else unguard_cell(row[run_at])
+        run = "" if run_at is None else files.unguard_cell(row[run_at])
         found.setdefault((run, way), []).append((position, value))
         if len(found) > limits.MAX_RUNS:
             raise SceneError(
@@ -248,7 +241,7 @@ class CurveReader:
             (lambda _file, _column: ()) if constant else self.folder and self._column,
             axis=self.axis,
             axes=self.axes,
-            curve=lambda inner, path: self._read(inner, location(where, path), constant),
+            curve=lambda inner, path: self._read(inner, files.location(where, path), constant),
         )
         table = cast("dict[str, object]", raw) if isinstance(raw, dict) else {}
         if is_number(raw):

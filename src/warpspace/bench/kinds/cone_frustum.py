@@ -167,7 +167,8 @@ class ConeFrustum(BenchTest):
             length_mm=self.radius_mm,
             travel=placing.travels(coordinates, np.ones(len(theta))),
             setup={
-                **placing.ball_columns(model, coordinates, direction), "bar_um": np.ones(len(theta)),
+                **placing.ball_columns(model, coordinates, direction),
+                "bar_um": np.ones(len(theta)),
             },
         )  # fmt: skip
 

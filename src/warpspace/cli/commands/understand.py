@@ -6,25 +6,8 @@ from typing import TYPE_CHECKING
 import click
 
 from warpspace.analysis.blocks import Column, Table, number_columns
+from warpspace.cli import options
 from warpspace.cli.analyses import print_blocks
-from warpspace.cli.options import (
-    at_option,
-    csv_option,
-    direction_option,
-    force_option,
-    grid_option,
-    json_option,
-    load_placed,
-    loop_option,
-    output_option,
-    parse_point,
-    placed_option,
-    say_second_order,
-    scene_argument,
-    size_text,
-    spell_json,
-    warn_outside_travel,
-)
 from warpspace.cli.tables import print_text, progress
 from warpspace.exceptions import OptionError
 
@@ -43,12 +26,12 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
 
 
 @click.command()
-@scene_argument()
-@at_option
-@grid_option(None)
-@loop_option
-@placed_option
-@direction_option
+@options.scene_argument()
+@options.at_option
+@options.grid_option(None)
+@options.loop_option
+@options.placed_option
+@options.direction_option
 @click.option(
     "--uncertainty",
     "uncertain",
@@ -63,14 +46,14 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
     show_default=True,
     help="Frame of the resulting vectors.",
 )
-@csv_option
-@output_option(
+@options.csv_option
+@options.output_option(
     "Write all points to this file: .parquet, .npz, .csv or, of a grid, .vts.",
     *FIELDS,
     required=False,
 )
-@force_option
-@json_option
+@options.force_option
+@options.json_option
 def field(
     scene: str,
     points: tuple[str, ...],
@@ -106,7 +89,7 @@ def field(
         raise OptionError(
             f"{output}: a .vts file holds a grid, --at gives points; expected {others}"
         )
-    loaded = load_placed(scene, direction, loop, placed=placed)
+    loaded = options.load_placed(scene, direction, loop, placed=placed)
     view = choose_view(loaded, loop, frame)
     spread = None
     with progress("evaluating", silent=as_json):
@@ -116,7 +99,7 @@ def field(
             from warpspace.analysis.measured import evaluate_uncertainty
 
             spread = evaluate_uncertainty(loaded, at=places, grid=grid, loop=loop, frame=frame)
-        said = {} if exact else say_second_order(second_order(loaded, loop, at=places))
+        said = {} if exact else options.say_second_order(second_order(loaded, loop, at=places))
         plain = statistics(result, axes)
         summary = plain if nodes is None else volume_statistics(result, nodes)
     files = [path for path in (csv_path, output) if path is not None]
@@ -136,7 +119,7 @@ def field(
             found["statistics_nodes"] = asdict(plain)
         if output is not None:
             size = {"output": output, "points_written": result.norm_um.size}
-            click.echo(spell_json({**size, **found}))
+            click.echo(options.spell_json({**size, **found}))
             return
         _print_json(axes, result, found, spread)
         return
@@ -162,7 +145,7 @@ def field(
     print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
     print_text(f"  --at {spell_at(worst)}")
     for path in files:
-        print_text(f"  {path}: {size_text(path)}")
+        print_text(f"  {path}: {options.size_text(path)}")
 
 
 def _evaluate(
@@ -175,14 +158,14 @@ def _evaluate(
     from warpspace.scene.model import evaluate, evaluate_grid
 
     if points:
-        typed = [parse_point(text, scene.machine.axes) for text in points]
+        typed = [options.parse_point(text, scene.machine.axes) for text in points]
         full = [
             complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
         found = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
         for point in typed:
-            warn_outside_travel(scene.machine, point)
+            options.warn_outside_travel(scene.machine, point)
         return axes, found, None
     nodes = DEFAULT_NODES if grid is None else grid
     built = build_grid(scene.model, scene.workspace, nodes)
@@ -224,9 +207,11 @@ def _print_json(
             {"axes": dict(zip(axes, place, strict=True)), **dict(zip(columns, row, strict=True))}
             for place, row in zip(places, numbers, strict=True)
         ]
-        click.echo((", " if start else "") + spell_json(rows)[1:-1], nl=False)
+        click.echo((", " if start else "") + options.spell_json(rows)[1:-1], nl=False)
     click.echo(
-        "]" + "".join(f', "{name}": {spell_json(part)}' for name, part in found.items()) + "}"
+        "]"
+        + "".join(f', "{name}": {options.spell_json(part)}' for name, part in found.items())
+        + "}"
     )
 
 

@@ -8,23 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpspace.exceptions import SceneError, near_miss
+from warpspace.formats import measured
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.measured import (
-    BACKWARD,
-    BOTH,
-    FORWARD,
-    Imported,
-    Plane,
-    Point,
-    Run,
-    Series,
-    distinct,
-    merge,
-    plane_by_ways,
-    sampled,
-    tables_of,
-    zero_key,
-)
 from warpspace.formats.registry import Files, Format, ReadOptions, described
 from warpspace.formats.source import (
     DEG_PER,
@@ -43,7 +28,7 @@ from warpspace.scene.files import CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
-SIGNS = {FORWARD: "+", BACKWARD: "-", BOTH: ""}
+SIGNS = {measured.FORWARD: "+", measured.BACKWARD: "-", measured.BOTH: ""}
 DIGITS = 6  # behind the point of a value, µm or µrad
 UNITS = "# Units stand in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
 
@@ -106,7 +91,7 @@ def _to_fill_in(
 def write(wanted: Wanted) -> Files:
     """Write the errors of a scene: constants in the main file, one file an axis beside it."""
     files: dict[str, str] = {}
-    for table in tables_of(sampled(wanted)):
+    for table in measured.tables_of(measured.sampled(wanted)):
         directed = [DIRECTION] if table.directed else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
         for at, way, values in table.rows:
@@ -115,7 +100,7 @@ def write(wanted: Wanted) -> Files:
         name = ("constant", *table.axes[:1], table.keys[0])[len(table.axes)]
         files[f"_{name}.csv"] = _lines(rows)
     if not files:
-        return {"": _lines([[_value(zero_key(wanted.scene))], ["0.0"]])}
+        return {"": _lines([[_value(measured.zero_key(wanted.scene))], ["0.0"]])}
     files[""] = files.pop(next(iter(files)))
     return files
 
@@ -123,16 +108,16 @@ def write(wanted: Wanted) -> Files:
 NAME = "csv"
 POSITION, ERROR, UNCERTAINTY = "position", "error", "uncertainty"
 DIRECTIONS: Mapping[str, int] = {
-    "": BOTH,
-    "0": BOTH,
-    "+": FORWARD,
-    "1": FORWARD,
-    "+1": FORWARD,
-    "forward": FORWARD,
-    "-": BACKWARD,
-    "-1": BACKWARD,
-    "−": BACKWARD,
-    "backward": BACKWARD,
+    "": measured.BOTH,
+    "0": measured.BOTH,
+    "+": measured.FORWARD,
+    "1": measured.FORWARD,
+    "+1": measured.FORWARD,
+    "forward": measured.FORWARD,
+    "-": measured.BACKWARD,
+    "-1": measured.BACKWARD,
+    "−": measured.BACKWARD,
+    "backward": measured.BACKWARD,
 }
 _HEADING = re.compile(
     r"(?:(u)\s*\(\s*)?([A-Za-z0-9]+)\s*\)?\s*"
@@ -184,7 +169,7 @@ class _Table:
         return [one.name for one in self.columns if one.role == role]
 
     def ways(self) -> list[int]:
-        return [int(row.get((DIRECTION, DIRECTION), BOTH)) for _, row in self.rows]
+        return [int(row.get((DIRECTION, DIRECTION), measured.BOTH)) for _, row in self.rows]
 
 
 def recognise(head: str, name: str) -> bool:
@@ -230,12 +215,12 @@ def _column(at: Place, part: str) -> _Column:
     return _Column(role, name, at.unit(unit, known, name), unit)
 
 
-def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
+def read(sources: Sequence[Source], options: ReadOptions) -> measured.Imported:
     del options
-    return merge([_read_one(source) for source in sources])
+    return measured.merge([_read_one(source) for source in sources])
 
 
-def _read_one(source: Source) -> Imported:
+def _read_one(source: Source) -> measured.Imported:
     given = source.rows(MAX_POINTS)
     if not given.header:
         source.refuse("has no header", "one such as X [mm],EXX [um]")
@@ -258,7 +243,7 @@ def _read_one(source: Source) -> Imported:
     return replace(found, units=units, notes=(*notes, *found.notes))
 
 
-def _errors(table: _Table) -> Imported:
+def _errors(table: _Table) -> measured.Imported:
     errors, positions = table.of(ERROR), table.of(POSITION)
     if not positions:
         return _constants(table)
@@ -276,7 +261,7 @@ def _errors(table: _Table) -> Imported:
     return _series(table, axis)
 
 
-def _constants(table: _Table) -> Imported:
+def _constants(table: _Table) -> measured.Imported:
     if len(table.rows) != 1:
         expected = "one, or a column of positions such as X [mm]"
         table.head.refuse(f"{len(table.rows)} rows of errors without positions", expected)
@@ -286,12 +271,12 @@ def _constants(table: _Table) -> Imported:
         at.refuse(f"{empty} is empty", "a number")
     uncertain = {key: row[UNCERTAINTY, key] for key in table.of(UNCERTAINTY)}
     given = {key: value for key, value in uncertain.items() if not math.isnan(value)}
-    return Imported(NAME, constants=constants, uncertainty=given)
+    return measured.Imported(NAME, constants=constants, uncertainty=given)
 
 
-def _series(table: _Table, axis: str) -> Imported:
+def _series(table: _Table, axis: str) -> measured.Imported:
     at = np.array([row[POSITION, axis] for _, row in table.rows])
-    places = distinct(at)
+    places = measured.distinct(at)
     runs = [int(row.get((RUN, RUN), 1)) for _, row in table.rows]
     ways = list(zip(runs, table.ways(), strict=True))
     known = list(dict.fromkeys(ways))
@@ -304,7 +289,7 @@ def _series(table: _Table, axis: str) -> Imported:
             found = f"position {places[place]:g} of {axis} stands also in line {taken[way, place]}"
             line.refuse(found, "columns run and direction to tell them apart")
         taken[way, place] = line.line
-    series: list[Series] = []
+    series: list[measured.Series] = []
     for key in table.of(ERROR):
         values = {way: np.full(len(places), math.nan) for way in known}
         uncertain = np.zeros(len(places))
@@ -316,16 +301,16 @@ def _series(table: _Table, axis: str) -> Imported:
             table.source.refuse(f"column {key} is empty", "numbers, or no such column")
         _check_holes(table.source, key, given, places, axis)
         series.append(
-            Series(
+            measured.Series(
                 key,
                 tuple(places.tolist()),
-                tuple(Run(*way, tuple(own.tolist())) for way, own in given.items()),
+                tuple(measured.Run(*way, tuple(own.tolist())) for way, own in given.items()),
                 tuple(uncertain.tolist()) if uncertain.any() else (),
             )
         )
     sorted_rows = len(known) == 1 and np.any(np.diff(at) < 0.0)
     notes = (f"rows were sorted by the position of {axis}",) if sorted_rows else ()
-    return Imported(NAME, tuple(series), notes=notes)
+    return measured.Imported(NAME, tuple(series), notes=notes)
 
 
 def _check_holes(
@@ -343,30 +328,32 @@ def _check_holes(
         own = np.array([values for (_, way), values in given.items() if way == direction])
         holes = np.isnan(own).all(axis=0)
         if holes.any():
-            said = {FORWARD: "forward", BACKWARD: "backward"}.get(direction, "any")
+            said = {measured.FORWARD: "forward", measured.BACKWARD: "backward"}.get(
+                direction, "any"
+            )
             found = f"{key} has no value at {axis} {places[holes][0]:g} in {said} direction"
             source.refuse(found, "every direction at every position")
 
 
-def _planes(table: _Table) -> Imported:
+def _planes(table: _Table) -> measured.Imported:
     first, second = table.of(POSITION)
     if unknown := next((one for one in table.columns if one.role in (RUN, UNCERTAINTY)), None):
         what = RUN if unknown.role == RUN else f"u({unknown.name})"
         expected = "positions, direction and errors over two axes: one value a point"
         table.head.refuse(f"column {what}", expected)
-    planes: list[Plane] = []
+    planes: list[measured.Plane] = []
     for key in table.of(ERROR):
         own = parameter(key).axis
         if own not in (first, second):
             expected = f"errors of {first} or {second}"
             table.head.refuse(f"column {key} is an error of {own}", expected)
         other = second if own == first else first
-        points: dict[int, list[Point]] = {}
+        points: dict[int, list[measured.Point]] = {}
         for way, (at, row) in zip(table.ways(), table.rows, strict=True):
             point = (at, row[POSITION, own], row[POSITION, other], row[ERROR, key])
             points.setdefault(way, []).append(point)
-        planes.append(plane_by_ways(key, (own, other), points, table.source))
-    return Imported(NAME, planes=tuple(planes))
+        planes.append(measured.plane_by_ways(key, (own, other), points, table.source))
+    return measured.Imported(NAME, planes=tuple(planes))
 
 
 FORMAT = Format(

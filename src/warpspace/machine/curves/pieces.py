@@ -8,14 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.machine.curves.curve import (
-    SPAN_SAMPLES,
-    ErrorFunction,
-    Rows,
-    Span,
-    Spell,
-    ValueReader,
-)
+from warpspace.machine.curves import curve
 from warpspace.machine.curves.simple import Constant, Poly
 from warpspace.machine.limits import MAX_LENGTH_MM, MAX_POINTS
 from warpspace.units import Array
@@ -27,7 +20,7 @@ PER_PIECE = 8  # positions of each piece at which the peak is looked for
 
 
 @dataclass(frozen=True)
-class Pieces(ErrorFunction):
+class Pieces(curve.ErrorFunction):
     """Polynomials one behind the other, their ends held."""
 
     name = "pieces"
@@ -70,14 +63,14 @@ class Pieces(ErrorFunction):
 
     @property
     def samples(self) -> int:
-        return max(SPAN_SAMPLES, PER_PIECE * len(self.starts) + 1)
+        return max(curve.SPAN_SAMPLES, PER_PIECE * len(self.starts) + 1)
 
     @property
     def kinks(self) -> tuple[float, ...]:
         return (*self.starts, self.end)
 
     @classmethod
-    def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
+    def read(cls, raw: Any, span: curve.Span, reader: curve.ValueReader) -> Self:
         """Read ``{ pieces = [[start, c0, c1, …], …], end = q, points = [] }``."""
         limit = (-MAX_LENGTH_MM, MAX_LENGTH_MM)
         rows: list[tuple[float, ...]] = []
@@ -106,17 +99,17 @@ class Pieces(ErrorFunction):
         pieces = [[start, *row] for start, row in pairs]
         return {"pieces": pieces, "end": self.end, "points": list(self.points)}
 
-    def describe(self, unit: str, value: Spell, position: Spell) -> str:
+    def describe(self, unit: str, value: curve.Spell, position: curve.Spell) -> str:
         del unit, value, position
         return f"{len(self.starts)} pieces of polynomials"
 
-    def rows(self) -> Rows:
+    def rows(self) -> curve.Rows:
         return [(s, *row) for s, row in zip(self.starts, self.coefficients, strict=True)]
 
 
 def fit_curves(
-    evaluate: Callable[[Array], Array], span: Span, kinks: Array
-) -> list[ErrorFunction | None]:
+    evaluate: Callable[[Array], Array], span: curve.Span, kinks: Array
+) -> list[curve.ErrorFunction | None]:
     """Fit curves to functions of one position, values [n, K] at [n], smooth between kinks, [m].
 
     A constant or a polynomial where one piece is enough, else pieces; None where the function is
@@ -175,7 +168,7 @@ def _power_matrix() -> Array:
     return rows
 
 
-def _simplest(span: Span, at: Array, coefficients: Array) -> ErrorFunction | None:
+def _simplest(span: curve.Span, at: Array, coefficients: Array) -> curve.ErrorFunction | None:
     width = np.diff(at)[:, None]
     reach = np.abs(coefficients) * width ** np.arange(DEGREE + 1.0)
     kept = np.where(reach > SMALL / 4.0, coefficients, 0.0)

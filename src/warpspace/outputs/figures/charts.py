@@ -20,14 +20,7 @@ from warpspace.outputs.charts.blocks import bars_chart, charts_sheet, histogram_
 from warpspace.outputs.charts.results import bench_chart
 from warpspace.outputs.drawing.settings import FONT, FigureSettings
 from warpspace.outputs.drawing.sheet import LOOP_WORDS, Drawing, metadata
-from warpspace.picture.traces import (
-    TraceLine,
-    evaluate_axis_motion,
-    evaluate_traces,
-    motion_lines,
-    name_trace,
-    trace_lines,
-)
+from warpspace.picture import traces
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene, choose_view
 from warpspace.units import spell_count
@@ -71,9 +64,9 @@ def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
             " and points in [points_mm] traces"
         )
     charts = [
-        motion_lines(name_trace(line.trace), motion, part)
+        traces.motion_lines(traces.name_trace(line.trace), motion, part)
         for line in chosen
-        if (motion := evaluate_axis_motion(scene, line)) is not None
+        if (motion := traces.evaluate_axis_motion(scene, line)) is not None
         for part in motion.motions
     ]
     title = f"Error motions of the rotary axes: {scene.title}"
@@ -81,16 +74,16 @@ def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         "ISO 230-7 · over the position of the axis, at the height of the point and in its"
         " direction, which turns with it"
     )
-    for name in (name_trace(line.trace) for line in chosen):
+    for name in (traces.name_trace(line.trace) for line in chosen):
         if not any(chart.title.startswith(name) for chart in charts):
             what += f" · {name}: the point lies on the axis"
     return _draw("rotary", title, scene, settings, charts_sheet, charts, title, what, 3)
 
 
-def first_lines(scene: Scene) -> list[TraceLine]:
+def first_lines(scene: Scene) -> list[traces.TraceLine]:
     stands = scene.workspace.positions
-    found: dict[str, TraceLine] = {}
-    for line in trace_lines(evaluate_traces(scene, 1.0)):
+    found: dict[str, traces.TraceLine] = {}
+    for line in traces.trace_lines(traces.evaluate_traces(scene, 1.0)):
         here = all(stands.get(axis, 0.0) == at for axis, at in line.trace.at.items())
         if here:
             found.setdefault(line.trace.axis, line)

@@ -11,23 +11,8 @@ from warpspace.geometry import surfaces
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.kinematics.chain import BASE
 from warpspace.machine.description import Vector
+from warpspace.outputs.drawing import map3d, render
 from warpspace.outputs.drawing.canvas import Canvas, Occupancy, draw_leader, write_label
-from warpspace.outputs.drawing.map3d import (
-    GHOST_DASHES,
-    draw_lone_line,
-    draw_raster,
-    map_room_mm,
-    surface_bodies,
-)
-from warpspace.outputs.drawing.render import (
-    Body,
-    Projection,
-    Raster,
-    Rect,
-    fit_projection,
-    render_bodies,
-    split_visible,
-)
 from warpspace.outputs.drawing.settings import SIZES, FigureSettings, Theme, evaluate_for
 from warpspace.outputs.drawing.sheet import (
     Drawing,
@@ -55,11 +40,11 @@ VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
 DARKER = 0.62
 
 
-def _drawn_body(part: PlacedBody, theme: Theme) -> Body:
+def _drawn_body(part: PlacedBody, theme: Theme) -> render.Body:
     shade = 1.0 if theme.name == "light" else DARKER
     red, green, blue = (shade * channel / 255.0 for channel in part.body.colour)
     triangles = part.body.triangles.astype(np.intp)
-    return Body(part.vertices_mm, triangles, colour=(red, green, blue), shaded=True)
+    return render.Body(part.vertices_mm, triangles, colour=(red, green, blue), shaded=True)
 
 
 def bodies_of(
@@ -78,22 +63,24 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
         "bodies schematic, deformed and tilted like their frames",
     ]
     legend = [
-        line_entry("nominal volume", lambda theme: theme.ink, SIZES.thin, GHOST_DASHES, 0.6),
+        line_entry("nominal volume", lambda theme: theme.ink, SIZES.thin, map3d.GHOST_DASHES, 0.6),
         line_entry("deformed volume", lambda theme: theme.ink),
         line_entry("nominal bodies", lambda theme: theme.ghost, SIZES.thin, alpha=0.6),
     ]
     sheet = start_sheet("machine", settings, title, facts, scenes, legend, exact=exact)
     canvas, (left, bottom, right, top) = sheet.canvas, sheet.content
-    points = [map_room_mm(picture), *(part.vertices_mm for part in placed)]
+    points = [map3d.map_room_mm(picture), *(part.vertices_mm for part in placed)]
     side = canvas.px(20.0)
     room = (left + side, bottom + side, right - canvas.px(150.0), top - side)
-    projection = fit_projection(settings.view, np.concatenate(points), room)
+    projection = render.fit_projection(settings.view, np.concatenate(points), room)
     machine = draw_bodies(canvas, placed, projection)
-    volume = render_bodies(surface_bodies(picture, surfaces.outer_faces(picture.shape)), projection)
+    volume = render.render_bodies(
+        map3d.surface_bodies(picture, surfaces.outer_faces(picture.shape)), projection
+    )
     if volume is not None:
         _overlay(canvas, volume, machine)
     _draw_volume_lines(canvas, picture, projection, volume, machine)
-    draw_lone_line(canvas, picture, projection)
+    map3d.draw_lone_line(canvas, picture, projection)
     if machine is not None:
         _label_bodies(canvas, placed, projection, machine, right)
     say_statistics(sheet, picture, projection.px_per_mm)
@@ -103,20 +90,20 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
 def draw_bodies(
     canvas: Canvas,
     placed: Sequence[PlacedBody],
-    projection: Projection,
+    projection: render.Projection,
     *,
     opacity: float = 1.0,
     nominal: bool = True,
     zorder: float = 1.0,
-) -> Raster | None:
+) -> render.Raster | None:
     theme = canvas.theme
-    raster = render_bodies([_drawn_body(part, theme) for part in placed], projection)
+    raster = render.render_bodies([_drawn_body(part, theme) for part in placed], projection)
     if raster is None:
         return None
-    draw_raster(canvas, raster, opacity, zorder)
+    map3d.draw_raster(canvas, raster, opacity, zorder)
 
     def draw(edges: Iterable[Array], colour: str, alpha: float, height: float) -> None:
-        seen, _ = split_visible(edges, projection, raster)
+        seen, _ = render.split_visible(edges, projection, raster)
         canvas.lines(seen, width=SIZES.hair, colour=colour, alpha=alpha, zorder=zorder + height)
 
     draw((edge for part in placed for edge in part.edges_mm), theme.grid, 0.75, 0.1)
@@ -126,7 +113,7 @@ def draw_bodies(
     return raster
 
 
-def _overlay(canvas: Canvas, volume: Raster, machine: Raster | None) -> None:
+def _overlay(canvas: Canvas, volume: render.Raster, machine: render.Raster | None) -> None:
     rgba = volume.rgba.copy()
     before = np.ones(rgba.shape[:2], dtype=bool)
     if machine is not None:
@@ -143,9 +130,9 @@ def _overlay(canvas: Canvas, volume: Raster, machine: Raster | None) -> None:
 def _draw_volume_lines(
     canvas: Canvas,
     picture: ScenePicture,
-    projection: Projection,
-    volume: Raster | None,
-    machine: Raster | None,
+    projection: render.Projection,
+    volume: render.Raster | None,
+    machine: render.Raster | None,
 ) -> None:
     theme, shape = canvas.theme, picture.shape
     nodes, nominal = picture.drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
@@ -155,22 +142,22 @@ def _draw_volume_lines(
         (surfaces.face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
         (surfaces.crease_lines(faces, shape) or surfaces.box_edges(shape), SIZES.line, 0.95),
     ):
-        seen, _ = split_visible((nodes[line] for line in lines), projection, volume)
+        seen, _ = render.split_visible((nodes[line] for line in lines), projection, volume)
         canvas.lines(seen, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
-    parts = split_visible(
+    parts = render.split_visible(
         (nominal[edge] for edge in surfaces.box_edges(shape)), projection, machine
     )
     for lines, width, alpha in zip(parts, (SIZES.thin, SIZES.hair), (0.6, 0.3), strict=True):
         canvas.lines(
-            lines, width=width, colour=theme.ink, alpha=alpha, dashes=GHOST_DASHES, zorder=2.2
+            lines, width=width, colour=theme.ink, alpha=alpha, dashes=map3d.GHOST_DASHES, zorder=2.2
         )
 
 
 def _label_bodies(
     canvas: Canvas,
     placed: Sequence[PlacedBody],
-    projection: Projection,
-    raster: Raster,
+    projection: render.Projection,
+    raster: render.Raster,
     right: float,
 ) -> None:
     spots = [(_visible_spot(part, projection, raster), part.label) for part in placed]
@@ -188,7 +175,7 @@ def _label_bodies(
 
 
 def _visible_spot(
-    part: PlacedBody, projection: Projection, raster: Raster
+    part: PlacedBody, projection: render.Projection, raster: render.Raster
 ) -> tuple[float, float] | None:
     corners = part.vertices_mm[part.body.triangles]
     rng = np.random.default_rng(0)
@@ -246,7 +233,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     inset = canvas.px(70.0)
     left, bottom, right, top = sheet.content
     room = (left + inset, bottom + inset / 2, right - inset, top - inset / 2)
-    projection = fit_projection(settings.view, np.concatenate(points), room)
+    projection = render.fit_projection(settings.view, np.concatenate(points), room)
     raster = draw_bodies(canvas, placed, projection, opacity=FADED)
     _draw_lines(canvas, traces, coloured, scale, projection, raster)
     _label_traces(canvas, traces, projection, sheet.content)
@@ -268,11 +255,11 @@ def _draw_lines(
     traces: Sequence[TraceLine],
     coloured: Sequence[Array],
     scale: ColourScale,
-    projection: Projection,
-    raster: Raster | None,
+    projection: render.Projection,
+    raster: render.Raster | None,
 ) -> None:
     theme = canvas.theme
-    parts = split_visible((trace.nominal_mm for trace in traces), projection, raster)
+    parts = render.split_visible((trace.nominal_mm for trace in traces), projection, raster)
     for lines, width, alpha in zip(parts, (SIZES.thin, SIZES.hair), (1.0, 0.5), strict=True):
         canvas.lines(
             lines, width=width, colour=theme.muted, alpha=alpha, dashes=TRACE_DASHES, zorder=3.0
@@ -285,7 +272,7 @@ def _draw_lines(
         for start in range(0, len(values) - 1, PIECE):
             piece = slice(start, start + PIECE + 1)
             colour = scale.colours(values[piece].mean()) / 255.0
-            before, behind = split_visible([trace.actual_mm[piece]], projection, raster)
+            before, behind = render.split_visible([trace.actual_mm[piece]], projection, raster)
             seen += before
             hidden += behind
             seen_colours += [colour] * len(before)
@@ -296,7 +283,7 @@ def _draw_lines(
 
 
 def _label_traces(
-    canvas: Canvas, traces: Sequence[TraceLine], projection: Projection, frame: Rect
+    canvas: Canvas, traces: Sequence[TraceLine], projection: render.Projection, frame: render.Rect
 ) -> None:
     taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     taken.add_rects(canvas.rects)

@@ -15,22 +15,8 @@ from warpspace.geometry.colour import ColourScale
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
 from warpspace.machine.axes import is_linear
+from warpspace.outputs.drawing import map3d, render
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.map3d import (
-    GHOST_DASHES,
-    Stage,
-    draw_map,
-    draw_raster,
-    fit_map,
-    surface_bodies,
-)
-from warpspace.outputs.drawing.render import (
-    Body,
-    Rect,
-    fit_projection,
-    render_bodies,
-    split_visible,
-)
 from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import (
     Drawing,
@@ -60,7 +46,7 @@ def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: 
     words = isoline_words(picture.scale, picture.values)
     legend = map_legend(words, diverging=picture.scale.diverging)
     sheet = start_sheet("error-map", settings, title, facts, scenes, legend, exact=exact)
-    drawn = draw_map(sheet.canvas, picture, sheet.content, settings.view)
+    drawn = map3d.draw_map(sheet.canvas, picture, sheet.content, settings.view)
     say_statistics(sheet, picture, drawn.projection.px_per_mm)
     return sheet.finish(picture.exaggeration, [drawn])
 
@@ -125,7 +111,9 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     sheet = start_sheet("slices", settings, title, facts, scenes, legend, exact=exact)
     canvas = sheet.canvas
     cells = _cells(canvas, sheet.content, slices)
-    fitted = [fit_map(canvas, [part], cells[part.axis], VIEW_OF[part.axis]) for part in slices]
+    fitted = [
+        map3d.fit_map(canvas, [part], cells[part.axis], VIEW_OF[part.axis]) for part in slices
+    ]
     px_per_mm = min(one.px_per_mm for one in fitted)
     maps: list[DrawnMap] = []
     for part, own in zip(slices, fitted, strict=True):
@@ -134,7 +122,7 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         nominal = part.grid.nominal_mm.reshape(-1, 3)
         centre = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
         projection = replace(own, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
-        maps.append(draw_map(canvas, part, cell, view, projection=projection))
+        maps.append(map3d.draw_map(canvas, part, cell, view, projection=projection))
         name = f"{PLANES[part.axis]} plane at axis {part.axis} = {spell_short(part.position_mm)} mm"
         high = cell[3] - canvas.px(12.0)
         canvas.text(middle[0], high, name, weight="bold", ha="center", va="top")
@@ -173,7 +161,7 @@ def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
     return found
 
 
-def _cells(canvas: Canvas, rect: Rect, slices: Sequence[Slice]) -> dict[str, Rect]:
+def _cells(canvas: Canvas, rect: render.Rect, slices: Sequence[Slice]) -> dict[str, render.Rect]:
     spans = {part.axis: np.ptp(part.grid.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
     x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
     left, bottom, right, top = rect
@@ -189,28 +177,30 @@ def _cells(canvas: Canvas, rect: Rect, slices: Sequence[Slice]) -> dict[str, Rec
     }
 
 
-def _draw_key(canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: Rect) -> None:
+def _draw_key(
+    canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: render.Rect
+) -> None:
     inset = canvas.px(46.0)
     room = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
     nodes = picture.grid.nominal_mm.reshape(-1, 3)
-    projection = fit_projection("iso", nodes, room)
-    bodies: list[Body] = []
+    projection = render.fit_projection("iso", nodes, room)
+    bodies: list[render.Body] = []
     creases: list[Array] = []
     for part in slices:
         faces = surfaces.outer_faces(part.shape)
-        bodies += surface_bodies(replace(part, exaggeration=0.0), faces)
+        bodies += map3d.surface_bodies(replace(part, exaggeration=0.0), faces)
         points = part.grid.nominal_mm.reshape(-1, 3)
         creases += [points[line] for line in surfaces.crease_lines(faces, part.shape)]
-    raster = render_bodies(bodies, projection)
+    raster = render.render_bodies(bodies, projection)
     if raster is not None:
-        draw_raster(canvas, raster)
+        map3d.draw_raster(canvas, raster)
     theme = canvas.theme
-    seen, _ = split_visible(creases, projection, raster)
+    seen, _ = render.split_visible(creases, projection, raster)
     canvas.lines(seen, width=SIZES.thin, colour=theme.grid, zorder=2.0)
     edges = (nodes[edge] for edge in surfaces.box_edges(picture.grid.shape))
-    seen, hidden = split_visible(edges, projection, raster)
-    canvas.lines(seen, width=SIZES.thin, colour=theme.ghost, dashes=GHOST_DASHES)
-    canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=GHOST_DASHES)
+    seen, hidden = render.split_visible(edges, projection, raster)
+    canvas.lines(seen, width=SIZES.thin, colour=theme.ghost, dashes=map3d.GHOST_DASHES)
+    canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=map3d.GHOST_DASHES)
     canvas.text(
         (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0), "where they lie (not exaggerated)",
         weight="bold", ha="center", va="top",
@@ -264,8 +254,8 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
     needles = _needles(picture, factor, view)
     content = replace(picture, exaggeration=0.0)  # the volume itself is drawn undeformed
     ends = np.concatenate(needles.ends_mm(nodes, needles.feet)).reshape(-1, 3)
-    projection = fit_map(sheet.canvas, [content], sheet.content, view, beside_mm=ends)
-    drawn = draw_map(
+    projection = map3d.fit_map(sheet.canvas, [content], sheet.content, view, beside_mm=ends)
+    drawn = map3d.draw_map(
         sheet.canvas, content, sheet.content, view, projection=projection,
         annotate=partial(_draw_needles, needles), ghost=False,
     )  # fmt: skip
@@ -307,7 +297,7 @@ def _needles(picture: ScenePicture, factor: float, view: str) -> Needles:
     return Needles(axis, lean, length, tilt, _feet(picture, view))
 
 
-def _draw_needles(needles: Needles, stage: Stage) -> None:
+def _draw_needles(needles: Needles, stage: map3d.Stage) -> None:
     nodes, theme = stage.picture.grid.nominal_mm.reshape(-1, 3), stage.canvas.theme
     nominal, drawn = needles.ends_mm(nodes, needles.feet)
     for ends, colour, width, dashes in (
