@@ -95,6 +95,7 @@ class Analysis(ABC):
 
     name: ClassVar[str]  # of the command
     task: ClassVar[Task]  # where it stands: one of `catalogue.TASKS`
+    title: ClassVar[str] = ""  # what it is called in a report, where its section does not say it
     # how many scenes it takes, at least and at most
     scenes: ClassVar[tuple[int, int | None]] = (1, 1)
     doing: ClassVar[str] = "computing"  # what is said while it works

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
-from warpspace.cli.options import ROWS, draw_figure_file, output_option, plot_option, read_size
+from warpspace.cli.options import ROWS, draw_figure_file, output_option, plot_option, size_option
 from warpspace.exceptions import OptionError, WorkersLostError
 from warpspace.machine.limits import LOCAL_WORKERS
 
@@ -181,17 +181,7 @@ def _machine_table(
 
 MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
     "concepts": (
-        (
-            plot_option("machines side by side"),
-            click.option(
-                "--size",
-                default="1600x1200",
-                show_default=True,
-                metavar="WxH",
-                callback=read_size,
-                help="Of the picture, px.",
-            ),
-        ),
+        (plot_option("machines side by side"), size_option("1600x1200", "Of the picture, px.")),
         draw_beside,
     ),
     "montecarlo": (

@@ -243,6 +243,13 @@ def read_size(
         ) from None
 
 
+def size_option(default: str | None, about: str) -> Decorator:
+    return click.option(
+        "--size", default=default, show_default=default is not None, metavar="WxH",
+        callback=read_size, help=about,
+    )  # fmt: skip
+
+
 def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator:
     options = (
         component_option,
@@ -254,14 +261,7 @@ def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator
             show_default=True,
             help="Where the camera stands.",
         ),
-        click.option(
-            "--size",
-            default=size,
-            show_default=size is not None,
-            metavar="WxH",
-            callback=read_size,
-            help=f"Width and height of the picture in px.{sizes}",
-        ),
+        size_option(size, f"Width and height of the picture in px.{sizes}"),
         loop_option,
         placed_option,
         direction_option,

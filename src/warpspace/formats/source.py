@@ -44,8 +44,6 @@ DEG_PER: Mapping[str, float] = {
     "rad": 180.0 / math.pi,
     "arcsec": 1.0 / 3600.0,
 }
-MM_TO_UM = 1e3
-RAD_TO_URAD = 1e6
 DEG_TO_URAD = URAD_PER["deg"]
 
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.formats import measured
-from warpspace.formats.source import DEG_TO_URAD, MM_TO_UM, RAD_TO_URAD, Source
+from warpspace.formats.source import DEG_TO_URAD, Source
 from warpspace.kinematics.model import Coordinates
 from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.description import Machine
-from warpspace.units import Array
+from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 HELD, MODULO, EXTENDED = "held", "modulo", "extended"
 """What a table does beyond its ends: its end values, its period, or its last straight line."""
@@ -261,7 +261,7 @@ def side(machine: Machine | None, axis: str) -> float:
 
 
 def _factor(machine: Machine | None, source_axis: str, target: str) -> float:
-    size = MM_TO_UM if is_linear(target) else DEG_TO_URAD
+    size = UM_PER_MM if is_linear(target) else DEG_TO_URAD
     return -size * sense(machine, target) * side(machine, source_axis)
 
 
@@ -321,7 +321,7 @@ def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.Pl
             (2, 0): over[1,] - over[1, 2] - over[0, 1] + over[0, 1, 2],
         }
         rest = np.abs(values - sum(parts.values())).max()
-        left = max(left, float(rest) * MM_TO_UM)
+        left = max(left, float(rest) * UM_PER_MM)
         for (first, second), part in parts.items():
             flat = part.squeeze(axis=3 - first - second)
             table = flat if first < second else flat.T
@@ -386,7 +386,7 @@ def _affine(
             if (target, axis) in SQUARENESS:
                 key, sign = SQUARENESS[target, axis]
                 turned = sense(machine, target) * sense(machine, axis)
-                constants[key] = -value * sign * turned * RAD_TO_URAD
+                constants[key] = -value * sign * turned * URAD_PER_RAD
             else:
                 slope = value * _factor(machine, axis, target)
                 curves[error_key(axis, target)] = {"poly": [0.0, slope]}

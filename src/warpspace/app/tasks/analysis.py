@@ -337,8 +337,9 @@ class AnalysisPart(Section):
 
     def _into_report(self) -> None:
         if self._answer is not None:
-            self.context.reported.append((self.title, self._answer.found))
-            self.context.notify("Added to the report", f"{self.title}; see Report at the top")
+            title = self.kind.title or self.title
+            self.context.reported.append((title, self._answer.found))
+            self.context.notify("Added to the report", f"{title}; see Report at the top")
 
 
 def _endings(found: Result) -> tuple[str, ...]:

@@ -200,11 +200,6 @@ class TestsPart(FilesPart):
     def received(self, name: str, content: bytes) -> None:
         self._files = (Held(name, upload_text(content, name, WHAT)),)
 
-    def _into_report(self) -> None:
-        if self._answer is not None and isinstance(found := self._answer.found, BenchResult):
-            self.context.reported.append((found.test.title, found))
-            self.context.notify("Added to the report", f"{found.test.title}; see Report at the top")
-
 
 # --- Calibration ----------------------------------------------------------------------------------
 

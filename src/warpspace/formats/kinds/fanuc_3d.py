@@ -125,12 +125,10 @@ def write(wanted: Wanted) -> Files:
     return {"": "\n".join(lines) + "\n"}
 
 
-FORMAT = Format(
-    **described("fanuc-3d"),
-    limits=f"{MOST_POINTS} points an axis, ±{MOST_COUNT} detection units times the magnification",
-    recognise=has(rf"\A\s*{MARK}"),
-    tables=read_tables,
-    write=write,
-    most_points=MOST_POINTS,
-)
-FORMATS = (FORMAT,)
+LARGEST = f"{MOST_POINTS} points an axis, ±{MOST_COUNT} detection units times the magnification"
+FORMATS = (
+    Format(
+        **described("fanuc-3d"), limits=LARGEST, recognise=has(rf"\A\s*{MARK}"),
+        tables=read_tables, write=write, most_points=MOST_POINTS,
+    ),
+)  # fmt: skip

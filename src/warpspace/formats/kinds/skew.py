@@ -21,8 +21,9 @@ import numpy as np
 from warpspace.formats.compensation.wanted import AXES, Wanted
 from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
 from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import RAD_TO_URAD, Place, Source, spell
+from warpspace.formats.source import Place, Source, spell
 from warpspace.formats.terms import Affine, Tables, errors_of
+from warpspace.units import URAD_PER_RAD
 
 PLANES = ("XY", "XZ", "YZ")
 MOST = 1.0  # of a factor (Marlin, SKEW_FACTOR_MAX)
@@ -187,7 +188,7 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
         place.refuse(f"y_offset {offset:g} mm", f"{LEAST_OFFSET_MM:g} mm or more to tell a twist")
     options.axis_named("X", at)
     places = np.linspace(ends[0], ends[1], len(heights))
-    values = np.array(heights) / offset * RAD_TO_URAD
+    values = np.array(heights) / offset * URAD_PER_RAD
     said = (
         f"the heights that the probe is off by, {offset:g} mm behind the nozzle, are taken for"
         " roll of X; their mean is not in the file"

@@ -35,9 +35,10 @@ from warpspace.formats.measured import (
     zero_key,
 )
 from warpspace.formats.registry import Files, Format, ReadOptions, described
-from warpspace.formats.source import MM_TO_UM, RAD_TO_URAD, Place, Source, spell
+from warpspace.formats.source import Place, Source, spell
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
+from warpspace.units import UM_PER_MM, URAD_PER_RAD
 
 STANDARD, ALTERNATIVE = "standard", "alternative"
 ARGUMENTS = ("X", "Y", "Z", "A", "B", "C")
@@ -69,7 +70,7 @@ def file_name(key: str) -> str:
 
 def factor_of(key: str) -> float:
     """Give the factor from mm or rad to µm or µrad."""
-    return RAD_TO_URAD if parameter(key).is_rotation else MM_TO_UM
+    return URAD_PER_RAD if parameter(key).is_rotation else UM_PER_MM
 
 
 def left_out(names: Sequence[str]) -> tuple[str, ...]:
