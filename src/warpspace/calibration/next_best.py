@@ -8,19 +8,10 @@ from itertools import product
 import numpy as np
 
 from warpspace.bench.placing import PLANES
+from warpspace.calibration import solve
 from warpspace.calibration.readings import Readings, nominal_tip
 from warpspace.calibration.registry import TestReadings
 from warpspace.calibration.results import Calibration, Candidate, Step
-from warpspace.calibration.solve import (
-    Stack,
-    Terms,
-    Watch,
-    build_terms,
-    find_rank,
-    orthonormal,
-    unwatched,
-    without,
-)
 from warpspace.calibration.spheres import solve_linear
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.field.grid import build_grid
@@ -154,7 +145,7 @@ def next_best(
     found: Calibration,
     count: int = 1,
     choice: Sequence[Candidate] | None = None,
-    watch: Watch = unwatched,
+    watch: solve.Watch = solve.unwatched,
 ) -> tuple[Step, ...]:
     """Choose measurements one after the other, each for the greatest gain.
 
@@ -167,15 +158,15 @@ def next_best(
     if not count:
         return ()
     keys = tuple(one.key for one in found.parameters)
-    terms = build_terms(found.scene, keys)
+    terms = solve.build_terms(found.scene, keys)
     noise = max(found.sigma_mm, LEAST_NOISE_MM)
     stated = [one.sigma_mm for one in sets if one.sigma_mm is not None]
     if len(stated) == len(sets):
         noise = float(np.median(np.concatenate(stated)))
-    known = _information(Stack.of(scene, sets, watch), terms, noise) + _prior(scene, keys)
+    known = _information(solve.Stack.of(scene, sets, watch), terms, noise) + _prior(scene, keys)
     weigh = map_weights(found.scene, terms)
     rows = [
-        (one, _information(Stack.of(scene, [one.readings], watch), terms, noise))
+        (one, _information(solve.Stack.of(scene, [one.readings], watch), terms, noise))
         for one in choice or candidates(scene)
     ]
     steps: list[Step] = []
@@ -194,19 +185,19 @@ def separating(
     scene: Scene,
     sets: Sequence[Readings],
     found: Calibration,
-    watch: Watch = unwatched,
+    watch: solve.Watch = solve.unwatched,
 ) -> dict[tuple[str, ...], str]:
     """Name for each group of parameters that look alike a measurement that tells them apart."""
     keys = tuple(one.key for one in found.parameters)
-    terms = build_terms(scene, keys)
+    terms = solve.build_terms(scene, keys)
     missing = set(found.rank.confounded)
     told: dict[tuple[str, ...], str] = {}
     for one in candidates(scene):
         if not missing:
             break
-        stack = Stack.of(scene, [*sets, one.readings], watch)
+        stack = solve.Stack.of(scene, [*sets, one.readings], watch)
         by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
-        rank = find_rank(keys, np.vstack(by_parameter), np.vstack(by_unknown))
+        rank = solve.find_rank(keys, np.vstack(by_parameter), np.vstack(by_unknown))
         still = {group[0] for group in rank.confounded}
         for group in [group for group in missing if group[0] not in still]:
             told[group] = one.name
@@ -214,10 +205,10 @@ def separating(
     return {group: told[group] for group in found.rank.confounded if group in told}
 
 
-def _information(stack: Stack, terms: Terms, noise_mm: float) -> Array:
+def _information(stack: solve.Stack, terms: solve.Terms, noise_mm: float) -> Array:
     by_parameter, by_unknown = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
     weights = np.concatenate(stack.weights(noise_mm))[:, None]
-    rows = without(weights * by_parameter, orthonormal(weights * by_unknown))
+    rows = solve.without(weights * by_parameter, solve.orthonormal(weights * by_unknown))
     return rows.T @ rows
 
 
@@ -235,7 +226,7 @@ def _covariance(known: Array) -> Array:
     return inverse / np.outer(scale, scale)
 
 
-def map_weights(scene: Scene, terms: Terms) -> Array:
+def map_weights(scene: Scene, terms: solve.Terms) -> Array:
     """Give how the map weighs covariances, [K, K]: its mean square is the sum of the products."""
     grid = build_grid(scene.model, scene.workspace, NODES)
     basis = grid_basis(replace(scene, errors=terms.errors), grid, keys=terms.keys)

@@ -22,16 +22,9 @@ from warpspace.machine.errors import (
     ToleranceSet,
 )
 from warpspace.resources import scenes_dir
-from warpspace.scene import schema
+from warpspace.scene import machines, schema
 from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.files import parse_toml, read_text
-from warpspace.scene.machines import (
-    body_notes,
-    load_machine,
-    machine_names,
-    machine_of,
-    read_bodies,
-)
 from warpspace.scene.model import Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.save import Notation, read_errors
@@ -149,7 +142,7 @@ def parse_scene(
         placed=view["placed"],
         limit_um=view["limit_um"],
         description=description,
-        notes=(*scene_notes(machine, workspace, errors), *body_notes(machine)),
+        notes=(*scene_notes(machine, workspace, errors), *machines.body_notes(machine)),
         uncertainty=uncertainty,
         measured=measured,
         review=review,
@@ -161,14 +154,16 @@ def _machine(
 ) -> Machine:
     given, machine = raw.get("machine"), None
     if not isinstance(given, str):
-        machine = machine_of(given, "machine", name, problems, folder=folder)
-    elif given in machine_names():
-        machine = load_machine(given)
+        machine = machines.machine_of(given, "machine", name, problems, folder=folder)
+    elif given in machines.machine_names():
+        machine = machines.load_machine(given)
     else:
-        problems.add("machine", f"unknown machine{near_miss(given, machine_names())}", given)
+        problems.add(
+            "machine", f"unknown machine{near_miss(given, machines.machine_names())}", given
+        )
     problems.only("", raw, SECTIONS, "key")
     if machine is not None and "bodies" in raw:
-        own = read_bodies(raw["bodies"], machine, folder, problems)
+        own = machines.read_bodies(raw["bodies"], machine, folder, problems)
         machine = replace(machine, bodies={**machine.bodies, **own})
     return machine or STAND_IN
 

@@ -7,16 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from warpspace.exceptions import ChainError, SceneError, UnknownNameError
+from warpspace.machine import description
 from warpspace.machine.axes import direction_index, is_linear
-from warpspace.machine.description import (
-    BODY_FRAMES,
-    FIXED_FRAMES,
-    MESH_ENDINGS,
-    BodySource,
-    Machine,
-    build_machine,
-    parse_chain,
-)
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
 from warpspace.scene import schema
@@ -25,16 +17,16 @@ from warpspace.scene.schema import Problems
 
 
 def read_bodies(
-    raw: object, machine: Machine, folder: Path | None, problems: Problems
-) -> dict[str, BodySource]:
-    found: dict[str, BodySource] = {}
-    frames = (*machine.axes, *BODY_FRAMES)
+    raw: object, machine: description.Machine, folder: Path | None, problems: Problems
+) -> dict[str, description.BodySource]:
+    found: dict[str, description.BodySource] = {}
+    frames = (*machine.axes, *description.BODY_FRAMES)
     for frame, value in problems.table("bodies", raw).items():
         if frame not in frames:
             problems.only("bodies", [frame], frames, "frame of this machine")
             continue
         where = f"bodies.{frame}"
-        body: BodySource | None = problems.read(
+        body: description.BodySource | None = problems.read(
             schema.BODY, where, {"file": value} if isinstance(value, str) else value
         )
         if body is None:
@@ -44,7 +36,7 @@ def read_bodies(
         elif body.shape and frame != "t":
             problems.add(f"{where}.shape", "only the tool t has one; expected a file", body.shape)
         elif body.shape:
-            found[frame] = BodySource(shape=body.shape)
+            found[frame] = description.BodySource(shape=body.shape)
         else:
             found[frame] = replace(body, path=_path(body.file, where, folder, problems))
     return found
@@ -52,8 +44,8 @@ def read_bodies(
 
 def _path(file: str, where: str, folder: Path | None, problems: Problems) -> str:
     ending = Path(file).suffix.lower()
-    if ending not in MESH_ENDINGS:
-        known = ", ".join(MESH_ENDINGS)
+    if ending not in description.MESH_ENDINGS:
+        known = ", ".join(description.MESH_ENDINGS)
         problems.add(where, f"unknown ending; expected a mesh that ends in {known}", file)
         return ""
     if folder is None:
@@ -73,7 +65,7 @@ def _path(file: str, where: str, folder: Path | None, problems: Problems) -> str
     return ""
 
 
-def body_notes(machine: Machine) -> tuple[str, ...]:
+def body_notes(machine: description.Machine) -> tuple[str, ...]:
     """Remark on meshes that are named and cannot be drawn, since an upload has no folder."""
     return tuple(
         f"bodies.{frame}: {source.file} cannot be read from here (the text came without its"
@@ -94,7 +86,7 @@ def machine_picture(name: str) -> Path | None:
 
 
 @lru_cache(maxsize=64)
-def load_machine(name: str) -> Machine:
+def load_machine(name: str) -> description.Machine:
     if name not in machine_names():
         raise UnknownNameError("machine", name, machine_names())
     folder = assets_dir() / "machines" / name
@@ -114,7 +106,7 @@ def machine_of(
     problems: Problems,
     body_dir: str = "",
     folder: Path | None = None,
-) -> Machine | None:
+) -> description.Machine | None:
     expected = 'expected a machine name or a [machine] table with "chain"'
     if raw is None:
         problems.add(key, f"is missing; {expected}")
@@ -127,15 +119,18 @@ def machine_of(
         return None
     prefix = f"{key}." if key else ""
     try:
-        chain = parse_chain(section["chain"])
+        chain = description.parse_chain(section["chain"])
     except ChainError as error:
         problems.add(f"{prefix}chain", str(error))
         return None
     tables = {part: section[part] for part in ("offset_mm", "rotation_deg", "travel", "direction")}
     for part, entries in {**tables, "gantry": section["gantry"]}.items():
-        known = (*chain.axes, *(FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()))
+        known = (
+            *chain.axes,
+            *(description.FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()),
+        )
         problems.only(f"{prefix}{part}", entries, known, "frame of this machine")
-    machine = build_machine(
+    machine = description.build_machine(
         chain,
         **tables,
         gantry=_gantries(section["gantry"], chain.axes, f"{prefix}gantry", problems),

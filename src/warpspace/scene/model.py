@@ -20,15 +20,7 @@ from warpspace.field.evaluate import (
 )
 from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
-from warpspace.machine.axes import (
-    PARAMETERS,
-    ErrorKind,
-    TravelDirection,
-    default_keys,
-    direction_index,
-    is_linear,
-    parameter,
-)
+from warpspace.machine import axes
 from warpspace.machine.description import Machine, Vector
 from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics, Measurement, ToleranceSet
 from warpspace.machine.limits import MAX_ERROR
@@ -95,7 +87,7 @@ class Scene:
     @property
     def parameter_keys(self) -> tuple[str, ...]:
         """Keys of the machine's default parameters and of any other constant the scene gives."""
-        default = default_keys(self.machine.chain.axes)
+        default = axes.default_keys(self.machine.chain.axes)
         given = [*self.errors, *self.tolerances.own, *self.uncertainty]
         extra = [key for key in self.machine.allowed_keys if key in given and key not in default]
         return (*default, *extra)
@@ -189,7 +181,7 @@ def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
     for key, values in error_values(scene.model, scene.errors, coordinates).items():
         peak = np.abs(values).max(initial=0.0)
         if not peak <= MAX_ERROR:
-            row = parameter(key)
+            row = axes.parameter(key)
             raise OptionError(
                 f"{key} reaches {peak:.3g} {row.unit} at the positions given for {row.axis};"
                 f" expected at most ±{MAX_ERROR:g}"
@@ -199,10 +191,10 @@ def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
 def in_direction(scene: Scene, direction: str | None) -> Scene:
     if direction is None:
         return scene
-    if direction not in [*TravelDirection]:
-        known = ", ".join(TravelDirection)
+    if direction not in [*axes.TravelDirection]:
+        known = ", ".join(axes.TravelDirection)
         raise OptionError(f"direction {direction!r}; expected one of {known}")
-    return replace(scene, model=replace(scene.model, direction=TravelDirection(direction)))
+    return replace(scene, model=replace(scene.model, direction=axes.TravelDirection(direction)))
 
 
 def placed_in(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
@@ -323,10 +315,10 @@ def _costly_notes(errors: ErrorSet) -> tuple[str, ...]:
 def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
     notes: list[str] = []
     for key in errors:
-        row = PARAMETERS[key]
-        if row.kind is not ErrorKind.SQUARENESS or errors.amplitude(key) == 0.0:
+        row = axes.PARAMETERS[key]
+        if row.kind is not axes.ErrorKind.SQUARENESS or errors.amplitude(key) == 0.0:
             continue
-        own = direction_index(row.axis)
+        own = axes.direction_index(row.axis)
         if row.direction == own:
             continue
         branches = (machine.chain.tool, machine.chain.workpiece)
@@ -335,6 +327,6 @@ def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
             f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
             f" between them stays, the pair turns as a whole"
             for other in branch[branch.index(row.axis) + 1 :]
-            if is_linear(other) and direction_index(other) == 3 - row.direction - own
+            if axes.is_linear(other) and axes.direction_index(other) == 3 - row.direction - own
         ]
     return tuple(notes)

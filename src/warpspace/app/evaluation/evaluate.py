@@ -20,14 +20,7 @@ from warpspace.app.state.look import slice_positions
 from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid, build_slice
 from warpspace.geometry.colour import ColourScale
-from warpspace.picture.model import (
-    Slice,
-    choose_exaggeration,
-    choose_scale,
-    coloured_error,
-    coloured_values,
-    picture_size_mm,
-)
+from warpspace.picture import model
 from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
 from warpspace.scene.model import grid_basis
 from warpspace.units import Array
@@ -58,8 +51,10 @@ class LiveModel:
         response: Response = self._kept.get(key, lambda: _build(state), _size)
         (grid, basis), traces = response
         field = self._field(state, grid, basis)
-        size = picture_size_mm(state.scene, grid)
-        factor = choose_exaggeration(state.exaggeration, None, float(field.norm_um.max()), size)
+        size = model.picture_size_mm(state.scene, grid)
+        factor = model.choose_exaggeration(
+            state.exaggeration, None, float(field.norm_um.max()), size
+        )
         common: dict[str, Any] = {
             "view": state.view(),
             "exaggeration": factor,
@@ -73,7 +68,7 @@ class LiveModel:
             field=field,
             cut=state.look.surface == "cut",
             slices=tuple(
-                Slice(**common, grid=plane, axis=axis, position_mm=at, field=on_plane)
+                model.Slice(**common, grid=plane, axis=axis, position_mm=at, field=on_plane)
                 for axis, at, plane, on_plane in self._slices(state)
             ),
             state=state,
@@ -158,15 +153,15 @@ class PassFail(ColourScale):
 def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> ColourScale:
     """Give the colours that a user has chosen: fixed, shared, or with round ends."""
     quantity, component, look = state.look.quantity, state.component, state.look
-    values = coloured_values(field, component, quantity)
+    values = model.coloured_values(field, component, quantity)
     if look.pass_fail and not look.tilts and component == "norm":
-        scale, limit = choose_scale([values], component), state.specification.limit_um
+        scale, limit = model.choose_scale([values], component), state.specification.limit_um
         top = max(scale.high, limit)
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
     if look.range_mode == "shared":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
-        both = (coloured_error(one, quantity) for one in (field, opened))
+        both = (model.coloured_error(one, quantity) for one in (field, opened))
         lengths = [np.linalg.norm(error, axis=-1) for error in both]
-        return choose_scale(lengths, component, quantity)
+        return model.choose_scale(lengths, component, quantity)
     end = look.range_top if look.range_mode == "fixed" else None
-    return choose_scale([values], component, quantity, end=end)
+    return model.choose_scale([values], component, quantity, end=end)

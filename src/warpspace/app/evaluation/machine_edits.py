@@ -21,19 +21,9 @@ from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
 from warpspace.field.grid import find_volume_axes
+from warpspace.machine import description
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
-from warpspace.machine.description import (
-    ACROSS,
-    FIXED_FRAMES,
-    ORIGIN,
-    BodySource,
-    Chain,
-    Gantry,
-    Machine,
-    default_across,
-    parse_chain,
-)
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machines import body_notes, load_machine, machine_names
@@ -58,7 +48,7 @@ SHOWN = 30  # characters of what was typed that a message repeats
 
 def tables_of(scene: Scene) -> Tables:
     """Give all that can be changed frame by frame."""
-    machine, fixed = scene.machine, dict.fromkeys(FIXED_FRAMES, ORIGIN)
+    machine, fixed = scene.machine, dict.fromkeys(description.FIXED_FRAMES, description.ORIGIN)
     offset = {name: axis.offset_mm for name, axis in machine.axes.items()}
     rotation = {name: axis.rotation_deg for name, axis in machine.axes.items()}
     return {
@@ -71,7 +61,7 @@ def tables_of(scene: Scene) -> Tables:
     }
 
 
-def own_bodies(machine: Machine) -> dict[str, BodySource]:
+def own_bodies(machine: description.Machine) -> dict[str, description.BodySource]:
     """Give the bodies that a description names, without those of its machine in the library."""
     known = load_machine(machine.name).bodies if machine.name in machine_names() else {}
     return {frame: source for frame, source in machine.bodies.items() if known.get(frame) != source}
@@ -87,23 +77,25 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
     guides, bodies = raw["machine"].setdefault("gantry", {}), dict(machine.bodies)
     match what, rest.split(" ", maxsplit=2):
         case "chain", _:
-            _rearrange(raw, scene, parse_chain(rest[:MOST_CHAIN_TEXT]))
+            _rearrange(raw, scene, description.parse_chain(rest[:MOST_CHAIN_TEXT]))
         case "left" | "right" | "side" | "remove", [axis]:
             _rearrange(raw, scene, _moved(machine, what, axis))
         case "turn", [axis]:
             _put(raw, "direction", axis, -machine.axis(axis).direction)
         case "gantry", [axis]:
             if guides.pop(axis, None) is None:
-                across = default_across(machine.axis(axis).name)
+                across = description.default_across(machine.axis(axis).name)
                 others = [one for one in machine.axes.values() if one.is_linear]
                 spans = [
-                    one.travel[1] - one.travel[0] for one in others if ACROSS[one.index] == across
+                    one.travel[1] - one.travel[0]
+                    for one in others
+                    if description.ACROSS[one.index] == across
                 ]
                 guides[axis] = {"span_mm": max(spans, default=START_SPAN_MM), "across": across}
         case "across", [axis]:
             _entry(tables, "span", axis)
-            taken = (guides[axis]["across"], ACROSS[direction_index(axis)])
-            guides[axis]["across"] = next(name for name in ACROSS if name not in taken)
+            taken = (guides[axis]["across"], description.ACROSS[direction_index(axis)])
+            guides[axis]["across"] = next(name for name in description.ACROSS if name not in taken)
         case "mesh", [frame]:
             _entry(tables, what, frame)
             del bodies[frame]
@@ -144,7 +136,7 @@ def _put(raw: Tables, key: str, frame: str, value: object) -> None:
     raw["machine"].setdefault(key, {})[frame] = value
 
 
-def _moved(machine: Machine, what: str, axis: str) -> Chain:
+def _moved(machine: description.Machine, what: str, axis: str) -> description.Chain:
     """Move an axis along the written chain, across the frame too; or next to it; or away."""
     places = [*reversed(machine.chain.workpiece), FRAME, *machine.chain.tool]
     at = places.index(machine.axis(axis).name) + {"left": -1, "right": 1}.get(what, 0)
@@ -153,10 +145,10 @@ def _moved(machine: Machine, what: str, axis: str) -> Chain:
         at = places.index(FRAME) + (axis not in machine.chain.tool)
     if what != "remove":
         places.insert(max(at, 0), axis)
-    return parse_chain(f"w{''.join(places)}t")
+    return description.parse_chain(f"w{''.join(places)}t")
 
 
-def _rearrange(raw: Tables, scene: Scene, chain: Chain) -> None:
+def _rearrange(raw: Tables, scene: Scene, chain: description.Chain) -> None:
     """Give a scene another chain; the tool moves over the workpiece as before."""
     machine = scene.machine
     raw["machine"]["chain"] = str(chain)
@@ -187,13 +179,13 @@ def _document(scene: Scene) -> Tables:
     return tomllib.loads(scene_to_toml(replace(scene, model=model, errors=ErrorSet())))
 
 
-def _read(scene: Scene, raw: Tables, like: Machine) -> tuple[Scene, tuple[str, ...]]:
+def _read(scene: Scene, raw: Tables, like: description.Machine) -> tuple[Scene, tuple[str, ...]]:
     """Read a changed document without what belongs to axes that are gone; and say what that was.
 
     The machine is named after its frames: as the one that it is like, as that of the library with
     the same ones, or as its scene. Bodies that were made for other frames suit it no more.
     """
-    chain = parse_chain(raw["machine"]["chain"])
+    chain = description.parse_chain(raw["machine"]["chain"])
     gone = {a: at for a, at in scene.workspace.positions.items() if a not in chain.axes}
     raw["convention"]["reference_axis"] = "free"  # which axis that is may have changed
     bare = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
@@ -231,12 +223,12 @@ def _without(table: Tables, axes: Collection[str]) -> Tables:
     return {key: value for key, value in kept.items() if value != {}}
 
 
-def _frames(machine: Machine) -> tuple[object, ...]:
+def _frames(machine: description.Machine) -> tuple[object, ...]:
     places = [(axis.offset_mm, axis.rotation_deg) for axis in machine.axes.values()]
     return machine.chain, places, machine.fixed_mm, machine.fixed_deg
 
 
-def known_alike(machine: Machine) -> Machine | None:
+def known_alike(machine: description.Machine) -> description.Machine | None:
     """Find the machine of the library with the same frames, whatever their travels and ways."""
     known = map(load_machine, machine_names())
     return next((one for one in known if _frames(one) == _frames(machine)), None)
@@ -361,7 +353,7 @@ SAMPLES = 65
 ALIKE = 1e-9  # by how much two curves of amplitude 1 may differ that count as one
 
 
-def guide_errors(state: AppState, gantry: Gantry) -> tuple[float, float] | None:
+def guide_errors(state: AppState, gantry: description.Gantry) -> tuple[float, float] | None:
     """Give the positioning errors of both guides, µm; None where their curves differ."""
     if not _alike(*_curves(state, gantry)):
         return None
@@ -370,7 +362,9 @@ def guide_errors(state: AppState, gantry: Gantry) -> tuple[float, float] | None:
     return mean - half, mean + half
 
 
-def with_guide_error(state: AppState, gantry: Gantry, guide: int, value_um: float) -> AppState:
+def with_guide_error(
+    state: AppState, gantry: description.Gantry, guide: int, value_um: float
+) -> AppState:
     """Set the positioning error of one guide; the other one stays."""
     present = guide_errors(state, gantry)
     if present is None:
@@ -386,7 +380,7 @@ def with_guide_error(state: AppState, gantry: Gantry, guide: int, value_um: floa
     return state
 
 
-def _curves(state: AppState, gantry: Gantry) -> tuple[ErrorFunction, ErrorFunction]:
+def _curves(state: AppState, gantry: description.Gantry) -> tuple[ErrorFunction, ErrorFunction]:
     along, about = gantry.positioning_key, gantry.rotation_key
     return state.curve(along), state.curve(about)
 

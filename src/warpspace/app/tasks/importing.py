@@ -21,18 +21,8 @@ from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
 from warpspace.app.tasks.measure import FilesPart, Held
 from warpspace.exceptions import WarpspaceError
+from warpspace.formats import registry
 from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summary_table
-from warpspace.formats.registry import (
-    Format,
-    Reading,
-    ReadOptions,
-    find_format,
-    formats,
-    open_upload,
-    parse_axis_options,
-    read_errors,
-    recognise,
-)
 from warpspace.formats.source import Source
 from warpspace.formats.to_scene import ImportedScene, into_scene
 from warpspace.machine.axes import is_linear, parameter
@@ -76,9 +66,13 @@ class Import(Analysis):
     sources: tuple[Source, ...] = ()
 
     def run(self, scene: Scene, _watch: Watch, /) -> "ImportResult":
-        axis, names = parse_axis_options([word for word in re.split(r"[\s,;]+", self.axis) if word])
-        options = ReadOptions(scene.machine, axis, names, self.sign or "", self.variant or "")
-        reading = read_errors(self.sources, options, self.format or "")
+        axis, names = registry.parse_axis_options(
+            [word for word in re.split(r"[\s,;]+", self.axis) if word]
+        )
+        options = registry.ReadOptions(
+            scene.machine, axis, names, self.sign or "", self.variant or ""
+        )
+        reading = registry.read_errors(self.sources, options, self.format or "")
         files = ", ".join(source.name for source in self.sources)
         made = into_scene(reading, scene, scene.title, files)
         return ImportResult(files=files, before=scene, reading=reading, made=made)
@@ -90,7 +84,7 @@ class ImportResult(Result):
 
     files: str
     before: Scene
-    reading: Reading
+    reading: registry.Reading
     made: ImportedScene
 
     def changes(self) -> Sequence[Change]:
@@ -157,14 +151,14 @@ class ImportPart(FilesPart):
         if not self._files:
             return ()
         found = {one.name: one for one in self.options()}
-        names = {one.name: one.title for one in formats()}
+        names = {one.name: one.title for one in registry.formats()}
         own = self._recognised()
         first = own.title if own is not None else "none, choose one"
         found["format"] = replace(
             found["format"], choices=tuple(names), words=names, unset=f"recognised: {first}"
         )
         chosen = self.values(state).get("format")
-        kind = find_format(chosen) if chosen in names else own
+        kind = registry.find_format(chosen) if chosen in names else own
         if kind is None or kind.tables is None:
             del found["sign"]
         if kind is None or not kind.variants:
@@ -173,9 +167,9 @@ class ImportPart(FilesPart):
             found["variant"] = replace(found["variant"], choices=kind.variants)
         return list(found.values())
 
-    def _recognised(self) -> Format | None:
+    def _recognised(self) -> registry.Format | None:
         try:
-            return recognise([one.content for one in self._files])
+            return registry.recognise([one.content for one in self._files])
         except WarpspaceError:  # none that is known, or several
             return None
 
@@ -207,7 +201,7 @@ class ImportPart(FilesPart):
         Alone it is kept also where it cannot be read yet: the section asks for what it does not
         say, or another file comes to it.
         """
-        own, before, problem = Held(name, open_upload(name, content)), self._files, None
+        own, before, problem = Held(name, registry.open_upload(name, content)), self._files, None
         is_applied = self._applied[-1:] == (before,)
         held = () if is_applied else tuple(one for one in before if one.name != name)
         state, keeps = self.context.state, False

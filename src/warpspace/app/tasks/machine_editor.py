@@ -10,17 +10,8 @@ from markupsafe import Markup
 from PIL import Image
 
 from warpspace.app.browser.html import EMPTY, button, field, fill, ident, join, tag, text_box
+from warpspace.app.evaluation import machine_edits
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine_edits import (
-    UNCHANGED,
-    UNITS,
-    Tables,
-    guide_errors,
-    library,
-    tables_of,
-    with_library_scene,
-    with_word,
-)
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.typed_numbers import spell_typed
 from warpspace.app.tasks.context import Context
@@ -74,7 +65,7 @@ class EditorSection(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         state, name = picture.state, "editor:set.chain"
-        chain, tables = state.scene.machine.chain, tables_of(state.scene)
+        chain, tables = state.scene.machine.chain, machine_edits.tables_of(state.scene)
         typed, problem = self._refused if self._refused[1] else (str(chain), "")
         box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
         whole = (button(*words, hint=hint) for *words, hint in WHOLE)
@@ -91,22 +82,27 @@ class EditorSection(Section):
     def take(self, state: AppState, word: str, value: str) -> AppState:
         self._refused = ("", "")
         if word == "do":
-            return with_word(state, value)
+            return machine_edits.with_word(state, value)
         what = word.removeprefix("set.")
-        changed = with_word(state, f"{what} {value}")
+        changed = machine_edits.with_word(state, f"{what} {value}")
         notes = changed.notes[len(state.notes) :]
         if what == "chain" and notes and changed.scene is state.scene:
-            self._refused = (value[:200], "\n".join(notes).removesuffix(f"; {UNCHANGED}"))
+            self._refused = (
+                value[:200],
+                "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}"),
+            )
             self.context.act(lambda: self.context.renew(self))
             return state
         return changed
 
 
-def _frame(state: AppState, tables: Tables, name: str) -> Markup:
+def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
     machine = state.scene.machine
     axis, gantry = machine.axes.get(name), machine.gantries.get(name)
     lines = [
-        _numbers(f"{what} {name}", label, UNITS[what] or unit, tables[what][name], letters)
+        _numbers(
+            f"{what} {name}", label, machine_edits.UNITS[what] or unit, tables[what][name], letters
+        )
         for what, (label, letters) in ROWS.items()
         if name in tables[what] and (unit := axis.unit if axis else "mm")
     ]
@@ -152,7 +148,7 @@ def _numbers(
 def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     if gantry is None:
         return []
-    name, errors = gantry.axis, guide_errors(state, gantry)
+    name, errors = gantry.axis, machine_edits.guide_errors(state, gantry)
     words = (
         f"{gantry.positioning_key} is the mean of the guides, {gantry.rotation_key} follows from"
         " their difference."
@@ -211,14 +207,14 @@ class MachinesWindow(Window):
                 tag("b", scene.machine.title), tag("small", str(scene.machine.chain)),
             )), type="button", data_do="machines:choose", data_value=name,
                 aria_current="true" if name == present else None)
-            for name, scene in library().items()
+            for name, scene in machine_edits.library().items()
         ), class_="ws-gallery", data_list=True)  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        scene = library().get(value)
+        scene = machine_edits.library().get(value)
         if word != "choose" or scene is None:
             return state
-        found = with_library_scene(state, scene)
+        found = machine_edits.with_library_scene(state, scene)
         self.context.act(lambda: self.context.scenes.add(found.origin) and None)
         return self.closed(replace(found, page=state.page))
 

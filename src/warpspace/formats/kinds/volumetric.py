@@ -20,20 +20,8 @@ from itertools import pairwise
 import numpy as np
 
 from warpspace.exceptions import OptionError
+from warpspace.formats import measured
 from warpspace.formats.compensation.wanted import Wanted
-from warpspace.formats.measured import (
-    BOTH,
-    Imported,
-    Plane,
-    Run,
-    Series,
-    in_one_direction,
-    merge,
-    plane_of,
-    sampled,
-    tables_of,
-    zero_key,
-)
 from warpspace.formats.registry import Files, Format, ReadOptions, described
 from warpspace.formats.source import Place, Source, spell
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
@@ -77,12 +65,12 @@ def left_out(names: Sequence[str]) -> tuple[str, ...]:
     return (f"{', '.join(names)}: no errors, left out",) if names else ()
 
 
-def check_axes(held: Imported, name: str) -> None:
+def check_axes(held: measured.Imported, name: str) -> None:
     if other := next((axis for axis in held.axes if axis not in ARGUMENTS), ""):
         raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
 
 
-def _finished(found: Imported, options: ReadOptions) -> Imported:
+def _finished(found: measured.Imported, options: ReadOptions) -> measured.Imported:
     found = replace(
         found,
         units=("mm", "rad", "degrees for rotary positions"),
@@ -100,7 +88,9 @@ def _finished(found: Imported, options: ReadOptions) -> Imported:
     return found
 
 
-def _about_distorted_axis(found: Imported, axis: str, options: ReadOptions) -> Imported:
+def _about_distorted_axis(
+    found: measured.Imported, axis: str, options: ReadOptions
+) -> measured.Imported:
     """Take back, turned with the axis, what the constant errors of a rotary axis move at zero.
 
     A rotation R about an axis that is displaced by E₀ is E₀·R·E₀⁻¹: to first order the constant
@@ -122,8 +112,8 @@ def _about_distorted_axis(found: Imported, axis: str, options: ReadOptions) -> I
 
 
 def _plus(
-    found: Imported, key: str, offset: float = 0.0, cosine: float = 0.0, sine: float = 0.0
-) -> Imported:
+    found: measured.Imported, key: str, offset: float = 0.0, cosine: float = 0.0, sine: float = 0.0
+) -> measured.Imported:
     size = math.hypot(cosine, sine)
     if not size and not offset:
         return found
@@ -137,16 +127,18 @@ def _plus(
         at = np.union1d(at, np.arange(at[0], at[-1], FINE_DEG))
     values = np.interp(at, present.positions, present.values) + offset
     values = values + cosine * np.cos(np.deg2rad(at)) + sine * np.sin(np.deg2rad(at))
-    changed = Series(key, tuple(at.tolist()), (Run(1, BOTH, tuple(values.tolist())),))
+    changed = measured.Series(
+        key, tuple(at.tolist()), (measured.Run(1, measured.BOTH, tuple(values.tolist())),)
+    )
     series = tuple(changed if one.key == key else one for one in found.series)
     return replace(found, series=series)
 
 
 def _read_with(
-    read_one: Callable[[Source], Sequence[Imported]],
-) -> Callable[[Sequence[Source], ReadOptions], Imported]:
+    read_one: Callable[[Source], Sequence[measured.Imported]],
+) -> Callable[[Sequence[Source], ReadOptions], measured.Imported]:
     return lambda sources, options: _finished(
-        merge([part for source in sources for part in read_one(source)]), options
+        measured.merge([part for source in sources for part in read_one(source)]), options
     )
 
 
@@ -182,8 +174,8 @@ def _blocks(source: Source) -> list[Block]:
     return [block for block in blocks if block]
 
 
-def _read_isg(source: Source) -> list[Imported]:
-    found: list[Imported] = []
+def _read_isg(source: Source) -> list[measured.Imported]:
+    found: list[measured.Imported] = []
     known: set[str] = set()
     for block in _blocks(source):
         part = _read_block(source, block)
@@ -198,7 +190,7 @@ def _read_isg(source: Source) -> list[Imported]:
     return found
 
 
-def _read_block(source: Source, block: Block) -> Imported:
+def _read_block(source: Source, block: Block) -> measured.Imported:
     at, names = block[0]
     arguments = [name for name in names if name in ARGUMENTS]
     left = [name for name in names if OTHER.fullmatch(name)]
@@ -233,12 +225,12 @@ def _read_block(source: Source, block: Block) -> Imported:
     for key in keys:
         _check_arguments(at, key, arguments)
     if not arguments:
-        return Imported(ISG, constants={key: rows[0][1][key] for key in keys}, notes=notes)
+        return measured.Imported(ISG, constants={key: rows[0][1][key] for key in keys}, notes=notes)
     if len(arguments) == 2:
         planes = tuple(_isg_plane(source, key, arguments, rows) for key in keys)
-        return Imported(ISG, planes=planes, notes=notes)
+        return measured.Imported(ISG, planes=planes, notes=notes)
     series = tuple(_isg_series(key, arguments[0], rows) for key in keys)
-    return Imported(ISG, series, notes=notes)
+    return measured.Imported(ISG, series, notes=notes)
 
 
 def _check_arguments(at: Place, key: str, arguments: Sequence[str]) -> None:
@@ -253,31 +245,33 @@ def _check_arguments(at: Place, key: str, arguments: Sequence[str]) -> None:
         at.refuse(f"{key} over {' and '.join(arguments)}", f"the argument {row.axis}")
 
 
-def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> Series:
+def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.Series:
     for (_, before), (at, row) in pairwise(rows):
         if row[argument] <= before[argument]:
             found = f"{argument} {row[argument]:g} after {before[argument]:g}"
             at.refuse(found, "ascending positions")
-    run = Run(1, BOTH, tuple(row[key] for _, row in rows))
-    return Series(key, tuple(row[argument] for _, row in rows), (run,))
+    run = measured.Run(1, measured.BOTH, tuple(row[key] for _, row in rows))
+    return measured.Series(key, tuple(row[argument] for _, row in rows), (run,))
 
 
-def _isg_plane(source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]) -> Plane:
+def _isg_plane(
+    source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]
+) -> measured.Plane:
     own = parameter(key).axis
     other = next(axis for axis in arguments if axis != own)
     points = [(at, row[own], row[other], row[key]) for at, row in rows]
-    return plane_of(key, (own, other), points, source)
+    return measured.plane_of(key, (own, other), points, source)
 
 
 def _write_isg(wanted: Wanted) -> Files:
-    held = in_one_direction(sampled(wanted), wanted)
+    held = measured.in_one_direction(measured.sampled(wanted), wanted)
     check_axes(held, ISG)
 
     def spelled(value: float, key: str) -> str:
         return spell(value / factor_of(key), DIGITS)
 
     blocks: list[list[list[str]]] = []
-    for table in tables_of(held):
+    for table in measured.tables_of(held):
         names = [*reversed(table.axes), *map(file_name, table.keys)]
         ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis runs fastest
         rows = [
@@ -286,7 +280,7 @@ def _write_isg(wanted: Wanted) -> Files:
         ]
         blocks.append([names, *rows])
     if not blocks:
-        key = zero_key(wanted.scene)
+        key = measured.zero_key(wanted.scene)
         blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
     return {"": f"// {wanted.title}\n// mm, rad, degrees\n" + "\n#\n".join(texts) + "\n"}
@@ -304,9 +298,9 @@ def _is_iso(head: str, name: str) -> bool:
     return bool(blocks) and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))
 
 
-def _read_iso(source: Source) -> Imported:
+def _read_iso(source: Source) -> measured.Imported:
     constants: dict[str, float] = {}
-    series: list[Series] = []
+    series: list[measured.Series] = []
     left: list[str] = []
     key, name = "", ""
     opened: Place | None = None
@@ -320,7 +314,9 @@ def _read_iso(source: Source) -> Imported:
                     at.refuse(f"[{name}] has no points", "position and value")
                 if key:
                     places, values = zip(*rows, strict=True)
-                    series.append(Series(key, places, (Run(1, BOTH, values),)))
+                    series.append(
+                        measured.Series(key, places, (measured.Run(1, measured.BOTH, values),))
+                    )
                 opened, rows = None, []
         elif matched := _SECTION.fullmatch(bare):
             name = matched[1].upper()
@@ -348,7 +344,7 @@ def _read_iso(source: Source) -> Imported:
     if opened:
         opened.refuse(f"Gridpoints of [{name}] do not end", "} (is the file cut off?)")
     notes = (*source.notes, *left_out(left))
-    return Imported(ISO, tuple(series), constants=constants, notes=notes)
+    return measured.Imported(ISO, tuple(series), constants=constants, notes=notes)
 
 
 def _iso_row(
@@ -368,7 +364,7 @@ def _iso_row(
 
 
 def _write_iso(wanted: Wanted) -> Files:
-    held = in_one_direction(sampled(wanted), wanted)
+    held = measured.in_one_direction(measured.sampled(wanted), wanted)
     check_axes(held, ISO)
     lines = [f"// {wanted.title}", "// mm, rad, degrees; variant Vendor"]
     for plane in held.planes:

@@ -17,15 +17,7 @@ from warpspace.machine.limits import MAX_FIGURE_AREA_PX as LARGEST_AREA
 from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
 from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
 from warpspace.machine.limits import RANGE_TOP
-from warpspace.picture.model import (
-    VIEWS,
-    Exaggeration,
-    Picture,
-    ScenePicture,
-    choose_scale,
-    evaluate_picture,
-    given_exaggeration,
-)
+from warpspace.picture import model
 from warpspace.picture.words import range_words
 from warpspace.scene.model import Scene
 
@@ -107,7 +99,7 @@ class FigureSettings:
     component: str = "norm"  # "norm", "x", "y" or "z"
     # "auto" or None; display factor of displacements; "auto" chooses a round one, None takes the
     # scene's
-    exaggeration: Exaggeration = None
+    exaggeration: model.Exaggeration = None
     view: str = "iso"  # "iso", "front", "right" or "top"
     # px; width and height; vector formats take 100 px for an inch
     size: tuple[int, int] = (1600, 1200)
@@ -130,9 +122,9 @@ class FigureSettings:
         if self.component not in COMPONENTS:
             expected = ", ".join(COMPONENTS)
             raise OptionError(f"component {self.component!r}; expected one of {expected}")
-        if self.view not in VIEWS:
-            raise OptionError(f"view {self.view!r}; expected one of {', '.join(VIEWS)}")
-        given_exaggeration(self.exaggeration, None)
+        if self.view not in model.VIEWS:
+            raise OptionError(f"view {self.view!r}; expected one of {', '.join(model.VIEWS)}")
+        model.given_exaggeration(self.exaggeration, None)
         low, high = RANGE_TOP
         if self.range_top is not None and not low <= self.range_top <= high:
             found = f"range_top {self.range_top:g}; expected a number above 0"
@@ -157,8 +149,8 @@ def check_size(size: tuple[int, int]) -> None:
 
 def evaluate_for(
     settings: FigureSettings, scene: Scene, quantity: str = "position"
-) -> ScenePicture:
-    picture = evaluate_picture(
+) -> model.ScenePicture:
+    picture = model.evaluate_picture(
         scene,
         grid=settings.grid,
         loop=settings.loop,
@@ -173,9 +165,9 @@ def evaluate_for(
     return replace(picture, colours=scale, conditions=conditions)
 
 
-def shared_colours(settings: FigureSettings, pictures: Sequence[Picture]) -> ColourScale:
+def shared_colours(settings: FigureSettings, pictures: Sequence[model.Picture]) -> ColourScale:
     """Choose the colours of pictures that share one bar."""
-    return choose_scale(
+    return model.choose_scale(
         [picture.values for picture in pictures],
         settings.component,
         pictures[0].quantity,
