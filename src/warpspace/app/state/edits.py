@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
+from warpspace.analysis.distribution import round_width
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Span
 from warpspace.machine.axes import parameter
@@ -18,9 +19,7 @@ FINE_STEP, FINE = 0.1, (5.0, 500.0)  # a slider that ends between has this step
 
 def _span(low: float, reach: float) -> Span:
     """Choose a slider that reaches a value, with a round end: 1, 2 or 5 × 10ⁿ."""
-    decade = 10.0 ** math.floor(math.log10(reach))
-    ends = (step * decade for step in (1, 2, 5, 10) if step * decade >= reach * (1.0 - 1e-9))
-    high = min(*ends, MAX_ERROR)
+    high = min(round_width(reach * (1.0 - 1e-9)), MAX_ERROR)
     fine = FINE[0] <= high <= FINE[1]
     return Span(low * high, high, FINE_STEP if fine else 10.0 ** (math.ceil(math.log10(high)) - 3))
 
