@@ -371,11 +371,10 @@ class _Document:
             else:
                 table = self.problems.read(schema.RUNS, where, raw)
                 runs: tuple[Run, ...] = table["runs"] if table else ()
-            count, most = sum(len(run.points) for run in runs), limits.MAX_POINTS
-            if count > most:
-                expected = f"expected at most {most:,}"
-                self.problems.add(f"{where}.runs", f"have {count:,} readings; {expected}")
             found[key] = Measurement(runs)
+            if (count := found[key].count) > limits.MAX_POINTS:
+                expected = f"expected at most {limits.MAX_POINTS:,}"
+                self.problems.add(f"{where}.runs", f"have {count:,} readings; {expected}")
         return found
 
     def _csv_runs(self, where: str, csv: str, column: str) -> tuple[Run, ...]:

@@ -104,7 +104,8 @@ def _choice(names: Callable[[], Iterable[object]], words: str = "{} or {}") -> K
 
     def read(reader: ValueReader, value: Any, path: Path) -> Any:
         known = list(names())
-        if value in known and type(value) is not bool and type(value) is not float:
+        is_alike = isinstance(value, bool) == isinstance(known[0], bool)  # True and 1 are equal
+        if value in known and is_alike and type(value) is not float:
             return value
         *others, last = [spell_value(name) for name in known]
         if "{}" in words:
@@ -145,12 +146,6 @@ def _reference(reader: ValueReader, value: Any, path: Path) -> dict[str, float] 
 def _component_errors(reader: ValueReader, value: Any, path: Path) -> str | dict[str, str]:
     name = _choice(convention_names)
     return (_by_name(name) if isinstance(value, dict) else name)(reader, value, path)
-
-
-def _placed(reader: ValueReader, value: Any, path: Path) -> bool:
-    if not isinstance(value, bool):
-        reader.note(path, "expected true or false", value)
-    return value is True
 
 
 def _date(reader: ValueReader, value: Any, path: Path) -> Any:
@@ -251,7 +246,7 @@ VIEW = Section(
     {
         "exaggeration": (_exaggeration, None),
         "reference": (_reference, None),
-        "placed": (_placed, False),
+        "placed": (_choice(lambda: (True, False)), False),
         "limit_um": (_number(*limits.LIMIT_UM), None),
     }
 )

@@ -269,7 +269,7 @@ def notes(
     loaded = load_scene(scene)
     if text is not None:
         at = {} if point is None else parse_point(point, loaded.machine.axes)
-        loaded = _add_note(loaded, scene, output, force=force, text=text, at=at, **about)
+        loaded = _add_note(loaded, scene, output or scene, force=force, text=text, at=at, **about)
         output = None
     elif point is not None or (output or "").endswith(".toml"):
         raise OptionError("--at and an .toml file belong to --add; there is no text to add")
@@ -285,10 +285,8 @@ def notes(
         print_blocks([notes_table(loaded, title)])
 
 
-def _add_note(
-    scene: "Scene", name: str, output: str | None, *, force: bool, **about: Any
-) -> "Scene":
-    """Add a note to the file of a scene; what its author has written besides stays."""
+def _add_note(scene: "Scene", name: str, path: str, *, force: bool, **about: Any) -> "Scene":
+    """Add a note to the file of a scene, or to a copy; what its author has written stays."""
     from warpspace.analysis.reviewing import note_numbers
     from warpspace.machine.limits import MAX_SCENE_BYTES
     from warpspace.scene.files import read_text
@@ -296,7 +294,7 @@ def _add_note(
     from warpspace.scene.notes import Note
     from warpspace.scene.save import spell_note
 
-    file, path = scene_path(name), output or name
+    file = scene_path(name)
     if not path.endswith(".toml"):
         expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
         raise OptionError(f"{path}: {expected}")
