@@ -158,7 +158,7 @@ def test_an_adjustment_is_decided_on_and_taken_back(tab):
     tab.click("Record decision")
     tab.until(lambda: "EA0Z" in tab.page.locator("#ws-notes textarea").input_value())
     tab.click("Keep")
-    tab.says("max 51.7 → 46.1 µm", within="#ws-notes .ws-note")
+    tab.says("max 51.72 → 46.0", within="#ws-notes .ws-note")
     (note,) = tab.state.review
     assert (note.kind, note.change["EA0Z"][0]) == ("decision", start["EA0Z"])
     tab.click("Take back")

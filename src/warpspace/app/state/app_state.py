@@ -27,7 +27,7 @@ from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Toleranc
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, PROBABILITY
 from warpspace.scene.model import Scene
-from warpspace.scene.notes import KINDS, Note
+from warpspace.scene.notes import KINDS, Mark, Note
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
@@ -153,11 +153,11 @@ class Picked:
     @classmethod
     def of_note(cls, note: Note) -> "Picked | None":
         """Give the point that a note is pinned to; none for the whole or a body."""
-        mark = note.on
-        if not note.at or (mark and mark.body):
+        mark = note.on or Mark()
+        if not note.at or mark.body:
             return None
-        is_traced = mark and mark.loop and mark.point_mm
-        return cls(note.at, Loop(mark.loop), mark.point_mm) if mark and is_traced else cls(note.at)
+        is_traced = mark.loop and mark.point_mm
+        return cls(note.at, Loop(mark.loop), mark.point_mm) if is_traced else cls(note.at)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.parts import Part, actions
 from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_REPLIES
-from warpspace.scene.notes import TOLERANCES, Mark, Note, Pair, Reply, story, told, with_note
+from warpspace.scene.notes import TOLERANCES, Mark, Note, Pair, Reply, story, with_note
 from warpspace.units import spell_short
 
 LIST, NEW = "list", "new"
@@ -106,22 +106,20 @@ class NotesPart(Part):
         return _opened(state, NEW, place="whole" if text else "point", text=text)
 
     def _kept(self, state: AppState, edited: Note | None) -> AppState:
+        """Keep an edit; or a note of what is on the screen, with the numbers that it rests on."""
         text, kind = clean(state.page.note_text), state.page.note_kind
         if not 0 < len(text) <= MAX_NOTE_TEXT:
             return state.noted(f"a note needs a text, of at most {MAX_NOTE_TEXT} characters")
-        note = edited.edited(kind=kind, text=text) if edited else self._pinned(state, kind, text)
+        note = edited and edited.edited(kind=kind, text=text)
+        if note is None:
+            (at, on), view = self._place(state), view_of(state, self.context.camera.remember())
+            note = Note(kind=kind, text=text, author=_author(state), at=at, on=on, view=view,
+                        loop=state.loop.value)  # fmt: skip
+            if self._decided is not None and kind == "decision":
+                before = note_numbers(self._decided.resulting_scene(), [note])[0]
+                note = replace(note, before=before, change=_changed(self._decided, state))
+            note = replace(note, numbers=note_numbers(state.resulting_scene(), [note])[0])
         return _opened(replace(state, review=with_note(state.review, note)), LIST)
-
-    def _pinned(self, state: AppState, kind: str, text: str) -> Note:
-        """Give a note of what is on the screen now, with the numbers that it rests on."""
-        at, on = self._place(state)
-        view = view_of(state, self.context.camera.remember())
-        note = Note(kind=kind, text=text, author=_author(state), at=at, on=on, view=view,
-                    loop=state.loop.value)  # fmt: skip
-        if self._decided is not None and kind == "decision":
-            before = note_numbers(self._decided.resulting_scene(), [note])[0]
-            note = replace(note, before=before, change=_changed(self._decided, state))
-        return replace(note, numbers=note_numbers(state.resulting_scene(), [note])[0])
 
     def _place(self, state: AppState) -> tuple[Mapping[str, float], Mark | None]:
         picture, place = self.context.shown, state.page.note_place
@@ -271,8 +269,6 @@ def _said(one: Note | Reply) -> Markup:
 
 def _entry(number: int, note: Note, steps: Sequence[Note]) -> Markup:
     facts, texts = [spell_place(note), spell_numbers(note), spell_change(note)], [_said(note)]
-    was = told({key: at for key, at in note.before.items() if key == "max_um"}, note.numbers)
-    facts.append(f"max {was}" if was else "")
     if note.versions:
         texts = [tag("p", "Edited by several: which is to stay?", class_="ws-stale")]
         texts += [_said(one) + actions(button("Keep this one", f"notes:choose.{note.id}", index))
