@@ -64,6 +64,7 @@ class Page:
         self.toasts: list[list[str]] = []
         self.stage = ""
         self.asked = 0  # how often it was asked whether all is drawn
+        self.pointer: list[Any] = []  # of another tab: which, name, place
         self.points = ""  # of the surface that is shown, as they are packed
 
     @property
@@ -85,6 +86,8 @@ class Page:
                 (self.stage,) = values
             case "Page.drawn":
                 self.asked += 1
+            case "Page.pointer":
+                self.pointer = values
             case "Mesh.bend":
                 self.points = values[0]
             case _:

@@ -15,8 +15,8 @@ from warpspace.cli.services import build_services
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-# two workers that look for a free port from the same one on may both find it
-viewer.DEFAULT_PORT += 1000 * int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+# two processes that look for a free port from the same one on may both find it
+viewer.DEFAULT_PORT = 10_000 + 10 * (os.getpid() % 2_000)
 
 
 @pytest.fixture(scope="session")

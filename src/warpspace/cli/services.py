@@ -239,15 +239,11 @@ BYTES_PER_RESPONSE = 48  # position and orientation error of one node to one par
 
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
-    from warpspace.app.documents.offline_page import (
-        build_offline_html,
-        build_story_html,
-        offline_picture,
-    )
+    from warpspace.app.documents import offline_page
     from warpspace.scene.notes import story
 
     _check_size(picture)
-    live = offline_picture(
+    live = offline_page.offline_picture(
         picture.scene,
         exaggeration=picture.exaggeration,
         nodes=max(picture.grid.shape),
@@ -255,9 +251,9 @@ def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> N
         component=picture.component,
     )
     if story(live.state.review):
-        page = build_story_html(live.state, picture.provenance)
+        page = offline_page.build_story_html(live.state, picture.provenance)
     else:
-        page = build_offline_html(live, picture.provenance)
+        page = offline_page.build_offline_html(live, picture.provenance)
     write_text(target, page, force=overwrite)
 
 

@@ -1,6 +1,7 @@
 // Steps of a page that needs nothing but itself: words around the drawing, which follows.
 (async () => {
   const WIDTH = 1.25;  // of a window, as a part of its height, that a camera is left where it was
+  const NARROW = 500;  // px; where numbers along the axes would cover each other
   const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
   const packed = new Blob([bytes(document.getElementById("steps").textContent)]);
   const stream = packed.stream().pipeThrough(new DecompressionStream("deflate"));
@@ -21,6 +22,8 @@
     const { camera, point, shifts, levels, palette } = steps[at];
     const wait = () => { timer = setTimeout(draw, 100, long); };  // the drawing is not there yet
     if (!view?.nodeRefFromName?.["/box/surface"] || !fly(fitted(camera), long)) { wait(); return; }
+    if (frame.clientWidth < NARROW)
+      for (const name in view.nodeRefFromName) if (name.startsWith("/words/tick")) mesh.move(name, [0, 0, 1e4]);
     if (!from) return;
     mesh.move("/story/point", point);
     mesh.open({ count, lines, palette });

@@ -31,7 +31,7 @@ from warpspace.app.drawing.box import box, line_facts, packed
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.drawing.colours import colour_levels, level_colours
 from warpspace.app.drawing.labels import axes_room_mm, note_labels, point_labels
-from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, Shape, ball, light_scene
+from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, Shapes, ball, light_scene
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, start_state
@@ -45,6 +45,7 @@ from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note, story
 from warpspace.units import Array
 
+About = Mapping[str, Any] | None
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:;"
     " style-src 'unsafe-inline'; img-src data: blob:; font-src data: blob:;"
@@ -84,9 +85,7 @@ def offline_picture(
 
 
 def build_offline_html(
-    picture: LivePicture,
-    provenance: Mapping[str, Any] | None = None,
-    camera: CameraMemory | None = None,
+    picture: LivePicture, provenance: About = None, camera: CameraMemory | None = None
 ) -> str:
     """Build the page: the interactive scene with its colour bar, numbers and factor."""
     conditions = list(legend.picture_conditions(picture))
@@ -96,9 +95,7 @@ def build_offline_html(
     return _build_page(picture.title, steps, shapes, about)
 
 
-def build_story_html(
-    state: AppState, provenance: Mapping[str, Any] | None = None, known: Known = None
-) -> str:
+def build_story_html(state: AppState, provenance: About = None, known: Known = None) -> str:
     """Build the page of the story that the notes of a state tell."""
     steps = _story_steps(state, known)
     first, grid = steps[0].picture, steps[0].picture.grid.nominal_mm
@@ -136,7 +133,7 @@ def _usual_camera(picture: LivePicture) -> CameraMemory:
     return fit_camera(drawn, ASPECT)
 
 
-def _export(step: Step, shapes: Mapping[str, Shape | None]) -> str:
+def _export(step: Step, shapes: Shapes) -> str:
     """Export the 3-D scene of a step as a page of its own, without a word around it."""
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
@@ -155,13 +152,12 @@ def _story_steps(state: AppState, known: Known) -> list[Step]:
     notes, scene, live = story(state.review), state.resulting_scene(), LiveModel()
     if not notes:
         raise OptionError("no note of this scene has a step of a story")
-    dark, steps, camera = state.shown.dark, list[Step](), None
-    picture = live.evaluate(_whole(state, dark=dark, review=()))
+    picture, camera, steps = live.evaluate(_whole(state, state)), None, list[Step]()
     for index, note in enumerate(notes):
         problem = ""
         try:
             shown, seen = reopened(state, note, known) if note.view else (state, None)
-            found = live.evaluate(_whole(shown, dark=dark, review=(note,), nodes=state.nodes))
+            found = live.evaluate(_whole(shown, state, note))
             if steps and found.shape != picture.shape:
                 raise OptionError("its machine has another volume")
             picture, camera = found, seen
@@ -172,11 +168,11 @@ def _story_steps(state: AppState, known: Known) -> list[Step]:
     return steps
 
 
-def _whole(state: AppState, *, dark: bool, **more: Any) -> AppState:
+def _whole(shown: AppState, like: AppState, *notes: Note) -> AppState:
     """Give what the steps have in common: the whole surface of the box, on the same ground."""
-    look = replace(state.look, surface="surface", isolines=False)
-    machine, shown = replace(state.machine, shown=False), replace(state.shown, dark=dark)
-    return replace(state, look=look, machine=machine, shown=shown, **more)
+    look, machine = replace(shown.look, surface="surface", isolines=False), shown.machine
+    ground, machine = replace(shown.shown, dark=like.shown.dark), replace(machine, shown=False)
+    return replace(shown, look=look, shown=ground, machine=machine, nodes=like.nodes, review=notes)
 
 
 def _packed_steps(steps: Sequence[Step]) -> str:
@@ -194,19 +190,14 @@ def _packed_steps(steps: Sequence[Step]) -> str:
                 "levels": packed(colour_levels(scale, mesh.values)),
                 "palette": packed(level_colours(diverging=scale.diverging)),
             }
-    text = json.dumps(found, allow_nan=False)
-    return b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
+    text = json.dumps(found, allow_nan=False).encode()
+    return b64encode(zlib.compress(text, 9)).decode("ascii")
 
 
 # --- The page around it ---------------------------------------------------------------------------
 
 
-def _build_page(
-    title: str,
-    steps: Sequence[Step],
-    shapes: Mapping[str, Shape | None],
-    about: Mapping[str, Any],
-) -> str:
+def _build_page(title: str, steps: Sequence[Step], shapes: Shapes, about: About) -> str:
     texts = files("warpspace.app.documents")
     scripts = "".join(f"<script>{script_source(name)}</script>" for name in ("mesh.js", "fly.js"))
     scene = _export(steps[0], shapes).replace("</body>", f"{scripts}</body>")

@@ -288,9 +288,6 @@ class Viewer:
         with self._lock:
             return tuple(self._sessions.values())
 
-    def _contexts(self) -> list[Context]:
-        return [session.context for session in self.sessions]
-
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
         surface_glb(self._live.evaluate(self._start))
@@ -301,7 +298,7 @@ class Viewer:
             return  # it has gone meanwhile
         store, scenes = self._shared or StateStore(self._start), SceneList(self._scenes)
         context = Context(self._server, client, store, scenes, self._services)
-        others = None if self._shared is None else self._contexts
+        others = (lambda: [one.context for one in self.sessions]) if self._shared else None
         session = Session(context, self._live, self._claim, others=others)
         with self._lock:
             self._sessions[client.client_id] = session

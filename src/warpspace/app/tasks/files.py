@@ -12,6 +12,7 @@ from warpspace.analysis.description import Result
 from warpspace.app.browser.html import button, choice, field, join, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents import files, scene_file
+from warpspace.app.documents.offline_page import build_offline_html, build_story_html
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
@@ -208,15 +209,11 @@ class FilesWindow(JobWindow):
         self.make("Picture of the screen", "_view.png", draw, as_drawn=True)
 
     def _page(self) -> None:
-        from warpspace.app.documents.offline_page import build_offline_html
-
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
         self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
 
     def _story(self) -> None:
-        from warpspace.app.documents.offline_page import build_story_html
-
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
         about = without_table(self.context.state), toml, self.context.scenes.fixed
         self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),

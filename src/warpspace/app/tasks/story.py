@@ -52,16 +52,16 @@ class StoryPart(Part):
 
     def _tell(self, now: AppState, notes: Sequence[Note], number: int) -> None:
         context, note, camera, problem = self.context, notes[number], None, ""
-        found, before = now, context.telling or now
+        # the page stays the same thing, so that little is written anew
+        found, before = now, context.telling or replace(now, page=replace(now.page, window=""))
         try:
             if note.view:
                 found, camera = reopened(now, note, context.scenes.fixed)
         except WarpspaceError as error:
             found, problem = before, str(error)
         context.notes += found.notes
-        # the page stays the same thing, so that little is written anew
-        page = context.telling.page if context.telling else replace(now.page, window="")
-        context.telling, self._number = replace(found.without_notes(), page=page), number
+        context.telling = replace(found.without_notes(), page=before.page)
+        self._number = number
         self._words = step_words(now.resulting_scene(), notes, number, problem) + actions(
             button("←", "story:back", hint="Back (←)", aria_label="Back", disabled=number == 0),
             button("→", "story:on", kind="main", hint="On (→)", aria_label="On",
