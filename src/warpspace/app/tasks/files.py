@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.description import Result
-from warpspace.app.browser.html import button, choice, field, join, tag
+from warpspace.app.browser.html import button, choice, field, join, tag, text_box
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents import files, scene_file
 from warpspace.app.documents.offline_page import build_offline_html, build_story_html
@@ -262,10 +262,13 @@ class ReportWindow(JobWindow):
             tag("li", join((f"{title} ", button("remove", "report:remove", index, kind="link"))))
             for index, (title, _) in enumerate(self.context.reported)
         ]
+        # the notes beside it may ask for the same name
+        author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
         hint = "More results are added with the button “Add to report” below each of them."
         return join((
             tag("p", f"{subject} Limit: {limit}."),
-            setting(picture.state, "page.author"), setting(picture.state, "page.questions"),
+            field("Author", author, "report.author"),
+            setting(picture.state, "page.questions"),
             actions(button("Write HTML", "report:write", ".html", kind="main",
                            hint="One page with a rotatable view; needs no network"),
                     button("Write PDF", "report:write", ".pdf", hint="For paper")),
