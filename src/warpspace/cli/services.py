@@ -298,7 +298,7 @@ def tell_story(scene: "Scene", nodes: int) -> "list[Step]":
     from warpspace.app.documents.legend import look_words, numbers_words, picture_conditions
     from warpspace.app.documents.scene_file import reopened
     from warpspace.app.evaluation.evaluate import LiveModel
-    from warpspace.app.state.app_state import start_state
+    from warpspace.app.state.app_state import START_NODES, start_state
     from warpspace.kinematics.model import Loop
     from warpspace.picture.model import VIEW_WORDS, VIEWS
     from warpspace.scene.notes import story
@@ -307,10 +307,10 @@ def tell_story(scene: "Scene", nodes: int) -> "list[Step]":
     steps: list[Step] = []
     ends: dict[tuple[str, str], float] = {}
     for note in notes:
-        start = start_state(scene, loop=Loop(note.loop), nodes=nodes)
+        start = start_state(scene, loop=Loop(note.loop), nodes=min(nodes, START_NODES))
         try:
             state, camera = reopened(start, note)
-            picture = live.evaluate(replace(state, nodes=nodes))
+            picture = live.evaluate(replace(state, nodes=start.nodes))
             name, scenes, settings = _figure_of(picture)
         except WarpspaceError as error:
             picture, camera = live.evaluate(start.noted(f"the scene as it is now: {error}")), None
@@ -328,7 +328,7 @@ def tell_story(scene: "Scene", nodes: int) -> "list[Step]":
         caption += f" (note {scene.review.index(note) + 1}; {' · '.join(filter(None, said))})"
         key, end = (name, settings.component), settings.range_top or 0.0
         ends[key] = max(ends.get(key, 0.0), end)
-        steps.append((caption, name, scenes, replace(settings, view=view, dark=False)))
+        steps.append((caption, name, scenes, replace(settings, view=view, dark=False, grid=nodes)))
     return [
         (caption, name, scenes, replace(one, range_top=ends[name, one.component] or None))
         for caption, name, scenes, one in steps

@@ -31,6 +31,8 @@ from warpspace.outputs.report.render import (
     Report,
     Section,
     Text,
+    render_html,
+    render_pdf,
     report_time,
 )
 from warpspace.outputs.report.review import (
@@ -83,18 +85,16 @@ class ReportFigures:
         form: str,
     ) -> None:
         self._worker, self._form = worker, form
-        self._loop, self._grid, self._factor = loop, grid, pictures[0].exaggeration
+        self._loop, self.grid, self._factor = loop, grid, pictures[0].exaggeration
         self.missing: list[str] = []
         scenes = [picture.scene for picture in pictures]
         drawn = f"displacement drawn {spell_factor(self._factor)}"
         compares = len(scenes) == 2
-        if compares:
-            self.first = self._begin("comparison", scenes, f"A, B and their difference; {drawn}.")
-        else:
-            self.first = self._begin(
-                "error-map", scenes, f"Error map of {scenes[0].title}; {drawn}."
-            )
-        self._evidence: list[list[Drawn]] = []
+        what = "A, B and their difference" if compares else f"Error map of {scenes[0].title}"
+        self.first = self.begin(
+            "comparison" if compares else "error-map", scenes, f"{what}; {drawn}."
+        )
+        self.evidence: list[list[Drawn]] = []
         for number, picture in enumerate(pictures):
             scene = picture.scene
             own = f"Error map of {scene.title}; {drawn}; colour scale of its own."
@@ -107,22 +107,7 @@ class ReportFigures:
                 for kind in figure_kinds()
                 if kind.evidence and kind.name not in left_out
             ]
-            self._evidence.append([self._begin(name, [scene], caption) for name, caption in wanted])
-
-    def evidence(self, number: int) -> list[Block]:
-        return [drawn() for drawn in self._evidence[number]]
-
-    def repair(self, scene: Scene, prefix: str) -> Block:
-        caption = f"{prefix}Before, after the last set of the table, and their difference."
-        return self._begin("repair", [scene], caption)()
-
-    def concepts(self, scenes: Sequence[Scene], plan: Concepts, caption: str) -> Block:
-        settings = FigureSettings(loop=str(plan.loop), grid=self._grid, concepts=plan)
-        return self._begin("concepts", scenes, caption, settings=settings)()
-
-    def story(self, steps: Iterable[Step]) -> Iterator[Block]:
-        begun = [self._begin(name, scenes, caption, one) for caption, name, scenes, one in steps]
-        yield from (drawn() for drawn in begun)
+            self.evidence.append([self.begin(name, [scene], caption) for name, caption in wanted])
 
     def chart(self, chart: Chart) -> Block:
         data = self._worker.begin_chart("chart", CHART, self._form, chart)()
@@ -131,7 +116,7 @@ class ReportFigures:
         caption = f"Distribution: {chart.x_label}." if named else chart.title
         return Picture("chart", caption, data, self._form, width)
 
-    def _begin(
+    def begin(
         self,
         name: str,
         scenes: Sequence[Scene],
@@ -141,7 +126,7 @@ class ReportFigures:
         """Begin a figure; it is drawn a second time where the first fails, then it is missing."""
         # the lean of the tool axis has a factor of its own, at which it is seen
         factor = "auto" if name == "orientation-map" else self._factor
-        chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
+        chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self.grid)
         size = PRINTED_PX, OTHER_PX.get(name, HEIGHT_PX)
         chosen = replace(chosen, size=size, printed=True)
         begun = self._worker.begin(name, scenes, chosen, self._form)
@@ -190,8 +175,6 @@ def write_report(
     page = target.suffix.lower() == ".html"
     form, embed = ("svg", embed) if page else ("pdf", None)
     report = build_report(scenes, settings, form=form, embed=embed, **parts)
-    from warpspace.outputs.report.render import render_html, render_pdf
-
     content = render_html(report).encode() if page else render_pdf(report)
     with write_atomically(target, overwrite=overwrite) as temporary:
         temporary.write_bytes(content)
@@ -311,7 +294,8 @@ def notes(review: Review, painter: ReportFigures, tell: Tell | None) -> Iterator
         yield notes_table(reviewed.scene, title)
         if tell and (steps := tell(reviewed.scene, review.settings.grid)):
             yield Text(reviewed.titled("The story"), "heading")
-            yield from painter.story(steps)
+            begun = [painter.begin(name, of, caption, one) for caption, name, of, one in steps]
+            yield from (drawn() for drawn in begun)
 
 
 def told(review: Review, painter: ReportFigures, *names: str) -> Iterator[Block]:
@@ -334,7 +318,8 @@ def told(review: Review, painter: ReportFigures, *names: str) -> Iterator[Block]
                 continue
             yield from said(blocks)
             if found.changes():
-                yield painter.repair(reviewed.scene, reviewed.titled(""))
+                caption = "Before, after the last set of the table, and their difference."
+                yield painter.begin("repair", [reviewed.scene], reviewed.titled(caption))()
 
 
 def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterator[Block]:
@@ -357,7 +342,7 @@ def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterat
             )
             title = reviewed.titled(f"{reviewed.scene.title}: turn it with the mouse")
             yield Embedded(title, page)
-        yield from painter.evidence(number)
+        yield from (drawn() for drawn in painter.evidence[number])
 
 
 def explanation(reviewed: Reviewed) -> Table:
@@ -467,7 +452,9 @@ def compare_with(
 def concept_blocks(found: ConceptsResult, painter: ReportFigures) -> Iterator[Block]:
     yield from said(found.blocks())
     caption = "The machines in one scale; colours are the RMS of |E| within tolerance."
-    yield painter.concepts([one.scene for one in found.concepts], found.asked, caption)
+    settings = FigureSettings(loop=str(found.asked.loop), grid=painter.grid, concepts=found.asked)
+    scenes = [one.scene for one in found.concepts]
+    yield painter.begin("concepts", scenes, caption, settings)()
 
 
 def conventions(review: Review) -> Items:
