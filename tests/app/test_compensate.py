@@ -17,7 +17,7 @@ from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation import budget
-from warpspace.app.evaluation.budget import pick_worst, with_picked
+from warpspace.app.evaluation.budget import measured, pick_worst, with_picked
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import tool_point
@@ -128,6 +128,14 @@ def test_slices_and_the_tool_point_have_the_table_too(controller):
         assert np.abs(cut.field.error_um - wanted.error_um).max() < 1e-9
         assert cut.field.norm_um.max() < plain.field.norm_um.max()
     assert np.linalg.norm(tool_point(picture)[1]) < np.linalg.norm(tool_point(bare)[1])
+
+
+def test_a_measured_distance_is_that_of_the_points_as_drawn(left):
+    ends = {"distance.start": "X=-200,Y=0", "distance.end": "X=200,Y=0"}
+    found, seen, drawn = measured(LIVE.evaluate(replace(left, forms=ends, exaggeration=1.0)))
+    nominal, actual = (float(np.linalg.norm(at[1] - at[0])) for at in (seen, drawn))
+    assert found.distance_mm == pytest.approx((nominal, actual), abs=1e-9)
+    assert found.difference_um == pytest.approx(1e3 * (actual - nominal), abs=1e-6)
 
 
 @pytest.mark.parametrize("loop", Loop)

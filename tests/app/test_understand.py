@@ -11,10 +11,15 @@ from warpspace.analysis.catalogue import entries
 from warpspace.analysis.description import silent
 from warpspace.analysis.distance import Distance
 from warpspace.app.drawing.around import around
-from warpspace.app.drawing.labels import measured_words, point_labels
-from warpspace.app.evaluation.budget import answer, pick, pick_worst, with_picked
+from warpspace.app.drawing.labels import point_labels
+from warpspace.app.evaluation.budget import (
+    answer,
+    pick,
+    pick_worst,
+    with_clicked,
+    with_picked,
+)
 from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.measuring import point_form
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_positions
@@ -40,9 +45,11 @@ def test_a_ray_through_a_drawn_node_finds_its_axis_positions(surface):
     state = replace(START, look=replace(START.look, surface=surface), nodes=11)
     picture = LIVE.evaluate(replace(state, shown=replace(state.shown, traces=False)))
     drawn = picture.slices[0].drawn_mm.reshape(11, 11, 3) if picture.slices else picture.drawn_mm
-    picked = pick(picture, *look_at(picture, drawn[4, 2] if picture.slices else drawn[2, 0, 3]))
+    target = drawn[4, 2] if picture.slices else drawn[2, 0, 3]
+    picked, at = pick(picture, *look_at(picture, target))
     assert picked.point_mm is None
     if not picture.slices:
+        np.testing.assert_allclose(at, target, atol=0.01)
         for axis, index in (("X", 2), ("Y", 0), ("Z", 3)):
             there = picture.grid.coordinates[axis].reshape(-1)[index]
             assert picked.at[axis] == pytest.approx(there, abs=0.01)
@@ -62,10 +69,10 @@ def test_a_trace_in_front_of_the_box_is_what_a_click_on_it_means():
     picture = LIVE.evaluate(START.with_amplitude("EXC", 1.0))
     lines = picture.traces[0]
     hits = [
-        (picked, trace.point_mm)
+        (found[0], trace.point_mm)
         for trace, points in zip(lines.group.traces, lines.actual_mm, strict=True)
         for target in points[::6]
-        if (picked := pick(picture, *look_at(picture, target))) is not None
+        if (found := pick(picture, *look_at(picture, target))) is not None
     ]
     assert sum(picked.point_mm == point for picked, point in hits) > 20
     assert all(p.loop is Loop.WORKPIECE for p, _ in hits if p.point_mm is not None)
@@ -257,14 +264,14 @@ def measuring(**points):
     state = replace(
         START,
         page=replace(START.page, open=START.page.open | {"distance"}),
-        forms={point_form(name): text for name, text in points.items()},
+        forms={f"distance.{name}": text for name, text in points.items()},
     )
-    return Alone(DistancePart, state, entry, take_picked=with_picked)
+    return Alone(DistancePart, state, entry)
 
 
 def click(alone, at, **more):
     picked = Picked(at, **more)
-    alone.store.apply(lambda state: alone.context.take_picked(state, picked))
+    alone.store.apply(lambda state: with_clicked(state, picked))
     return alone.store.state
 
 
@@ -272,8 +279,8 @@ def test_clicks_set_start_end_and_corner_in_turn_and_then_ask_about_a_point_agai
     alone = measuring(exact="1")
     alone.do("pick")
     assert "first point" in alone.html
-    assert click(alone, {"X": 1.0}, point_mm=(0.0, 0.0, 0.0)).forms == {"distance.exact": "1"}
-    assert "a trace was clicked" in alone.said[0][1]
+    waiting = alone.store.state.forms
+    assert click(alone, {"X": 1.0}, point_mm=(0.0, 0.0, 0.0)).forms == waiting
     for x in (-200.0, 200.0, 0.0):
         state = click(alone, {"X": x, "Y": 0.0 if x else 200.0})
     assert state.forms["distance.start"] == "X=-200,Y=0"
@@ -288,7 +295,7 @@ def test_a_folded_section_takes_no_clicks():
     alone.do("pick")
     alone.store.apply(lambda state: replace(state, page=replace(state.page, open=frozenset())))
     assert click(alone, {"X": 7.0}).picked == Picked({"X": 7.0})
-    assert alone.store.state.forms == {}
+    assert alone.do("stop").forms == {}
 
 
 def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_numbers():
@@ -298,7 +305,7 @@ def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_
     found = Distance(
         start={"X": -200, "Y": 0}, end={"X": 200, "Y": 0}, corner={"X": -200, "Y": 200}
     ).run(FIRST, silent)
-    assert words == measured_words(found)
+    assert words == found.words()
     assert words[0].startswith("400.000 → ")
     assert words[1].count("Δ") == 3
     shapes = around(picture)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, TypeV
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Table, blocks_html
-from warpspace.analysis.options import Option, options_of
+from warpspace.analysis.options import PLACE, Option, options_of, outside_travel
 
 if TYPE_CHECKING:
     from warpspace.field.evaluate import SecondOrder
@@ -152,9 +152,12 @@ class Analysis(ABC):
         (scene,) = scenes
         return self.run(scene, watch)
 
-    def warnings(self, scene: "Scene") -> Iterable[str]:  # noqa: ARG002 - for others
-        """Say what a user should doubt of the options with this scene."""
-        return ()
+    def warnings(self, scene: "Scene") -> Iterable[str]:
+        """Say what a user should doubt of the options with this scene: places beyond the travel."""
+        for one in self.options():
+            if one.grammar is PLACE:
+                for words in outside_travel(scene.machine, dict(getattr(self, one.name))):
+                    yield f"{{{one.name}}} {words}"
 
 
 def silent(_share: float) -> None:

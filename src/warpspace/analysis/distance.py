@@ -1,26 +1,27 @@
 """Distance between two points and the angle at a third: nominal, actual, and how they differ."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.line import complete_ends
-from warpspace.analysis.options import LOOP_HELP, Place, option, place_words, travel_warnings
+from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.line import Between
+from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
-from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.scene.model import Scene, evaluate, placed_in
-from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
+from warpspace.kinematics.model import Coordinates, Loop
+from warpspace.scene.model import Scene, placed_in
+from warpspace.units import MINUS, UM_PER_MM, URAD_PER_RAD, Array
 
 RIGHT_RAD = 1e-6  # a nominal angle this close to 90° is a right one: its deviation is a squareness
 
 
 @dataclass(frozen=True, kw_only=True)
-class Distance(Analysis):
+class Distance(Between):
     """Measure between points of SCENE: distance, angle.
 
     Points are where the axes stand, by default the ends of the diagonal of the working volume.
@@ -32,13 +33,6 @@ class Distance(Analysis):
     name = "distance"
     task = "understand"
     has_table = True
-    start: Place = option(
-        (), "First point, mm and degrees", unset="lower ends of the working volume",
-        flag="--from", label="From",
-    )  # fmt: skip
-    end: Place = option(
-        (), "Second point", unset="upper ends of the working volume", flag="--to", label="To"
-    )
     corner: Place = option((), "Point whose angle between both edges is measured", unset="no angle")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     placed: bool = option(False, "Leave out where the workpiece lies; of the relative loop")
@@ -46,34 +40,41 @@ class Distance(Analysis):
 
     def run(self, scene: Scene, watch: Watch, /) -> "DistanceResult":
         scene = placed_in(scene, self.loop, placed=self.placed)
-        places = list(complete_ends(scene, self.start, self.end))
-        if self.corner:
-            stand = scene.workspace.positions
-            corner = complete_coordinates(scene.machine, dict(self.corner), stand)
-            places.append({name: float(at) for name, at in corner.items()})
-        if any(place == places[-1] for place in places[:2]) and self.corner:
-            raise OptionError("{corner} is an end of an edge; expected a third point")
-        found = [self._point(scene, place) for place in places]
+        at = self.places(scene, self.corner)
+        point = nominal_point(scene.model, Loop.TOOL, at)  # in any loop, as over the grid
+        solve = evaluate_exact if self.exact else evaluate_first_order
+        field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
         watch(1.0)
+        return self.between(scene, at, field)
+
+    def between(self, scene: Scene, at: Coordinates, field: ErrorField) -> "DistanceResult":
+        """Measure between points, [n], of a field in R."""
+        to_workpiece = transforms.inverse(branch_pose(scene.model, "workpiece", at))
+        nominal = transforms.apply(to_workpiece, field.nominal_mm)
+        error = transforms.rotate(to_workpiece[..., :3, :3], field.error_um)
+        start, end, *corner = np.stack([nominal, nominal + error / UM_PER_MM], axis=1)
+        distance = np.linalg.norm(end - start, axis=-1)
+        angle = _angles_rad(start - corner[0], end - corner[0]) if corner else None
         return DistanceResult(
-            at=tuple(places),
-            nominal_mm=np.stack([point for point, _ in found]),
-            error_um=np.stack([error for _, error in found]),
+            at=tuple(dict(zip(at, one, strict=True)) for one in np.transpose([*at.values()])),
+            nominal_mm=nominal,
+            error_um=error,
+            distance_mm=distance,
+            difference_um=float(distance[1] - distance[0]) * UM_PER_MM,
+            along_mm=nominal[1] - nominal[0],
+            along_um=error[1] - error[0],
+            angle_deg=None if angle is None else np.rad2deg(angle),
+            deviation_urad=None if angle is None else float(angle[1] - angle[0]) * URAD_PER_RAD,
+            is_squareness=angle is not None and bool(abs(angle[0] - np.pi / 2.0) < RIGHT_RAD),
             title=f"{scene.title} · {self.loop} loop",
         )
 
-    def _point(self, scene: Scene, place: Mapping[str, float]) -> tuple[Array, Array]:
-        at = complete_coordinates(scene.machine, place)
-        to_workpiece = transforms.inverse(branch_pose(scene.model, "workpiece", at))
-        point = transforms.apply(to_workpiece, nominal_point(scene.model, Loop.TOOL, at))
-        # as over the grid, the workpiece point is the one that nominally is at the tool point
-        x, y, z = map(float, point)
-        scene = replace(scene, model=replace(scene.model, workpiece_point_mm=(x, y, z)))
-        field = evaluate(scene, at=place, loop=self.loop, exact=self.exact, frame="workpiece")
-        return point, field.error_um
 
-    def warnings(self, scene: Scene) -> Iterator[str]:
-        return travel_warnings(scene.machine, start=self.start, end=self.end, corner=self.corner)
+def _angles_rad(first: Array, second: Array) -> Array:
+    if not first[0].any() or not second[0].any():
+        raise OptionError("{corner} is an end of an edge; expected a third point")
+    across = np.linalg.norm(np.cross(first, second), axis=-1)
+    return np.arctan2(across, (first * second).sum(axis=-1))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,62 +88,44 @@ class DistanceResult(Result):
     at: tuple[Mapping[str, float], ...]  # start, end and corner, mm or degrees
     nominal_mm: Array  # [n, 3], in the workpiece frame
     error_um: Array  # [n, 3], in the workpiece frame
+    distance_mm: Array  # [2], nominal and actual
+    difference_um: float
+    along_mm: Array  # [3], from start to end, nominal
+    along_um: Array  # [3], what the errors add to it
+    # [2], nominal and actual, from the edge to start to the edge to end; None without a corner
+    angle_deg: Array | None
+    deviation_urad: float | None
+    is_squareness: bool
     title: str
 
-    @property
-    def distance_mm(self) -> tuple[float, float]:
-        """Nominal and actual."""
-        nominal, actual = (float(np.linalg.norm(ends[1] - ends[0])) for ends in self._both())
-        return nominal, actual
-
-    @property
-    def difference_um(self) -> float:
+    def words(self) -> list[str]:
+        """Say it in short: the distance, its parts, and the angle where there is one."""
         nominal, actual = self.distance_mm
-        return (actual - nominal) * UM_PER_MM
-
-    @property
-    def along_mm(self) -> Array:
-        """From start to end along x, y, z, nominal."""
-        return self.nominal_mm[1] - self.nominal_mm[0]
-
-    @property
-    def along_um(self) -> Array:
-        """What the errors add to it, along x, y, z."""
-        return self.error_um[1] - self.error_um[0]
-
-    @property
-    def angle_deg(self) -> tuple[float, float] | None:
-        """Nominal and actual angle at the corner, from the edge to start to the edge to end."""
-        if len(self.nominal_mm) == 2:
-            return None
-        nominal, actual = (_angle_deg(*points) for points in self._both())
-        return nominal, actual
-
-    @property
-    def deviation_urad(self) -> float | None:
-        angle = self.angle_deg
-        return None if angle is None else float(np.deg2rad(angle[1] - angle[0])) * URAD_PER_RAD
-
-    @property
-    def is_squareness(self) -> bool:
-        angle = self.angle_deg
-        return angle is not None and abs(np.deg2rad(angle[0]) - np.pi / 2.0) < RIGHT_RAD
-
-    def _both(self) -> tuple[Array, Array]:
-        return self.nominal_mm, self.nominal_mm + self.error_um / UM_PER_MM
+        parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", self.along_um, strict=True))
+        words = [
+            f"{nominal:.3f} → {actual:.3f} mm, {self.difference_um:+.1f} µm",
+            f"{'  '.join(parts)} µm",
+        ]
+        if self.angle_deg is not None:
+            nominal, actual = self.angle_deg
+            words.append(f"angle {nominal:.4f} → {actual:.4f}°, {self.deviation_urad:+.1f} µrad")
+        return [one.replace("-", MINUS) for one in words]
 
     def blocks(self) -> Iterator[Block]:
         start, end, *_ = (place_words(place) for place in self.at)
         yield f"{self.title} · from {start} to {end}"
-        lengths = (("distance", *self.distance_mm, self.difference_um),)
-        along = zip("xyz", self.along_mm, self.along_um, strict=True)
-        parts = ((f"along {x}", mm, mm + um / UM_PER_MM, um) for x, mm, um in along)
+        nominal_mm = (self.distance_mm[0], *self.along_mm)
+        added_um = (self.difference_um, *self.along_um)
+        names = ("distance", "along x", "along y", "along z")
+        rows = [
+            (name, float(mm), float(mm + um / UM_PER_MM), float(um))
+            for name, mm, um in zip(names, nominal_mm, added_um, strict=True)
+        ]
         columns = (
             Column(key="of", leads=True),
             *number_columns(("nominal", "actual"), ".4f", "mm", ("nominal_mm", "actual_mm")),
             Column("difference", "+.2f", "µm", key="difference_um"),
         )
-        rows = [(name, *map(float, numbers)) for name, *numbers in (*lengths, *parts)]
         yield Table(columns, rows)
         if self.angle_deg is not None:
             nominal, actual = self.angle_deg
@@ -152,9 +135,3 @@ class DistanceResult(Result):
                 f"  {kind} of the edge to {end} against the edge to {start}:"
                 f" {self.deviation_urad:+.2f} µrad; positive is wider"
             )
-
-
-def _angle_deg(start: Array, end: Array, corner: Array) -> float:
-    first, second = start - corner, end - corner
-    across = np.linalg.norm(np.cross(first, second))
-    return float(np.rad2deg(np.arctan2(across, first @ second)))

@@ -1,7 +1,7 @@
 """Error gains: how much of each error parameter arrives at the functional point, and why."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any, ClassVar
@@ -19,7 +19,6 @@ from warpspace.analysis.options import (
     error_words,
     option,
     place_words,
-    travel_warnings,
 )
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -290,9 +289,6 @@ class Gains(Analysis):
             found = gains_at(scene.model, self.loop, keys, place, self.share)
         return GainsResult(gains=found, asked=self, machine=scene.machine)
 
-    def warnings(self, scene: Scene) -> Iterable[str]:
-        return travel_warnings(scene.machine, at=self.at)
-
 
 @dataclass(frozen=True, kw_only=True)
 class GainsResult(Result, Sequence[Gain]):
@@ -365,30 +361,25 @@ class GainsResult(Result, Sequence[Gain]):
         return Table(columns, rows, csv_order=order)
 
     def bars(self) -> Bars:
-        title = f"Error gains · {self.machine.title}"
         signed = not self.asked.over_travel
-        return gain_bars(self.gains, title, self.where, self.asked.share, signed=signed)
-
-
-def gain_bars(
-    gains: Sequence[Gain], title: str, subtitle: str, share: float, *, signed: bool = False
-) -> Bars:
-    panels = tuple(
-        Panel(
-            title="|E|" if name == "norm" else name,
-            series=(Series([getattr(gain, name) for gain in gains], form=form),),
-            unit="µm per µm or µrad",
-            signed=signed and name != "norm",
-            width=width,
+        panels = tuple(
+            Panel(
+                title="|E|" if name == "norm" else name,
+                series=(Series([getattr(gain, name) for gain in self.gains], form=form),),
+                unit="µm per µm or µrad",
+                signed=signed and name != "norm",
+                width=width,
+            )
+            for name, form, width in (("norm", ".2f", 2.2), *((name, "", 1.0) for name in "xyz"))
         )
-        for name, form, width in (("norm", ".2f", 2.2), *((name, "", 1.0) for name in "xyz"))
-    )
-    count = sum(gain.is_key for gain in gains)
-    words = f"key errors: the largest {count}, {share:.0%} of the sum of squares"
-    return Bars(
-        title, subtitle, [error_words(gain.key) for gain in gains], panels,
-        keys=[gain.is_key for gain in gains], legend=((words, "key"), ("others", "plain")),
-    )  # fmt: skip
+        count = sum(gain.is_key for gain in self.gains)
+        words = f"key errors: the largest {count}, {self.asked.share:.0%} of the sum of squares"
+        return Bars(
+            f"Error gains · {self.machine.title}", self.where,
+            [error_words(gain.key) for gain in self.gains], panels,
+            keys=[gain.is_key for gain in self.gains],
+            legend=((words, "key"), ("others", "plain")),
+        )  # fmt: skip
 
 
 def thesis_keys(machine: str) -> tuple[str, ...]:

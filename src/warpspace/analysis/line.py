@@ -7,18 +7,45 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.options import LOOP_HELP, Place, option, place_words, travel_warnings
+from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.axes import is_linear
-from warpspace.scene.model import Scene, evaluate
+from warpspace.scene.model import Scene, check_magnitude, evaluate
 from warpspace.units import Array
 
 SHOWN = 21  # points that the table of a longer line shows; the file has all
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line(Analysis):
+class Between(Analysis):
+    """A question about two points, by default the ends of the volume's diagonal."""
+
+    start: Place = option(
+        (), "First point, mm and degrees", unset="lower ends of the working volume",
+        flag="--from", label="From",
+    )  # fmt: skip
+    end: Place = option(
+        (), "Second point", unset="upper ends of the working volume", flag="--to", label="To"
+    )
+
+    def places(self, scene: Scene, *others: Place) -> dict[str, Array]:
+        """Give where all axes stand at both points, and at others that are given, [n]."""
+        ranges, asked = scene.workspace.ranges, [dict(self.start), dict(self.end)]
+        if not any(asked):
+            asked = [{name: at[end] for name, at in ranges.items()} for end in (0, -1)]
+        asked += [dict(one) for one in others if one]
+        stand = scene.workspace.positions
+        found = [complete_coordinates(scene.machine, one, stand) for one in asked]
+        if found[0] == found[1]:
+            raise OptionError("{start} and {end} are one point; expected two")
+        places = {name: np.array([one[name] for one in found]) for name in scene.machine.axes}
+        check_magnitude(scene, places)
+        return places
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line(Between):
     """Follow the error of SCENE along a straight line.
 
     All axes go in proportion from one point to the other, by default along the diagonal of the
@@ -30,21 +57,14 @@ class Line(Analysis):
     task = "understand"
     has_chart = True
     has_table = True
-    start: Place = option(
-        (), "Where it begins, mm and degrees", unset="lower ends of the working volume",
-        flag="--from", label="From",
-    )  # fmt: skip
-    end: Place = option(
-        (), "Where it ends", unset="upper ends of the working volume", flag="--to", label="To"
-    )
     points: int = option(101, "Points along it", low=2, high=10_001)
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: Scene, watch: Watch, /) -> "LineResult":
-        start, end = complete_ends(scene, self.start, self.end)
         share = np.linspace(0.0, 1.0, self.points)
-        axes = {name: at + (end[name] - at) * share for name, at in start.items()}
+        ends = self.places(scene).items()
+        axes = {name: low + (high - low) * share for name, (low, high) in ends}
         field = evaluate(scene, at=axes, loop=self.loop, exact=self.exact)
         watch(1.0)
         nominal = field.nominal_mm
@@ -58,29 +78,6 @@ class Line(Analysis):
             orientation_urad=field.orientation_urad,
             title=f"{scene.title} · {self.loop} loop",
         )
-
-    def warnings(self, scene: Scene) -> Iterator[str]:
-        return travel_warnings(scene.machine, start=self.start, end=self.end)
-
-
-def complete_ends(scene: Scene, start: Place, end: Place) -> tuple[dict[str, float], ...]:
-    """Give where all axes stand at two points; by default the diagonal of the working volume."""
-    ranges, stand = scene.workspace.ranges, scene.workspace.positions
-    low = {name: ranges.get(name, (at,))[0] for name, at in stand.items()}
-    high = {name: ranges.get(name, (at,))[-1] for name, at in stand.items()}
-    given = start or end
-    ends = tuple(
-        {
-            name: float(at)
-            for name, at in complete_coordinates(
-                scene.machine, dict(place), stand if given else default
-            ).items()
-        }
-        for place, default in ((start, low), (end, high))
-    )
-    if ends[0] == ends[1]:
-        raise OptionError("{start} and {end} are one point; expected two")
-    return ends
 
 
 @dataclass(frozen=True, kw_only=True)

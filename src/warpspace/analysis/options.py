@@ -2,7 +2,7 @@
 
 import math
 import types
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cache
@@ -313,7 +313,8 @@ Axis: TypeAlias = Annotated[str, Grammar("AXIS", _axis)]
 Vector: TypeAlias = Annotated[tuple[float, float, float] | None, Grammar("X,Y,Z", _vector)]
 """A point in mm."""
 Files: TypeAlias = Annotated[tuple[str, ...], Grammar("FILE", typed_word, each=True, is_file=True)]
-Place: TypeAlias = Annotated[tuple[tuple[str, float], ...], Grammar("X=..,Y=..", _place)]
+PLACE = Grammar("X=..,Y=..", _place)
+Place: TypeAlias = Annotated[tuple[tuple[str, float], ...], PLACE]
 """Axis positions in mm and degrees."""
 Keys: TypeAlias = Annotated[tuple[str, ...], Grammar("KEY,…|all", read_keys, many=True)]
 Limits: TypeAlias = Annotated[
@@ -339,13 +340,6 @@ def outside_travel(machine: "Machine", place: Mapping[str, float]) -> list[str]:
                 " its errors are continued beyond it"
             )
     return said
-
-
-def travel_warnings(machine: "Machine", **places: Place) -> Iterator[str]:
-    """Warn of places beyond the travel, each by the name of its option."""
-    for name, place in places.items():
-        for words in outside_travel(machine, dict(place)):
-            yield f"{{{name}}} {words}"
 
 
 def error_words(key: str) -> str:

@@ -165,7 +165,7 @@ def evaluate(
     if at is not None:
         solve = evaluate_exact if exact else evaluate_first_order
         given = complete_coordinates(scene.machine, at, scene.workspace.positions)
-        _check_magnitude(scene, given)
+        check_magnitude(scene, given)
         return solve(scene.model, scene.errors, given, view)
     nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
     return evaluate_grid(scene, nodes, view, exact=exact)
@@ -177,7 +177,7 @@ def evaluate_grid(scene: Scene, grid: Grid, view: View, *, exact: bool = False) 
     return replace(field, nominal_mm=grid.nominal_mm)
 
 
-def _check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
+def check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
     for key, values in error_values(scene.model, scene.errors, coordinates).items():
         peak = np.abs(values).max(initial=0.0)
         if not peak <= MAX_ERROR:

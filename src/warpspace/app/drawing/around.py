@@ -16,10 +16,9 @@ from warpspace.app.drawing.shapes import (
     lines,
     polylines,
 )
-from warpspace.app.evaluation.budget import answer
+from warpspace.app.evaluation.budget import answer, measured
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
-from warpspace.app.evaluation.measuring import measured
 from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.mesh import outline_pieces
 from warpspace.units import Array
@@ -126,12 +125,12 @@ def _measured(picture: LivePicture) -> Shapes:
     found = measured(picture)
     if found is None:
         return {}
-    # start to end, and both edges of the angle
-    ends = [[0, 1]] if len(found.drawn_mm) == 2 else [[0, 1], [2, 0], [2, 1]]
+    _, nominal, actual = found
+    ends = [[0, 1], [2, 0], [2, 1]] if len(actual) == 3 else [[0, 1]]  # and edges of the angle
     return {
-        "/measured/nominal": lines(found.nominal_mm[ends], colour(picture, "edge"), 1.5),
-        "/measured/actual": lines(found.drawn_mm[ends], ACCENT, 3.0),
-        "/measured/points": dots(found.drawn_mm, ASKED * picture.size_mm, ACCENT),
+        "/measured/nominal": lines(nominal[ends], colour(picture, "edge"), 1.5),
+        "/measured/actual": lines(actual[ends], ACCENT, 3.0),
+        "/measured/points": dots(actual, ASKED * picture.size_mm, ACCENT),
     }
 
 

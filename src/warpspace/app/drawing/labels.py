@@ -9,11 +9,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from warpspace.analysis.distance import DistanceResult
-from warpspace.app.evaluation.budget import answer, drawn_places
+from warpspace.app.evaluation.budget import answer, drawn_places, measured
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, drawn_bodies, tool_point
-from warpspace.app.evaluation.measuring import measured
 from warpspace.app.state.app_state import Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
@@ -172,26 +170,11 @@ def _asked(picture: LivePicture) -> Iterator[Label]:
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:
-    drawn = measured(picture)
-    if drawn is None:
-        return
-    found, middle = drawn.found, drawn.drawn_mm[:2].mean(axis=0)
-    for words in measured_words(found):
-        yield Label(words, drawn.drawn_mm[2] if words.startswith("angle") else middle, "measured")
-
-
-def measured_words(found: DistanceResult) -> list[str]:
-    """Say a measured distance, its parts along the axes, and the angle where there is one."""
-    nominal, actual = found.distance_mm
-    parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", found.along_um, strict=True))
-    words = [
-        f"{nominal:.3f} → {actual:.3f} mm, {found.difference_um:+.1f} µm",
-        f"{'  '.join(parts)} µm",
-    ]
-    if found.angle_deg is not None:
-        nominal, actual = found.angle_deg
-        words.append(f"angle {nominal:.4f} → {actual:.4f}°, {found.deviation_urad:+.1f} µrad")
-    return [one.replace("-", MINUS) for one in words]
+    if (drawn := measured(picture)) is not None:
+        found, _, (start, end, *corner) = drawn
+        places = (*[(start + end) / 2.0] * 2, *corner)
+        for words, at in zip(found.words(), places, strict=True):
+            yield Label(words, at, "measured")
 
 
 def _names(picture: LivePicture) -> Iterator[Label]:

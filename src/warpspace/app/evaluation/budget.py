@@ -2,24 +2,29 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.contributions import Contribution, Explanation, explain
+from warpspace.analysis.distance import Distance, DistanceResult
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Picked
-from warpspace.field.evaluate import evaluate_first_order
+from warpspace.app.state.forms import option_values, read_form, with_form
+from warpspace.app.state.leaf import Identity
+from warpspace.exceptions import WarpspaceError
+from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
 from warpspace.field.grid import seen_from_workpiece
 from warpspace.geometry.surfaces import deform, is_thin
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
-from warpspace.kinematics.model import Loop
+from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.machine.axes import is_linear
 from warpspace.picture.mesh import thick_map
 from warpspace.picture.traces import is_moved
+from warpspace.picture.words import spell_at
 from warpspace.units import Array
 
 TOLERANCE_RAD = 0.0032  # how far a click may pass a trace: about seven pixels of the usual view
@@ -57,15 +62,7 @@ class Answer:
         return sorted(self.explanation.contributions, key=lambda part: -abs(part.along_um))
 
 
-def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> Picked | None:
-    """Find the point of a drawn trace or surface that a click means."""
-    found = pick_drawn(picture, origin_mm, direction)
-    return found and found[0]
-
-
-def pick_drawn(
-    picture: LivePicture, origin_mm: Array, direction: Array
-) -> tuple[Picked, Array] | None:
+def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Picked, Array] | None:
     """Find the point of a drawn trace or surface that a ray meets, and where it is drawn, [3]."""
     ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
     if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
@@ -163,25 +160,83 @@ def drawn_places(
     state: AppState, points: Sequence[Mapping[str, float]], exaggeration: float
 ) -> Array:
     """Tell where points of the surface are drawn, [n, 3], mm; all at once, as a drag needs it."""
-    scene, model = state.active_scene(), state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions}
-    coordinates = {
-        name: np.array([at.get(name, stands.get(name, 0.0)) for at in points])
-        for name in model.machine.axes
+    at = {
+        name: np.array([one.get(name, stands.get(name, 0.0)) for one in points])
+        for name in state.scene.machine.axes
     }
-    nominal = nominal_point(model, Loop.TOOL, coordinates)
-    volume = state.scene.workspace.moved(state.positions)
-    seen = seen_from_workpiece(model, coordinates, volume, nominal)
-    if state.controller is not None:
-        field = state.controller.field(coordinates, nominal, scene, state.loop, nominal)
-    else:
-        field = evaluate_first_order(model, scene.errors, coordinates, state.view(), nominal)
+    seen, field = drawn_field(state, at)
     return deform(seen, field.error_um, exaggeration)
+
+
+def drawn_field(
+    state: AppState, at: Coordinates, *, exact: bool = False
+) -> tuple[Array, ErrorField]:
+    """Tell where points of the surface are drawn without errors, and evaluate them in R, [n]."""
+    scene, model, loop = state.active_scene(), state.scene.model, state.loop
+    nominal = nominal_point(model, Loop.TOOL, at)
+    seen = seen_from_workpiece(model, at, scene.workspace, nominal)
+    if state.controller is not None:
+        return seen, state.controller.field(at, nominal, scene, loop, nominal)
+    solve = evaluate_exact if exact else evaluate_first_order
+    return seen, solve(model, scene.errors, at, state.view(), nominal)
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
     """Ask about a point, or about none; the chosen contribution stays while there is a point."""
     return replace(state, picked=picked, lever=state.lever if picked else "")
+
+
+# --- A distance between points of the map ---------------------------------------------------------
+
+POINTS = {
+    f"{Distance.name}.start": "Click the first point on the map.",
+    f"{Distance.name}.end": "Click the second point.",
+    f"{Distance.name}.corner": "Click the corner of an angle, or stop.",
+}
+"""What asks for the points of a distance, by form, in turn; an empty form waits for a click."""
+
+
+def awaited(state: AppState) -> str:
+    """Give the form of the point that the next click sets; empty where a click asks why."""
+    page = state.page
+    is_open = Distance.name in page.open and page.task == Distance.task and not page.notes
+    return next((one for one in POINTS if is_open and state.forms.get(one) == ""), "")
+
+
+def with_clicked(state: AppState, picked: Picked) -> AppState:
+    """Take a click on the drawing: a point that is waited for, else one that is asked about."""
+    point = awaited(state)
+    if not point:
+        return with_picked(state, picked)
+    if picked.point_mm is not None:
+        return state.noted("a trace was clicked; click a point of the map")
+    return with_form(state, point, spell_at(picked.at))
+
+
+def measured(picture: LivePicture) -> tuple[DistanceResult, Array, Array] | None:
+    """Measure between the points that were chosen; None where there are not two.
+
+    With the result where start, end and corner are drawn, [n, 3], without errors and displaced.
+    """
+    return None if picture.is_difference else _measured(Identity(picture))
+
+
+@lru_cache(maxsize=1)  # lines and words of one picture ask; it keeps the picture
+def _measured(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
+    picture: LivePicture = of.thing
+    state, told = picture.drawn_state, option_values(picture.state, Distance.name)
+    scene = state.active_scene()
+    try:
+        asked = replace(read_form(Distance, Distance.options(), told, scene), loop=state.loop)
+        if not (asked.start and asked.end):
+            return None
+        at = asked.places(scene, asked.corner)
+        seen, field = drawn_field(state, at, exact=asked.exact)
+        found = asked.between(scene, at, field)
+    except WarpspaceError:  # said in its section
+        return None
+    return found, seen, deform(seen, field.error_um, picture.exaggeration)
 
 
 # --- Where a ray from the eye meets a surface or passes a line ------------------------------------

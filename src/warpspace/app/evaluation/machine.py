@@ -4,11 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from warpspace.app.evaluation.budget import drawn_field
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
 from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
-from warpspace.field.evaluate import evaluate_first_order
 from warpspace.geometry.surfaces import deform
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
@@ -44,13 +44,9 @@ def drawn_bodies(
 
 def tool_point(picture: LivePicture) -> tuple[Array, Array]:
     """Find the tool point in the deformed grid, [3], mm, and its error, [3], µm."""
-    state, scene = picture.state, picture.state.scene
+    state = picture.state
     axes, nominal = standing(state)
-    coordinates, now = complete_coordinates(scene.machine, axes), state.active_scene()
-    if state.controller is not None:
-        field = state.controller.field(coordinates, nominal, now, state.loop)
-    else:
-        field = evaluate_first_order(scene.model, now.errors, coordinates, state.view(), nominal)
+    _, field = drawn_field(state, complete_coordinates(state.scene.machine, axes))
     return deform(nominal, field.error_um, picture.exaggeration), field.error_um
 
 

@@ -30,7 +30,7 @@ from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Layer
-from warpspace.app.evaluation.budget import pick
+from warpspace.app.evaluation.budget import pick, with_clicked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
@@ -319,15 +319,14 @@ class Session:
             context.act(partial(self._clicked, event.ray_origin, event.ray_direction))
 
     def _clicked(self, origin: object, direction: object) -> None:
-        """Ask why a point is off, or what else a section has points picked for."""
+        """Take a click on the drawing."""
         context, picture = self.context, self.context.shown
         if picture is None or context.telling is not None:
             return
         ray = np.array([origin, direction], dtype=float)
-        picked = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
-        if picked is None:
-            return
-        context.post(lambda state: context.take_picked(state, picked))
+        found = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
+        if found is not None:
+            context.post(lambda state: with_clicked(state, found[0]))
 
     def _hear(self, event: Event) -> None:
         """Take note of what a page says of itself."""

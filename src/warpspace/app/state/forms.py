@@ -43,6 +43,12 @@ def _is_known(name: str) -> bool:
     return known and _OPTION.fullmatch(option) is not None
 
 
+def option_values(state: AppState, name: str) -> dict[str, str]:
+    """Give what was told of the options of an analysis."""
+    own = f"{name}."
+    return {k.removeprefix(own): v for k, v in state.forms.items() if k.startswith(own)}
+
+
 def read_form(
     kind: type[A], options: Sequence[Option], values: Mapping[str, str], scene: Scene
 ) -> A:

@@ -25,7 +25,7 @@ from warpspace.app.evaluation.cache import taken_turn
 from warpspace.app.evaluation.compare import applied, plain_state, with_applied, with_proposal
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.forms import LONGEST, read_form
+from warpspace.app.state.forms import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.table import without_table
 from warpspace.app.tasks.charts import block_html, result_html
@@ -161,10 +161,8 @@ class AnalysisPart(Section):
 
     def values(self, state: AppState) -> dict[str, str]:
         """Give what is set of its options."""
-        own = f"{self.name}."
-        set_ = {k.removeprefix(own): v for k, v in state.forms.items() if k.startswith(own)}
-        found = self.defaults(state)
-        return {**found, **set_, **{name: found[name] for name in OF_STATE & found.keys()}}
+        found, told = self.defaults(state), option_values(state, self.name)
+        return {**found, **told, **{name: found[name] for name in OF_STATE & found.keys()}}
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.question(picture.state), self._version)

@@ -20,9 +20,8 @@ from warpspace.app.documents.scene_file import MOST_OPENED, SceneList
 from warpspace.app.documents.services import Services
 from warpspace.app.drawing.camera import CameraMemory, TabCamera, focus
 from warpspace.app.drawing.moving import MovingLayer
-from warpspace.app.evaluation.budget import with_picked
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.state.app_state import AppState, Picked
+from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.store import StateStore, Update
 
@@ -60,8 +59,6 @@ class Context:
         self.rest_again: Callable[..., None] = lambda *_: None
         self.jobs: set[threading.Event] = set()  # work that goes on; set when the page has gone
         self.reported: list[tuple[str, Result]] = []  # what is to stand in the report
-        # what a click on the drawing means; a section that has points picked says otherwise
-        self.take_picked: Callable[[AppState, Picked], AppState] = with_picked
         # what has been applied last: the state before it, and what it was in words
         self.decided: tuple[AppState, str] | None = None
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None

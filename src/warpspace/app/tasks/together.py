@@ -7,7 +7,7 @@ import numpy as np
 
 from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.shapes import SCENE_PER_MM
-from warpspace.app.evaluation.budget import pick_drawn
+from warpspace.app.evaluation.budget import pick
 from warpspace.app.state.app_state import AppState
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.parts import Part
@@ -39,7 +39,7 @@ class PointerPart(Part):
             except ValueError:  # not six numbers; what is not finite or too far meets nothing
                 return state
             self._last = now
-            found = picture and pick_drawn(picture, ray[0] / SCENE_PER_MM, ray[1])
+            found = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
             at = found and (found[1] * SCENE_PER_MM).round(4).tolist()
         for one in self._tabs():
             if one is not self.context and not one.telling and queued(one.client) <= MOST_QUEUED:

@@ -7,8 +7,6 @@ from markupsafe import Markup
 
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.contributions import Contribution
-from warpspace.analysis.description import Result
-from warpspace.analysis.distance import DistanceResult
 from warpspace.app.browser.html import (
     EMPTY,
     button,
@@ -21,29 +19,30 @@ from warpspace.app.browser.html import (
     text_box,
 )
 from warpspace.app.drawing.camera import fit_camera
-from warpspace.app.drawing.labels import measured_words
-from warpspace.app.evaluation.budget import Answer, answer, pick_worst, with_picked
+from warpspace.app.evaluation.budget import (
+    POINTS,
+    Answer,
+    answer,
+    awaited,
+    measured,
+    pick_worst,
+    with_picked,
+)
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.measuring import POINTS, point_form
-from warpspace.app.state.app_state import AppState, Picked
-from warpspace.app.state.forms import with_form
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.table import without_words
 from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.app.tasks.analysis import AnalysisPart
 from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.parts import Section, actions
 from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
-from warpspace.picture.words import LOOP_WORDS, spell_at, spell_axes, spell_in_r
+from warpspace.picture.words import LOOP_WORDS, spell_axes, spell_in_r
 from warpspace.scene.model import evaluate_grid
 from warpspace.units import spell_count
 
 FIRST = 3  # contributions in sight at once; all of them stand under Details
 DIFFERENCE = "B − A is a difference: show A or B to see what the error of a point consists of."
-ASKED_FOR = {
-    "start": "Click the first point on the map.",
-    "end": "Click the second point.",
-    "corner": "Click the corner of an angle, or stop.",
-}
 ELSEWHERE = (
     "The largest contribution here may compensate others elsewhere: it is not always the one to"
     " adjust."
@@ -178,50 +177,31 @@ def _lever(part: Contribution) -> Markup:
 class DistancePart(AnalysisPart):
     """Distance and angle between points that are picked on the map."""
 
-    _turn: str = ""  # which point the next click sets
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().concerns(picture), id(picture))
 
     def before_result(self, state: AppState) -> Markup:
-        picked = [state.forms.get(point_form(name), "") for name in POINTS]
+        point, drawn = awaited(state), self.context.shown and measured(self.context.shown)
         hint = "Click two points of the map, and a third for an angle"
-        pick = button("Pick points", f"{self.name}:pick", kind="main", hint=hint)
-        buttons = [button("Stop", f"{self.name}:stop") if self._turn else pick]
-        if any(picked):
+        buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
+        if point:
+            buttons = [button("Stop", f"{self.name}:stop")]
+        if any(map(state.forms.get, POINTS)):
             buttons.append(button("Clear", f"{self.name}:clear", kind="quiet",
                                   hint="Take the points out of the drawing"))  # fmt: skip
-        said = tag("p", ASKED_FOR[self._turn], role="status") if self._turn else EMPTY
-        return actions(*buttons) + said
-
-    def actions(self, found: Result, *, stale: bool) -> Markup:
-        if not isinstance(found, DistanceResult):
-            return super().actions(found, stale=stale)
-        pin = button("Pin", "notes:pin", "\n".join(measured_words(found)),
-                     hint="Write a note with these numbers", disabled=stale)  # fmt: skip
-        return actions(pin) + super().actions(found, stale=stale)
+        if drawn:
+            buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].words()),
+                                  hint="Write a note with these numbers"))  # fmt: skip
+        said = tag("p", POINTS[point], role="status") if point else EMPTY
+        return actions(*buttons) + said + tag("p", without_words(state), class_="ws-tiny")
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word in ("pick", "stop", "clear"):
-            self._wait_for("" if word != "pick" else POINTS[0])
-        if word in ("pick", "clear"):
-            points = {point_form(name) for name in POINTS}
-            kept = {name: text for name, text in state.forms.items() if name not in points}
-            return replace(state, forms=kept)
-        return super().take(state, word, value)
-
-    def _wait_for(self, turn: str) -> None:
-        self._turn = turn
-        self.context.take_picked = self._take_point if turn else with_picked
-        self._again()
-
-    def _take_point(self, state: AppState, picked: Picked) -> AppState:
-        if state.page.notes or not (self.is_open(state) and self.is_seen(state)):
-            self._wait_for("")
-            return with_picked(state, picked)
-        if picked.point_mm is not None:
-            self.context.notify("Not taken", "a trace was clicked; click a point of the map")
-            return state
-        name = POINTS.index(self._turn)
-        self._wait_for((*POINTS, "")[name + 1])
-        return with_form(state, point_form(POINTS[name]), spell_at(picked.at))
+        if word not in ("pick", "stop", "clear"):
+            return super().take(state, word, value)
+        picked = {one: text for one in POINTS if (text := state.forms.get(one))}
+        points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[word]
+        others = {one: text for one, text in state.forms.items() if one not in POINTS}
+        return replace(state, forms={**others, **points})
 
 
 class VolumePart(Section):
