@@ -12,7 +12,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Mark, Table, number_columns
 from warpspace.analysis.blocks import Block as AnyBlock
-from warpspace.analysis.concepts import Concepts, ConceptsResult
+from warpspace.analysis.concepts import Concepts
 from warpspace.analysis.description import Result, silent
 from warpspace.analysis.distribution import choose_distribution
 from warpspace.analysis.reviewing import notes_table
@@ -85,7 +85,7 @@ class ReportFigures:
         form: str,
     ) -> None:
         self._worker, self._form = worker, form
-        self._loop, self.grid, self._factor = loop, grid, pictures[0].exaggeration
+        self._loop, self._grid, self._factor = loop, grid, pictures[0].exaggeration
         self.missing: list[str] = []
         scenes = [picture.scene for picture in pictures]
         drawn = f"displacement drawn {spell_factor(self._factor)}"
@@ -126,7 +126,7 @@ class ReportFigures:
         """Begin a figure; it is drawn a second time where the first fails, then it is missing."""
         # the lean of the tool axis has a factor of its own, at which it is seen
         factor = "auto" if name == "orientation-map" else self._factor
-        chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self.grid)
+        chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
         size = PRINTED_PX, OTHER_PX.get(name, HEIGHT_PX)
         chosen = replace(chosen, size=size, printed=True)
         begun = self._worker.begin(name, scenes, chosen, self._form)
@@ -199,7 +199,7 @@ def build_report(
     with FigureWorker() as worker:
         painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form)
         review = build_review(scenes, settings, pictures)
-        compared = compare_with([one.scene for one in review.scenes], concepts, settings)
+        beside = {"Concepts side by side": concept_blocks(review, concepts, painter)}
         found = {
             "Where the error is": where(review, painter, embed),
             "Error budget at the worst point": map(explanation, review.scenes),
@@ -208,7 +208,7 @@ def build_report(
             "Errors and tolerances": map(parameters, review.scenes),
             "How errors arrive at the point": told(review, painter, "gains"),
             "What the tolerances promise": told(review, painter, "worst", "sampled", "shares"),
-            **({"Concepts side by side": concept_blocks(compared, painter)} if compared else {}),
+            **(beside if concepts else {}),
             **{name: said(result.blocks(), painter) for name, result in (results or {}).items()},
             "Conventions": [conventions(review)],
             "Provenance": provenance(review, files),
@@ -429,32 +429,24 @@ def differences(review: Review) -> Iterator[Block]:
         yield Text("A and B have different working volumes: no difference is formed.", "note")
 
 
-def compare_with(
-    scenes: Sequence[Scene], others: Sequence[Scene], settings: ReportSettings
-) -> ConceptsResult | None:
-    if not others:
-        return None
-    every = (*scenes, *others)
+def concept_blocks(
+    review: Review, others: Sequence[Scene], painter: ReportFigures
+) -> Iterator[Block]:
+    every, settings = (*(one.scene for one in review.scenes), *others), review.settings
     if len(every) > MOST_CONCEPTS:
         raise OptionError(
             f"{len(every)} machines side by side; expected at most {MOST_CONCEPTS}"
-            f" with the {len(scenes)} of the report"
+            f" with the {len(review.scenes)} of the report"
         )
     asked = Concepts(
-        limit_um=settings.spec_um,
-        samples=settings.samples,
-        seed=settings.seed,
+        limit_um=settings.spec_um, samples=settings.samples, seed=settings.seed,
         distribution=choose_distribution(settings.distribution),
-    )
-    return asked.run_all(every, silent)
-
-
-def concept_blocks(found: ConceptsResult, painter: ReportFigures) -> Iterator[Block]:
+    )  # fmt: skip
+    found = asked.run_all(every, silent)
     yield from said(found.blocks())
     caption = "The machines in one scale; colours are the RMS of |E| within tolerance."
-    settings = FigureSettings(loop=str(found.asked.loop), grid=painter.grid, concepts=found.asked)
-    scenes = [one.scene for one in found.concepts]
-    yield painter.begin("concepts", scenes, caption, settings)()
+    chosen = FigureSettings(loop=str(asked.loop), grid=settings.grid, concepts=asked)
+    yield painter.begin("concepts", [one.scene for one in found.concepts], caption, chosen)()
 
 
 def conventions(review: Review) -> Items:
