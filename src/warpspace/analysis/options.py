@@ -66,6 +66,7 @@ class Option:
     label: str  # on a page
     words: Mapping[str, str]  # what choices are called on a page
     required: bool  # whether a command line must give it
+    positional: bool  # whether it is given there without its flag, behind the scene
 
     @property
     def help(self) -> str:
@@ -154,6 +155,7 @@ def option(
     label: str = "",
     words: Mapping[str, str] | None = None,
     required: bool = False,
+    positional: bool = False,
 ) -> T:
     """Give a field of an analysis that a user may set; its kind comes from its annotation.
 
@@ -162,7 +164,7 @@ def option(
     said = {
         "about": about, "unit": unit, "low": low, "high": high, "unset": unset, "needs": needs,
         "flag": flag, "former": former, "label": label, "words": words or {},
-        "required": required,
+        "required": required, "positional": positional,
     }  # fmt: skip
     return field(default_factory=lambda: default, metadata={"option": said})
 
@@ -192,7 +194,7 @@ def _build(name: str, default: Any, hint: Any, said: Mapping[str, Any]) -> Optio
         enum=enum, unit=said["unit"], low=said["low"], high=said["high"], unset=said["unset"],
         needs=said["needs"], flag=said["flag"] or "--" + plain.replace("_", "-"),
         former=said["former"], label=said["label"] or plain.replace("_", " ").capitalize(),
-        words=said["words"], required=said["required"],
+        words=said["words"], required=said["required"], positional=said["positional"],
     )  # fmt: skip
 
 

@@ -114,13 +114,12 @@ def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> 
         target = transforms.apply(branch_pose(model, "workpiece", at), target_mm)
         return nominal_point(model, Loop.TOOL, at) - target
 
-    away = gap(start)
-    moves = np.stack([gap({**start, name: start[name] + 1.0}) - away for name in names], axis=-1)
+    moves = np.stack([motion_direction(model, start, name) for name in names], axis=-1)
     if np.abs(np.linalg.det(moves)).min() < FLAT:
         raise OptionError(
             f"{', '.join(names)} move in one plane in some pose and cannot follow the point"
         )
-    steps = np.linalg.solve(moves, -away[..., None])[..., 0]
+    steps = -transforms.rotate(np.linalg.inv(moves), gap(start))
     for index, name in enumerate(names):
         start[name] = start[name] + steps[..., index]
     return start

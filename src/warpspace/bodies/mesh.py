@@ -31,14 +31,35 @@ _DAE_REFERENCES = 20
 """Nodes of a DAE file by reference: each may hold others, so that they multiply."""
 
 
-def count_mesh(data: bytes, ending: str) -> bytes:
+@dataclass(frozen=True, slots=True)
+class Most:
+    """What a mesh file may hold at most."""
+
+    triangles: int = limits.MAX_TRIANGLES
+    megabytes: int = limits.MAX_MESH_MB
+
+    @property
+    def listed(self) -> int:
+        """Numbers in lists, points and indices, lines of text: three corners, each with more."""
+        return 12 * self.triangles
+
+    @property
+    def words(self) -> int:
+        """Words of a text: a triangle of an STL file has 21."""
+        return 40 * self.triangles
+
+
+OF_BODY, OF_PART = Most(), Most(limits.MAX_PART_TRIANGLES, limits.MAX_PART_MB)
+
+
+def count_mesh(data: bytes, ending: str, most: Most = OF_BODY) -> bytes:
     """Refuse a mesh file that holds more than can be built in a moment."""
     if ending == ".obj":
         text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", "")
         data = _GROUPS.sub("", text).encode()
     elif ending == ".stl" and not _is_binary(data):
         data = _NEXT_SOLID.sub(b"", data)
-    _COUNTERS[ending](data)
+    _COUNTERS[ending](data, most)
     return data
 
 
@@ -47,14 +68,14 @@ def _limit(count: int, limit: int, what: str) -> None:
         raise OptionError(f"it holds {count:,} {what}; expected at most {limit:,}")
 
 
-def _count_stl(data: bytes) -> None:
+def _count_stl(data: bytes, most: Most) -> None:
     if _is_binary(data):
-        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, limits.MAX_TRIANGLES, "triangles")
+        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, most.triangles, "triangles")
         return
-    _count_text(data)
+    _count_text(data, most)
     text = data.lower()
     _limit(text.count(b"endsolid"), limits.MAX_SOLIDS, "solids")
-    _limit(text.count(b"vertex") // 3, limits.MAX_TRIANGLES, "triangles")
+    _limit(text.count(b"vertex") // 3, most.triangles, "triangles")
 
 
 def _is_binary(data: bytes) -> bool:
@@ -62,22 +83,22 @@ def _is_binary(data: bytes) -> bool:
     return len(data) == _STL_HEAD + _STL_TRIANGLE * stated
 
 
-def _count_text(data: bytes) -> int:
-    _limit(data.count(b"\n"), limits.MAX_MESH_LISTS, "lines")
+def _count_text(data: bytes, most: Most) -> int:
+    _limit(data.count(b"\n"), most.listed, "lines")
     blank = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
     words = int(np.count_nonzero(blank[:-1] & ~blank[1:]))
-    _limit(words, limits.MAX_MESH_WORDS, "words")
+    _limit(words, most.words, "words")
     return words
 
 
-def _count_obj(data: bytes) -> None:
-    _count_text(data)
+def _count_obj(data: bytes, most: Most) -> None:
+    _count_text(data, most)
     faces = _FACE.finditer(data.decode())
     triangles = sum(max(len(face[1].split()) - 2, 0) for face in faces)
-    _limit(triangles, limits.MAX_TRIANGLES, "triangles")
+    _limit(triangles, most.triangles, "triangles")
 
 
-def _count_ply(data: bytes) -> None:
+def _count_ply(data: bytes, most: Most) -> None:
     rows, total, scalars, smallest, at = 0, 0, 0, 4, 0
     is_text = b"ascii" in data[:100].lower()
     while at < len(data):
@@ -90,19 +111,19 @@ def _count_ply(data: bytes) -> None:
         if len(words) == 3 and "element" in words[0]:
             rows = max(int(words[2]), 0)
             total += rows
-            _limit(rows, 3 * limits.MAX_TRIANGLES, f"rows of {words[1][:40]!r}")
+            _limit(rows, 3 * most.triangles, f"rows of {words[1][:40]!r}")
         elif len(words) == 3 and "property" in words[0]:
             scalars += rows * (1 if is_text else _PLY_BYTES.get(words[1], 4))
         elif len(words) == 5 and "property" in words[0]:
             smallest = min(smallest, _PLY_BYTES.get(words[3], 4))
     if is_text:
         _limit(data.count(b"\n", at), total + 100, "lines")
-    held = _count_text(data[at:]) if is_text else (len(data) - at) // smallest
+    held = _count_text(data[at:], most) if is_text else (len(data) - at) // smallest
     scalars //= 1 if is_text else smallest
-    _limit(held - scalars, limits.MAX_MESH_LISTS, "numbers in lists")
+    _limit(held - scalars, most.listed, "numbers in lists")
 
 
-def _count_glb(data: bytes) -> None:
+def _count_glb(data: bytes, most: Most) -> None:
     size = int.from_bytes(data[12:16], "little")
     if data[:4] != b"glTF" or size > len(data):
         return  # whoever reads it says what it is not
@@ -119,16 +140,16 @@ def _count_glb(data: bytes) -> None:
     primitives = [mesh["primitives"] for mesh in held.get("meshes", [])]
     _limit(sum(map(len, primitives)), limits.MAX_MESH_PARTS, "primitives")
     accessors = [max(int(accessor["count"]), 0) for accessor in held.get("accessors", [])]
-    _limit(sum(accessors), limits.MAX_MESH_LISTS, "points and indices")
+    _limit(sum(accessors), most.listed, "points and indices")
     stored = sum(max(int(view["byteLength"]), 0) for view in held.get("bufferViews", []))
-    _limit(stored, limits.MAX_MESH_MB * 1_000_000, "bytes in views of its data")
+    _limit(stored, most.megabytes * 1_000_000, "bytes in views of its data")
     placed = [primitive for mesh in _placed(held) for primitive in primitives[mesh]]
     _limit(len(placed), limits.MAX_MESH_PARTS, "primitives, each placing counted")
     corners = sum(
         accessors[part["indices"] if "indices" in part else part["attributes"]["POSITION"]]
         for part in placed
     )
-    _limit(corners // 3, limits.MAX_TRIANGLES, "triangles, each placing counted")
+    _limit(corners // 3, most.triangles, "triangles, each placing counted")
 
 
 def _placed(held: Any) -> Iterator[int]:
@@ -149,13 +170,13 @@ def _placed(held: Any) -> Iterator[int]:
             yield nodes[node]["mesh"]
 
 
-def _count_dae(data: bytes) -> None:
+def _count_dae(data: bytes, most: Most) -> None:
     _limit(data.count(b"<"), 2 * limits.MAX_MESH_PARTS, "XML tags")
     _limit(data.count(b"<instance_node"), _DAE_REFERENCES, "nodes by reference")
-    _count_text(data)
+    _count_text(data, most)
 
 
-_COUNTERS: dict[str, Callable[[bytes], object]] = {
+_COUNTERS: dict[str, Callable[[bytes, Most], object]] = {
     ".stl": _count_stl,
     ".obj": _count_obj,
     ".ply": _count_ply,
@@ -200,7 +221,7 @@ def crease_edges(mesh: Any) -> Array:
     return np.asarray(mesh.vertices[mesh.face_adjacency_edges[sharp]], dtype=float)
 
 
-def _check_geometry(scene: Any) -> None:
+def _check_geometry(scene: Any, most: Most) -> None:
     """Refuse what trimesh takes as it comes: points in a plane, vertices that are not there."""
     for mesh in scene.geometry.values():
         if np.shape(getattr(mesh, "vertices", ()))[1:] != (3,):
@@ -208,23 +229,31 @@ def _check_geometry(scene: Any) -> None:
         faces = np.asarray(getattr(mesh, "faces", ()))
         if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(mesh.vertices)):
             raise ValueError("a triangle names a vertex that is not there")
-        if len(faces) > limits.MAX_TRIANGLES:
-            raise ValueError(f"{len(faces):,} triangles; expected at most {limits.MAX_TRIANGLES:,}")
+        if len(faces) > most.triangles:
+            raise ValueError(f"{len(faces):,} triangles; expected at most {most.triangles:,}")
 
 
-def open_meshes(path: Path, what: str) -> Any:
+def open_meshes(path: Path, what: str, most: Most = OF_BODY) -> Any:
     try:
-        size = path.stat().st_size
-        if size > limits.MAX_MESH_MB * 1_000_000:
-            raise OptionError(
-                f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {limits.MAX_MESH_MB} MB. "
-                "Reduce its triangles before"
-            )
+        check_size(path, path.stat().st_size, what, most)
         data = path.read_bytes()
     except FileNotFoundError:
         raise OptionError(f"{path}: there is no such file") from None
     except OSError as error:
         raise OptionError(f"{path}: cannot be read ({error.strerror})") from None
+    return parse_meshes(data, path, what, most)
+
+
+def check_size(path: Path, size: int, what: str, most: Most) -> None:
+    if size > most.megabytes * 1_000_000:
+        raise OptionError(
+            f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {most.megabytes} MB. "
+            "Reduce its triangles before"
+        )
+
+
+def parse_meshes(data: bytes, path: Path, what: str, most: Most = OF_BODY) -> Any:
+    check_size(path, len(data), what, most)
     if not data:
         raise OptionError(f"{path}: the file is empty; expected a {what}")
     import trimesh
@@ -234,9 +263,9 @@ def open_meshes(path: Path, what: str) -> Any:
     try:
         with np.errstate(all="ignore"):
             ending = path.suffix.lower()
-            data = count_mesh(data, ending)
+            data = count_mesh(data, ending, most)
             found = trimesh.load_scene(io.BytesIO(data), file_type=ending[1:], process=False)
-            _check_geometry(found)
+            _check_geometry(found, most)
             return found
     except OptionError as error:
         raise OptionError(f"{path}: {error}. Reduce it before") from None

@@ -36,17 +36,38 @@ def load_mesh(
     path: str | Path, frame: str, *, unit: str | None = None, up: str | None = None
 ) -> LoadedMesh:
     path = Path(path)
-    standard = FORMATS.get(path.suffix.lower())
-    if standard is None:
-        raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
-    for given, known in ((unit, tuple(UNITS_MM)), (up, UP_AXES)):
-        if given is not None and given not in known:
-            raise OptionError(f"{path}: {given!r}; expected one of {', '.join(known)}")
+    check_format(path, unit, up)
     try:
         changed = path.stat().st_mtime_ns
     except OSError:
         changed = 0
     return _read_mesh(path, changed, frame, unit, up)
+
+
+def check_format(path: Path, unit: str | None, up: str | None = None) -> str:
+    """Refuse what is not read; give what a message calls the file."""
+    if path.suffix.lower() not in FORMATS:
+        raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
+    for given, known in ((unit, tuple(UNITS_MM)), (up, UP_AXES)):
+        if given is not None and given not in known:
+            raise OptionError(f"{path}: {given!r}; expected one of {', '.join(known)}")
+    return f"{path.suffix[1:].upper()} file"
+
+
+def join_meshes(found: Any, path: Path, unit: str | None, up: str | None = None) -> Any:
+    """Give what a file holds as one mesh of trimesh, in mm with z upwards."""
+    standard_unit, standard_up = FORMATS[path.suffix.lower()]
+    mesh = found.to_mesh()
+    if not len(mesh.faces):
+        raise OptionError(f"{path}: there are no triangles in it")
+    if not np.isfinite(mesh.vertices[mesh.faces]).all():
+        raise OptionError(f"{path}: a vertex is not finite")
+    mesh.apply_scale(UNITS_MM[unit or standard_unit])
+    if (up or standard_up) == "y":
+        mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+    if unit is None:
+        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), standard_unit)
+    return mesh
 
 
 @lru_cache(maxsize=16)
@@ -57,17 +78,8 @@ def _read_mesh(
     unit: str | None,
     up: str | None,
 ) -> LoadedMesh:
-    standard_unit, standard_up = FORMATS[path.suffix.lower()]
-    mesh = open_meshes(path, f"{path.suffix[1:].upper()} file").to_mesh()
-    if not len(mesh.faces):
-        raise OptionError(f"{path}: there are no triangles in it")
-    if not np.isfinite(mesh.vertices[mesh.faces]).all():
-        raise OptionError(f"{path}: a vertex is not finite")
-    mesh.apply_scale(UNITS_MM[unit or standard_unit])
-    if (up or standard_up) == "y":
-        mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-    if unit is None:
-        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), standard_unit)
+    what = check_format(path, unit, up)
+    mesh = join_meshes(open_meshes(path, what), path, unit, up)
     mesh.update_faces(mesh.nondegenerate_faces())
     if not len(mesh.faces):
         raise OptionError(f"{path}: all of its triangles are points or lines")

@@ -57,6 +57,10 @@ def command_of(kind: "type[Analysis]") -> click.Command:
 
 
 def _click_option(one: Option) -> Callable[..., Any]:
+    if one.positional and one.grammar is not None:
+        metavar = one.grammar.metavar if one.required else f"[{one.grammar.metavar}]"
+        kind = DataFile() if one.grammar.is_file else str
+        return click.argument(one.name, type=kind, nargs=-1, required=one.required, metavar=metavar)
     traits: dict[str, Any] = {"cls": RenamedOption, "former": one.former, "help": one.help}
     if one.kind is bool:
         traits |= {"is_flag": True}

@@ -62,10 +62,8 @@ MAX_MESH_PARTS = 5_000  # entries of any one list of a GLB file, and primitives,
 MAX_SOLIDS = 1_000  # of an STL file, those between which there is text
 MAX_MESH_DEPTH = 50  # nodes of a GLB file below each other
 MAX_MESH_HEADER = {".glb": 12_000_000, ".ply": 65_536}  # bytes before the numbers
-# numbers in the lists of a PLY file, points and indices of a GLB file, lines of a text: of three
-# corners with normals and texture
-MAX_MESH_LISTS = 12 * MAX_TRIANGLES
-MAX_MESH_WORDS = 40 * MAX_TRIANGLES  # of a mesh file that is text: a triangle of an STL has 21
+MAX_PART_MB = 200  # of a part that is to be cut
+MAX_PART_TRIANGLES = 2_000_000
 MAX_LINKS = 2_000  # links of a URDF file
 MAX_SHAPES = 500  # shapes of its links
 MAX_URDF_ELEMENTS = 50_000

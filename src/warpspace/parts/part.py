@@ -1,0 +1,227 @@
+"""A part as the machine makes it: a mesh in the workpiece frame, moved by the relative error.
+
+The error of a point is that of the tool against the workpiece, in the workpiece frame w, where the
+linear axes bring the tool to the point and the rotary axes stand as they do in the scene. The part
+as cut is the nominal one plus that error. Geometry only: no forces, heat, wear or servo.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.bench.placing import ball_point, follow, within_travel
+from warpspace.bodies.mesh import CREASE_DEG, OF_PART, open_meshes, parse_meshes
+from warpspace.bodies.own_meshes import check_format, join_meshes
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import ErrorBasis, build_basis
+from warpspace.kinematics import transforms
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.scene.model import Scene, evaluate
+from warpspace.units import Array
+
+
+class Corners(NamedTuple):
+    """Vertices once for each smooth face that they belong to, so that creases stay sharp."""
+
+    corner_of: NDArray[np.int32]  # [W], number of the vertex of each corner
+    triangles: NDArray[np.int32]  # [T, 3], numbers of corners
+    normals: Array  # [W, 3], unit vectors; zero where all triangles are slivers
+
+
+@dataclass(frozen=True, eq=False)
+class PartMesh:
+    """A closed surface, vertices merged, its triangles counter-clockwise seen from outside."""
+
+    name: str
+    vertices_mm: Array  # [V, 3]
+    triangles: NDArray[np.int32]  # [T, 3]
+    warnings: tuple[str, ...] = ()  # open, inverted, crooked: shown and said
+
+    @cached_property
+    def areas_mm2(self) -> Array:
+        """Area times unit normal of the triangles, [T, 3], outwards."""
+        first, second, third = (self.vertices_mm[self.triangles[:, at]] for at in range(3))
+        return np.cross(second - first, third - first) / 2.0
+
+    @cached_property
+    def normals(self) -> Array:
+        """Unit normals of the triangles, [T, 3], outwards; zero for slivers without area."""
+        length = np.linalg.norm(self.areas_mm2, axis=1, keepdims=True)
+        return self.areas_mm2 / np.where(length > 0.0, length, 1.0)
+
+    @cached_property
+    def corners(self) -> Corners:
+        """Vertices split at creases above `CREASE_DEG`."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        count = len(self.triangles)
+        edge = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], -1).reshape(-1, 2)
+        low, high = edge.min(axis=1).astype(np.int64), edge.max(axis=1)
+        order = np.argsort(low * len(self.vertices_mm) + high, kind="stable")
+        one, other = order[:-1], order[1:]
+        is_same = (low[one] == low[other]) & (high[one] == high[other])
+        cosine = np.sum(self.normals[one // 3] * self.normals[other // 3], axis=1)
+        joined = is_same & (cosine > np.cos(np.deg2rad(CREASE_DEG)))
+        one, other = one[joined], other[joined]
+        # an edge begins at its corner of the triangle and ends at the following one
+        begin, end = other, other // 3 * 3 + (other % 3 + 1) % 3
+        turned = edge[one, 0] != edge[other, 0]
+        rows = np.concatenate([one, one // 3 * 3 + (one % 3 + 1) % 3])
+        columns = [np.where(turned, end, begin), np.where(turned, begin, end)]
+        columns = np.concatenate(columns)
+        links = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(3 * count, 3 * count))
+        found, label = connected_components(links, directed=False)
+        vertex = np.empty(found, dtype=np.int32)
+        vertex[label] = self.triangles.reshape(-1)
+        area = np.repeat(self.areas_mm2, 3, axis=0)
+        normals = np.stack([np.bincount(label, area[:, at], found) for at in range(3)], -1)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return Corners(
+            vertex,
+            label.reshape(-1, 3).astype(np.int32),
+            normals / np.where(length > 0.0, length, 1.0),
+        )
+
+
+def load_part(path: str | Path, unit: str | None = None) -> PartMesh:
+    """Read a mesh from a file: .stl, .obj, .ply in mm, .glb in m unless a unit is given."""
+    path = Path(path)
+    found = open_meshes(path, check_format(path, unit), OF_PART)
+    return _build(join_meshes(found, path, unit), path)
+
+
+def parse_part(data: bytes, name: str, unit: str | None = None) -> PartMesh:
+    """Read a mesh from the bytes of a file of this name."""
+    path = Path(name)
+    found = parse_meshes(data, path, check_format(path, unit), OF_PART)
+    return _build(join_meshes(found, path, unit), path)
+
+
+def _build(mesh: Any, path: Path) -> PartMesh:
+    vertices, numbers = _merge(np.asarray(mesh.vertices, dtype=float))
+    triangles = numbers[mesh.faces]
+    following = np.roll(triangles, -1, axis=1)
+    is_flat = (triangles == following).any(axis=1)
+    triangles, following = triangles[~is_flat], following[~is_flat]
+    if not len(triangles):
+        raise OptionError(f"{path}: all of its triangles are points or lines")
+    there = np.sort((triangles * np.int64(len(vertices)) + following).reshape(-1))
+    back = np.sort((following * np.int64(len(vertices)) + triangles).reshape(-1))
+    is_closed = np.array_equal(there, back)
+    part = PartMesh(path.stem, vertices, triangles.astype(np.int32))
+    middle = vertices.mean(axis=0)
+    lever = part.vertices_mm[part.triangles[:, 0]] - middle
+    warnings: list[str] = []
+    if not is_closed:
+        alone = len(np.setdiff1d(there, back))
+        warnings.append(
+            f"{path}: the surface is not closed, or its triangles do not agree on the outside"
+            f" ({alone:,} edges); it is taken as it is"
+        )
+    elif np.sum(lever * part.areas_mm2) < 0.0:
+        warnings.append(f"{path}: its triangles face inwards; they are turned outwards")
+        triangles = triangles[:, ::-1]
+    return PartMesh(path.stem, vertices, triangles.astype(np.int32), tuple(warnings))
+
+
+def _merge(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Give each place once, and its number for each vertex; order by first appearance."""
+    words = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # −0 becomes 0
+    mixed = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
+    for at in (1, 2):
+        mixed = (mixed ^ (mixed >> np.uint64(29)) ^ words[:, at]) * np.uint64(0xBF58476D1CE4E5B9)
+    _, first, numbers = np.unique(mixed, return_index=True, return_inverse=True)
+    if not np.array_equal(vertices[first][numbers], vertices):  # two places with one hash
+        _, first, numbers = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return vertices[first[order]], place[numbers.reshape(-1)]
+
+
+def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> PartMesh:
+    """Put a part into the workpiece frame.
+
+    Parameters
+    ----------
+    mesh : PartMesh
+    scene : Scene
+    place : sequence of float, (3,) or (6,), or None
+        Shift in mm and turns in degrees about the fixed x, y, z in that order; None puts the middle
+        of its box into the middle of the working volume.
+    """
+    if place is None:
+        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+        box = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
+        pose = transforms.translation(ball_point(scene.model, stand) - box)
+    else:
+        pose = transforms.placed(place[:3], [*place[3:], 0.0, 0.0, 0.0][:3])
+    return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm))
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """Points of the workpiece frame as the machine makes them."""
+
+    point_mm: Array  # [n, 3], nominal, w
+    coordinates: dict[str, Array]  # [n] or one for all: where the axes stand
+    error_um: Array  # [n, 3], w, actual − nominal
+    outside: NDArray[np.bool_]  # [n], beyond the travel of a linear axis; errors are continued
+
+
+def make_points(scene: Scene, point_mm: Array) -> Made:
+    """Find where the axes stand at points of w, [n, 3], mm, and what error they have there."""
+    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+    coordinates = follow(scene.model, stand, point_mm)
+    field = evaluate(scene, at=coordinates, loop=Loop.RELATIVE, frame="workpiece")
+    inside = within_travel(scene.machine, coordinates)
+    return Made(point_mm, coordinates, field.error_um, ~np.broadcast_to(inside, len(point_mm)))
+
+
+def point_basis(scene: Scene, made: Made, keys: Sequence[str] | None = None) -> ErrorBasis:
+    """Give the response of the points to each parameter, [K, n, 3], in w: what a slider moves."""
+    keys = scene.parameter_keys if keys is None else keys
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    basis = build_basis(scene.model, scene.errors, keys, made.coordinates, view)
+    return replace(basis, nominal_mm=made.point_mm)
+
+
+def fit_out(point_mm: Array, error_um: Array) -> Array:
+    """Give errors, [..., n, 3], µm, less the rigid motion of the points, [n, 3], that fits best."""
+    arm = point_mm - point_mm.mean(axis=0)
+    shift = error_um.mean(axis=-2, keepdims=True)
+    inertia = np.sum(arm * arm) * np.eye(3) - arm.T @ arm
+    moment = np.cross(arm, error_um).sum(axis=-2)
+    # points on a line do not tell the turn about it: the smallest one counts
+    turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)
+    return error_um - shift - np.cross(turn[..., None, :], arm)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How long errors are, each point counting once."""
+
+    mean_um: float
+    rms_um: float
+    p95_um: float
+    max_um: float
+    max_at_mm: tuple[float, float, float]  # nominal, w
+
+
+def deviation_of(point_mm: Array, error_um: Array) -> Deviation:
+    length = np.sqrt(np.einsum("ij,ij->i", error_um, error_um))
+    worst = int(np.argmax(length))
+    x, y, z = point_mm[worst].tolist()
+    return Deviation(
+        mean_um=float(length.mean()),
+        rms_um=float(np.sqrt(np.mean(length * length))),
+        p95_um=float(np.percentile(length, 95.0)),
+        max_um=float(length[worst]),
+        max_at_mm=(x, y, z),
+    )

@@ -1,0 +1,92 @@
+"""The part as it is made, against closed forms; its mesh, merged and split at creases."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from bench_scenes import scene_with
+from warpspace import load_scene
+from warpspace.exceptions import OptionError
+from warpspace.kinematics.model import Loop
+from warpspace.parts.part import (
+    deviation_of,
+    fit_out,
+    load_part,
+    make_points,
+    parse_part,
+    place_part,
+    point_basis,
+)
+from warpspace.scene.model import evaluate
+
+
+def mesh_of(mesh, ending="ply"):
+    return parse_part(mesh.export(file_type=ending), f"x.{ending}", "mm")
+
+
+BOX = trimesh.creation.box([100.0, 60.0, 40.0])
+BALL = trimesh.creation.icosphere(subdivisions=3, radius=50.0)
+
+
+@pytest.mark.parametrize("ending", ["stl", "ply"])
+def test_vertices_are_merged_and_creases_are_split(ending):
+    box, ball = mesh_of(BOX, ending), mesh_of(BALL, ending)
+    assert (len(box.vertices_mm), len(box.corners.corner_of)) == (8, 24)
+    assert (len(ball.vertices_mm), len(ball.corners.corner_of)) == (642, 642)
+    outwards = ball.vertices_mm[ball.corners.corner_of] / 50.0
+    assert np.abs(ball.corners.normals - outwards).max() < 0.02
+    assert np.array_equal(box.corners.corner_of[box.corners.triangles], box.triangles)
+    across = box.normals[:, None] - box.corners.normals[box.corners.triangles]
+    assert np.abs(across).max() < 1e-12
+    assert not box.warnings
+
+
+def test_what_is_wrong_with_a_surface_is_said(tmp_path):
+    inside = BOX.copy()
+    inside.invert()
+    found = mesh_of(inside)
+    assert "face inwards" in found.warnings[0]
+    assert np.allclose(found.areas_mm2.sum(axis=0), 0.0)
+    assert np.sum(found.vertices_mm[found.triangles[:, 0]] * found.areas_mm2) > 0.0
+    lid = trimesh.Trimesh(BOX.vertices, BOX.faces[2:], process=False)
+    assert "not closed" in mesh_of(lid).warnings[0]
+    with pytest.raises(OptionError, match="probably in m"):
+        parse_part(trimesh.creation.box([0.1] * 3).export(file_type="stl"), "x.stl")
+    with pytest.raises(OptionError, match="no such file"):
+        load_part(tmp_path / "none.stl")
+
+
+def test_a_part_stands_in_the_middle_or_where_it_is_put():
+    scene = scene_with()
+    part = place_part(mesh_of(BOX), scene, None)
+    middle = make_points(scene, np.array([part.vertices_mm.mean(axis=0)])).coordinates
+    for name, (low, high) in scene.workspace.ranges.items():
+        assert float(np.mean(middle[name])) == pytest.approx((low + high) / 2.0)
+    turned = place_part(mesh_of(BOX), scene, (10.0, 20.0, 30.0, 0.0, 0.0, 90.0))
+    assert np.ptp(turned.vertices_mm, axis=0) == pytest.approx([60.0, 100.0, 40.0])
+    assert turned.vertices_mm.mean(axis=0) == pytest.approx([10.0, 20.0, 30.0])
+
+
+def test_a_part_is_what_the_field_says():
+    scene = load_scene("dvf5000_first")
+    part = place_part(mesh_of(BALL), scene, None)
+    made = make_points(scene, part.vertices_mm)
+    field = evaluate(scene, at=made.coordinates, loop=Loop.RELATIVE, frame="workpiece")
+    assert np.array_equal(field.error_um, made.error_um)
+    basis = point_basis(scene, made)
+    amplitudes = np.array([scene.errors.amplitude(key) for key in basis.keys])
+    assert np.abs(basis.evaluate(amplitudes).error_um - made.error_um).max() < 1e-9
+    assert not made.outside.any()
+    far = make_points(scene, part.vertices_mm + np.array([400.0, 0.0, 0.0]))
+    assert 0 < far.outside.sum() <= len(far.outside)
+
+
+def test_a_location_error_is_fitted_out_and_a_squareness_is_not():
+    part = place_part(mesh_of(BALL), scene_with(), None)
+    located = make_points(scene_with(EX0C=20.0, EY0C=-7.0, EA0C=30.0), part.vertices_mm)
+    assert deviation_of(located.point_mm, located.error_um).max_um > 20.0
+    assert np.abs(fit_out(located.point_mm, located.error_um)).max() < 1e-9
+    square = make_points(scene_with(EC0Y=100.0), part.vertices_mm)
+    left = fit_out(square.point_mm, square.error_um)
+    # 100 µrad over ±50 mm: half of it is a rotation, the other half a shear of ±2.5 µm
+    assert np.linalg.norm(left, axis=1).max() == pytest.approx(2.5, rel=0.01)
