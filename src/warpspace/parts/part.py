@@ -9,11 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpspace.analysis.options import Grammar
 from warpspace.bench.placing import ball_point, follow, within_travel
 from warpspace.bodies.mesh import CREASE_DEG, OF_PART, open_meshes, parse_meshes
 from warpspace.bodies.own_meshes import check_format, join_meshes
@@ -21,6 +22,8 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, build_basis
 from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.machine.limits import MAX_LENGTH_MM
+from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene, evaluate
 from warpspace.units import Array
 
@@ -145,6 +148,36 @@ def _merge(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
     return vertices[first[order]], place[numbers.reshape(-1)]
 
 
+PLACE_HELP = (
+    "Where the part is clamped, in the workpiece frame: shift in mm and turns in degrees about the"
+    " fixed x, y, z in that order"
+)
+PLACE_UNSET = "that of the scene, or the middle of the working volume"
+
+
+def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
+    """Read a place as it is typed: ``X,Y,Z`` or ``X,Y,Z,A,B,C``."""
+    try:
+        found = tuple(parse_number(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) not in (3, 6) or not all(abs(value) <= MAX_LENGTH_MM for value in found):
+        raise ValueError("expected three numbers in mm, or six with degrees, such as 0,0,50,0,0,90")
+    return found
+
+
+Place: TypeAlias = Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)]
+
+
+def find_place(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> tuple[float, ...]:
+    """Give all six numbers of a place, mm and degrees; see `place_part`."""
+    if place is not None:
+        return (*place, 0.0, 0.0, 0.0)[:6]
+    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+    box = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
+    return (*(ball_point(scene.model, stand) - box).tolist(), 0.0, 0.0, 0.0)
+
+
 def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> PartMesh:
     """Put a part into the workpiece frame.
 
@@ -156,12 +189,8 @@ def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> P
         Shift in mm and turns in degrees about the fixed x, y, z in that order; None puts the middle
         of its box into the middle of the working volume.
     """
-    if place is None:
-        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-        box = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
-        pose = transforms.translation(ball_point(scene.model, stand) - box)
-    else:
-        pose = transforms.placed(place[:3], [*place[3:], 0.0, 0.0, 0.0][:3])
+    at = find_place(mesh, scene, place)
+    pose = transforms.placed(at[:3], at[3:])
     return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm))
 
 
