@@ -69,6 +69,14 @@ MAX_SHAPES = 500  # shapes of its links
 MAX_URDF_ELEMENTS = 50_000
 MAX_URDF_TRIANGLES = 1_000_000  # of all shapes together
 
+# --- programs -------------------------------------------------------------------------------------
+
+MAX_PROGRAM_BYTES = 50 * 1024 * 1024
+MAX_PROGRAM_LINES = 2_000_000
+MAX_PROGRAM_LINE = 4096  # characters of one line
+MAX_PATH_POINTS = 5_000_000  # samples of a path
+MAX_CYCLE = 10_000  # pecks of a hole, repetitions of a cycle, turns of an arc
+
 # --- how a scene is looked at ---------------------------------------------------------------------
 
 EXAGGERATION = (1e-3, 1e6)

@@ -1,0 +1,191 @@
+"""Programs: what a control makes of their words, and the path of the tip against closed forms."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import warpspace
+from warpspace.bench.kinds.circular import Circular
+from warpspace.exceptions import SceneError
+from warpspace.parts.program import ReadProgram, Setup, ToolPath, read_program, trace_program
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import Scene
+
+HEAD = """
+title = "head"
+[machine]
+chain = "wXYFZCBt"
+[machine.direction]
+X = -1
+Y = -1
+[machine.travel]
+X = [-900, 900]
+Y = [-900, 900]
+Z = [-900, 900]
+[workspace]
+X = [-900, 900]
+Y = [-900, 900]
+Z = [-900, 900]
+B = 0
+C = 0
+"""
+
+
+@pytest.fixture(scope="module")
+def head() -> Scene:
+    return parse_scene(HEAD, "head")
+
+
+@pytest.fixture(scope="module")
+def dvf() -> Scene:
+    return warpspace.load_scene("dvf5000_first")
+
+
+def run(scene: Scene, text: str, **setup: Any) -> tuple[ReadProgram, ToolPath]:
+    read = read_program(scene, text.splitlines(), Setup(**setup))
+    return read, trace_program(scene, read)
+
+
+def ends(path: ToolPath) -> np.ndarray:
+    return path.tip_mm[path.is_end]
+
+
+def test_without_tcp_a_tool_of_length_l_swings_by_l_sin_b(head: Scene):
+    length, angle = 180.0, 35.0
+    _, path = run(head, f"G43 H1 G0 X0 Y0 Z0 B0\nG1 B{angle}", length_mm=length)
+    moved, b = np.diff(ends(path), axis=0)[0], math.radians(angle)
+    expected = [-length * math.sin(b), 0.0, length * (1.0 - math.cos(b))]
+    assert moved == pytest.approx(expected, abs=1e-9)
+    assert np.linalg.norm(path.tip_mm[0] - ends(run(head, "G0 X0 Y0 Z0")[1])) < 1e-9
+    swing = path.tip_mm - [0.0, 0.0, path.tip_mm[0, 2] + length]
+    sagitta = length - np.linalg.norm((swing[1:] + swing[:-1]) / 2.0, axis=1)
+    assert 0.001 < sagitta.max() <= 0.01
+
+
+@pytest.mark.parametrize("name", ["head", "dvf"])
+def test_with_tcp_the_tip_stays_on_its_line(name: str, request: pytest.FixtureRequest):
+    scene = request.getfixturevalue(name)
+    text = "G0 X10 Y0 Z-200\nG43.4 H1 Z-190\nG1 B20 C40\nX50 Y30 B-30 C90\nG49 X0"
+    setup = {"offsets": {"G54": {"X": 5.0, "C": 10.0}}, "length_mm": 60.0}
+    read, path = run(scene, text, **setup)
+    straight = ends(run(scene, "G0 X15 Y0 Z-200\nZ-190\nX55 Y30")[1])
+    assert ends(path)[1:3] == pytest.approx(straight[[1, 1]], abs=1e-9)
+    assert ends(path)[3] == pytest.approx(straight[2], abs=1e-9)
+    along = path.tip_mm[path.line == 4] - straight[1]
+    assert np.cross(along, straight[2] - straight[1]) == pytest.approx(0.0, abs=1e-8)
+    assert path.coordinates["C"][path.is_end][-1] == 100.0
+    moved = {axis: values[path.line == 5][-1] for axis, values in path.coordinates.items()}
+    before = {axis: values[path.line == 4][-1] for axis, values in path.coordinates.items()}
+    assert moved["X"] == pytest.approx(5.0)
+    assert [moved[axis] for axis in "YZBC"] == pytest.approx([before[axis] for axis in "YZBC"])
+    assert read.blocks == 5
+
+
+def test_a_thousand_arcs_are_circles(dvf: Scene):
+    rng = np.random.default_rng(7)
+    planes = {"G17": ("X", "Y", "Z"), "G18": ("Z", "X", "Y"), "G19": ("Y", "Z", "X")}
+    text, expected = ["G91 G0 X0 Y0 Z0 F1"], []
+    for number in range(1000):
+        plane, axes = list(planes.items())[number % 3]
+        radius, start = rng.uniform(1.0, 90.0), rng.uniform(0.0, 2.0 * np.pi)
+        turn, pitch = rng.uniform(0.1, 2.0 * np.pi - 0.1), rng.uniform(-5.0, 5.0)
+        sense = rng.choice([-1.0, 1.0])
+
+        def place(share, start=start, sense=sense, radius=radius, turn=turn, pitch=pitch):
+            angle = start + sense * turn * share
+            circle = np.stack([np.cos(angle) - np.cos(start), np.sin(angle) - np.sin(start)])
+            return np.column_stack([*(radius * circle), pitch * share])
+
+        to = dict(zip(axes, place(np.ones(1))[0], strict=True))
+        words = " ".join(f"{axis}{value:.10f}" for axis, value in to.items())
+        if number % 2:
+            words += f" R{radius if turn < np.pi else -radius:.10f}"
+        else:
+            centre = dict(
+                zip(axes, -radius * np.array([np.cos(start), np.sin(start)]), strict=False)
+            )
+            words += "".join(f" {'IJK'['XYZ'.index(x)]}{v:.10f}" for x, v in centre.items())
+        text.append(f"{plane} G{3 if sense > 0 else 2} {words}")
+        expected.append(([*map("XYZ".index, axes)], radius, place))
+    _, path = run(dvf, "\n".join(text))
+    starts = ends(path)
+    for number, (axes, radius, place) in enumerate(expected):
+        found = (path.tip_mm[path.line == number + 2] - starts[number])[:, axes]
+        points = place(np.linspace(0.0, 1.0, len(found) + 1))
+        assert found == pytest.approx(points[1:], abs=1e-6)
+        middle = place((np.arange(len(found)) + 0.5) / len(found))
+        away = np.linalg.norm(middle - (points[1:] + points[:-1]) / 2.0, axis=1)
+        assert away.max() <= 0.01001, radius
+
+
+def test_a_circle_deviates_as_the_circular_test_reads(dvf: Scene):
+    test = Circular(plane="XY", radius_mm=100.0, points=72)
+    plan = test.plan(dvf)
+    outcome = test.run(dvf, lambda _: None).model
+    _, path = run(dvf, "G0 X100 Y0 Z-280\nG3 X100 Y0 I-100")
+    centre = run(dvf, "G0 X0 Y0 Z-280")[1]
+    relative = path.error_um - centre.error_um[-1]
+    outward = (path.tip_mm - centre.tip_mm[-1]) / 100.0
+    radial = np.sum(relative * outward, axis=1)
+    angle = np.rad2deg(np.arctan2(outward[:, 1], outward[:, 0])) % 360.0
+    forward = plan.marks["sense"] > 0
+    order = np.argsort(angle)
+    found = np.interp(plan.marks["angle_deg"][forward], angle[order], radial[order], period=360.0)
+    assert found == pytest.approx(outcome.readings[forward], abs=0.02)
+
+
+def test_modal_words(dvf: Scene):
+    text = """%
+    O0012 (inches, then millimetres)
+    N10 g20 g90 g0 x1 y.5 z-10. ; comment
+    N20 G91 X1 (Y9)
+    N30 G21 G55 G90 X10 M8 S5000 T1 F200
+    N40 G53 Z-100
+    N50 G91 G28 Z0
+    G4 X5
+    / G90 G54 X0
+    M30
+    X99
+    """
+    read, path = run(dvf, text, offsets={"G54": {"X": 100.0}, "G55": {"X": 1.0}})
+    x, z = (path.coordinates[axis][path.is_end] for axis in "XZ")
+    assert x == pytest.approx([125.4, 150.8, 11.0, 11.0, 11.0, 100.0])
+    assert z == pytest.approx([-254.0, -254.0, -254.0, -100.0, 0.0, 0.0])
+    assert path.line[path.is_end].tolist() == [3, 4, 5, 6, 7, 9]
+    assert read.unknown == {"/": 9}
+
+
+def test_holes(dvf: Scene):
+    text = "G0 X0 Y0 Z-100\nG99 G83 X10 Z-112 R-102 Q4\nX20\nG98 G81 X30\nG80 G0 X40"
+    read, path = run(dvf, text)
+    z = [read.end[read.line == line, 2].tolist() for line in (2, 3, 4)]
+    hole = [-106, -102, -106, -110, -102, -110, -112, -102]
+    assert z == [[-100, -102, *hole], [-102, *hole], [-102, -112, -102, -100]]
+    assert path.coordinates["Z"][path.is_end].tolist() == [-100.0, -102.0, -102.0, -100.0, -100.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [("#1=5", "#1=5"), ("G1 X[1+2]", "X[1+2]"), ("X#3", "X#3"), ("M98 P100", "M98"),
+     ("G41 D1 X5", "G41"), ("O100 sub", "O100"), ("IF [#1 GT 2] GOTO 5", "IF"), ("G68 R30", "G68")],
+)  # fmt: skip
+def test_what_is_refused_ends_the_path(dvf: Scene, text: str, word: str):
+    read, _ = run(dvf, f"G0 X1 Y1 Z-200\n{text}\nG1 X50\nM98 P5")
+    assert (read.refused[0].line, read.refused[0].word) == (2, word)
+    assert read.refused[-1].line == 4
+    assert read.blocks == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("G1 X1.2.3", "line 1: 'X1.2.3'"), ("G1 X", "'X'"), ("G1 A5", "A5; expected an axis"),
+     ("X1 X2", "expected X once"), ("G2 X1", "without I, J, K or R"), ("(open", "the end of the comment"),
+     ("G0 X999999", "at most ±100000"), ("G2 X10 R1", "R1; expected a radius"),
+     ("G2 X10 I2", "one radius"), ("G83 X1 Z-9 R1", "Q; expected"), ("G81 X1", "without Z and R")],
+)  # fmt: skip
+def test_errors_name_line_and_word(dvf: Scene, text: str, said: str):
+    with pytest.raises(SceneError, match="line 1: ") as caught:
+        run(dvf, text)
+    assert said in str(caught.value)
