@@ -30,7 +30,7 @@ Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]  # NaN is
 Side = Annotated[float, Meta(ge=0, le=LARGEST_SIDE_PX)]
 Name = Annotated[str, Meta(max_length=1000)]
 EventName = Annotated[str, Meta(max_length=160, pattern=":")]
-EventValue = Annotated[str, Meta(max_length=6_000_000)]
+EventValue = Annotated[str, Meta(max_length=15_500_000)]
 Vector = tuple[Number, Number, Number]
 
 
@@ -68,6 +68,29 @@ class DrawingClicked(_Said, tag="ScenePointerMessage"):
     modifier: Annotated[str, Meta(max_length=40)] | None
 
 
+class PartMoved(_Said, tag="TransformControlsUpdateMessage"):
+    """What moves the part, while it is dragged."""
+
+    name: Name
+    wxyz: tuple[Number, Number, Number, Number]
+    position: Vector
+    owner: Name = ""
+
+
+class PartHeld(_Said, tag="TransformControlsDragStartMessage"):
+    """What moves the part, as it is seized."""
+
+    name: Name
+    owner: Name = ""
+
+
+class PartLetGo(_Said, tag="TransformControlsDragEndMessage"):
+    """What moves the part, as it is let go."""
+
+    name: Name
+    owner: Name = ""
+
+
 class PictureRendered(_Said, tag="GetRenderResponseMessage"):
     """The picture that the app has asked for, a PNG."""
 
@@ -75,7 +98,7 @@ class PictureRendered(_Said, tag="GetRenderResponseMessage"):
     render_uuid: Name
 
 
-Message = Events | CameraMoved | DrawingClicked | PictureRendered
+Message = Events | CameraMoved | DrawingClicked | PictureRendered | PartMoved | PartHeld | PartLetGo
 _READER = msgspec.msgpack.Decoder(Message)
 
 

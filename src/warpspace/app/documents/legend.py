@@ -24,6 +24,7 @@ from warpspace.units import Array, spell_count, spell_short
 
 # --- The colour bar -------------------------------------------------------------------------------
 
+GEOMETRY_ONLY = "Geometry only: no forces, heat, wear or servo"
 APART = 15.5 / 240.0  # least distance of two names beside the colour bar, as a part of its height
 _STOPS = 33
 
@@ -106,6 +107,22 @@ def _stops(scale: ColourScale) -> str:
     at = 100.0 * min(limit / scale.high, 1.0)  # two colours that meet there
     colours = scale.colours(np.array([0.0, 2.0 * limit])).tolist()
     return ",".join(f"rgb({r},{g},{b}) {at:.1f}%" for r, g, b in colours)
+
+
+def part_words(picture: LivePicture) -> str:
+    """Say how far the part is off where it is drawn, and what it leaves out."""
+    found = picture.part
+    if found is None:
+        return ""
+    most, normal, outside = found.norm_um.max(), found.normal_um, int(found.placed.outside.sum())
+    change = "changes " if picture.is_difference else ""
+    said = [
+        f"Part {picture.state.part.name} {change}up to {number(float(most))} µm",
+        f"{number(float(normal.min()))} to {number(float(normal.max()))} µm along its normal",
+    ]
+    if outside:
+        said.append(f"{spell_count(outside)} of its points are beyond the travel")
+    return f"{', '.join(said)}. {GEOMETRY_ONLY}."
 
 
 # --- The heading ----------------------------------------------------------------------------------

@@ -25,7 +25,8 @@ BEFORE, AFTER = "before", "after"
 """What was pinned, and what is steered beside it."""
 DIGITS = 3  # decimals of a proposed error, µm or µrad: a nanometre is nothing to be set
 LOOKED_AT = (
-    "component", "nodes", "exaggeration", "look", "machine", "shown", "forms", "picked", "lever",
+    "component", "nodes", "exaggeration", "look", "machine", "shown", "part", "forms", "picked",
+    "lever",
 )  # fmt: skip
 """What of the present state a side is looked at with."""
 REFUSED = "The working volumes are not the same, so there is no difference node by node."

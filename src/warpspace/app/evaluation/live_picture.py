@@ -8,7 +8,9 @@ import numpy as np
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.bench import BenchPicture, bench_picture
+from warpspace.app.evaluation.part import PartPicture, part_change, part_picture
 from warpspace.app.state.app_state import AppState
+from warpspace.geometry.colour import ColourScale, build_scale
 from warpspace.picture.model import Picture, picture_size_mm
 from warpspace.picture.traces import TraceLine, TraceLines, is_moved, name_trace
 from warpspace.units import Array
@@ -56,6 +58,27 @@ class LivePicture(Picture):
     def bench(self) -> BenchPicture | None:
         """The path of the standard test that is run; None where none is, or cannot be."""
         return None if self.is_difference else bench_picture(self.drawn_state)
+
+    @cached_property
+    def part(self) -> PartPicture | None:
+        """The part in the box; None where none is, or cannot be. Of a difference its change."""
+        if self.is_difference and self.compared is not None:
+            return part_change(*map(part_picture, self.compared.sides))
+        return part_picture(self.drawn_state)
+
+    @cached_property
+    def part_scale(self) -> ColourScale:
+        """The colours of the part: those of the map, with both signs along its normal."""
+        found, scale = self.part, self.scale
+        if found is None or not (self.state.part.normal or self.tilts):
+            return scale
+        normal = self.state.part.normal
+        values = found.values(self.component, normal=normal)
+        end = scale.high if normal and not self.tilts else None
+        if end is None:
+            end = build_scale(float(np.abs(values).max()), "x").high
+        signed = normal or self.component != "norm"
+        return ColourScale(-end if signed else 0.0, end, diverging=signed, label="E · n")
 
     @cached_property
     def worst_node(self) -> int:

@@ -36,7 +36,7 @@ class Limits:
     """How much is taken at once."""
 
     sessions: int = 64  # tabs that are open at the same time
-    # largest message of a page: a picture of the view. A file has 6 MB at most.
+    # largest message of a page: a picture of the view. A file has 15.5 MB at most.
     message_bytes: int = 16 * 2**20
     messages_per_second: float = 400.0  # of one connection, on average; a page sends 50
     burst: int = 2000  # messages that may come at once

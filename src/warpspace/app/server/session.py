@@ -29,6 +29,7 @@ from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
+from warpspace.app.drawing.part import PartLayer
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Layer
 from warpspace.app.evaluation.budget import pick, with_clicked
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -36,6 +37,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
+from warpspace.app.state.tree import put
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
@@ -311,7 +313,8 @@ class Session:
         context = self.context
         with context.page.as_one():
             context.stage = MovingLayer(self._client, context.page, picture)
-            self.display.add(picture, [context.stage])
+            part = PartLayer(self._client.scene, context.page, self._clamp)
+            self.display.add(picture, [context.stage, part])
             context.page.call("stage", "open")
 
         @self._client.scene.on_click()
@@ -327,6 +330,10 @@ class Session:
         found = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         if found is not None:
             context.post(lambda state: with_clicked(state, found[0]))
+
+    def _clamp(self, place: str) -> None:
+        """Take where the part has been moved to in the drawing."""
+        self.context.post(partial(put, path="part.place", text=place))
 
     def _hear(self, event: Event) -> None:
         """Take note of what a page says of itself."""

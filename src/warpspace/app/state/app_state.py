@@ -31,6 +31,7 @@ from warpspace.scene.notes import KINDS, Mark, Note
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
+    from warpspace.parts.part import PartMesh
 
 AMPLITUDE = Span(-MAX_ERROR, MAX_ERROR, 0.1)
 NODES = Span(*LIVE_NODES, 2.0)  # grid nodes per axis: odd numbers
@@ -54,7 +55,7 @@ LOOP_NAMES = {
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
-KEPT = ("component", "nodes", "shown", "look", "machine", "forms", "page")
+KEPT = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
 """What stays when another scene is shown."""
 SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
 """What can be drawn of a comparison; the difference is the change from A to B."""
@@ -158,6 +159,31 @@ class Picked:
             return None
         is_traced = mark.loop and mark.point_mm
         return cls(note.at, Loop(mark.loop), mark.point_mm) if is_traced else cls(note.at)
+
+
+@dataclass(frozen=True, slots=True)
+class PartLook:
+    """The part that stands in the box, in place of the scene's own."""
+
+    mesh: "PartMesh | None" = None  # never saved or linked, but for its name
+    name: str = described("", "Part", linked="part")
+    place: tuple[float, ...] | None = described(
+        None,
+        "Place",
+        kind="point",
+        linked="place",
+        hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
+        " degrees about the fixed x, y and z, in that order; empty for the usual place.",
+    )
+    shown: bool = described(
+        True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
+    )
+    normal: bool = described(
+        False, "Coloured along its normal", hint="Material too much above zero, too little below."
+    )
+    moved: bool = described(
+        False, "Move in the drawing", hint="Arrows and arcs at the part.", linked=""
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,6 +316,7 @@ class AppState:
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
+    part: PartLook = field(default_factory=PartLook)
     # the point whose error is explained, and the error whose axis and lever are drawn
     picked: Picked | None = field(default=None, metadata=said("Point"))
     lever: str = described("", "Lever", choices=lambda state: {"": "none", **error_names(state)})

@@ -26,10 +26,11 @@ from warpspace.app.state.leaf import (
     name_of,
 )
 from warpspace.app.state.look import linear_positions, linear_spans, slice_positions
-from warpspace.app.state.typed_numbers import read_list, read_positions, read_typed
+from warpspace.app.state.typed_numbers import SIGNS, read_list, read_positions, read_typed
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import axis_order, parameter
 from warpspace.machine.limits import COST, MAX_HALF_WIDTH, MIN_HALF_WIDTH
+from warpspace.parts.part import read_place
 
 LONGEST = 4000  # characters that are read
 SHOWN = 40  # characters of a text that a note shows
@@ -246,9 +247,20 @@ def _with_asked(state: AppState, leaf: Leaf, text: str) -> AppState:
     return replace(state, picked=replace(picked, at={**picked.at, axis: at})).noted(note)
 
 
+def _with_place(state: AppState, _leaf: Leaf, text: str) -> AppState:
+    plain = text.translate(SIGNS).replace(";", " ").strip()
+    words = ",".join(plain.replace(",", " ").split())
+    try:
+        found = read_place(words, None) if words else None
+    except ValueError as problem:
+        raise Unreadable(str(problem)) from None
+    return replace(state, part=replace(state.part, place=found))
+
+
 OWN: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
     "tolerances": _with_half_width,
     "specification.costs": _with_costs,
+    "part.place": _with_place,
     "picked": _with_point,
     "picked.trace": _with_trace,
     "picked.at": _with_asked,

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,8 @@ PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their 
 
 def accepted_endings() -> str:
     """List the endings of files that can be given to the page."""
-    endings = dict.fromkeys((".toml", ".urdf", *(end for one in formats() for end in one.endings)))
+    own = (".toml", ".urdf", *files.PART_ENDINGS)
+    endings = dict.fromkeys((*own, *(end for one in formats() for end in one.endings)))
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
 
@@ -135,7 +137,8 @@ class FilesWindow(JobWindow):
         elif name.lower().endswith(".toml"):
             text = files.upload_text(content, name)
         else:
-            self.context.offer_import(name, content)
+            offers = self.context.offers
+            offers.get(Path(name).suffix.lower(), offers[""])(name, content)
             return
         opened, camera = scene_file.open_text(text, files.safe_name(name), name)
         whole = is_robot or scene_file.settings_of(text) != ""

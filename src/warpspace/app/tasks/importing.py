@@ -26,7 +26,7 @@ from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summary_
 from warpspace.formats.source import Source
 from warpspace.formats.to_scene import ImportedScene, into_scene
 from warpspace.machine.axes import is_linear, parameter
-from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.machine.limits import MAX_UPLOAD_BYTES
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -144,7 +144,7 @@ class ImportPart(FilesPart):
     def __init__(self, context: Context) -> None:
         words = "Measured errors, or a controller's table"
         super().__init__(context, Entry(NAME, "measure", words, f"{__name__}:Import"))
-        context.offer_import = self.received
+        context.offers[""] = self.received
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         """Leave out what the format has no choice of."""
@@ -183,7 +183,7 @@ class ImportPart(FilesPart):
     def before_result(self, state: AppState) -> Markup:
         kind = "" if self._files else "main"
         upload = upload_button(
-            "Import a file", "files", MAX_SCENE_BYTES, accepted_endings(), kind=kind,
+            "Import a file", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind=kind,
             hint="Several that belong together may follow each other",
         )  # fmt: skip
         words = EMPTY if self._files else tag("p", OFFERED)

@@ -15,7 +15,7 @@ from warpspace.app.state.tree import put, toggled
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
 from warpspace.app.tasks.parts import Part, Window
-from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
 LONGEST_SENTENCE = 110
 
@@ -55,7 +55,7 @@ class TopPart(Part):
                 tag("strong", "warpspace", class_="ws-brand"),
                 button(title, "page:open", "scenes", kind="ws-scene",
                        hint="Choose another scene"),
-                upload_button("Open", "files", MAX_SCENE_BYTES, accepted_endings(), kind="quiet",
+                upload_button("Open", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind="quiet",
                               hint=hint),
                 button("Save", "page:open", "files", kind="quiet",
                        hint="Save the scene, pictures, exports"),
