@@ -25,6 +25,7 @@ class Nobody(SimpleNamespace):
         posted, told = [], []
         super().__init__(
             jobs=set(), scenes=SceneList({}), services=Services(), posted=posted, told=told,
+            offers={},
             act=lambda do: do(), renew=lambda _: None, post=posted.append,
             notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
         )  # fmt: skip
@@ -47,7 +48,7 @@ class Alone:
             notify=lambda *words: self.said.append(words), post=self.store.apply, reported=[],
             send=lambda *event: self.sent.append(event), closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
-            page=SimpleNamespace(
+            offers={}, page=SimpleNamespace(
                 report=None, call=lambda *what: self.called.append(what)
             ),
             camera=SimpleNamespace(remember=lambda: None),

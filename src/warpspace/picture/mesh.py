@@ -93,10 +93,13 @@ def map_mesh(picture: Picture) -> MapMesh:
     return _collect([(part, surface.nodes, surface.triangles) for part, surface in surfaces])
 
 
-def line_mesh(picture: Picture) -> MapMesh:
+def line_mesh(picture: Picture, *, grid: bool = True) -> MapMesh:
+    """Give the lines of a map alone: those of its grid too, or only its edges."""
     found: list[tuple[Part, Index, Index]] = []
     for part in map_parts(picture):
-        segments = np.concatenate([part.drawn_of.grid_segments, part.drawn_of.edge_segments])
+        segments = part.drawn_of.edge_segments
+        if grid:
+            segments = np.concatenate([part.drawn_of.grid_segments, segments])
         used, numbered = np.unique(segments, return_inverse=True)
         found.append((part, used, numbered.reshape(-1, 2)))
     return _collect(found)

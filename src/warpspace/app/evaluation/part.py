@@ -154,7 +154,7 @@ def _place(scene: Scene, mesh: PartMesh, place: Sequence[float] | None) -> Place
 
 def part_picture(state: AppState) -> PartPicture | None:
     """Give the part with the errors of a state; None where none is drawn, or it cannot be."""
-    if state.part.mesh is None or not state.part.shown:
+    if not state.part.is_drawn:
         return None
     try:
         placed = placed_part(state)

@@ -185,6 +185,10 @@ class PartLook:
         False, "Move in the drawing", hint="Arrows and arcs at the part.", linked=""
     )
 
+    @property
+    def is_drawn(self) -> bool:
+        return self.mesh is not None and self.shown
+
 
 @dataclass(frozen=True, slots=True)
 class PageLook:

@@ -1,0 +1,135 @@
+"""The part in the box: what is drawn is what the machine makes, however it is looked at."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.parts import LIVE
+from warpspace.app.documents.legend import GEOMETRY_ONLY, part_words
+from warpspace.app.documents.scene_file import open_link, state_to_link
+from warpspace.app.evaluation.compare import with_pin
+from warpspace.app.evaluation.part import clamped_scene, place_of, placed_part, turned_place
+from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.store import StateStore
+from warpspace.app.state.tree import put
+from warpspace.kinematics import transforms
+from warpspace.parts.part import PartMesh, make_points, place_part
+from warpspace.scene.library import load_scene
+
+SCENE = load_scene("dvf5000_first")
+TRIANGLES = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+MESH = PartMesh(
+    "tip", np.array([[0.0, 0, 0], [100, 0, 0], [0, 80, 0], [0, 0, 60]]), np.array(TRIANGLES, "i4")
+)
+
+
+def holding(state: AppState, mesh: PartMesh = MESH, place: str = "") -> AppState:
+    state = replace(state, part=replace(state.part, mesh=mesh, name=mesh.name))
+    return put(state, "part.place", place)
+
+
+STATE = holding(start_state(SCENE))
+
+
+@pytest.mark.parametrize("turned", [{}, {"B": 30.0, "C": 75.0}])
+def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> None:
+    state = holding(replace(start_state(SCENE), positions={"B": 0.0, "C": 0.0, **turned}),
+                    place="20,-30,140,0,0,25")  # fmt: skip
+    state = put(state, "amplitudes.EXX", "12")
+    found = LIVE.evaluate(state).part
+    assert found is not None
+    scene = clamped_scene(replace(state, scene=state.active_scene()))
+    made = make_points(scene, place_part(MESH, scene, state.part.place).vertices_mm)
+    back = np.linalg.inv(found.placed.workpiece)
+    np.testing.assert_allclose(found.error_um @ back[:3, :3].T, made.error_um, atol=1e-4)
+    np.testing.assert_allclose(
+        transforms.apply(back, found.placed.nominal_mm), made.point_mm, atol=1e-3
+    )
+    drawn = found.drawn_mm(1.0) - found.drawn_mm(0.0)
+    at = found.placed.mesh.corners.corner_of
+    np.testing.assert_allclose(drawn, 1e-3 * found.error_um[at], atol=1e-4)
+
+
+def test_a_part_in_the_middle_stands_in_the_middle_of_the_box() -> None:
+    picture = LIVE.evaluate(STATE)
+    assert picture.part is not None
+    middle = picture.part.placed.nominal_mm
+    middle = (middle.min(axis=0) + middle.max(axis=0)) / 2.0
+    np.testing.assert_allclose(middle, picture.grid.bounds_mm.mean(axis=0), atol=1e-3)
+
+
+def test_the_change_of_a_part_is_b_less_a() -> None:
+    pinned = with_pin(STATE)
+    changed = put(put(pinned, "amplitudes.EC0Y", "80"), "comparison.shown", "difference")
+    found = LIVE.evaluate(changed).part
+    a, b = (LIVE.evaluate(one).part for one in (STATE, put(STATE, "amplitudes.EC0Y", "80")))
+    assert found is not None and a is not None and b is not None  # noqa: PT018
+    np.testing.assert_allclose(found.error_um, b.error_um - a.error_um, atol=1e-4)
+
+
+def test_turns_keep_the_middle_and_add_up() -> None:
+    placed = placed_part(STATE)
+    assert placed is not None
+    for axis in "xyz":
+        state = STATE
+        for _ in range(4):
+            one = placed_part(state)
+            assert one is not None
+            place = turned_place(one, axis, 90.0)
+            state = replace(state, part=replace(state.part, place=place))
+            again = placed_part(state)
+            assert again is not None
+            np.testing.assert_allclose(
+                transforms.apply(again.pose, again.middle_mm),
+                transforms.apply(placed.pose, placed.middle_mm), atol=5e-3,
+            )  # fmt: skip
+        np.testing.assert_allclose(again.pose, placed.pose, atol=5e-3)
+    for angle in (90.0, -90.0):
+        place = place_of(transforms.placed((1, 2, 3), (20, angle, 30)))
+        back = transforms.placed(place[:3], place[3:])
+        np.testing.assert_allclose(back, transforms.placed((1, 2, 3), (20, angle, 30)), atol=1e-4)
+
+
+def test_a_place_is_typed_linked_and_undone() -> None:
+    store = StateStore(STATE)
+    store.apply(lambda state: put(state, "part.place", "10; 20; 140"))
+    assert store.state.part.place == (10.0, 20.0, 140.0)
+    link = state_to_link(store.state, None, [SCENE])
+    assert "place=10.0%2C20.0%2C140.0" in link
+    assert "part=tip" in link
+    opened, _ = open_link(link, [SCENE])
+    assert opened.part == replace(store.state.part, mesh=None)
+    assert store.undo() == "place"
+    assert store.state.part.place is None
+    assert "expected three numbers" in put(STATE, "part.place", "1,2").notes[0]
+
+
+def test_what_leaves_the_travel_is_said() -> None:
+    words = part_words(LIVE.evaluate(put(STATE, "part.place", "2000,0,0")))
+    assert "4 of its points are beyond the travel" in words
+    assert GEOMETRY_ONLY in words
+    assert part_words(LIVE.evaluate(put(STATE, "part.shown", "0"))) == ""
+
+
+def test_a_slider_moves_a_large_part_in_60_ms() -> None:
+    count = 100_000
+    point = np.random.default_rng(1).uniform(-100.0, 100.0, (count, 3))
+    triangles = np.arange(count - 1, dtype="i4")[:, None].repeat(3, axis=1) % (count - 3) + [
+        0,
+        1,
+        2,
+    ]
+    state = holding(start_state(SCENE), PartMesh("large", point, triangles.astype("i4")))
+    part = LIVE.evaluate(state).part
+    assert part is not None
+    best = 1.0
+    for value in range(5):
+        state, began = put(state, "amplitudes.EA0Z", str(value)), time.process_time()
+        part = LIVE.evaluate(state).part
+        assert part is not None
+        part.values("norm", normal=False)
+        part.drawn_mm(1000.0)
+        best = min(best, time.process_time() - began)
+    assert best < 0.06
