@@ -1,397 +1,48 @@
-"""A program as a control runs it, and the path that the tool takes over the workpiece.
+"""The path that a program takes over the workpiece, nominal and with the errors of a machine.
 
-**Words** are axis positions plus the active offset; after G53 they are axis positions. A tool of
-length L reaches L beyond the scene's tool point, against the tool axis: tip = tool point − L · tool
-axis in the tool frame. G43 H moves Z by +L, so that the tip is at the programmed Z while rotary
-axes are at zero. A change of length or offset moves nothing by itself.
-
-**Without tool centre point** (TCP) all axes go in proportion, arcs are arcs of axis positions,
-and rotary axes swing the tip. **With it** (G43.4 to G49) X, Y, Z are the tip on the workpiece: the
-point of the workpiece frame where the tip is with these words at rotary axes zero. The tip then
-runs along lines and arcs of the workpiece, rotary axes turn in proportion, linear axes follow.
-
-The path begins where the first straight block ends: nobody knows where the machine stood before.
-G28 goes to axis positions zero, or to the end of the travel that is nearest.
+Lengths of errors are weighed by the way: mean, RMS and P95 do not depend on where samples lie.
+Geometry only: no forces, heat, wear or servo.
 """
 
-from array import array
-from cmath import phase
-from collections.abc import Generator, Iterable, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from math import ceil, sqrt, tau
-from typing import Literal, NamedTuple, TypeAlias
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple, dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.bench.placing import SLACK, ball_point, follow, following_axes
+from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import File, option, place_words
+from warpspace.analysis.statistics import P95, Summary
+from warpspace.bench.placing import SLACK, ball_point, follow
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import evaluate_first_order
-from warpspace.kinematics.model import Loop, Model, complete_coordinates
+from warpspace.field.evaluate import amplitudes_of, build_basis, evaluate_first_order
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Axis
-from warpspace.machine.limits import FULL_TURN_DEG, MAX_CYCLE, MAX_LENGTH_MM, MAX_PATH_POINTS
-from warpspace.parts.words import Block, Refused, Remarks, read_blocks
-from warpspace.scene.model import Scene, check_magnitude
+from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS, MAX_PROGRAM_LINES
+from warpspace.parts.control import (
+    ARC,
+    PLANES,
+    Frame,
+    ReadProgram,
+    Setup,
+    read_program,
+    with_length,
+)  # fmt: skip
+from warpspace.parts.part import Deviation
+from warpspace.parts.words import Refused, program_lines
+from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.units import Array
 
-Tcp: TypeAlias = Literal["program", "always", "never"]
-MM_PER_INCH = 25.4
-RADIUS_SLACK = 0.5, 0.005, 1e-3  # mm, and mm with share of the radius: both ends of an arc differ
-FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
-STAND, RAPID, FEED, ARC = range(
-    4
-)  # kinds of moves; axes that stand are the same place in new words
-PLANES = "YZ", "ZX", "XY"  # of arcs, by the direction across
 MOST_AT_ONCE = 50_000  # samples
-_AXIS_LETTERS = frozenset("XYZUVWABC")
-_MODAL: Mapping[str, tuple[str, object]] = {
-    **{f"G{motion}": ("motion", f"G{motion}") for motion in (0, 1, 2, 3, 81, 82, 83)},
-    "G80": ("motion", ""),
-    "G17": ("across", 2), "G18": ("across", 1), "G19": ("across", 0),
-    "G20": ("unit_mm", MM_PER_INCH), "G21": ("unit_mm", 1.0),
-    "G90": ("absolute", True), "G91": ("absolute", False),
-    "G90.1": ("absolute_centre", True), "G91.1": ("absolute_centre", False),
-    "G98": ("to_initial", True), "G99": ("to_initial", False),
-    **{f"G{system}": ("system", f"G{system}") for system in range(54, 60)},
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What is set on a control before a program runs."""
-
-    # of work coordinate systems by name, "G54", axis to mm or degrees; zero where none is given
-    offsets: Mapping[str, Mapping[str, float]] = field(
-        default_factory=dict[str, Mapping[str, float]]
-    )
-    tcp: Tcp = "program"  # whether G43.4 and G49 switch it, or it is on or off throughout
-    length_mm: float = 0.0  # of the tool, and of every H without a length of its own
-    lengths_mm: Mapping[str, float] = field(default_factory=dict[str, float])  # "H1" to its length
-
-
-@dataclass(frozen=True, eq=False)
-class ReadProgram:
-    """Moves of a program, one a row; each begins where the one before it ends."""
-
-    axes: tuple[str, ...]  # of the machine, [a]
-    line: NDArray[np.int64]  # [m], of the file, from 1; 0 for where the axes stand at first
-    kind: NDArray[np.int64]  # [m]; STAND, RAPID, FEED or ARC
-    tcp: NDArray[np.bool_]  # [m]
-    length_mm: Array  # [m], of the tool
-    # [m, a], mm and degrees; axis positions. With TCP those of the linear axes are what the scene's
-    # tool point has where the tip is, rotary axes at zero: `Frame` takes them to the workpiece
-    end: Array
-    across: NDArray[np.int64]  # [m]; direction 0 to 2 about which an arc turns
-    turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
-    centre_mm: Array  # [m, 2]; of an arc, along the two directions that follow `across`
-    refused: tuple[Refused, ...]  # the path ends before the first of them
-    unknown: Mapping[str, int]  # words that are not understood, to their first line
-
-    @property
-    def moves(self) -> NDArray[np.bool_]:
-        return self.kind != STAND
-
-    @property
-    def blocks(self) -> int:
-        """How many lines move an axis."""
-        return len(np.unique(self.line[self.moves]))
-
-
-class Frame:
-    """Where words with TCP are on the workpiece: the tool point, rotary axes at zero."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.names = following_axes(scene.model)
-        stand = {name: np.asarray(at) for name, at in scene.workspace.positions.items()}
-        zero = {
-            name: at if scene.machine.axes[name].is_linear else np.zeros(())
-            for name, at in complete_coordinates(scene.machine, stand).items()
-        }
-        at_zero = {**zero, **dict.fromkeys(self.names, np.zeros(()))}
-        self.origin_mm = ball_point(scene.model, at_zero)
-        far = np.asarray(1024.0)  # a power of two: differences keep their digits
-        ends = [ball_point(scene.model, {**at_zero, name: far}) for name in self.names]
-        self.directions = (np.stack(ends, axis=-1) - self.origin_mm[:, None]) / far
-
-    def to_workpiece(self, words_mm: Array) -> Array:
-        """Give points of w, [..., 3], of words of the three axes, [..., 3]."""
-        return self.origin_mm + words_mm @ self.directions.T
-
-    def to_words(self, point_mm: Array) -> Array:
-        return np.linalg.inv(self.directions) @ (point_mm - self.origin_mm)
-
-
-def with_length(model: Model, length_mm: float) -> Model:
-    """Give a model whose tool point is the tip of a tool of this length."""
-    x, y, z = model.tool_point_mm
-    return replace(model, tool_point_mm=(x, y, z - length_mm))
-
-
-def read_program(
-    scene: Scene, lines: Iterable[str], setup: Setup | None = None, name: str = "program"
-) -> ReadProgram:
-    """Run a program on the control of a machine.
-
-    Parameters
-    ----------
-    scene : Scene
-    lines : iterable of str
-        Its lines, as `warpspace.parts.words.program_lines` reads them from a file.
-    setup : Setup, optional
-    name : str, optional
-        What messages call it.
-
-    Raises
-    ------
-    SceneError
-        If a block cannot be run; names line and word.
-    """
-    control, remarks = _Control(scene, setup or Setup(), name), Remarks()
-    for block in read_blocks(lines, name, remarks):
-        control.run(block)
-    rows = np.frombuffer(control.rows).reshape(-1, 8 + len(control.names))
-    whole = rows[:, :5].astype(np.int64)
-    return ReadProgram(
-        axes=control.names,
-        line=whole[:, 0],
-        kind=whole[:, 1],
-        tcp=whole[:, 2] > 0,
-        across=whole[:, 3],
-        length_mm=rows[:, 4],
-        turn_rad=rows[:, 5],
-        centre_mm=rows[:, 6:8],
-        end=rows[:, 8:],
-        refused=tuple(remarks.refused),
-        unknown=remarks.unknown | control.without_length,
-    )
-
-
-class _Control:
-    """Modal words of a control, and where its axes stand."""
-
-    def __init__(self, scene: Scene, setup: Setup, name: str) -> None:
-        self.scene, self.setup = scene, setup
-        self.names = tuple(scene.machine.axes)
-        first = [axis[0] for axis in self.names]
-        self.index = {x: first.index(x) for x in first if first.count(x) == 1}
-        self.rotary = [not scene.machine.axes[axis].is_linear for axis in self.names]
-        self.motion, self.system, self.across, self.unit_mm = "", "G54", 2, 1.0
-        self.absolute, self.absolute_centre, self.to_initial = True, False, True
-        self.is_compensated, self.tcp, self.length_mm = False, False, setup.length_mm
-        self.cycle: dict[str, float] = {}
-        self.without_length: dict[str, int] = {}
-        self.rows = array("d")
-        self.frame: Frame | None = None
-        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-        self.at = [float(stand[axis]) for axis in self.names]
-        self.begun = False
-        self.block = Block(name, 0)
-        self.switch(tcp=setup.tcp == "always", length_mm=self.length_mm)
-        if not self.rows:
-            self.record(STAND)
-
-    def run(self, block: Block) -> None:
-        self.block, words, once = block, block.numbers, ""
-        for code in block.codes:
-            if code in _MODAL:
-                setattr(self, *_MODAL[code])
-            elif code in {"G43", "G43.4", "G49"}:
-                self.compensate(code)
-            elif code in {"G4", "G28", "G53"}:
-                once = code
-        drills = self.motion in {"G81", "G82", "G83"}
-        if not drills:
-            self.cycle = {}
-        if once == "G4":  # X is a time there
-            return
-        letters = words.keys() & _AXIS_LETTERS
-        for letter in letters - self.index.keys():
-            self.refuse(letter, f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}")
-        if once == "G28":
-            self.go_home(letters)
-        elif once == "G53" and letters:
-            with self.bare_axes():
-                self.line_to(self.target(bare=True))
-        elif self.motion in {"G2", "G3"}:
-            if letters or words.keys() & set("IJKR"):
-                self.arc_to(self.target())
-        elif letters and drills:
-            self.drill()
-        elif letters:
-            self.line_to(self.target())
-
-    @contextmanager
-    def bare_axes(self) -> Generator[None]:
-        """Count positions of axes while the block lasts, not places of the tip."""
-        tcp = self.tcp
-        self.switch(tcp=False, length_mm=self.length_mm)
-        yield
-        self.switch(tcp=tcp, length_mm=self.length_mm)
-
-    def refuse(self, letter: str, expected: str) -> None:
-        value = self.block.numbers.get(letter)
-        word = letter if value is None else f"{letter}{value:g}"
-        self.block.refuse(f"{word}; expected {expected}")
-
-    def compensate(self, code: str) -> None:
-        length = self.length_mm
-        if code != "G49":
-            number = f"H{self.block.numbers.get('H', 0.0):g}"
-            if number not in self.setup.lengths_mm and not self.setup.length_mm:
-                self.without_length.setdefault(f"{number} (no length given)", self.block.line)
-            length = self.setup.lengths_mm.get(number, self.setup.length_mm)
-        self.is_compensated = code != "G49"
-        by_word = code == "G43.4" and self.setup.tcp == "program"
-        self.switch(tcp=by_word or self.setup.tcp == "always", length_mm=length)
-
-    def switch(self, *, tcp: bool, length_mm: float) -> None:
-        """Say the place where the axes stand in the words of another mode; nothing moves."""
-        if not (tcp or self.tcp) or (tcp, length_mm) == (self.tcp, self.length_mm):
-            self.length_mm = length_mm
-            return
-        frame = self.frame = self.frame or Frame(self.scene)
-        at = {axis: np.asarray(q) for axis, q in zip(self.names, self.at, strict=True)}
-        if self.tcp:
-            tip = frame.to_workpiece(np.array([at[axis] for axis in frame.names]))
-            at = follow(with_length(self.scene.model, self.length_mm), at, tip)
-        if tcp:
-            tip = ball_point(with_length(self.scene.model, length_mm), at)
-            at |= dict(zip(frame.names, frame.to_words(tip), strict=True))
-        self.at = [float(at[axis]) for axis in self.names]
-        self.tcp, self.length_mm = tcp, length_mm
-        self.record(STAND)
-
-    def record(self, kind: int, turn: float = 0.0, centre: tuple[float, float] = (0, 0)) -> None:
-        self.rows.extend(
-            (self.block.line, kind, self.tcp, self.across, self.length_mm, turn, *centre, *self.at)
-        )
-
-    def place(self, letter: str, value: float) -> float:
-        """Give the position of an axis of an absolute word."""
-        shift = self.setup.offsets.get(self.system, {}).get(letter, 0.0)
-        if letter == "Z" and self.is_compensated and not self.tcp:
-            shift += self.length_mm
-        return value + shift
-
-    def target(self, without: str = "", *, bare: bool = False) -> list[float]:
-        """Give where the words of the block lead; after G53 they are axis positions."""
-        to = self.at.copy()
-        for letter, value in self.block.numbers.items():
-            if letter == without or (index := self.index.get(letter)) is None:
-                continue
-            place = value if self.rotary[index] else value * self.unit_mm
-            if not bare:
-                place = self.place(letter, place) if self.absolute else to[index] + place
-            to[index] = place
-            if not abs(to[index]) <= MAX_LENGTH_MM:
-                self.refuse(letter, f"at most ±{MAX_LENGTH_MM:g} mm or degrees")
-        return to
-
-    def line_to(self, to: list[float], kind: int | None = None) -> None:
-        if kind is None:
-            kind = RAPID if self.motion in {"G0", ""} else FEED
-        begins, self.begun = not self.begun, True
-        if begins or to != self.at:
-            self.at = to
-            if begins:
-                self.record(STAND)
-            self.record(kind)
-
-    def go_home(self, letters: Iterable[str]) -> None:
-        if letters:
-            self.line_to(self.target(), RAPID)
-        with self.bare_axes():
-            to = self.at.copy()
-            for letter in letters or self.index:
-                low, high = self.scene.machine.axes[self.names[self.index[letter]]].travel
-                to[self.index[letter]] = min(max(0.0, low), high)
-            self.line_to(to, RAPID)
-
-    def arc_to(self, to: list[float]) -> None:
-        words, across = self.block.numbers, self.across
-        first, second = PLANES[across]
-        if first not in self.index or second not in self.index:
-            self.block.refuse(f"an arc in {first}{second}; expected axes of the machine")
-        i, j = self.index[first], self.index[second]
-        start, end = complex(self.at[i], self.at[j]), complex(to[i], to[j])
-        sense = 1.0 if self.motion == "G3" else -1.0
-        if "R" in words:
-            centre = self.centre_of_radius(start, end, sense)
-        else:
-            offsets = {x: words["IJK"["XYZ".index(x)]] * self.unit_mm
-                       for x in (first, second) if "IJK"["XYZ".index(x)] in words}  # fmt: skip
-            if not offsets:
-                self.block.refuse(f"{self.motion} without I, J, K or R")
-            centre = start + complex(offsets.get(first, 0.0), offsets.get(second, 0.0))
-            if self.absolute_centre:
-                given = {x: self.place(x, value) for x, value in offsets.items()}
-                centre = complex(given.get(first, start.real), given.get(second, start.imag))
-        radius, other = abs(start - centre), abs(end - centre)
-        most, least, share = RADIUS_SLACK
-        if not radius or abs(radius - other) > min(most, max(least, share * radius)):
-            self.block.refuse(
-                f"{self.motion}: its start is {radius:.4f} mm from its centre, its end"
-                f" {other:.4f} mm; expected one radius above 0",
-            )
-        turn = sense * phase((end - centre) / (start - centre))
-        turn += 0.0 if turn > FULL_TURN_RAD else tau
-        turn += tau * (self.count("P") - 1)
-        self.at, self.begun = to, True
-        self.record(ARC, sense * turn, (centre.real, centre.imag))
-
-    def count(self, letter: str) -> int:
-        """Read how often something is done; once where the word is missing."""
-        number = self.block.numbers.get(letter, 1.0)
-        if not (1.0 <= number <= MAX_CYCLE and number == int(number)):
-            self.refuse(letter, f"a whole number from 1 to {MAX_CYCLE:,}")
-        return int(number)
-
-    def centre_of_radius(self, start: complex, end: complex, sense: float) -> complex:
-        """Find the centre of an arc of a given radius: of the longer one where it is negative."""
-        radius = self.block.numbers["R"] * self.unit_mm
-        chord = abs(end - start)
-        if not chord or chord / 2.0 - abs(radius) > max(RADIUS_SLACK[1], RADIUS_SLACK[2] * chord):
-            self.refuse("R", f"a radius for an arc of a chord of {chord:.4f} mm, above 0")
-        height = sqrt(max(0.0, radius * radius - chord * chord / 4.0))
-        side = sense if radius > 0.0 else -sense
-        return (start + end) / 2.0 + side * height * 1j * (end - start) / chord
-
-    def drill(self) -> None:
-        """Drill a hole at the place of the block: R plane, depth, in pecks of Q with G83."""
-        words, deep = self.block.numbers, "XYZ"[self.across]
-        for letter in {deep, "R", "Q"} & words.keys():
-            self.cycle[letter] = words[letter] * self.unit_mm
-        if deep not in self.index or not {deep, "R"} <= self.cycle.keys():
-            self.block.refuse(f"{self.motion} without {deep} and R")
-        index = self.index[deep]
-        initial = self.cycle.setdefault("initial", self.at[index])
-        if self.absolute:
-            clear, bottom = (self.place(deep, self.cycle[letter]) for letter in ("R", deep))
-        else:
-            clear = initial + self.cycle["R"]
-            bottom = clear + self.cycle[deep]
-        if bottom > clear:
-            self.refuse(deep, f"a depth below R at {clear:g} mm")
-        peck = self.cycle.get("Q", 0.0) if self.motion == "G83" else clear - bottom or 1.0
-        if peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
-            self.refuse("Q", f"a depth of a peck above 0, at most {MAX_CYCLE:,} pecks")
-        pecks = ceil((clear - bottom) / peck)
-        back = max(initial, clear) if self.to_initial else clear
-
-        def go(level: float, kind: int = RAPID) -> None:
-            self.line_to([level if i == index else q for i, q in enumerate(self.at)], kind)
-
-        for _ in range(self.count("L")):
-            if self.at[index] < clear:
-                go(clear)
-            self.line_to([*self.target(deep)], RAPID)
-            go(clear)
-            for number in range(pecks):
-                go(clear - number * peck)
-                go(max(bottom, clear - (number + 1) * peck), FEED)
-                go(clear)
-            go(back)
+WORST = 10  # blocks that are split by parameter
+DRAWN = 2000  # points of a chart
+SAID = 20  # words that a remark lists
 
 
 @dataclass(frozen=True, eq=False)
@@ -405,11 +56,37 @@ class ToolPath:
     tip_mm: Array  # [n, 3], nominal, w
     error_um: Array  # [n, 3], relative, actual − nominal, w
     outside: NDArray[np.bool_]  # [n], beyond the travel; errors are continued
-    step_mm: Array  # [n, 3], from the sample before; zero where nothing moved
+    step_mm: Array  # [n, 3], from the sample before; zero where the path begins or a tool changes
 
-    @property
-    def length_mm(self) -> float:
-        return float(np.linalg.norm(self.step_mm, axis=1).sum())
+    def axes_at(self, sample: int) -> dict[str, float]:
+        return {name: float(at[sample]) for name, at in self.coordinates.items()}
+
+    @cached_property
+    def way_mm(self) -> Array:
+        """Length of the nominal path up to each sample, [n]."""
+        return np.cumsum(np.linalg.norm(self.step_mm, axis=1))
+
+    @cached_property
+    def across_um(self) -> Array:
+        """What of the errors is across the path, [n, 3]; all of them where nothing moves."""
+        back, ahead = self.step_mm, np.roll(self.step_mm, -1, axis=0)
+        follows = (self.move == np.roll(self.move, 1))[:, None]
+        bend = np.where(follows, back - np.roll(back, 1, axis=0), 0.0)
+        bend = np.where(np.roll(follows, -1, axis=0), ahead - back, bend)
+        along = 2.0 * back + bend
+        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+        return self.error_um - np.sum(self.error_um * along, axis=1, keepdims=True) * along
+
+    def summary(self, length_um: Array) -> Summary:
+        """Sum lengths of errors up over the way; each sample counts once where there is none."""
+        way = np.diff(self.way_mm, prepend=0.0)
+        weight = way + np.append(way[1:], 0.0)
+        weight = weight / weight.sum() if weight.any() else np.full(len(way), 1.0 / len(way))
+        order = np.argsort(length_um)
+        place = np.cumsum(weight[order]) - weight[order] / 2.0
+        rms = float(np.sqrt(weight @ length_um**2))
+        p95 = float(np.interp(P95, place, length_um[order]))
+        return Summary(float(weight @ length_um), rms, p95, float(length_um.max()))
 
 
 def trace_program(
@@ -420,16 +97,10 @@ def trace_program(
     turn_deg: float = 2.0,
     step_mm: float = 10.0,
 ) -> ToolPath:
-    """Follow the tip of the tool over the workpiece, nominal and with the errors of the machine.
+    """Follow the tip of the tool over the workpiece.
 
-    Parameters
-    ----------
-    scene : Scene
-    read : ReadProgram
-    chord_mm : float, mm
-        Largest distance of an arc, or of the swing of a rotary axis, from the line between samples.
-    turn_deg, step_mm : float, degrees and mm
-        Largest turn of a rotary axis and largest move of the linear ones between samples.
+    Between samples a bent path leaves its chord by `chord_mm` at most, rotary axes and arcs turn by
+    `turn_deg` at most, and linear axes move by `step_mm` at most.
     """
     count = _samples_of_moves(scene, read, chord_mm, turn_deg, step_mm)
     if count.sum() > MAX_PATH_POINTS:
@@ -441,6 +112,7 @@ def trace_program(
     coordinates, tip, error = _along(scene, read, move, share)
     inside = [within_travel(scene.machine.axes[name], at) for name, at in coordinates.items()]
     line = read.line[move]
+    same_tool = np.diff(read.length_mm[move], prepend=read.length_mm[move[:1]]) == 0.0
     return ToolPath(
         line=line,
         move=move,
@@ -449,7 +121,7 @@ def trace_program(
         tip_mm=tip,
         error_um=error,
         outside=~np.all(inside, axis=0),
-        step_mm=np.diff(tip, axis=0, prepend=tip[:1]),
+        step_mm=np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None],
     )
 
 
@@ -535,3 +207,172 @@ def _unwound(axis: Axis, at: Array) -> Array:
 def within_travel(axis: Axis, at: Array) -> NDArray[np.bool_]:
     low, high = axis.travel
     return (at >= low - SLACK) & (at <= high + SLACK)
+
+
+@dataclass(frozen=True)
+class WorstBlock:
+    """The worst place of a block."""
+
+    line: int
+    um: float  # |E|
+    axes: Mapping[str, float]  # mm or degrees
+    error_um: Array  # [3]
+    budget: Mapping[str, float]  # µm of |E| by parameter, which add up to it
+
+    def words(self) -> str:
+        first = sorted(self.budget.items(), key=lambda share: -share[1])[:3]
+        return "  ".join(f"{key} {um:.1f}" for key, um in first)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Program(Setup, Analysis):
+    """Run a program on SCENE: the path of the tool and its errors.
+
+    G-code: G0 to G3 in three planes, G17 to G21, G28, G43, G43.4, G49, G53 to G59, G80 to G83, G90,
+    G91. Subprograms and variables are refused by line: the path ends before them. Errors are those
+    of the tool against the workpiece, in the workpiece frame, actual − nominal. Geometry only: no
+    forces, heat, wear or servo.
+    """
+
+    name = "program"
+    task = "measure"
+    has_chart = True
+    has_table = True
+    file: File = option(None, "Program, G-code", positional=True, required=True)
+    chord_mm: float = option(
+        0.01, "How far the path may bend between samples", unit="mm", low=1e-5, high=10.0
+    )
+    at_line: int | None = option(
+        None, "Line whose end is told", low=1, high=MAX_PROGRAM_LINES, unset="none"
+    )
+
+    def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
+        if self.file is None:
+            raise OptionError("{file} is missing; expected a program")
+        read = read_program(scene, program_lines(self.file), self, self.file)
+        watch(0.3)
+        path = trace_program(scene, read, chord_mm=self.chord_mm)
+        watch(0.9)
+        norm = np.linalg.norm(path.error_um, axis=1)
+        order = np.lexsort((-norm, path.line))
+        block = order[np.unique(path.line[order], return_index=True)[1]]
+        mean, rms, p95, largest = astuple(path.summary(norm))
+        x, y, z = path.tip_mm[int(np.argmax(norm))].tolist()
+        return ProgramResult(
+            moving=read.blocks,
+            length_mm=float(path.way_mm[-1]),
+            outside=int(path.outside.sum()),
+            refused=read.refused,
+            deviation=Deviation(mean, rms, p95, largest, (x, y, z)),
+            across=path.summary(np.linalg.norm(path.across_um, axis=1)),
+            worst=_split(scene, path, block[np.argsort(-norm[block], kind="stable")][:WORST]),
+            line=None if self.at_line is None else _end_of(path, self.at_line),
+            unknown=read.unknown,
+            path=path,
+            of_lines=block,
+            title=scene.title,
+            second_order=second_order(scene, Loop.RELATIVE),
+        )
+
+
+def _end_of(path: ToolPath, line: int) -> dict[str, Any]:
+    (found,) = np.nonzero(path.is_end & (path.line == line))
+    if not len(found):
+        lines = np.unique(path.line[path.is_end])
+        near = ", ".join(map(str, lines[np.argsort(np.abs(lines - line))][:3])) or "none"
+        raise OptionError(f"{{at_line}} {line} moves no axis; expected a line that does: {near}")
+    at = int(found[-1])
+    return {"axes": path.axes_at(at), "error_um": path.error_um[at]}
+
+
+def _split(scene: Scene, path: ToolPath, chosen: NDArray[np.int64]) -> tuple[WorstBlock, ...]:
+    """Split the errors of some samples by parameter."""
+    at = {name: values[chosen] for name, values in path.coordinates.items()}
+    keys = [key for key in scene.parameter_keys if scene.errors.amplitude(key)]
+    point = transforms.apply(branch_pose(scene.model, "workpiece", at), path.tip_mm[chosen])
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    basis = build_basis(scene.model, scene.errors, keys, at, view, point)
+    error = path.error_um[chosen]
+    norm = np.linalg.norm(error, axis=1)
+    along = error / np.where(norm > 0.0, norm, 1.0)[:, None]
+    share = amplitudes_of(scene.errors, keys)[:, None] * np.sum(basis.position * along, axis=-1)
+    return tuple(
+        WorstBlock(
+            int(path.line[sample]),
+            float(norm[row]),
+            path.axes_at(sample),
+            error[row],
+            dict(zip(keys, share[:, row].tolist(), strict=True)),
+        )
+        for row, sample in enumerate(chosen)
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProgramResult(Result):
+    """The path of a program, and its worst blocks."""
+
+    keys = ("length_mm", "outside", "refused", "deviation", "across", "worst", "line")
+    moving: int  # blocks that move
+    length_mm: float  # of the nominal path of the tool, in the workpiece frame
+    outside: int  # samples beyond the travel
+    refused: tuple[Refused, ...]
+    deviation: Deviation
+    across: Summary
+    worst: tuple[WorstBlock, ...]
+    line: Mapping[str, Any] | None  # axes and error at the end of the line asked for
+    unknown: Mapping[str, int]
+    path: ToolPath
+    of_lines: NDArray[np.int64]  # the worst sample of each line
+    title: str
+
+    def as_plain(self) -> dict[str, Any]:
+        said = {"blocks": self.moving} | super().as_plain()
+        return {key: said[key] for key in said if key != "line" or self.line}
+
+    def doubts(self) -> Iterator[str]:
+        if self.refused:
+            said = ", ".join(f"line {one.line} {one.word}" for one in self.refused[:SAID])
+            yield f"refused: {said}; the path ends before line {self.refused[0].line}"
+        if self.unknown:
+            said = ", ".join(f"{word} (line {line})" for word, line in self.unknown.items())
+            yield f"not understood and left out: {said}"
+        if self.outside:
+            yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
+        if not self.moving:
+            yield "no block moves an axis: the errors are those where the axes stand"
+
+    def blocks(self) -> Iterator[Block]:
+        yield f"{self.title} · {self.moving} blocks, {self.length_mm:.1f} mm"
+        yield "  relative error in the workpiece frame"
+        yield "  Geometry only: no forces, heat, wear or servo"
+        heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
+        both = ("error", self.deviation), ("across the path", self.across)
+        yield Table(
+            (Column("", leads=True), *heads), [(word, *astuple(one)[:4]) for word, one in both]
+        )
+        if self.line:
+            said = ", ".join(f"{value:.2f}" for value in self.line["error_um"])
+            yield f"{place_words(self.line['axes'])}: x, y, z {said} µm"
+        path, norm = self.path, np.linalg.norm(self.path.error_um, axis=1)
+        across = np.linalg.norm(path.across_um, axis=1)
+        places = *path.coordinates.values(), *path.tip_mm.T, *path.error_um.T, path.outside
+        hidden = [f"{name}_{'mm' if is_linear(name) else 'deg'}" for name in path.coordinates]
+        hidden += ["x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um", "outside"]
+        columns = (
+            Column("line", "d", key="line", leads=True),
+            *number_columns(("|E|", "across"), ".2f", "µm", ("norm_um", "across_um")),
+            *(Column(key=key, shows=False) for key in hidden),
+            Column("most of it", unit="µm"),
+        )
+        numbers = np.column_stack([norm, across, *places])[self.of_lines].tolist()
+        lines = path.line[self.of_lines].tolist()
+        told = {line: [line, *row, ""] for line, row in zip(lines, numbers, strict=True)}
+        worst = [[*told[one.line][:-1], one.words()] for one in self.worst]
+        yield Table(columns, worst, "Worst blocks", file_rows=[*told.values()])
+        step = np.arange(0, len(norm), -(-len(norm) // DRAWN))
+        curves = (
+            Curve(word, path.way_mm[step], np.maximum.reduceat(values, step), colour)
+            for colour, (word, values) in enumerate((("|E|", norm), ("across the path", across)))
+        )
+        yield Lines("lines", "Error along the path", "way [mm]", "error [µm]", tuple(curves))

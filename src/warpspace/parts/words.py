@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_PROGRAM_BYTES, MAX_PROGRAM_LINE, MAX_PROGRAM_LINES
@@ -37,7 +37,8 @@ MOST_SAID = 1000  # refused and unknown words that are listed
 SHOWN = 40  # characters of a word that a message shows
 
 
-class Refused(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Refused:
     """A word that no path is followed past."""
 
     line: int

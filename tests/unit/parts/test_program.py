@@ -9,7 +9,8 @@ import pytest
 import warpspace
 from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import SceneError
-from warpspace.parts.program import ReadProgram, Setup, ToolPath, read_program, trace_program
+from warpspace.parts.control import ReadProgram, Setup, read_program
+from warpspace.parts.program import ToolPath, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
@@ -68,7 +69,7 @@ def test_without_tcp_a_tool_of_length_l_swings_by_l_sin_b(head: Scene):
 def test_with_tcp_the_tip_stays_on_its_line(name: str, request: pytest.FixtureRequest):
     scene = request.getfixturevalue(name)
     text = "G0 X10 Y0 Z-200\nG43.4 H1 Z-190\nG1 B20 C40\nX50 Y30 B-30 C90\nG49 X0"
-    setup = {"offsets": {"G54": {"X": 5.0, "C": 10.0}}, "length_mm": 60.0}
+    setup = {"offset": (("G54", "X", 5.0), ("G54", "C", 10.0)), "length_mm": 60.0}
     read, path = run(scene, text, **setup)
     straight = ends(run(scene, "G0 X15 Y0 Z-200\nZ-190\nX55 Y30")[1])
     assert ends(path)[1:3] == pytest.approx(straight[[1, 1]], abs=1e-9)
@@ -149,7 +150,7 @@ def test_modal_words(dvf: Scene):
     M30
     X99
     """
-    read, path = run(dvf, text, offsets={"G54": {"X": 100.0}, "G55": {"X": 1.0}})
+    read, path = run(dvf, text, offset=(("G54", "X", 100.0), ("G55", "X", 1.0)))
     x, z = (path.coordinates[axis][path.is_end] for axis in "XZ")
     assert x == pytest.approx([125.4, 150.8, 11.0, 11.0, 11.0, 100.0])
     assert z == pytest.approx([-254.0, -254.0, -254.0, -100.0, 0.0, 0.0])
@@ -162,7 +163,7 @@ def test_holes(dvf: Scene):
     read, path = run(dvf, text)
     z = [read.end[read.line == line, 2].tolist() for line in (2, 3, 4)]
     hole = [-106, -102, -106, -110, -102, -110, -112, -102]
-    assert z == [[-100, -102, *hole], [-102, *hole], [-102, -112, -102, -100]]
+    assert z == [[-100, -102, *hole], [-102, *hole], [-102, -112, -100]]
     assert path.coordinates["Z"][path.is_end].tolist() == [-100.0, -102.0, -102.0, -100.0, -100.0]
 
 
