@@ -235,7 +235,7 @@ class _Control:
         if code != "G49":
             number = f"H{self.block.numbers.get('H', 0.0):g}"
             if number not in self.lengths_mm and not self.setup.length_mm:
-                self.without_length.setdefault(f"{number} (no length given)", self.block.line)
+                self.without_length.setdefault(f"{number} without a length", self.block.line)
             length = self.lengths_mm.get(number, self.setup.length_mm)
         self.is_compensated = code != "G49"
         by_word = code == "G43.4" and self.setup.tcp == "program"

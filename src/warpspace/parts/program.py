@@ -336,7 +336,7 @@ class ProgramResult(Result):
             yield f"refused: {said}; the path ends before line {self.refused[0].line}"
         if self.unknown:
             said = ", ".join(f"{word} (line {line})" for word, line in self.unknown.items())
-            yield f"not understood and left out: {said}"
+            yield f"not followed: {said}"
         if self.outside:
             yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
         if not self.moving:

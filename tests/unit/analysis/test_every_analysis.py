@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import click
 import pytest
@@ -21,6 +22,7 @@ from warpspace.exceptions import OptionError, WarpspaceError
 
 SCENES = ("dvf5000_first", "teach_squareness", "machine_printer_3d")
 EVERY = pytest.mark.parametrize("entry", entries(), ids=lambda entry: entry.name)
+CONTOUR = str(Path(__file__).parents[1] / "parts" / "contour.ngc")
 NEEDED = {
     "convert": (
         "dvf5000_first",
@@ -34,6 +36,7 @@ NEEDED = {
     ),
     "allocate": ("dvf5000_general", {"limit_um": 60.0}, ["--limit", "60"]),
     "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
+    "program": ("dvf5000_first", {"file": CONTOUR, "length_mm": 80.0}, [CONTOUR, "--length", "80"]),
 }
 """Scene, options and what is typed, of analyses that answer nothing without."""
 HEAVY = ("scipy", "rich", "matplotlib", "viser", "pyvista")

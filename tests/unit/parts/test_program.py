@@ -182,7 +182,8 @@ def test_what_is_refused_ends_the_path(dvf: Scene, text: str, word: str):
 @pytest.mark.parametrize(
     ("text", "said"),
     [("G1 X1.2.3", "line 1: 'X1.2.3'"), ("G1 X", "'X'"), ("G1 A5", "A5; expected an axis"),
-     ("X1 X2", "expected X once"), ("G2 X1", "without I, J, K or R"), ("(open", "the end of the comment"),
+     ("X1 X2", "expected X once"), ("G2 X1", "without I, J"),
+     ("(open", "end of the comment"),
      ("G0 X999999", "at most ±100000"), ("G2 X10 R1", "R1; expected a radius"),
      ("G2 X10 I2", "one radius"), ("G83 X1 Z-9 R1", "Q; expected"), ("G81 X1", "without Z and R")],
 )  # fmt: skip
