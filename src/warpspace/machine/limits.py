@@ -53,6 +53,9 @@ MAX_NOTE_VIEW = 20_000  # characters of what was on the screen, as in a link
 MAX_REPLIES = 200  # of one note, and versions of it
 MAX_REPLACED = 1000  # earlier versions that an edit of a note names
 
+MAX_FEATURE_ROWS = 1000  # of a file of tolerances of a part
+MAX_NAME = 100  # characters of the name of a feature
+
 # --- meshes and robots: what is counted before anything is built ----------------------------------
 
 MAX_MESH_MB = 50

@@ -58,23 +58,29 @@ class PartMesh:
         return self.areas_mm2 / np.where(length > 0.0, length, 1.0)
 
     @cached_property
+    def neighbours(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Edges where two triangles meet, [e] each: 3 × triangle + corner they begin at."""
+        edge = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], -1).reshape(-1, 2)
+        low, high = edge.min(axis=1).astype(np.int64), edge.max(axis=1)
+        order = np.argsort(low * len(self.vertices_mm) + high, kind="stable")
+        one, other = order[:-1], order[1:]
+        is_same = (low[one] == low[other]) & (high[one] == high[other])
+        return one[is_same], other[is_same]
+
+    @cached_property
     def corners(self) -> Corners:
         """Vertices split at creases above `CREASE_DEG`."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
         count = len(self.triangles)
-        edge = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], -1).reshape(-1, 2)
-        low, high = edge.min(axis=1).astype(np.int64), edge.max(axis=1)
-        order = np.argsort(low * len(self.vertices_mm) + high, kind="stable")
-        one, other = order[:-1], order[1:]
-        is_same = (low[one] == low[other]) & (high[one] == high[other])
+        one, other = self.neighbours
         cosine = np.sum(self.normals[one // 3] * self.normals[other // 3], axis=1)
-        joined = is_same & (cosine > np.cos(np.deg2rad(CREASE_DEG)))
+        joined = cosine > np.cos(np.deg2rad(CREASE_DEG))
         one, other = one[joined], other[joined]
         # an edge begins at its corner of the triangle and ends at the following one
         begin, end = other, other // 3 * 3 + (other % 3 + 1) % 3
-        turned = edge[one, 0] != edge[other, 0]
+        turned = self.triangles.reshape(-1)[one] != self.triangles.reshape(-1)[other]
         rows = np.concatenate([one, one // 3 * 3 + (one % 3 + 1) % 3])
         columns = [np.where(turned, end, begin), np.where(turned, begin, end)]
         columns = np.concatenate(columns)

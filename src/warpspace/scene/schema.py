@@ -190,6 +190,10 @@ class Section:
         return self.build(**found)
 
 
+FEATURE_MEASURES = (
+    "flatness", "cylindricity", "conicity", "sphericity", "diameter", "half_angle", "position",
+    "tilt", "distance", "angle", "squareness", "parallelism",
+)  # fmt: skip
 LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
 LENGTH = _number(*LIMIT)
 POINT = _numbers("[x, y, z]", *[limits.MAX_LENGTH_MM] * 3)
@@ -302,6 +306,33 @@ _BESIDE: dict[str, tuple[Kind, Any]] = {
     "versions": (_list(Section(_NOTE, Note), limits.MAX_REPLIES), ()),
 }
 NOTES = _list(Section(_NOTE | _BESIDE, Note), limits.MAX_NOTES)
+
+
+def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
+    if isinstance(value, list | tuple):
+        return _span(reader, value, path)
+    most = reader.number(value, path, *_HALF_WIDTH[:2], expected="a number or [lower, upper]")
+    return -most, most
+
+
+def _names(reader: ValueReader, value: Any, path: Path) -> tuple[str, ...]:
+    if isinstance(value, str):
+        return (reader.text(value, path, limits.MAX_NAME),)
+    return _list(_text(limits.MAX_NAME, 1), 6, 1)(reader, value, path)
+
+
+_FEATURE = Section(
+    {
+        "name": (_text(limits.MAX_NAME, 1, *_PLAIN), ""),
+        "is": (_text(limits.MAX_NAME, 1), MISSING),
+        "near": (POINT, None),
+        "measure": (_one_of(FEATURE_MEASURES), ""),
+        "to": (_names, ()),
+        "tolerance_um": (_band, None),
+        "tolerance_urad": (_band, None),
+    }
+)
+FEATURES = Section({"features": (_list(_FEATURE, limits.MAX_FEATURE_ROWS, 1), MISSING)})
 
 
 def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:

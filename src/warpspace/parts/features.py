@@ -1,0 +1,279 @@
+"""Planes, cylinders, cones and spheres of a part: found in its mesh, fitted by least squares.
+
+A shape is a surface of revolution about an axis: from a point at the height h along it and the
+distance ρ from it, (ρ − radius) · cos φ − h · sin φ is the way to the surface. φ is 0 for a
+cylinder and the half angle of a cone; −90° makes it a plane whose axis is its normal. Fits are
+Gauss-Newton steps on these distances, over the vertices that belong to the feature.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.kinematics.transforms import vector_rotation
+from warpspace.parts.part import PartMesh
+from warpspace.units import Array
+
+SMOOTH_DEG = 30.5  # triangles meeting at less may belong to one curved surface: 12 around a hole
+FLAT_RAD = 1e-3  # triangles meeting at less lie in one facet
+FINE = 5e-6  # share of the largest coordinate that vertices are rounded by: files of six digits
+CLOSE = 2e-5  # share of its extent that a feature's vertices may be off its shape, beside rounding
+ALIKE_DEG = 8.0  # angle between triangles and the shape below them, at most
+FACETS = 4  # of a curved surface, at least: fewer lie on many shapes
+BROAD = 3.0  # a facet so many times larger than those that it runs into is a plane of its own
+ODD = 0.01  # share of its area that may lean otherwise: slivers
+LEAST_VERTICES = 4  # a triangle is flat whatever the machine does
+MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
+TRIED = 2000  # triangles on which a kind is tried before all of them are
+STEPS, STILL_MM = 40, 1e-11  # steps of a fit, and the change of a distance that ends it
+FAR = 1e6  # a step so large leads away from all parts
+
+# what a fit may change of a shape: shifts along its u, v and axis, turns about them, radius, angle
+FREE = {
+    "plane": (2, 3, 4),
+    "cylinder": (0, 1, 3, 4, 6),
+    "cone": (0, 1, 3, 4, 6, 7),
+    "sphere": (0, 1, 2, 6),  # behind the cone: two circles lie on both
+}
+FREEDOMS = 8
+Indices = NDArray[np.intp]
+
+
+class Response(NamedTuple):
+    """How far points are from a shape, and what moves that."""
+
+    distance_mm: Array  # [n], outwards
+    normal: Array  # [n, 3], unit vectors; what the distance grows with
+    design: Array  # [n, 8], growth per unit of each freedom of the shape
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A plane, sphere, cylinder or cone."""
+
+    kind: str
+    centre_mm: Array  # [3]; on the plane or axis, amid the points that it was fitted to
+    frame: Array  # [3, 3], columns u, v and axis; the axis of a plane is its outward normal
+    radius_mm: float = 0.0  # at the centre
+    angle_rad: float = 0.0  # half angle of a cone, along whose axis the radius grows
+
+    @property
+    def axis(self) -> Array:
+        """Unit vector, [3]: normal of a plane, axis of a cylinder or cone."""
+        return self.frame[:, 2]
+
+    def respond(self, point_mm: Array) -> Response:
+        """Measure points, [n, 3], against the shape."""
+        arm = point_mm - self.centre_mm
+        sine, cosine = np.sin(self.angle_rad), np.cos(self.angle_rad)
+        height = np.zeros(len(arm)) if self.kind == "sphere" else arm @ self.axis
+        radial = arm - height[:, None] * self.axis
+        length = np.linalg.norm(radial, axis=1)
+        normal = radial / np.maximum(length, 1e-300)[:, None] * cosine - sine * self.axis
+        beyond = length - self.radius_mm
+        turned = np.cross(arm, normal) @ self.frame
+        opening = beyond * sine + height * cosine
+        columns = [normal @ self.frame, turned, np.full(len(arm), cosine), opening]
+        return Response(beyond * cosine - height * sine, normal, -np.column_stack(columns))
+
+    def solve(self, found: Response, moved_mm: Array) -> Array:
+        """Give how a fit follows points that move along their normals, [n, ...]: its free steps."""
+        design = found.design[:, FREE[self.kind]]
+        normal = np.linalg.pinv(design.T @ design, rcond=1e-13, hermitian=True)
+        return -normal @ (design.T @ moved_mm)
+
+    def moved(self, step: Array) -> "Shape":
+        """Give the shape after a step, [8], mm and rad, of its freedoms."""
+        return replace(
+            self,
+            centre_mm=self.centre_mm + self.frame @ step[:3],
+            frame=vector_rotation(self.frame @ step[3:6]) @ self.frame,
+            radius_mm=self.radius_mm + step[6],
+            angle_rad=self.angle_rad + step[7],
+        )
+
+    def posed(self, turn: Array, shift_mm: Array) -> "Shape":
+        """Give the shape after a turn, [3, 3], and a shift, [3]."""
+        centre = turn @ self.centre_mm + shift_mm
+        return replace(self, centre_mm=centre, frame=turn @ self.frame)
+
+
+def fit_shape(start: Shape, point_mm: Array) -> Shape:
+    """Fit a shape to points, [n, 3], by least squares of their distances, from a near one."""
+    shape, free = start, list(FREE[start.kind])
+    for _ in range(STEPS):
+        found = shape.respond(point_mm)
+        step = np.zeros(FREEDOMS)
+        step[free] = shape.solve(found, found.distance_mm)
+        if not np.abs(step).max() < FAR:
+            break
+        shape = shape.moved(step)
+        if np.abs(found.design @ step).max() < STILL_MM:
+            break
+    if shape.kind == "sphere":
+        return shape
+    away = point_mm.mean(axis=0) - shape.centre_mm
+    along = away @ shape.axis  # the centre stays amid the points
+    if shape.kind == "plane":
+        return replace(shape, centre_mm=shape.centre_mm + away - along * shape.axis)
+    radius = shape.radius_mm + along * np.tan(shape.angle_rad)
+    return replace(shape, centre_mm=shape.centre_mm + along * shape.axis, radius_mm=radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """One surface of a part."""
+
+    name: str
+    shape: Shape  # in the frame of the mesh
+    vertices: NDArray[np.int32]  # [n], of the mesh
+    triangles: Indices  # [m], of the mesh
+    area_mm2: float
+    residual_mm: float  # largest distance of a vertex
+
+    @property
+    def kind(self) -> str:
+        return self.shape.kind
+
+
+def find_features(mesh: PartMesh) -> tuple[Feature, ...]:
+    """Find the shapes that the surface of a part consists of, the largest first in each kind.
+
+    Equally large ones are in the order of their places, x before y before z. A surface that is none
+    of them, within `CLOSE` of its extent, is no feature.
+    """
+
+    def order(feature: Feature) -> tuple[float, ...]:
+        place = np.round(feature.shape.centre_mm, 3) + 0.0  # −0 becomes 0
+        return (float(f"{-feature.area_mm2:.5g}"), *place.tolist())
+
+    counts = dict.fromkeys(FREE, 0)
+    named: list[Feature] = []
+    for feature in sorted(_Surfaces(mesh).features(), key=order)[:MAX_FEATURES]:
+        counts[feature.kind] += 1
+        named.append(replace(feature, name=f"{feature.kind} {counts[feature.kind]}"))
+    return tuple(named)
+
+
+class _Surfaces:
+    """The surfaces of a mesh between its creases."""
+
+    def __init__(self, mesh: PartMesh) -> None:
+        self.mesh = mesh
+        self.area = np.linalg.norm(mesh.areas_mm2, axis=1)
+        self.rounding_mm = FINE * float(np.abs(mesh.vertices_mm).max())
+        one, other = (edge // 3 for edge in mesh.neighbours)
+        cosine = np.einsum("ec,ec->e", mesh.normals[one], mesh.normals[other])
+        is_smooth = cosine > np.cos(np.deg2rad(SMOOTH_DEG))
+        self.pairs = np.stack([one[is_smooth], other[is_smooth]], axis=-1)
+        self.facet_of = self._joined(self.pairs[cosine[is_smooth] > np.cos(FLAT_RAD)])
+
+    def features(self) -> Iterator[Feature]:
+        """Classify what lies between creases; then what is left of it between broad facets."""
+        is_left = np.ones(len(self.area), dtype=bool)
+        for part in self._largest(self._joined(self.pairs), is_left):
+            if feature := self._classify(part):
+                is_left[part] = False
+                yield feature
+        is_broad = is_left & self._broad()
+        rest = is_left & ~is_broad
+        links = self._joined(self.pairs[rest[self.pairs].all(axis=1)])
+        for label, chosen in ((self.facet_of, is_broad), (links, rest)):
+            yield from filter(None, map(self._classify, self._largest(label, chosen)))
+
+    def _joined(self, pairs: Indices) -> Indices:
+        """Give the same number, [T], to triangles that pairs of them connect."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        links = np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])
+        matrix = coo_array(links, shape=(len(self.area), len(self.area)))
+        return connected_components(matrix, directed=False)[1]
+
+    def _largest(self, label: Indices, chosen: NDArray[np.bool_]) -> list[Indices]:
+        """Part chosen triangles by their labels: the largest surfaces of them."""
+        area = np.bincount(label, self.area * chosen)
+        first = np.argsort(-area, kind="stable")[:MAX_FEATURES]
+        rank = np.full(len(area), len(first))
+        rank[first[area[first] > 0.0]] = np.arange(np.count_nonzero(area[first]))
+        place = np.where(chosen, rank[label], len(first))
+        ends = np.cumsum(np.bincount(place, minlength=len(first) + 1))
+        parts = np.split(np.argsort(place, kind="stable"), ends)[: len(first)]
+        return [part for part in parts if len(part)]
+
+    def _broad(self) -> NDArray[np.bool_]:
+        """Tell which triangles lie in facets much larger than all that these run into."""
+        one, other = self.facet_of[self.pairs].T
+        facet = np.bincount(self.facet_of, self.area)
+        beside = np.zeros(len(facet))
+        for here, there in ((one, other), (other, one)):
+            np.maximum.at(beside, here, np.where(here == there, 0.0, facet[there]))
+        return (facet > BROAD * beside)[self.facet_of]
+
+    def _classify(self, part: Indices) -> Feature | None:
+        """Take the first kind that fits; try it on some triangles first where there are many."""
+        few = part[:: 1 + len(part) // TRIED]
+        is_curved = len(np.unique(self.facet_of[few])) >= FACETS
+        for kind in FREE if is_curved else ("plane",):
+            found = self._fitted(self._start(kind, few), few)
+            if found and len(few) < len(part):
+                found = self._fitted(found.shape, part)
+            if found:
+                return found
+        return None
+
+    def _start(self, kind: str, part: Indices) -> Shape:
+        """Guess a shape from its triangles: their normals meet in its axis or its centre."""
+        normal, weight = self.mesh.normals[part], self.area[part] / self.area[part].sum()
+        place = self.mesh.vertices_mm[self.mesh.triangles[part]].mean(axis=1)
+        centre, mean = weight @ place, weight @ normal
+        if kind == "plane":
+            return Shape(kind, centre, _frame(mean), angle_rad=-np.pi / 2.0)
+        # normals are square to the axis of a cylinder, and on a circle about that of a cone
+        spread = (weight * normal.T) @ normal - (kind == "cone") * np.outer(mean, mean)
+        frame = _frame(np.linalg.eigh(spread)[1][:, 0])
+        across = frame[:, : 3 if kind == "sphere" else 2]
+        flat = normal @ across
+        flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+        ways = np.eye(across.shape[1]) - flat[:, :, None] * flat[:, None, :]
+        beside = np.einsum("t,tij,tj->i", weight, ways, (place - centre) @ across)
+        nearest = np.linalg.pinv(np.einsum("t,tij->ij", weight, ways)) @ beside
+        centre = centre + across @ nearest
+        radius = float(weight @ np.sum((place - centre) @ across * flat, axis=1))
+        angle = 0.0
+        if kind == "cone":  # the normals of a hole point to its axis
+            lean = float(mean @ frame[:, 2]) * np.sign(radius)
+            frame = frame * ([1.0, -1.0, -1.0] if lean > 0.0 else [1.0, 1.0, 1.0])
+            angle = float(np.arcsin(min(abs(lean), 1.0)))
+        return Shape(kind, centre, frame, abs(radius), angle)
+
+    def _fitted(self, start: Shape, part: Indices) -> Feature | None:
+        """Fit a shape; None where vertices or normals of the triangles are off it."""
+        triangles, area = self.mesh.triangles[part], self.area[part]
+        vertices = np.unique(triangles)
+        points, middle = self.mesh.vertices_mm[vertices], self.mesh.vertices_mm[triangles].mean(1)
+        extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+
+        def is_alike(shape: Shape, most_deg: float) -> bool:
+            turned = np.sum(shape.respond(middle).normal * self.mesh.normals[part], axis=1)
+            off = turned * np.sign(area @ turned) < np.cos(np.deg2rad(most_deg))
+            return bool(area @ off < ODD * area.sum())
+
+        if len(vertices) < LEAST_VERTICES or not is_alike(start, 2.0 * ALIKE_DEG):
+            return None
+        shape = fit_shape(start, points)
+        residual = float(np.abs(shape.respond(points).distance_mm).max())
+        if residual > CLOSE * extent + self.rounding_mm or not is_alike(shape, ALIKE_DEG):
+            return None
+        return Feature("", shape, vertices, part, float(area.sum()), residual)
+
+
+def _frame(axis: Array) -> Array:
+    """Build a right-handed frame, [3, 3], whose third column is along a direction, or z."""
+    third = axis / np.linalg.norm(axis) if axis.any() else np.array([0.0, 0.0, 1.0])
+    first = np.cross(np.eye(3)[(np.argmax(np.abs(third)) + 1) % 3], third)
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(third, first), third], axis=-1)
