@@ -13,6 +13,7 @@ from warpspace.kinematics.chain import AxisFrames, branch_frames, branch_pose, n
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import direction_index, parameter
 from warpspace.machine.description import Machine
+from warpspace.machine.limits import FULL_TURN_DEG
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -132,12 +133,11 @@ def ball_point(model: Model, coordinates: Coordinates) -> Array:
 
 
 def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Tell at which sites all linear axes are within their travel, [n]."""
+    """Tell at which sites all axes are within their travel, [n]; a full turn has no end."""
     inside = np.ones((), dtype=bool)
     for name, values in coordinates.items():
-        axis = machine.axes[name]
-        if axis.is_linear:
-            low, high = axis.travel
+        low, high = machine.axes[name].travel
+        if machine.axes[name].is_linear or high - low < FULL_TURN_DEG:
             inside = inside & (values >= low - SLACK) & (values <= high + SLACK)
     return np.asarray(inside)
 

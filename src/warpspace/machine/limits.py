@@ -76,10 +76,8 @@ MAX_URDF_TRIANGLES = 1_000_000  # of all shapes together
 # --- programs -------------------------------------------------------------------------------------
 
 MAX_PROGRAM_BYTES = 50 * 1024 * 1024
-MAX_PROGRAM_LINES = 2_000_000
-MAX_PROGRAM_LINE = 4096  # characters of one line
 MAX_PATH_POINTS = 5_000_000  # samples of a path
-MAX_CYCLE = 10_000  # pecks of a hole, repetitions of a cycle, turns of an arc
+MAX_CYCLE = 10_000  # pecks of a hole
 
 # --- how a scene is looked at ---------------------------------------------------------------------
 

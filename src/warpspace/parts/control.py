@@ -21,7 +21,7 @@ from collections.abc import Generator, Iterable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import ceil, sqrt, tau
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from warpspace.analysis.options import Grammar, option, read_numbers
 from warpspace.bench.placing import ball_point, follow, following_axes
 from warpspace.kinematics.model import Model, complete_coordinates
 from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM
-from warpspace.parts.words import Block, Refused, Remarks, read_blocks
+from warpspace.parts.words import Block, Reader, Refused
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -53,10 +53,6 @@ _MODAL: Mapping[str, tuple[str, object]] = {
 }  # fmt: skip
 
 
-def _lengths(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
-    return tuple(read_numbers(text, "H=length", "H1=120,H2=85.5").items())
-
-
 def _offsets(text: str, scene: Scene) -> tuple[tuple[str, str, float], ...]:
     found: list[tuple[str, str, float]] = []
     system = ""
@@ -71,13 +67,13 @@ def _offsets(text: str, scene: Scene) -> tuple[tuple[str, str, float], ...]:
     return tuple(found)
 
 
-Lengths: TypeAlias = Annotated[
-    tuple[tuple[str, float], ...], Grammar("H1=..,H2=..", _lengths, many=True)
-]
-Offsets: TypeAlias = Annotated[
-    tuple[tuple[str, str, float], ...], Grammar("G54=X..,Y..", _offsets, many=True)
-]
-"""Work coordinate system, axis, and its position at zero, mm or degrees."""
+def _lengths(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
+    return tuple(read_numbers(text, "H=length", "H1=120,H2=85.5").items())
+
+
+Lengths = Annotated[tuple[tuple[str, float], ...], Grammar("H1=..,H2=..", _lengths, many=True)]
+Offsets = Annotated[tuple[tuple[str, str, float], ...], Grammar("G54=X..", _offsets, many=True)]
+"""Work offset, axis, and its position where the word is zero, mm or degrees."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +119,21 @@ class ReadProgram:
         """How many lines move an axis."""
         return len(np.unique(self.line[self.moves]))
 
+    def positions(self, move: NDArray[np.int64], share: Array) -> Array:
+        """Give the positions of axes, as `end` has them, at shares of moves, [n, a]."""
+        start, end = self.end[np.maximum(move - 1, 0)], self.end[move]
+        at = start + share[:, None] * (end - start)
+        (arc,) = np.nonzero(self.turn_rad[move])
+        columns = [[self.axes.index(x) if x in self.axes else 0 for x in names] for names in PLANES]
+        rows, plane = arc[:, None], np.array(columns)[self.across[move[arc]]]
+        first, last = (places[rows, plane] - self.centre_mm[move[arc]] for places in (start, end))
+        radius, further = np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)
+        radius = radius + share[arc] * (further - radius)
+        angle = np.arctan2(first[:, 1], first[:, 0]) + share[arc] * self.turn_rad[move[arc]]
+        around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        at[rows, plane] = self.centre_mm[move[arc]] + radius[:, None] * around
+        return at
+
 
 class Frame:
     """Where words with TCP are on the workpiece: the tool point, rotary axes at zero."""
@@ -155,31 +166,24 @@ def read_program(
     scene: Scene, lines: Iterable[str], setup: Setup | None = None, name: str = "program"
 ) -> ReadProgram:
     """Run the lines of a program on the control of a machine; a `SceneError` names its line."""
-    control, remarks = _Control(scene, setup or Setup(), name), Remarks()
-    for block in read_blocks(lines, name, remarks):
+    reader = Reader(name)
+    control = _Control(scene, setup or Setup(), reader)
+    for block in reader.blocks(lines):
         control.run(block)
     rows = np.frombuffer(control.rows).reshape(-1, 8 + len(control.names))
     line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
     return ReadProgram(
-        axes=control.names,
-        line=line,
-        kind=kind,
-        tcp=tcp > 0,
-        across=across,
-        length_mm=rows[:, 4],
-        turn_rad=rows[:, 5],
-        centre_mm=rows[:, 6:8],
-        end=rows[:, 8:],
-        refused=tuple(remarks.refused),
-        unknown=remarks.unknown | control.without_length,
-    )
+        axes=control.names, line=line, kind=kind, tcp=tcp > 0, across=across, length_mm=rows[:, 4],
+        turn_rad=rows[:, 5], centre_mm=rows[:, 6:8], end=rows[:, 8:],
+        refused=tuple(reader.refused), unknown=reader.unknown,
+    )  # fmt: skip
 
 
 class _Control:
     """Modal words of a control, and where its axes stand."""
 
-    def __init__(self, scene: Scene, setup: Setup, name: str) -> None:
-        self.scene, self.setup, self.lengths_mm = scene, setup, dict(setup.lengths)
+    def __init__(self, scene: Scene, setup: Setup, reader: Reader) -> None:
+        self.scene, self.setup, self.reader = scene, setup, reader
         self.offset = {(system, axis): at for system, axis, at in setup.offset}
         self.names = tuple(scene.machine.axes)
         first = [axis[0] for axis in self.names]
@@ -188,8 +192,7 @@ class _Control:
         self.absolute, self.absolute_centre, self.to_initial = True, False, True
         self.is_compensated, self.tcp, self.length_mm = False, False, setup.length_mm
         self.cycle: dict[str, float] = {}
-        self.without_length: dict[str, int] = {}
-        self.rows, self.begun, self.block = array("d"), False, Block(name, 0)
+        self.rows, self.begun, self.block = array("d"), False, Block(reader.program, 0)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
         self.at = [float(stand[axis]) for axis in self.names]
         self.switch(tcp=setup.tcp == "always", length_mm=self.length_mm)
@@ -231,12 +234,11 @@ class _Control:
         self.block.refuse(f"{word}; expected {expected}")
 
     def compensate(self, code: str) -> None:
-        length = self.length_mm
+        length, lengths = self.length_mm, dict(self.setup.lengths)
         if code != "G49":
             number = f"H{self.block.numbers.get('H', 0.0):g}"
-            if number not in self.lengths_mm and not self.setup.length_mm:
-                self.without_length.setdefault(f"{number} without a length", self.block.line)
-            length = self.lengths_mm.get(number, self.setup.length_mm)
+            if not (length := lengths.get(number, self.setup.length_mm)):
+                self.reader.unknown.setdefault(f"{number} without a length", self.block.line)
         self.is_compensated = code != "G49"
         by_word = code == "G43.4" and self.setup.tcp == "program"
         self.switch(tcp=by_word or self.setup.tcp == "always", length_mm=length)
@@ -332,7 +334,7 @@ class _Control:
                 " expected one radius above 0"
             )
         turn = sense * phase((end - centre) / (start - centre))
-        turn += (0.0 if turn > FULL_TURN_RAD else tau) + tau * (self.count("P") - 1)
+        turn += 0.0 if turn > FULL_TURN_RAD else tau
         self.at, self.begun = to, True
         self.record(ARC, sense * turn, centre)
 
@@ -344,13 +346,6 @@ class _Control:
         height = sqrt(max(0.0, radius * radius - chord * chord / 4.0))
         side = sense if radius > 0.0 else -sense
         return (start + end) / 2.0 + side * height * 1j * (end - start) / chord
-
-    def count(self, letter: str) -> int:
-        """Read how often something is done; once where the word is missing."""
-        number = self.block.numbers.get(letter, 1.0)
-        if not (1.0 <= number <= MAX_CYCLE and number == int(number)):
-            self.refuse(letter, f"a whole number from 1 to {MAX_CYCLE:,}")
-        return int(number)
 
     def drill(self) -> None:
         """Drill a hole at the place of the block: R plane, depth, in pecks of Q with G83."""
@@ -373,11 +368,10 @@ class _Control:
         def go(level: float, kind: int = RAPID) -> None:
             self.line_to([level if i == index else q for i, q in enumerate(self.at)], kind)
 
-        for _ in range(self.count("L")):
-            go(max(clear, self.at[index]))
-            self.line_to(self.target(deep), RAPID)
-            for number in range(ceil((clear - bottom) / peck)):
-                go(clear)
-                go(clear - number * peck)
-                go(max(bottom, clear - (number + 1) * peck), FEED)
-            go(max(initial, clear) if self.to_initial else clear)
+        go(max(clear, self.at[index]))
+        self.line_to(self.target(deep), RAPID)
+        for number in range(ceil((clear - bottom) / peck)):
+            go(clear)
+            go(clear - number * peck)
+            go(max(bottom, clear - (number + 1) * peck), FEED)
+        go(max(initial, clear) if self.to_initial else clear)

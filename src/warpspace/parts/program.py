@@ -7,33 +7,26 @@ Geometry only: no forces, heat, wear or servo.
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple, dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Summary
-from warpspace.bench.placing import SLACK, ball_point, follow
+from warpspace.bench.placing import ball_point, follow, within_travel
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import amplitudes_of, build_basis, evaluate_first_order
+from warpspace.formats.source import MAX_LINES
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Axis
-from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS, MAX_PROGRAM_LINES
-from warpspace.parts.control import (
-    ARC,
-    PLANES,
-    Frame,
-    ReadProgram,
-    Setup,
-    read_program,
-    with_length,
-)  # fmt: skip
+from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
+from warpspace.parts.control import Frame, ReadProgram, Setup, read_program, with_length
 from warpspace.parts.part import Deviation
 from warpspace.parts.words import Refused, program_lines
 from warpspace.scene.model import Scene, check_magnitude, second_order
@@ -41,7 +34,6 @@ from warpspace.units import Array
 
 MOST_AT_ONCE = 50_000  # samples
 WORST = 10  # blocks that are split by parameter
-DRAWN = 2000  # points of a chart
 SAID = 20  # words that a remark lists
 
 
@@ -110,7 +102,6 @@ def trace_program(
     move = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(move)) - (np.cumsum(count) - count)[move] + 1.0) / count[move]
     coordinates, tip, error = _along(scene, read, move, share)
-    inside = [within_travel(scene.machine.axes[name], at) for name, at in coordinates.items()]
     line = read.line[move]
     same_tool = np.diff(read.length_mm[move], prepend=read.length_mm[move[:1]]) == 0.0
     return ToolPath(
@@ -120,7 +111,7 @@ def trace_program(
         coordinates=coordinates,
         tip_mm=tip,
         error_um=error,
-        outside=~np.all(inside, axis=0),
+        outside=~within_travel(scene.machine, coordinates),
         step_mm=np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None],
     )
 
@@ -131,7 +122,7 @@ def _samples_of_moves(
     is_rotary = np.array([not scene.machine.axes[name].is_linear for name in read.axes])
     change = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1]))
     way, turn = np.linalg.norm(change[:, ~is_rotary], axis=1), change[:, is_rotary]
-    is_bent = (read.kind == ARC) | (~read.tcp & turn.any(axis=1))
+    is_bent = (read.turn_rad != 0.0) | (~read.tcp & turn.any(axis=1))
     turn = np.maximum(turn.max(axis=1, initial=0.0), np.rad2deg(np.abs(read.turn_rad)))
     count = np.ceil(np.maximum(turn / turn_deg, way / step_mm))
     count = np.where(read.moves, np.maximum(count, 1.0), 0.0)
@@ -140,23 +131,17 @@ def _samples_of_moves(
     (bent,) = np.nonzero(is_bent & read.moves)
     if len(bent):  # how far the middle of a piece is from the line between its ends
         half = 0.5 / count[bent]
-        start, middle, end = (_along(scene, read, bent, 0.5 + at).tip_mm for at in (-half, 0, half))
+        start, middle, end = (_along(scene, read, bent, 0.5 + at)[1] for at in (-half, 0, half))
         away = np.linalg.norm(middle - (start + end) / 2.0, axis=1)
         count[bent] = np.ceil(count[bent] * np.maximum(1.0, np.sqrt(away / chord_mm)))
     return count.astype(np.int64)
 
 
-class _Samples(NamedTuple):
-    coordinates: dict[str, Array]
-    tip_mm: Array
-    error_um: Array
-
-
 def _along(
     scene: Scene, read: ReadProgram, move: NDArray[np.int64], share: Array | float
-) -> _Samples:
-    """Evaluate the path at shares of moves, [n]."""
-    at = _places(read, move, np.broadcast_to(share, move.shape))
+) -> tuple[dict[str, Array], Array, Array]:
+    """Give positions of axes, tip and error at shares of moves, [n]."""
+    at = read.positions(move, np.broadcast_to(share, move.shape))
     found = dict(zip(read.axes, at.T, strict=True))
     tip, error = np.empty((len(move), 3)), np.empty((len(move), 3))
     modes = np.stack([read.tcp, read.length_mm], axis=-1)[move]
@@ -175,25 +160,7 @@ def _along(
             check_magnitude(scene, here)
             tip[part] = ball_point(model, here)
             error[part] = evaluate_first_order(model, scene.errors, here, view).error_um
-    return _Samples(found, tip, error)
-
-
-def _places(read: ReadProgram, move: NDArray[np.int64], share: Array) -> Array:
-    """Give the words at shares of moves, [n, a]."""
-    start, end = read.end[np.maximum(move - 1, 0)], read.end[move]
-    at = start + share[:, None] * (end - start)
-    (arcs,) = np.nonzero(read.kind[move] == ARC)
-    if len(arcs):
-        columns = [[read.axes.index(x) if x in read.axes else 0 for x in names] for names in PLANES]
-        rows, of_arc = arcs[:, None], move[arcs]
-        plane, centre = np.array(columns)[read.across[of_arc]], read.centre_mm[of_arc]
-        first, last = (places[rows, plane] - centre for places in (start, end))
-        radius, further = np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)
-        radius = radius + share[arcs] * (further - radius)
-        angle = np.arctan2(first[:, 1], first[:, 0]) + share[arcs] * read.turn_rad[of_arc]
-        around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        at[rows, plane] = centre + radius[:, None] * around
-    return at
+    return found, tip, error
 
 
 def _unwound(axis: Axis, at: Array) -> Array:
@@ -201,12 +168,7 @@ def _unwound(axis: Axis, at: Array) -> Array:
     low, high = axis.travel
     if axis.is_linear or high - low < FULL_TURN_DEG:
         return at
-    return np.where(within_travel(axis, at), at, low + (at - low) % FULL_TURN_DEG)
-
-
-def within_travel(axis: Axis, at: Array) -> NDArray[np.bool_]:
-    low, high = axis.travel
-    return (at >= low - SLACK) & (at <= high + SLACK)
+    return np.where((at < low) | (at > high), low + (at - low) % FULL_TURN_DEG, at)
 
 
 @dataclass(frozen=True)
@@ -218,10 +180,6 @@ class WorstBlock:
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
     budget: Mapping[str, float]  # µm of |E| by parameter, which add up to it
-
-    def words(self) -> str:
-        first = sorted(self.budget.items(), key=lambda share: -share[1])[:3]
-        return "  ".join(f"{key} {um:.1f}" for key, um in first)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,14 +194,13 @@ class Program(Setup, Analysis):
 
     name = "program"
     task = "measure"
-    has_chart = True
     has_table = True
     file: File = option(None, "Program, G-code", positional=True, required=True)
     chord_mm: float = option(
         0.01, "How far the path may bend between samples", unit="mm", low=1e-5, high=10.0
     )
     at_line: int | None = option(
-        None, "Line whose end is told", low=1, high=MAX_PROGRAM_LINES, unset="none"
+        None, "Line whose end is told", low=1, high=MAX_LINES, unset="none"
     )
 
     def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
@@ -308,6 +265,11 @@ def _split(scene: Scene, path: ToolPath, chosen: NDArray[np.int64]) -> tuple[Wor
     )
 
 
+def _most(budget: Mapping[str, float]) -> str:
+    first = sorted(budget.items(), key=lambda share: -share[1])[:3]
+    return "  ".join(f"{key} {um:.1f}" for key, um in first)
+
+
 @dataclass(frozen=True, kw_only=True)
 class ProgramResult(Result):
     """The path of a program, and its worst blocks."""
@@ -348,9 +310,8 @@ class ProgramResult(Result):
         yield "  Geometry only: no forces, heat, wear or servo"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
         both = ("error", self.deviation), ("across the path", self.across)
-        yield Table(
-            (Column("", leads=True), *heads), [(word, *astuple(one)[:4]) for word, one in both]
-        )
+        rows = [(word, *astuple(one)[:4]) for word, one in both]
+        yield Table((Column("", leads=True), *heads), rows)
         if self.line:
             said = ", ".join(f"{value:.2f}" for value in self.line["error_um"])
             yield f"{place_words(self.line['axes'])}: x, y, z {said} µm"
@@ -363,16 +324,10 @@ class ProgramResult(Result):
             Column("line", "d", key="line", leads=True),
             *number_columns(("|E|", "across"), ".2f", "µm", ("norm_um", "across_um")),
             *(Column(key=key, shows=False) for key in hidden),
-            Column("most of it", unit="µm"),
+            Column("most of it", _most, "µm"),
         )
         numbers = np.column_stack([norm, across, *places])[self.of_lines].tolist()
         lines = path.line[self.of_lines].tolist()
         told = {line: [line, *row, ""] for line, row in zip(lines, numbers, strict=True)}
-        worst = [[*told[one.line][:-1], one.words()] for one in self.worst]
+        worst = [[*told[one.line][:-1], one.budget] for one in self.worst]
         yield Table(columns, worst, "Worst blocks", file_rows=[*told.values()])
-        step = np.arange(0, len(norm), -(-len(norm) // DRAWN))
-        curves = (
-            Curve(word, path.way_mm[step], np.maximum.reduceat(values, step), colour)
-            for colour, (word, values) in enumerate((("|E|", norm), ("across the path", across)))
-        )
-        yield Lines("lines", "Error along the path", "way [mm]", "error [µm]", tuple(curves))

@@ -3,12 +3,12 @@
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import NoReturn
 
 from warpspace.exceptions import SceneError
-from warpspace.machine.limits import MAX_PROGRAM_BYTES, MAX_PROGRAM_LINE, MAX_PROGRAM_LINES
+from warpspace.formats.source import MAX_LINE, MAX_LINES
+from warpspace.machine.limits import MAX_PROGRAM_BYTES
 from warpspace.scene.files import check_file
 
 
@@ -32,7 +32,6 @@ REFUSED = {"M96", "M97", "M98", "M99"} | _codes(
     " 68.3 72 73 74 76 84 85 86 87 88 89 92"
 )
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
-_LETTERS = frozenset("ABCDFHIJKLNPQRSTUVWXYZ")
 MOST_SAID = 1000  # refused and unknown words that are listed
 SHOWN = 40  # characters of a word that a message shows
 
@@ -43,22 +42,6 @@ class Refused:
 
     line: int
     word: str
-
-
-@dataclass(frozen=True, slots=True)
-class Remarks:
-    """What was found beside the words that are understood."""
-
-    refused: list[Refused] = field(default_factory=list[Refused])
-    unknown: dict[str, int] = field(default_factory=dict[str, int])  # word to its first line
-
-    def refuse(self, line: int, word: str) -> None:
-        if len(self.refused) < MOST_SAID:
-            self.refused.append(Refused(line, word))
-
-    def note(self, line: int, word: str) -> None:
-        if len(self.unknown) < MOST_SAID:
-            self.unknown.setdefault(word, line)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,76 +59,68 @@ class Block:
 
 def program_lines(path: str | Path) -> Iterator[str]:
     """Read the lines of a program one by one; bytes that are no UTF-8 stand in comments."""
-    source, path = str(path), Path(path)
-    check_file(path, MAX_PROGRAM_BYTES, source)
+    check_file(Path(path), MAX_PROGRAM_BYTES, str(path))
     try:
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            for line in range(1, MAX_PROGRAM_LINES + 2):
-                text = file.readline(MAX_PROGRAM_LINE + 1)
-                if not text:
-                    return
-                if len(text) > MAX_PROGRAM_LINE or line > MAX_PROGRAM_LINES:
-                    most = f"{MAX_PROGRAM_LINES:,} lines of {MAX_PROGRAM_LINE:,} characters"
-                    raise SceneError(source, [f"line {line}: expected at most {most}"])
-                yield text
+        with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
+            yield from iter(lambda: file.readline(MAX_LINE + 1), "")
     except OSError as error:
-        raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
+        raise SceneError(str(path), [f"cannot be read: {error.strerror or error}"]) from None
 
 
-@lru_cache(4096)
-def _code(letter: str, number: str) -> str:
-    return f"{letter}{float(number):g}"
+@dataclass(frozen=True, slots=True)
+class Reader:
+    """Takes words apart, up to the first that is refused; from there on only lists what is."""
 
+    program: str  # as messages call it
+    refused: list[Refused] = field(default_factory=list[Refused])
+    unknown: dict[str, int] = field(default_factory=dict[str, int])  # word to its first line
 
-def read_blocks(lines: Iterable[str], program: str, remarks: Remarks) -> Iterator[Block]:
-    """Read the blocks up to the first refused word; from there on only list what is refused.
-
-    A line of its own may number the program (O0012) before its first block.
-    """
-    begun = False
-    for line, raw in enumerate(lines, start=1):
-        text = raw.strip().upper()
-        if text.startswith("%"):
-            if begun:
+    def blocks(self, lines: Iterable[str]) -> Iterator[Block]:
+        """Read the blocks; a line of its own may number the program (O0012) before the first."""
+        begun = False
+        for line, raw in enumerate(lines, start=1):
+            block, text = Block(self.program, line), raw.strip().upper()
+            if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MOST_SAID:
+                most = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MOST_SAID:,} other words"
+                block.refuse(f"is no program in G-code; expected at most {most}")
+            if text.startswith("%") and begun:
                 return
-            continue
-        if text.startswith("/"):
-            remarks.note(line, "/")
-            text = text.lstrip("/0123456789")
-        block = Block(program, line)
-        for letter, number, other in _WORD.findall(text):
-            if letter in {"G", "M"}:
-                code = _code(letter, number)
-                block.codes.append(code)
-                if code in REFUSED:
-                    remarks.refuse(line, code)
-                elif letter == "G" and code not in UNDERSTOOD:
-                    remarks.note(line, code)
-            elif letter == "O":
-                if begun or text.split("(")[0].strip() != letter + number:
-                    remarks.refuse(line, letter + number)
-            elif letter:
-                if letter in block.numbers and not remarks.refused:
-                    block.refuse(f"{letter}{number}; expected {letter} once in a line")
-                block.numbers[letter] = float(number)
-                if letter not in _LETTERS:
-                    remarks.note(line, letter + number)
-            elif other:
-                _take_other(block, other, remarks)
-        begun = begun or bool(block.codes or block.numbers)
-        if not remarks.refused:
-            yield block
-        if "M30" in block.codes or "M2" in block.codes:
-            return
+            if text.startswith("/"):
+                self.unknown.setdefault("/", line)
+                text = text.lstrip("/0123456789")
+            for letter, number, other in _WORD.findall(text.lstrip("%")):
+                if letter == "O" and not begun and text.split("(")[0].strip() == "O" + number:
+                    continue
+                if letter:
+                    self.take(block, letter, number)
+                elif other:
+                    self.take_other(block, other)
+            begun = begun or bool(block.codes or block.numbers)
+            if not self.refused:
+                yield block
+            if "M30" in block.codes or "M2" in block.codes or len(self.refused) > MOST_SAID:
+                return
 
+    def take(self, block: Block, letter: str, number: str) -> None:
+        code = f"{letter}{float(number):g}"
+        if letter == "O" or code in REFUSED:
+            self.refused.append(Refused(block.line, letter + number if letter == "O" else code))
+        elif letter in {"G", "M"}:
+            block.codes.append(code)
+            if letter == "G" and code not in UNDERSTOOD:
+                self.unknown.setdefault(code, block.line)
+        elif letter in block.numbers and not self.refused:
+            block.refuse(f"{letter}{number}; expected {letter} once in a line")
+        else:
+            block.numbers[letter] = float(number)
+            if letter in {"E", "L"}:
+                self.unknown.setdefault(letter + number, block.line)
 
-def _take_other(block: Block, word: str, remarks: Remarks) -> None:
-    if _CONTROL_FLOW.match(word):
-        remarks.refuse(block.line, word[:SHOWN])
-    elif remarks.refused:  # what stands behind is of a language that is not read
-        return
-    elif word[:2].isalpha() and len(word) > 1:
-        remarks.note(block.line, word[:SHOWN])
-    else:
-        end = "the end of the comment" if word.startswith("(") else "a letter and a number"
-        block.refuse(f"{word[:SHOWN]!r}; expected {end}")
+    def take_other(self, block: Block, word: str) -> None:
+        if _CONTROL_FLOW.match(word):
+            self.refused.append(Refused(block.line, word[:SHOWN]))
+        elif word[:2].isalpha() and len(word) > 1:
+            self.unknown.setdefault(word[:SHOWN], block.line)
+        elif not self.refused:  # what stands behind that is of a language that is not read
+            end = "the end of the comment" if word.startswith("(") else "a letter and a number"
+            block.refuse(f"{word[:SHOWN]!r}; expected {end}")

@@ -1,18 +1,21 @@
 """Programs: what a control makes of their words, and the path of the tip against closed forms."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import warpspace
+from warpspace.analysis.catalogue import verb
 from warpspace.bench.kinds.circular import Circular
-from warpspace.exceptions import SceneError
-from warpspace.parts.control import ReadProgram, Setup, read_program
-from warpspace.parts.program import ToolPath, trace_program
+from warpspace.exceptions import OptionError, SceneError
+from warpspace.parts.control import ReadProgram, Setup, read_program, with_length
+from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.scene.library import parse_scene
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, evaluate
 
 HEAD = """
 title = "head"
@@ -165,6 +168,30 @@ def test_holes(dvf: Scene):
     hole = [-106, -102, -106, -110, -102, -110, -112, -102]
     assert z == [[-100, -102, *hole], [-102, *hole], [-102, -112, -100]]
     assert path.coordinates["Z"][path.is_end].tolist() == [-100.0, -102.0, -102.0, -100.0, -100.0]
+
+
+def test_json_holds_together(dvf: Scene, tmp_path: Path):
+    file = tmp_path / "x.ngc"
+    file.write_text(
+        "G43 H1 G0 X-50 Y-50 Z-300\nG1 X50\nY50\nX-50\nY-50\nG2 I50 J50\nG1 B-10 Z0\n#1=2"
+    )
+    found = verb("program")(dvf, file=str(file), length_mm=75.0, at_line=7)
+    said = found.as_json()
+    assert said["blocks"] == 7
+    assert said["refused"] == [{"line": 8, "word": "#1=2"}]
+    assert said["length_mm"] > 400.0 + 100.0 * math.sqrt(2.0) * math.pi
+    assert said["deviation"]["max_um"] == said["worst"][0]["um"]
+    assert said["across"]["max_um"] <= said["deviation"]["max_um"]
+    longer = replace(dvf, model=with_length(dvf.model, 75.0))
+    for one in [*said["worst"], said["line"]]:
+        field = evaluate(longer, at=one["axes"], loop="relative", frame="workpiece")
+        assert one["error_um"] == pytest.approx(field.error_um.tolist(), abs=1e-9)
+        if "um" in one:
+            assert sum(one["budget"].values()) == pytest.approx(one["um"], abs=1e-9)
+    assert said["line"]["axes"]["Z"] == 75.0
+    assert said["outside"] > 0
+    with pytest.raises(OptionError, match="line that does: 7"):
+        Program(file=str(file), at_line=8).run(dvf, lambda _: None)
 
 
 @pytest.mark.parametrize(
