@@ -53,8 +53,8 @@ MAX_NOTE_VIEW = 20_000  # characters of what was on the screen, as in a link
 MAX_REPLIES = 200  # of one note, and versions of it
 MAX_REPLACED = 1000  # earlier versions that an edit of a note names
 
-MAX_FEATURE_ROWS = 1000  # of a file of tolerances of a part
-MAX_NAME = 100  # characters of the name of a feature
+MAX_TOLERANCES = 1000  # of the features of a part
+MAX_FEATURE_TRIANGLES = 300_000  # of a mesh that features are looked for in: a second or two
 
 # --- meshes and robots: what is counted before anything is built ----------------------------------
 

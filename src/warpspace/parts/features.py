@@ -8,12 +8,14 @@ Gauss-Newton steps on these distances, over the vertices that belong to the feat
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.kinematics.transforms import vector_rotation
+from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
 from warpspace.parts.part import PartMesh
 from warpspace.units import Array
 
@@ -25,9 +27,7 @@ ALIKE_DEG = 8.0  # angle between triangles and the shape below them, at most
 FACETS = 4  # of a curved surface, at least: fewer lie on many shapes
 BROAD = 3.0  # a facet so many times larger than those that it runs into is a plane of its own
 ODD = 0.01  # share of its area that may lean otherwise: slivers
-LEAST_VERTICES = 4  # a triangle is flat whatever the machine does
 MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
-TRIED = 2000  # triangles on which a kind is tried before all of them are
 STEPS, STILL_MM = 40, 1e-11  # steps of a fit, and the change of a distance that ends it
 FAR = 1e6  # a step so large leads away from all parts
 
@@ -79,12 +79,6 @@ class Shape:
         columns = [normal @ self.frame, turned, np.full(len(arm), cosine), opening]
         return Response(beyond * cosine - height * sine, normal, -np.column_stack(columns))
 
-    def solve(self, found: Response, moved_mm: Array) -> Array:
-        """Give how a fit follows points that move along their normals, [n, ...]: its free steps."""
-        design = found.design[:, FREE[self.kind]]
-        normal = np.linalg.pinv(design.T @ design, rcond=1e-13, hermitian=True)
-        return -normal @ (design.T @ moved_mm)
-
     def moved(self, step: Array) -> "Shape":
         """Give the shape after a step, [8], mm and rad, of its freedoms."""
         return replace(
@@ -95,11 +89,6 @@ class Shape:
             angle_rad=self.angle_rad + step[7],
         )
 
-    def posed(self, turn: Array, shift_mm: Array) -> "Shape":
-        """Give the shape after a turn, [3, 3], and a shift, [3]."""
-        centre = turn @ self.centre_mm + shift_mm
-        return replace(self, centre_mm=centre, frame=turn @ self.frame)
-
 
 def fit_shape(start: Shape, point_mm: Array) -> Shape:
     """Fit a shape to points, [n, 3], by least squares of their distances, from a near one."""
@@ -107,11 +96,13 @@ def fit_shape(start: Shape, point_mm: Array) -> Shape:
     for _ in range(STEPS):
         found = shape.respond(point_mm)
         step = np.zeros(FREEDOMS)
-        step[free] = shape.solve(found, found.distance_mm)
+        design = found.design[:, free]
+        normal = np.linalg.pinv(design.T @ design, rcond=1e-13, hermitian=True)
+        step[free] = -normal @ (design.T @ found.distance_mm)
         if not np.abs(step).max() < FAR:
             break
         shape = shape.moved(step)
-        if np.abs(found.design @ step).max() < STILL_MM:
+        if np.abs(design @ step[free]).max() < STILL_MM:
             break
     if shape.kind == "sphere":
         return shape
@@ -143,8 +134,10 @@ def find_features(mesh: PartMesh) -> tuple[Feature, ...]:
     """Find the shapes that the surface of a part consists of, the largest first in each kind.
 
     Equally large ones are in the order of their places, x before y before z. A surface that is none
-    of them, within `CLOSE` of its extent, is no feature.
+    of them, within `CLOSE` of its extent, is no feature; a mesh that is too large has none.
     """
+    if len(mesh.triangles) > MAX_FEATURE_TRIANGLES:
+        return ()
 
     def order(feature: Feature) -> tuple[float, ...]:
         place = np.round(feature.shape.centre_mm, 3) + 0.0  # −0 becomes 0
@@ -194,15 +187,12 @@ class _Surfaces:
         return connected_components(matrix, directed=False)[1]
 
     def _largest(self, label: Indices, chosen: NDArray[np.bool_]) -> list[Indices]:
-        """Part chosen triangles by their labels: the largest surfaces of them."""
-        area = np.bincount(label, self.area * chosen)
-        first = np.argsort(-area, kind="stable")[:MAX_FEATURES]
-        rank = np.full(len(area), len(first))
-        rank[first[area[first] > 0.0]] = np.arange(np.count_nonzero(area[first]))
-        place = np.where(chosen, rank[label], len(first))
-        ends = np.cumsum(np.bincount(place, minlength=len(first) + 1))
-        parts = np.split(np.argsort(place, kind="stable"), ends)[: len(first)]
-        return [part for part in parts if len(part)]
+        """Part chosen triangles by their labels: the largest surfaces of several triangles."""
+        part = np.flatnonzero(chosen)
+        part = part[np.argsort(label[part], kind="stable")]
+        parts = np.split(part, np.flatnonzero(np.diff(label[part])) + 1)
+        several = [one for one in parts if len(one) > 1]  # one is flat whatever the machine does
+        return sorted(several, key=lambda one: -self.area[one].sum())[:MAX_FEATURES]
 
     def _broad(self) -> NDArray[np.bool_]:
         """Tell which triangles lie in facets much larger than all that these run into."""
@@ -214,16 +204,10 @@ class _Surfaces:
         return (facet > BROAD * beside)[self.facet_of]
 
     def _classify(self, part: Indices) -> Feature | None:
-        """Take the first kind that fits; try it on some triangles first where there are many."""
-        few = part[:: 1 + len(part) // TRIED]
-        is_curved = len(np.unique(self.facet_of[few])) >= FACETS
-        for kind in FREE if is_curved else ("plane",):
-            found = self._fitted(self._start(kind, few), few)
-            if found and len(few) < len(part):
-                found = self._fitted(found.shape, part)
-            if found:
-                return found
-        return None
+        """Take the first kind that fits."""
+        is_curved = len(np.unique(self.facet_of[part])) >= FACETS
+        tried = (self._fitted(self._start(kind, part), part) for kind in FREE)
+        return next(filter(None, islice(tried, None if is_curved else 1)), None)
 
     def _start(self, kind: str, part: Indices) -> Shape:
         """Guess a shape from its triangles: their normals meet in its axis or its centre."""
@@ -262,7 +246,7 @@ class _Surfaces:
             off = turned * np.sign(area @ turned) < np.cos(np.deg2rad(most_deg))
             return bool(area @ off < ODD * area.sum())
 
-        if len(vertices) < LEAST_VERTICES or not is_alike(start, 2.0 * ALIKE_DEG):
+        if not is_alike(start, 2.0 * ALIKE_DEG):
             return None
         shape = fit_shape(start, points)
         residual = float(np.abs(shape.respond(points).distance_mm).max())

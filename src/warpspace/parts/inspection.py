@@ -5,29 +5,30 @@ all its vertices. The placed difference is split by error parameter: what each o
 measure by where all errors are half as large, so that the parts add up.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from warpspace.analysis.blocks import Column, Table, number_columns
-from warpspace.exceptions import SceneError
+from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.evaluate import amplitudes_of
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.parts.features import FREE, FREEDOMS, Feature, Shape, find_features, fit_shape
+from warpspace.parts.features import FREE, Feature, Shape, find_features, fit_shape
 from warpspace.parts.part import Made, PartMesh, fit_out, point_basis
 from warpspace.scene import schema
 from warpspace.scene.files import parse_toml, read_text
 from warpspace.scene.model import Scene, evaluate
-from warpspace.units import MM_PER_UM, UM_PER_MM, URAD_PER_RAD, Array, spell_signed
+from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array, spell_signed
 
 RIGHT_RAD = 1e-4  # a nominal angle this close to 90° or to 0 has a squareness or a parallelism
-STEP = 1e-6  # mm and rad by which shapes are moved to find what a measure depends on
+NUDGE = 0.01  # share of an error by which points are moved to find what it adds
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
-POINTS_AT_ONCE = 2_000_000  # times parameters: what a budget holds in memory
+KEYS_AT_ONCE = 8  # parameters whose responses of all points are in memory
 Shapes = Sequence[Shape]
 
 
@@ -51,12 +52,7 @@ def _angle(actual: Shapes, nominal: Shapes) -> float:
     planes = [one.kind, other.kind].count("plane")
     if planes == 1:
         return abs(np.pi / 2.0 - turn)
-    return np.pi - turn if planes or nominal[0].axis @ nominal[1].axis < -STEP else turn
-
-
-def _parallelism(actual: Shapes, nominal: Shapes) -> float:
-    angle = _angle(actual, nominal)
-    return min(angle, np.pi - angle)
+    return np.pi - turn if planes or nominal[0].axis @ nominal[1].axis < -RIGHT_RAD else turn
 
 
 def _position(actual: Shapes, nominal: Shapes) -> float:
@@ -102,7 +98,7 @@ KINDS: Mapping[str, Kind] = {
     "distance": Kind(_distance, [*FREE], (1, 1)),
     "angle": Kind(_angle, _LEANING, (1, 1), is_angle=True),
     "squareness": Kind(_angle, _LEANING, (1, 1), is_angle=True),
-    "parallelism": Kind(_parallelism, _LEANING, (1, 1), is_angle=True),
+    "parallelism": Kind(_angle, _LEANING, (1, 1), is_angle=True),
 }
 
 
@@ -129,22 +125,12 @@ class FeatureResult:
 def inspect(
     scene: Scene, mesh: PartMesh, made: Made, tolerances: str | Path | None = None
 ) -> tuple[FeatureResult, ...]:
-    """Measure the features of a part as the machine makes it.
+    """Measure the features of a part, in its own frame, and made at some place in a scene.
 
-    Parameters
-    ----------
-    scene : Scene
-    mesh : PartMesh
-        The part in its own frame: names of features do not depend on where it is clamped.
-    made : Made
-        Its vertices in the workpiece frame, as the machine makes them.
-    tolerances : str or Path, optional
-        TOML file that names features and says what they have to keep; SceneError says all that is
-        wrong with it.
+    Tolerances are a TOML file that names features and says what they have to keep; SceneError says
+    all that is wrong with it.
     """
     features = find_features(mesh)
-    pose = _pose(mesh.vertices_mm, made.point_mm)
-    nominal = [feature.shape.posed(*pose) for feature in features]
     names = [one.name for one in features]
     asked = {} if tolerances is None else _read(Path(tolerances), features, names)
     wanted = [
@@ -153,25 +139,27 @@ def inspect(
         for kind, row in KINDS.items()
         if feature.kind in row.features and not row.others[0]
     ]
+    gauge = _Gauge(
+        made.point_mm, features, _posed(features, mesh, made), [*wanted, *asked.values()]
+    )
     rest = fit_out(made.point_mm, made.error_um)
-
-    def state(moved_um: Array) -> _State:
-        points = made.point_mm + moved_um * MM_PER_UM
-        chosen = [points[feature.vertices] for feature in features]
-        return _State(nominal, [*map(fit_shape, nominal, chosen)], chosen)
-
-    states = [state(moved) for moved in (0.0 * rest, made.error_um, rest)]
-    if any(one.tolerance for one in (*wanted, *asked.values())):
+    values = [gauge.measure(moved) for moved in (0.0 * rest, made.error_um, rest)]
+    if any(one.tolerance for one in gauge.wanted):
         at = made.coordinates
         exact = evaluate(scene, at=at, loop=Loop.RELATIVE, frame="workpiece", exact=True)
-        states.append(state(fit_out(made.point_mm, exact.error_um)))
-    keys, responses = _responses(scene, made, features, middle := state(rest / 2.0))
+        values.append(gauge.measure(fit_out(made.point_mm, exact.error_um)))
+    keys = [key for key in scene.parameter_keys if scene.errors.amplitude(key) != 0.0]
+    parts: list[Array] = []
+    for some in (keys[first : first + KEYS_AT_ONCE] for first in range(0, len(keys), KEYS_AT_ONCE)):
+        moved = point_basis(scene, made, some).position
+        for amplitude, one in zip(amplitudes_of(scene.errors, some), moved, strict=True):
+            step = NUDGE * amplitude * fit_out(made.point_mm, one)
+            up, down = (gauge.measure(rest / 2.0 + way * step) for way in (1.0, -1.0))
+            parts.append((up - down) / (2.0 * NUDGE))
     measures: list[dict[str, Mapping[str, Any]]] = [{} for _ in features]
-    for one in (*wanted, *asked.values()):
-        slopes = zip(middle.slopes(one), (responses[at] for at in one.of), strict=True)
-        parts = sum((slope @ response for slope, response in slopes), np.zeros(len(keys)))
-        values = [each.measure(one) for each in states]
-        measures[one.of[0]][one.name] = _numbers(one, values, zip(keys, parts, strict=True))
+    for index, one in enumerate(gauge.wanted):
+        split = {key: float(part[index]) for key, part in zip(keys, parts, strict=True)}
+        measures[one.of[0]][one.name] = _numbers(one, [float(row[index]) for row in values], split)
     results: list[FeatureResult] = []
     for name, feature, found in zip(names, features, measures, strict=True):
         of = next((key for key, one in found.items() if "tolerance_um" in one), "position")
@@ -179,84 +167,57 @@ def inspect(
     return tuple(results)
 
 
-def _pose(own_mm: Array, placed_mm: Array) -> tuple[Array, Array]:
-    """Find the turn, [3, 3], and shift, [3], that have put vertices where they are."""
-    middle, there = own_mm.mean(axis=0), placed_mm.mean(axis=0)
-    first, _, second = np.linalg.svd((own_mm - middle).T @ (placed_mm - there))
+def _posed(features: Sequence[Feature], mesh: PartMesh, made: Made) -> list[Shape]:
+    """Give the shapes of features where the part has been put."""
+    middle, there = mesh.vertices_mm.mean(axis=0), made.point_mm.mean(axis=0)
+    first, _, second = np.linalg.svd((mesh.vertices_mm - middle).T @ (made.point_mm - there))
     turn = (first * [1.0, 1.0, np.sign(np.linalg.det(first @ second))] @ second).T
-    return turn, there - turn @ middle
+    return [
+        replace(
+            shape, centre_mm=turn @ (shape.centre_mm - middle) + there, frame=turn @ shape.frame
+        )
+        for shape in (feature.shape for feature in features)
+    ]
 
 
-class _State:
-    """The features of a part with some errors."""
+@dataclass(frozen=True)
+class _Gauge:
+    """Takes measures of a part whose points are moved."""
 
-    def __init__(self, nominal: Shapes, shapes: list[Shape], points_mm: Sequence[Array]) -> None:
-        self.nominal, self.shapes = nominal, shapes
-        self.found = [one.respond(points) for one, points in zip(shapes, points_mm, strict=True)]
+    point_mm: Array  # [V, 3], nominal
+    features: Sequence[Feature]
+    nominal: Shapes
+    wanted: Sequence[Wanted]
 
-    def measure(self, wanted: Wanted, index: int = 0, step: Array | None = None) -> float:
-        """Take a measure, mm or rad; with a step of one of its features."""
-        take = KINDS[wanted.kind].take
-        if take is None:
-            return float(np.ptp(self.found[wanted.of[0]].distance_mm))
-        chosen = [self.shapes[at] for at in wanted.of]
-        if step is not None:
-            chosen[index] = chosen[index].moved(step)
-        return take(chosen, [self.nominal[at] for at in wanted.of])
+    @cached_property
+    def still(self) -> list[Array]:
+        """How far the vertices of each feature are off it in the file: no error of the machine."""
+        both = zip(self.nominal, self.features, strict=True)
+        return [shape.respond(self.point_mm[one.vertices]).distance_mm for shape, one in both]
 
-    def slopes(self, wanted: Wanted) -> list[Array]:
-        """Give how a measure grows with the freedoms and the form of its features, [9] each."""
-        if KINDS[wanted.kind].take is None:
-            return [np.eye(FREEDOMS + 1)[FREEDOMS]]
-        steps = np.eye(FREEDOMS + 1, FREEDOMS) * STEP
-        rise = [
-            [self.measure(wanted, at, step) - self.measure(wanted, at, -step) for step in steps]
-            for at in range(len(wanted.of))
-        ]
-        return [np.array(one) / (2.0 * STEP) for one in rise]
-
-    def respond(self, index: int, moved_mm: Array) -> Array:
-        """Give how freedoms and form of a feature follow moves of its points, [K, n, 3]: [9, K]."""
-        shape, found = self.shapes[index], self.found[index]
-        along = np.einsum("nc,knc->nk", found.normal, moved_mm)
-        follows = np.zeros((FREEDOMS + 1, len(moved_mm)))
-        follows[:3] = shape.frame.T @ moved_mm.mean(axis=1).T  # the centre stays amid the points
-        follows[list(FREE[shape.kind])] = shape.solve(found, along)
-        ends = [int(found.distance_mm.argmax()), int(found.distance_mm.argmin())]
-        high, low = along[ends] + found.design[ends] @ follows[:FREEDOMS]
-        follows[FREEDOMS] = high - low
-        return follows
+    def measure(self, moved_um: Array) -> Array:
+        """Take all measures, [m], µm or µrad, where points are moved by [V, 3]."""
+        points, shapes, forms = self.point_mm + moved_um * MM_PER_UM, list[Shape](), list[float]()
+        for feature, shape, still in zip(self.features, self.nominal, self.still, strict=True):
+            shapes.append(fit_shape(shape, points[feature.vertices]))
+            away = shapes[-1].respond(points[feature.vertices]).distance_mm
+            forms.append(float(np.ptp(away - still)))
+        found = np.empty(len(self.wanted))
+        for index, (name, of, *_) in enumerate(self.wanted):
+            kind, chosen = KINDS[name], ([both[at] for at in of] for both in (shapes, self.nominal))
+            value = kind.take(*chosen) if kind.take else forms[of[0]]
+            found[index] = value * (URAD_PER_RAD if kind.is_angle else UM_PER_MM)
+        return found
 
 
-def _responses(
-    scene: Scene, made: Made, features: Sequence[Feature], middle: _State
-) -> tuple[list[str], list[Array]]:
-    """Give what parameters add, placed, to the freedoms and forms of features, [9, K] each, mm."""
-    keys = [key for key in scene.parameter_keys if scene.errors.amplitude(key) != 0.0]
-    amplitudes = amplitudes_of(scene.errors, keys)[:, None, None] * MM_PER_UM
-    responses = [np.zeros((FREEDOMS + 1, len(keys))) for _ in features]
-    count = max(1, POINTS_AT_ONCE // len(made.point_mm))
-    for some in (slice(first, first + count) for first in range(0, len(keys), count)):
-        moved = point_basis(scene, made, keys[some]).position * amplitudes[some]
-        moved = fit_out(made.point_mm, moved)
-        for at, feature in enumerate(features):
-            responses[at][:, some] = middle.respond(at, moved[:, feature.vertices])
-    return keys, responses
-
-
-def _numbers(
-    wanted: Wanted, values: Sequence[float], parts: Iterable[tuple[str, float]]
-) -> dict[str, Any]:
-    """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, mm or rad."""
+def _numbers(wanted: Wanted, values: Sequence[float], split: Mapping[str, float]) -> dict[str, Any]:
+    """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad."""
     is_angle = KINDS[wanted.kind].is_angle
     large, small = ("deg", "urad") if is_angle else ("mm", "um")
-    per = URAD_PER_RAD if is_angle else UM_PER_MM
-    difference, placed, *exact = ((value - values[0]) * per for value in values[1:])
-    split = sorted(((key, float(part) * per) for key, part in parts), key=lambda one: -abs(one[1]))
-    found: dict[str, Any] = {
-        f"{name}_{large}": float(np.rad2deg(value) if is_angle else value)
-        for name, value in zip(("nominal", "actual", "placed"), values, strict=False)
-    }
+    per = np.rad2deg(RAD_PER_URAD) if is_angle else MM_PER_UM
+    difference, placed, *exact = (value - values[0] for value in values[1:])
+    names = ("nominal", "actual", "placed")
+    found: dict[str, Any] = {f"{a}_{large}": v * per for a, v in zip(names, values, strict=False)}
     found |= {f"difference_{small}": difference, f"placed_difference_{small}": placed}
     if wanted.tolerance is not None:
         low, high = wanted.tolerance
@@ -264,7 +225,7 @@ def _numbers(
         verdict = "in doubt" if abs(beyond) < doubt else "missed" if beyond > 0.0 else "kept"
         found |= {f"tolerance_{small}": wanted.tolerance, f"doubt_{small}": doubt}
         found["verdict"] = verdict
-    return found | {"budget": dict(split)}
+    return found | {"budget": dict(sorted(split.items(), key=lambda pair: -abs(pair[1])))}
 
 
 def _read(
@@ -279,10 +240,12 @@ def _read(
     for index, entry in enumerate(entries):
         where, name, chosen = f"features[{index}]", entry["name"], [entry["is"], *entry["to"]]
         if entry["near"] is not None:
-            place = np.array(entry["near"])
-            alike = [one for one in features if one.kind == entry["is"]]
-            away = [float(np.linalg.norm(one.shape.centre_mm - place)) for one in alike]
-            chosen[0] = alike[int(np.argmin(away))].name if alike else entry["is"]
+            away = {
+                float(np.linalg.norm(one.shape.centre_mm - entry["near"])): one.name
+                for one in features
+                if one.kind == entry["is"]
+            }
+            chosen[0] = away[min(away)] if away else entry["is"]
         problems.only(where, chosen, known, "feature")
         of = tuple(known[one] for one in chosen if one in known)
         if len(of) < len(chosen):
@@ -303,22 +266,24 @@ def _read(
 
 def _wrong(entry: Mapping[str, Any], shapes: Shapes) -> str:
     """Say why features do not have the measure of an entry; nothing where they do."""
-    if entry["measure"] not in KINDS:
-        is_named = not (entry["to"] or entry["tolerance_um"] or entry["tolerance_urad"])
-        return "" if is_named else "expected a measure"
-    name, kind = entry["measure"], KINDS[entry["measure"]]
-    other = "tolerance_um" if kind.is_angle else "tolerance_urad"
-    if entry[other] is not None:
-        return f"{other} of {name}; expected tolerance_{'urad' if kind.is_angle else 'um'}"
-    if not kind.others[0] <= len(shapes) - 1 <= kind.others[1]:
-        return f"{name} to {len(shapes) - 1} features; expected {kind.others[1]}"
-    strange = [one.kind for one in (shapes if kind.others[0] else shapes[:1])]
-    strange = [one for one in strange if one not in kind.features]
-    if strange:
-        return f"{name} of a {strange[0]}; expected a {' or a '.join(kind.features)}"
+    name, count = entry["measure"], len(shapes) - 1
+    if not name:
+        has_more = count or entry["tolerance_um"] or entry["tolerance_urad"]
+        return "expected a measure" if has_more else ""
+    if name not in KINDS:
+        return f"unknown measure {name!r}{near_miss(name, KINDS)}"
+    kind = KINDS[name]
+    unit, other = ("urad", "um") if kind.is_angle else ("um", "urad")
+    if entry[f"tolerance_{other}"] is not None:
+        return f"tolerance_{other} of {name}; expected tolerance_{unit}"
+    if not kind.others[0] <= count <= kind.others[1]:
+        return f"{name} to {count} features; expected {kind.others[1]}"
+    for one in shapes if kind.others[0] else shapes[:1]:
+        if one.kind not in kind.features:
+            return f"{name} of a {one.kind}; expected a {' or a '.join(kind.features)}"
     if name in ("squareness", "parallelism"):
-        angle = _parallelism(shapes, shapes)
-        if abs(angle - np.pi / 2.0 * (name == "squareness")) > RIGHT_RAD:
+        angle = _angle(shapes, shapes)
+        if abs((np.cos if name == "squareness" else np.sin)(angle)) > RIGHT_RAD:
             return f"{name} at a nominal angle of {np.rad2deg(angle):.4g}°; expected angle"
     return ""
 
@@ -328,29 +293,24 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
     rows: list[tuple[Any, ...]] = []
     for result in results:
         for name, one in result.measures.items():
-            large, small = ("deg", "urad") if "nominal_deg" in one else ("mm", "um")
+            is_angle = "nominal_deg" in one
+            large, small = ("deg", "urad") if is_angle else ("mm", "um")
             most = [*one["budget"].items()][:3]
+            words = f"{result.name} · {name.replace('_', ' ')}"
             rows.append((
-                result.name,
-                name.replace("_", " "),
-                one[f"nominal_{large}"],
-                "°" if large == "deg" else large,
-                one[f"difference_{small}"],
-                one[f"placed_difference_{small}"],
-                "µrad" if small == "urad" else "µm",
+                f"{words} [{'°, µrad' if is_angle else 'mm, µm'}]",
+                *(one[f"{key}_{large}"] for key in ("nominal", "placed")),
+                *(one[f"{key}_{small}"] for key in ("difference", "placed_difference")),
                 " … ".join(map(spell_signed, one.get(f"tolerance_{small}", ()))),
                 one.get("verdict", ""),
                 ", ".join(f"{key} {spell_signed(part)}" for key, part in most),
             ))  # fmt: skip
     columns = (
-        Column("feature", key="feature", leads=True),
-        Column("measure", key="measure", leads=True),
-        Column("nominal", ".4f", key="nominal"),
-        Column(key="nominal_unit", joins=True),
-        *number_columns(("in the\nmachine", "placed"), "+.2f", keys=("difference", "placed")),
-        Column(key="unit", joins=True),
+        Column("measure", key="measure", leads=True, wraps=True),
+        *number_columns(("nominal", "placed"), ".4f", keys=("nominal", "actual_placed")),
+        *number_columns(("deviation", "placed"), "+.2f", keys=("deviation", "placed")),
         Column("tolerance", key="tolerance"),
         Column("verdict", key="verdict"),
         Column("most of it", key="most_of_it", wraps=True),
     )
-    return Table(columns, rows, empty="no plane, cylinder, cone or sphere was found")
+    return Table(columns, rows, empty=f"no {', '.join(FREE)} was found")

@@ -190,10 +190,6 @@ class Section:
         return self.build(**found)
 
 
-FEATURE_MEASURES = (
-    "flatness", "cylindricity", "conicity", "sphericity", "diameter", "half_angle", "position",
-    "tilt", "distance", "angle", "squareness", "parallelism",
-)  # fmt: skip
 LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
 LENGTH = _number(*LIMIT)
 POINT = _numbers("[x, y, z]", *[limits.MAX_LENGTH_MM] * 3)
@@ -317,22 +313,22 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
 
 def _names(reader: ValueReader, value: Any, path: Path) -> tuple[str, ...]:
     if isinstance(value, str):
-        return (reader.text(value, path, limits.MAX_NAME),)
-    return _list(_text(limits.MAX_NAME, 1), 6, 1)(reader, value, path)
+        return (reader.text(value, path, 100),)
+    return _list(_text(100, 1), 6, 1)(reader, value, path)
 
 
 _FEATURE = Section(
     {
-        "name": (_text(limits.MAX_NAME, 1, *_PLAIN), ""),
-        "is": (_text(limits.MAX_NAME, 1), MISSING),
+        "name": (_text(100, 1, *_PLAIN), ""),
+        "is": (_text(100, 1), MISSING),
         "near": (POINT, None),
-        "measure": (_one_of(FEATURE_MEASURES), ""),
+        "measure": (_text(100), ""),
         "to": (_names, ()),
         "tolerance_um": (_band, None),
         "tolerance_urad": (_band, None),
     }
 )
-FEATURES = Section({"features": (_list(_FEATURE, limits.MAX_FEATURE_ROWS, 1), MISSING)})
+FEATURES = Section({"features": (_list(_FEATURE, limits.MAX_TOLERANCES, 1), MISSING)})
 
 
 def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:
