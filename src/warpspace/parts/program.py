@@ -4,7 +4,7 @@ Lengths of errors are weighed by the way: mean, RMS and P95 do not depend on whe
 Geometry only: no forces, heat, wear or servo.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, Result, Watch, plain
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Summary
 from warpspace.bench.placing import ball_point, follow, within_travel
@@ -28,7 +28,7 @@ from warpspace.machine.description import Axis
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
 from warpspace.parts.control import Frame, ReadProgram, Setup, read_program, with_length
 from warpspace.parts.part import Deviation
-from warpspace.parts.words import Refused, program_lines
+from warpspace.parts.words import program_lines
 from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.units import Array
 
@@ -216,16 +216,12 @@ class Program(Setup, Analysis):
         mean, rms, p95, largest = astuple(path.summary(norm))
         x, y, z = path.tip_mm[int(np.argmax(norm))].tolist()
         return ProgramResult(
-            moving=read.blocks,
-            length_mm=float(path.way_mm[-1]),
-            outside=int(path.outside.sum()),
-            refused=read.refused,
+            read=read,
+            path=path,
             deviation=Deviation(mean, rms, p95, largest, (x, y, z)),
             across=path.summary(np.linalg.norm(path.across_um, axis=1)),
             worst=_split(scene, path, block[np.argsort(-norm[block], kind="stable")][:WORST]),
             line=None if self.at_line is None else _end_of(path, self.at_line),
-            unknown=read.unknown,
-            path=path,
             of_lines=block,
             title=scene.title,
             second_order=second_order(scene, Loop.RELATIVE),
@@ -274,38 +270,39 @@ def _most(budget: Mapping[str, float]) -> str:
 class ProgramResult(Result):
     """The path of a program, and its worst blocks."""
 
-    keys = ("length_mm", "outside", "refused", "deviation", "across", "worst", "line")
-    moving: int  # blocks that move
-    length_mm: float  # of the nominal path of the tool, in the workpiece frame
-    outside: int  # samples beyond the travel
-    refused: tuple[Refused, ...]
+    read: ReadProgram
+    path: ToolPath
     deviation: Deviation
     across: Summary
     worst: tuple[WorstBlock, ...]
     line: Mapping[str, Any] | None  # axes and error at the end of the line asked for
-    unknown: Mapping[str, int]
-    path: ToolPath
     of_lines: NDArray[np.int64]  # the worst sample of each line
     title: str
 
     def as_plain(self) -> dict[str, Any]:
-        said = {"blocks": self.moving} | super().as_plain()
-        return {key: said[key] for key in said if key != "line" or self.line}
+        said = {
+            "blocks": self.read.blocks,
+            "length_mm": self.path.way_mm[-1],
+            "outside": self.path.outside.sum(),
+            "refused": self.read.refused,
+            "deviation": self.deviation,
+            "across": self.across,
+            "worst": self.worst,
+        }
+        return plain(said | ({"line": self.line} if self.line else {}))
 
     def doubts(self) -> Iterator[str]:
-        if self.refused:
-            said = ", ".join(f"line {one.line} {one.word}" for one in self.refused[:SAID])
-            yield f"refused: {said}; the path ends before line {self.refused[0].line}"
-        if self.unknown:
-            said = ", ".join(f"{word} (line {line})" for word, line in self.unknown.items())
-            yield f"not followed: {said}"
-        if self.outside:
-            yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
-        if not self.moving:
+        if refused := [f"line {one.line} {one.word}" for one in self.read.refused[:SAID]]:
+            yield f"refused: {', '.join(refused)}; the path ends before the first of them"
+        if unknown := [f"{word} (line {line})" for word, line in self.read.unknown.items()]:
+            yield f"not followed: {', '.join(unknown[:SAID])}"
+        if outside := self.path.outside.sum():
+            yield f"{outside} of {len(self.path.line)} points are beyond the travel"
+        if not self.read.blocks:
             yield "no block moves an axis: the errors are those where the axes stand"
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.title} · {self.moving} blocks, {self.length_mm:.1f} mm"
+        yield f"{self.title} · {self.read.blocks} blocks, {self.path.way_mm[-1]:.1f} mm"
         yield "  relative error in the workpiece frame"
         yield "  Geometry only: no forces, heat, wear or servo"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
@@ -315,8 +312,19 @@ class ProgramResult(Result):
         if self.line:
             said = ", ".join(f"{value:.2f}" for value in self.line["error_um"])
             yield f"{place_words(self.line['axes'])}: x, y, z {said} µm"
-        path, norm = self.path, np.linalg.norm(self.path.error_um, axis=1)
-        across = np.linalg.norm(path.across_um, axis=1)
+        lines = self.path.line[self.of_lines]
+        samples = self.of_lines[np.searchsorted(lines, [one.line for one in self.worst])]
+        yield self.table(samples, [one.budget for one in self.worst])
+
+    def file_table(self) -> Table:
+        return self.table(self.of_lines, [None] * len(self.of_lines))
+
+    def table(
+        self, samples: NDArray[np.int64], budgets: Sequence[Mapping[str, float] | None]
+    ) -> Table:
+        """Give the places of samples, their errors and, unless it is for a file, whose they are."""
+        path = self.path
+        both = (np.linalg.norm(error, axis=1) for error in (path.error_um, path.across_um))
         places = *path.coordinates.values(), *path.tip_mm.T, *path.error_um.T, path.outside
         hidden = [f"{name}_{'mm' if is_linear(name) else 'deg'}" for name in path.coordinates]
         hidden += ["x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um", "outside"]
@@ -326,8 +334,6 @@ class ProgramResult(Result):
             *(Column(key=key, shows=False) for key in hidden),
             Column("most of it", _most, "µm"),
         )
-        numbers = np.column_stack([norm, across, *places])[self.of_lines].tolist()
-        lines = path.line[self.of_lines].tolist()
-        told = {line: [line, *row, ""] for line, row in zip(lines, numbers, strict=True)}
-        worst = [[*told[one.line][:-1], one.budget] for one in self.worst]
-        yield Table(columns, worst, "Worst blocks", file_rows=[*told.values()])
+        numbers = np.column_stack([values[samples] for values in (*both, *places)]).tolist()
+        told = zip(path.line[samples].tolist(), numbers, budgets, strict=True)
+        return Table(columns, [[line, *row, budget] for line, row, budget in told], "Worst blocks")
