@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from warpspace.analysis.options import Grammar, option, read_numbers
 from warpspace.bench.placing import ball_point, follow, following_axes
 from warpspace.kinematics.model import Model, complete_coordinates
-from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM
+from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM, MAX_PATH_POINTS
 from warpspace.parts.words import Block, Reader, Refused
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -201,6 +201,8 @@ class _Control:
 
     def run(self, block: Block) -> None:
         self.block, words, once = block, block.numbers, ""
+        if len(self.rows) > MAX_PATH_POINTS * (8 + len(self.names)):
+            block.refuse(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
         for code in block.codes:
             if code in _MODAL:
                 setattr(self, *_MODAL[code])

@@ -33,6 +33,7 @@ REFUSED = {"M96", "M97", "M98", "M99"} | _codes(
 )
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
 MOST_SAID = 1000  # refused and unknown words that are listed
+MOST_DIGITS = 30  # characters of a number
 SHOWN = 40  # characters of a word that a message shows
 
 
@@ -111,6 +112,8 @@ class Reader:
                 self.unknown.setdefault(code, block.line)
         elif letter in block.numbers and not self.refused:
             block.refuse(f"{letter}{number}; expected {letter} once in a line")
+        elif len(number) > MOST_DIGITS:
+            block.refuse(f"{letter}{number[:SHOWN]}…; expected at most {MOST_DIGITS} characters")
         else:
             block.numbers[letter] = float(number)
             if letter in {"E", "L"}:
