@@ -10,7 +10,7 @@ from app.parts import LIVE
 from warpspace.app.documents.legend import GEOMETRY_ONLY, part_words
 from warpspace.app.documents.scene_file import open_link, state_to_link
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.part import clamped_scene, place_of, placed_part, turned_place
+from warpspace.app.evaluation.part import clamped_part, clamped_scene, place_of, turned_place
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
@@ -42,20 +42,20 @@ def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> No
     assert found is not None
     scene = clamped_scene(replace(state, scene=state.active_scene()))
     made = make_points(scene, place_part(MESH, scene, state.part.place).vertices_mm)
-    back = np.linalg.inv(found.placed.workpiece)
+    back = np.linalg.inv(found.clamped.points.pose)
     np.testing.assert_allclose(found.error_um @ back[:3, :3].T, made.error_um, atol=1e-4)
     np.testing.assert_allclose(
-        transforms.apply(back, found.placed.nominal_mm), made.point_mm, atol=1e-3
+        transforms.apply(back, found.clamped.points.nominal_mm), made.point_mm, atol=1e-3
     )
     drawn = found.drawn_mm(1.0) - found.drawn_mm(0.0)
-    at = found.placed.mesh.corners.corner_of
+    at = found.clamped.mesh.corners.corner_of
     np.testing.assert_allclose(drawn, 1e-3 * found.error_um[at], atol=1e-4)
 
 
 def test_a_part_in_the_middle_stands_in_the_middle_of_the_box() -> None:
     picture = LIVE.evaluate(STATE)
     assert picture.part is not None
-    middle = picture.part.placed.nominal_mm
+    middle = picture.part.clamped.points.nominal_mm
     middle = (middle.min(axis=0) + middle.max(axis=0)) / 2.0
     np.testing.assert_allclose(middle, picture.grid.bounds_mm.mean(axis=0), atol=1e-3)
 
@@ -70,16 +70,16 @@ def test_the_change_of_a_part_is_b_less_a() -> None:
 
 
 def test_turns_keep_the_middle_and_add_up() -> None:
-    placed = placed_part(STATE)
+    placed = clamped_part(STATE)
     assert placed is not None
     for axis in "xyz":
         state = STATE
         for _ in range(4):
-            one = placed_part(state)
+            one = clamped_part(state)
             assert one is not None
             place = turned_place(one, axis, 90.0)
             state = replace(state, part=replace(state.part, place=place))
-            again = placed_part(state)
+            again = clamped_part(state)
             assert again is not None
             np.testing.assert_allclose(
                 transforms.apply(again.pose, again.middle_mm),

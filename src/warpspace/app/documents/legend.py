@@ -114,7 +114,11 @@ def part_words(picture: LivePicture) -> str:
     found = picture.part
     if found is None:
         return ""
-    most, normal, outside = found.norm_um.max(), found.normal_um, int(found.placed.outside.sum())
+    most, normal, outside = (
+        found.norm_um.max(),
+        found.normal_um,
+        int(found.clamped.points.outside.sum()),
+    )
     change = "changes " if picture.is_difference else ""
     said = [
         f"Part {picture.state.part.name} {change}up to {number(float(most))} µm",

@@ -22,7 +22,7 @@ from warpspace.app.drawing.shapes import (
     lines,
 )
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.part import PartPicture, Placed, place_of
+from warpspace.app.evaluation.part import Clamped, PartPicture, place_of
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfTemplate
 from warpspace.kinematics import transforms
@@ -50,7 +50,7 @@ class PartLayer:
             return
         scale = picture.part_scale
         held = None if part is None else (
-            Identity(part.placed), scale.diverging, picture.state.shown.dark, picture.size_mm,
+            Identity(part.clamped), scale.diverging, picture.state.shown.dark, picture.size_mm,
             picture.state.part.moved,
         )  # fmt: skip
         if part is None or held != self._held:
@@ -78,8 +78,8 @@ class PartLayer:
         points, levels = _drawn(picture, part)
         palette = level_colours(diverging=picture.part_scale.diverging)
         self._nodes.draw(shapes(picture, part, points, palette[levels]))
-        edges = packed(part.placed.edges.astype("<u4"))
-        lifts = packed(np.zeros((2 * len(part.placed.edges), 3), "<f4"))
+        edges = packed(part.clamped.edges.astype("<u4"))
+        lifts = packed(np.zeros((2 * len(part.clamped.edges), 3), "<f4"))
         facts = {"surface": SURFACE, "count": len(points), "palette": packed(palette),
                  "lines": {EDGES: (edges, lifts)}}  # fmt: skip
         self._run(f"open({json.dumps(facts)})")
@@ -102,9 +102,9 @@ class PartLayer:
                 if event.phase == "end":
                     self._take()
 
-        at = transforms.apply(part.placed.pose, part.placed.middle_mm)
+        at = transforms.apply(part.clamped.pose, part.clamped.middle_mm)
         self._gizmo.position = at * SCENE_PER_MM
-        turn = part.placed.pose[:3, :3]
+        turn = part.clamped.pose[:3, :3]
         self._gizmo.wxyz = quaternions.SO3.from_matrix(turn).wxyz
         self._gizmo.visible = True
 
@@ -115,8 +115,8 @@ class PartLayer:
             return
         turn: Array = quaternions.SO3(np.asarray(gizmo.wxyz)).as_matrix().astype(float)
         at = np.asarray(gizmo.position) / SCENE_PER_MM
-        drawn = transforms.rigid(turn, at) @ transforms.translation(-part.placed.middle_mm)
-        place = place_of(transforms.inverse(part.placed.workpiece) @ drawn)
+        drawn = transforms.rigid(turn, at) @ transforms.translation(-part.clamped.middle_mm)
+        place = place_of(transforms.inverse(part.clamped.points.pose) @ drawn)
         self._moved(",".join(map(repr, place)))
 
 
@@ -128,13 +128,13 @@ def _drawn(picture: LivePicture, part: PartPicture) -> tuple[Array, Any]:
 
 def shapes(picture: LivePicture, part: PartPicture, points: Array, colours: Floats) -> Shapes:
     """Draw a part as cut, its creases, those of the nominal one, and what is out of reach."""
-    placed = part.placed
-    nominal = placed.nominal_mm[placed.mesh.corners.corner_of[placed.edges]]
-    away = placed.nominal_mm[placed.outside]
+    clamped = part.clamped
+    nominal = clamped.points.nominal_mm[clamped.mesh.corners.corner_of[clamped.edges]]
+    away = clamped.points.nominal_mm[clamped.points.outside]
     found: dict[str, Shape | None] = {
-        SURFACE: Shape("add_glb", UNLIT, {"glb_data": _template(Identity(placed))
+        SURFACE: Shape("add_glb", UNLIT, {"glb_data": _template(Identity(clamped))
                                           .fill(points, colours)}),
-        EDGES: lines(points[placed.edges], colour(picture, "edge"), 1.4),
+        EDGES: lines(points[clamped.edges], colour(picture, "edge"), 1.4),
         "/part/outside": dots(away[:: 1 + len(away) // MOST_OUTSIDE],
                               OUTSIDE_SIZE * picture.size_mm, OUTSIDE),
     }  # fmt: skip
@@ -142,16 +142,16 @@ def shapes(picture: LivePicture, part: PartPicture, points: Array, colours: Floa
         ghost = colour(picture, "ghost")
         found["/part/nominal"] = lines(nominal, ghost, 1.2)
         if picture.state.part.moved:  # goes with what is dragged, before the part follows
-            found[f"{GIZMO}/nominal"] = lines(_own(placed, nominal), ghost, 1.2)
+            found[f"{GIZMO}/nominal"] = lines(_own(clamped, nominal), ghost, 1.2)
     return found
 
 
-def _own(placed: Placed, points_mm: Array) -> Array:
+def _own(clamped: Clamped, points_mm: Array) -> Array:
     """Give points seen from the middle of the part, along its own axes."""
-    return transforms.apply(transforms.inverse(placed.pose), points_mm) - placed.middle_mm
+    return transforms.apply(transforms.inverse(clamped.pose), points_mm) - clamped.middle_mm
 
 
 @lru_cache(maxsize=4)
-def _template(placed: Identity) -> GltfTemplate:
-    found = placed.thing.mesh.corners
+def _template(clamped: Identity) -> GltfTemplate:
+    found = clamped.thing.mesh.corners
     return GltfTemplate("part", found.triangles, len(found.corner_of))

@@ -1,6 +1,6 @@
 """The part in the box: responses of its vertices are kept, a slider move is a product."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -12,17 +12,18 @@ from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.field.evaluate import build_basis
 from warpspace.formats.compensation.controller import Corrected
 from warpspace.geometry.colour import component_values
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.parts.part import PartMesh, find_place, make_points, place_part, point_basis
+from warpspace.parts.part import PartMesh, find_place, make_points, place_part
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
 CACHE_BYTES = 300_000_000
-MOST_VERTICES = 300_000  # of a part that the app draws
+MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app draws
 PIECE = 20_000  # vertices that are worked on at once: what lies between needs memory, too
 MOST_EDGES = 60_000  # of the creases of a part: those of a rough scan are left out
 STEEP = 1e-9  # cosine of a turn about y below which those about x and z are one
@@ -31,18 +32,69 @@ Floats: TypeAlias = NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Placed:
-    """A part where it is clamped, and what a unit of each amplitude does to it; as drawn, in R."""
+class Points:
+    """Points of the workpiece as they are drawn, in R, and what errors do to them."""
 
+    nominal_mm: Floats  # [n, 3]
+    response: Floats  # [K, n * 3], µm per µm or µrad
+    coordinates: dict[str, Array]  # [n] each: where the axes stand
+    own_mm: Array  # [n, 3]; in the workpiece frame
+    pose: Array  # [4, 4]; of the workpiece frame as drawn
+    outside: NDArray[np.bool_]  # [n]; beyond the travel
+
+    def error_um(self, state: AppState) -> Floats:
+        """Evaluate them to first order, or what a table of compensation leaves, [n, 3]."""
+        controller, scene, at = state.controller, state.active_scene(), self.coordinates
+        if controller is None:
+            amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
+            return (amplitudes @ self.response).reshape(-1, 3)
+        here = branch_pose(scene.model, "workpiece", at)
+        point = transforms.apply(here, self.own_mm)
+        kept = _CORRECTED.get(
+            (Identity(controller), Identity(self)),
+            lambda: controller.at(at, point, scene, Loop.RELATIVE, point),
+            lambda found: found.nbytes,
+        )
+        turn = self.pose[:3, :3] @ np.swapaxes(here[..., :3, :3], -1, -2)
+        return transforms.rotate(turn, kept.field(scene.errors).error_um).astype(np.float32)
+
+
+_CORRECTED: Cache[Corrected] = Cache(CACHE_BYTES // 2)
+
+
+def respond(
+    scene: Scene, own_mm: Array, coordinates: Mapping[str, Array], outside: NDArray[np.bool_]
+) -> Points:
+    """Work out what does not depend on errors, of points of the workpiece frame, [n, 3]."""
+    count, keys = len(own_mm), scene.parameter_keys
+    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+    pose = np.asarray(branch_pose(scene.model, "workpiece", stand))
+    at = {name: np.broadcast_to(values, count) for name, values in coordinates.items()}
+    response = np.empty((len(keys), count, 3), np.float32)
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    for start in range(0, count, PIECE):
+        rows = slice(start, start + PIECE)
+        here = {name: values[rows] for name, values in at.items()}
+        point = transforms.apply(branch_pose(scene.model, "workpiece", here), own_mm[rows])
+        basis = build_basis(scene.model, scene.errors, keys, here, view, point)
+        response[:, rows] = basis.position @ pose[:3, :3].T
+    nominal = transforms.apply(pose, own_mm).astype(np.float32)
+    return Points(nominal, response.reshape(len(keys), -1), at, own_mm, pose, outside)
+
+
+@dataclass(frozen=True, eq=False)
+class Clamped:
+    """A part where it is clamped."""
+
+    points: Points  # its vertices, [V]
     mesh: PartMesh  # in the workpiece frame
     middle_mm: Array  # [3]; of the box of the part, in its own frame
     pose: Array  # [4, 4]; takes the part's own frame to where it is drawn
-    workpiece: Array  # [4, 4]; likewise the workpiece frame
-    nominal_mm: Floats  # [V, 3]
-    normals: Floats  # [W, 3], of the corners
-    response: Floats  # [K, V * 3], µm per µm or µrad
-    coordinates: dict[str, Array]  # [V] each: where the axes stand
-    outside: NDArray[np.bool_]  # [V]
+
+    @cached_property
+    def normals(self) -> Floats:
+        """Unit normals of the corners as drawn, [W, 3]."""
+        return (self.mesh.corners.normals @ self.points.pose[:3, :3].T).astype(np.float32)
 
     @cached_property
     def edges(self) -> NDArray[np.int32]:
@@ -52,8 +104,8 @@ class Placed:
         ends = np.sort(pairs, axis=1).astype(np.int64) @ [len(found.corner_of), 1]
         _, first, count = np.unique(ends, return_index=True, return_counts=True)
         rims = pairs[first[count == 1]]  # of two smooth faces that meet, one each
-        ends = np.sort(found.corner_of[rims], axis=1).astype(np.int64) @ [len(self.nominal_mm), 1]
-        rims = rims[np.unique(ends, return_index=True)[1]]
+        ends = np.sort(found.corner_of[rims], axis=1).astype(np.int64)
+        rims = rims[np.unique(ends @ [len(self.mesh.vertices_mm), 1], return_index=True)[1]]
         return rims[: len(rims) * (len(rims) <= MOST_EDGES)]
 
 
@@ -61,35 +113,34 @@ class Placed:
 class PartPicture:
     """A part with the errors of a state."""
 
-    placed: Placed
+    clamped: Clamped
     error_um: Floats  # [V, 3]; of the tool against the workpiece, in R as drawn
-
-    @cached_property
-    def norm_um(self) -> Floats:
-        return component_values(self.error_um, "norm").astype(np.float32)
 
     @cached_property
     def normal_um(self) -> Floats:
         """Deviation along the normal of each corner, [W]."""
-        at = self.placed.mesh.corners.corner_of
-        return np.einsum("ij,ij->i", self.error_um[at], self.placed.normals)
+        at = self.clamped.mesh.corners.corner_of
+        return np.einsum("ij,ij->i", self.error_um[at], self.clamped.normals)
 
-    def values(self, component: str, *, normal: bool) -> Array:
+    @cached_property
+    def norm_um(self) -> Floats:
+        return component_values(self.error_um, "norm")
+
+    def values(self, component: str, *, normal: bool) -> Floats:
         """Give what is coloured at each corner, [W], µm."""
         if normal:
             return self.normal_um
-        norm = component == "norm"
-        found = self.norm_um if norm else component_values(self.error_um, component)
-        return found[self.placed.mesh.corners.corner_of]
+        is_norm = component == "norm"
+        found = self.norm_um if is_norm else component_values(self.error_um, component)
+        return found[self.clamped.mesh.corners.corner_of]
 
     def drawn_mm(self, exaggeration: float) -> Floats:
         """Give the corners of the part as cut, [W, 3], exaggerated."""
-        drawn = self.placed.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
-        return drawn[self.placed.mesh.corners.corner_of]
+        moved = np.float32(exaggeration * MM_PER_UM) * self.error_um
+        return (self.clamped.points.nominal_mm + moved)[self.clamped.mesh.corners.corner_of]
 
 
-_KEPT: Cache[Placed] = Cache(CACHE_BYTES)
-_CORRECTED: Cache[Corrected] = Cache(CACHE_BYTES // 2)
+_KEPT: Cache[Clamped] = Cache(CACHE_BYTES)
 
 
 def clamped_scene(state: AppState) -> Scene:
@@ -98,7 +149,7 @@ def clamped_scene(state: AppState) -> Scene:
     return replace(state.scene, workspace=workspace, placed=state.placed)
 
 
-def placed_part(state: AppState) -> Placed | None:
+def clamped_part(state: AppState) -> Clamped | None:
     """Give the part that a state holds, where it is clamped; None where it holds none.
 
     Raises
@@ -109,47 +160,26 @@ def placed_part(state: AppState) -> Placed | None:
     mesh, place = state.part.mesh, state.part.place
     if mesh is None:
         return None
-    key = (Identity(state.scene), tuple(state.positions.items()), state.placed, Identity(mesh),
-           place)  # fmt: skip
-    return _KEPT.get(
-        key,
-        lambda: _place(clamped_scene(state), mesh, place),
-        lambda found: found.response.nbytes,
-    )
+
+    def clamp() -> Clamped:
+        count, scene = len(mesh.vertices_mm), clamped_scene(state)
+        if count > MOST_POINTS:
+            raise OptionError(
+                f"{mesh.name} has {count:,} vertices; expected at most {MOST_POINTS:,} in the app"
+            )
+        at = find_place(mesh, scene, place)
+        part = place_part(mesh, scene, at)
+        made = make_points(scene, part.vertices_mm)
+        points = respond(scene, made.point_mm, made.coordinates, made.outside)
+        middle = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
+        return Clamped(points, part, middle, points.pose @ transforms.placed(at[:3], at[3:]))
+
+    key = (*_held(state), Identity(mesh), place)
+    return _KEPT.get(key, clamp, lambda found: found.points.response.nbytes)
 
 
-def _place(scene: Scene, mesh: PartMesh, place: Sequence[float] | None) -> Placed:
-    count = len(mesh.vertices_mm)
-    if count > MOST_VERTICES:
-        raise OptionError(
-            f"{mesh.name} has {count:,} vertices; expected at most {MOST_VERTICES:,} in the app"
-        )
-    at = find_place(mesh, scene, place)
-    part = place_part(mesh, scene, at)
-    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-    workpiece = np.asarray(branch_pose(scene.model, "workpiece", stand))
-    turn = workpiece[:3, :3]
-    response = np.empty((len(scene.parameter_keys), count, 3), np.float32)
-    made = make_points(scene, part.vertices_mm)
-    for start in range(0, count, PIECE):
-        rows = slice(start, start + PIECE)
-        piece = replace(
-            made,
-            point_mm=made.point_mm[rows],
-            coordinates={k: np.broadcast_to(q, count)[rows] for k, q in made.coordinates.items()},
-        )
-        response[:, rows] = point_basis(scene, piece).position @ turn.T
-    return Placed(
-        part,
-        (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0,
-        workpiece @ transforms.placed(at[:3], at[3:]),
-        workpiece,
-        transforms.apply(workpiece, part.vertices_mm).astype(np.float32),
-        (part.corners.normals @ turn.T).astype(np.float32),
-        response.reshape(len(response), -1),
-        made.coordinates,
-        made.outside,
-    )
+def _held(state: AppState) -> tuple[Hashable, ...]:
+    return Identity(state.scene), tuple(state.positions.items()), state.placed
 
 
 def part_picture(state: AppState) -> PartPicture | None:
@@ -157,33 +187,17 @@ def part_picture(state: AppState) -> PartPicture | None:
     if not state.part.is_drawn:
         return None
     try:
-        placed = placed_part(state)
-        return None if placed is None else PartPicture(placed, _error(state, placed))
+        found = clamped_part(state)
+        return found and PartPicture(found, found.points.error_um(state))
     except WarpspaceError:  # its section says it
         return None
-
-
-def _error(state: AppState, placed: Placed) -> Floats:
-    amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
-    if state.controller is None:
-        return (amplitudes @ placed.response).reshape(-1, 3)
-    controller, scene, at = state.controller, state.active_scene(), placed.coordinates
-    key = Identity(controller), Identity(placed), Identity(state.scene.model)
-    kept = _CORRECTED.get(
-        key,
-        lambda: controller.at(at, nominal_point(scene.model, Loop.TOOL, at), scene, Loop.RELATIVE),
-        lambda found: found.nbytes,
-    )
-    here = branch_pose(scene.model, "workpiece", at)[..., :3, :3]
-    turn = placed.workpiece[:3, :3] @ np.swapaxes(here, -1, -2)
-    return transforms.rotate(turn, kept.field(scene.errors).error_um).astype(np.float32)
 
 
 def part_change(a: PartPicture | None, b: PartPicture | None) -> PartPicture | None:
     """Give the change of a part from one machine to another; None where there is none."""
     if a is None or b is None or a.error_um.shape != b.error_um.shape:
         return None
-    return PartPicture(b.placed, b.error_um - a.error_um)
+    return PartPicture(b.clamped, b.error_um - a.error_um)
 
 
 # --- Where it is clamped --------------------------------------------------------------------------
@@ -202,10 +216,10 @@ def place_of(pose: Array) -> tuple[float, ...]:
     return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())
 
 
-def turned_place(placed: Placed, axis: str, angle_deg: float) -> tuple[float, ...]:
+def turned_place(clamped: Clamped, axis: str, angle_deg: float) -> tuple[float, ...]:
     """Turn a part about its middle and an axis of the workpiece frame."""
-    own = transforms.inverse(placed.workpiece) @ placed.pose
-    middle = transforms.apply(own, placed.middle_mm)
+    own = transforms.inverse(clamped.points.pose) @ clamped.pose
+    middle = transforms.apply(own, clamped.middle_mm)
     turn = transforms.rigid(
         transforms.axis_rotation("xyz".index(axis), np.deg2rad(angle_deg)), np.zeros(3)
     )

@@ -12,7 +12,7 @@ from warpspace.analysis.options import Option
 from warpspace.app.browser.html import button, join, tag, text_box, upload_button
 from warpspace.app.browser.html import field as labelled
 from warpspace.app.documents.files import PART_ENDINGS, read_upload
-from warpspace.app.evaluation.part import clamped_scene, placed_part, turned_place
+from warpspace.app.evaluation.part import clamped_part, clamped_scene, turned_place
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.forms import option_values
@@ -97,9 +97,9 @@ class PartPart(FilesPart):
         elif word == "remove":
             self._sent, self._answer = None, None
             return edits.with_sight(replace(state, part=PartLook()), inside=False)
-        elif word == "turn" and value in TURNS and (placed := placed_part(state)) is not None:
+        elif word == "turn" and value in TURNS and (clamped := clamped_part(state)) is not None:
             axis, angle = value.split()
-            place = turned_place(placed, axis, float(angle))
+            place = turned_place(clamped, axis, float(angle))
             return replace(state, part=replace(state.part, place=place))
         elif word == "set.unit" and self._sent is not None:
             self.attempt(partial(self.received, *self._sent))
