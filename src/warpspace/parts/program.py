@@ -203,10 +203,16 @@ class Program(Setup, Analysis):
         None, "Line whose end is told", low=1, high=MAX_LINES, unset="none"
     )
 
+    def lines(self) -> Iterable[str]:
+        """Give the lines of the program."""
+        if self.file is None:
+            raise OptionError("{file} is missing; expected a program")
+        return program_lines(self.file)
+
     def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
         if self.file is None:
             raise OptionError("{file} is missing; expected a program")
-        read = read_program(scene, program_lines(self.file), self, self.file)
+        read = read_program(scene, self.lines(), self, self.file)
         watch(0.3)
         path = trace_program(scene, read, chord_mm=self.chord_mm)
         watch(0.9)

@@ -64,6 +64,12 @@ def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
     return found
 
 
+@cache
+def level_line_colours(*, diverging: bool) -> NDArray[np.uint8]:
+    """Give the bytes for lines of all levels of a scale, [LEVELS, 3]."""
+    return np.stack([line_colour(tuple(rgb)) for rgb in colour_table(diverging=diverging).tolist()])
+
+
 # --- Colours of lines, on a light ground and on a dark one ----------------------------------------
 
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -11,7 +12,13 @@ from viser import transforms as quaternions
 
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.box import packed
-from warpspace.app.drawing.colours import Floats, colour, colour_levels, level_colours
+from warpspace.app.drawing.colours import (
+    Floats,
+    colour,
+    colour_levels,
+    level_colours,
+    level_line_colours,
+)
 from warpspace.app.drawing.shapes import (
     SCENE_PER_MM,
     UNLIT,
@@ -22,15 +29,22 @@ from warpspace.app.drawing.shapes import (
     lines,
 )
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.part import Clamped, PartPicture, place_of
+from warpspace.app.evaluation.part import (
+    AT_LINE,
+    Clamped,
+    PartPicture,
+    PathPicture,
+    place_of,
+)
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfTemplate
+from warpspace.geometry.colour import ColourScale
 from warpspace.kinematics import transforms
 from warpspace.units import Array
 
 SURFACE, EDGES, GIZMO = "/part/surface", "/part/edges", "/part/gizmo"
 OUTSIDE = (194, 24, 91)  # points that the machine does not reach
-MOST_OUTSIDE, OUTSIDE_SIZE = 4000, 0.006
+MOST_OUTSIDE, OUTSIDE_SIZE, LINE_SIZE = 4000, 0.006, 0.015
 GIZMO_SIZE = 0.3  # as a part of the longest edge of the box
 
 
@@ -39,19 +53,22 @@ class PartLayer:
 
     def __init__(self, scene: SceneApi, page: Page, moved: Callable[[str], None]) -> None:
         self._scene, self._page, self._moved = scene, page, moved
-        self._nodes, self._gizmo = Nodes(scene), None
+        self._nodes, self._paths, self._gizmo = Nodes(scene), Nodes(scene), None
+        self._has_path = False
         self._part: PartPicture | None = None
         self._held: object = None  # what viser and the page hold but for points and colours
         self._behind = False
 
     def show(self, picture: LivePicture) -> None:
-        part = picture.part
+        part, path = picture.part, picture.path
+        if path is not None or self._has_path:
+            self._has_path = path is not None
+            self._paths.draw(path_shapes(picture, path) if path else {})
         if part is None and self._held is None:
             return
-        scale = picture.part_scale
-        held = None if part is None else (
-            Identity(part.clamped), scale.diverging, picture.state.shown.dark, picture.size_mm,
-            picture.state.part.moved,
+        held = part and (
+            Identity(part.clamped), _scale(picture, part).diverging, picture.state.shown,
+            picture.size_mm, picture.state.part.moved,
         )  # fmt: skip
         if part is None or held != self._held:
             self._held = held
@@ -76,7 +93,7 @@ class PartLayer:
             self._nodes.draw({})
             return
         points, levels = _drawn(picture, part)
-        palette = level_colours(diverging=picture.part_scale.diverging)
+        palette = level_colours(diverging=_scale(picture, part).diverging)
         self._nodes.draw(shapes(picture, part, points, palette[levels]))
         edges = packed(part.clamped.edges.astype("<u4"))
         lifts = packed(np.zeros((2 * len(part.clamped.edges), 3), "<f4"))
@@ -120,10 +137,18 @@ class PartLayer:
         self._moved(",".join(map(repr, place)))
 
 
+def _values(picture: LivePicture, part: PartPicture) -> Array:
+    return part.values(picture.component, normal=picture.state.part.normal)
+
+
+def _scale(picture: LivePicture, part: PartPicture) -> ColourScale:
+    return picture.scale_of(_values(picture, part), normal=picture.state.part.normal)
+
+
 def _drawn(picture: LivePicture, part: PartPicture) -> tuple[Array, Any]:
-    values = part.values(picture.component, normal=picture.state.part.normal)
-    points = part.drawn_mm(picture.exaggeration).astype("<f4", copy=False)
-    return points, colour_levels(picture.part_scale, values)
+    drawn = part.drawn_mm(picture.exaggeration).astype("<f4", copy=False)
+    levels = colour_levels(_scale(picture, part), _values(picture, part))
+    return drawn[part.clamped.mesh.corners.corner_of], levels
 
 
 def shapes(picture: LivePicture, part: PartPicture, points: Array, colours: Floats) -> Shapes:
@@ -144,6 +169,25 @@ def shapes(picture: LivePicture, part: PartPicture, points: Array, colours: Floa
         if picture.state.part.moved:  # goes with what is dragged, before the part follows
             found[f"{GIZMO}/nominal"] = lines(_own(clamped, nominal), ghost, 1.2)
     return found
+
+
+def path_shapes(picture: LivePicture, path: PathPicture) -> Shapes:
+    """Draw the path of a program, nominal and actual, and the end of the line that is asked for."""
+    drawn, values = path.drawn_mm(picture.exaggeration), path.component_um(picture.component)
+    pieces = np.stack([path.ends - 1, path.ends], axis=1)
+    scale = picture.scale_of(values)
+    table = level_line_colours(diverging=scale.diverging)
+    actual = lines(drawn[pieces], OUTSIDE, 3.0)
+    if actual is not None:
+        coloured = {**actual.follows, "colors": table[colour_levels(scale, values)[pieces]]}
+        actual = replace(actual, follows=coloured)
+    nominal = lines(path.points.nominal_mm[pieces], colour(picture, "trace_nominal"), 1.2)
+    asked = picture.state.forms.get(AT_LINE, "")
+    (at,) = (path.line == int(asked if asked.isdecimal() else 0)).nonzero()
+    return {
+        "/program/nominal": nominal, "/program/actual": actual,
+        "/program/line": dots(drawn[at[-1:]], LINE_SIZE * picture.size_mm, OUTSIDE),
+    }  # fmt: skip
 
 
 def _own(clamped: Clamped, points_mm: Array) -> Array:

@@ -124,6 +124,16 @@ def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tup
         yield Picked(at, lines.group.loop, lines.group.traces[number].point_mm), found[1]
 
 
+def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int | None:
+    """Find the line of the program whose drawn path a ray passes."""
+    path = picture.path
+    if path is None or not direction.any():
+        return None
+    drawn = path.drawn_mm(picture.exaggeration)
+    found = pick_point(origin_mm, direction, drawn, TOLERANCE_RAD)
+    return None if found is None else int(path.line[found[0]])
+
+
 def _denser(samples: Array) -> Array:
     count = samples.shape[1]
     place = np.linspace(0.0, count - 1.0, (count - 1) * BETWEEN + 1)

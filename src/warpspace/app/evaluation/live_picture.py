@@ -1,14 +1,21 @@
 """The picture of a state: what the app draws, with the comparison it belongs to."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.bench import BenchPicture, bench_picture
-from warpspace.app.evaluation.part import PartPicture, part_change, part_picture
+from warpspace.app.evaluation.part import (
+    Moved,
+    PartPicture,
+    PathPicture,
+    part_picture,
+    path_picture,
+)
 from warpspace.app.state.app_state import AppState
 from warpspace.geometry.colour import ColourScale, build_scale
 from warpspace.picture.model import Picture, picture_size_mm
@@ -62,23 +69,28 @@ class LivePicture(Picture):
     @cached_property
     def part(self) -> PartPicture | None:
         """The part in the box; None where none is, or cannot be. Of a difference its change."""
-        if self.is_difference and self.compared is not None:
-            return part_change(*map(part_picture, self.compared.sides))
-        return part_picture(self.drawn_state)
+        return self._change(part_picture)
 
     @cached_property
-    def part_scale(self) -> ColourScale:
-        """The colours of the part: those of the map, with both signs along its normal."""
-        found, scale = self.part, self.scale
-        if found is None or not (self.state.part.normal or self.tilts):
-            return scale
-        normal = self.state.part.normal
-        values = found.values(self.component, normal=normal)
-        end = scale.high if normal and not self.tilts else None
-        if end is None:
-            end = build_scale(float(np.abs(values).max()), "x").high
-        signed = normal or self.component != "norm"
-        return ColourScale(-end if signed else 0.0, end, diverging=signed, label="E · n")
+    def path(self) -> PathPicture | None:
+        """The path of the program, likewise."""
+        return self._change(path_picture)
+
+    def _change(self, build: Callable[[AppState], Moved | None]) -> Any:
+        if not self.is_difference or self.compared is None:
+            return build(self.drawn_state)
+        a, b = map(build, self.compared.sides)
+        if a is None or b is None or a.error_um.shape != b.error_um.shape:
+            return None
+        return replace(b, error_um=b.error_um - a.error_um)
+
+    def scale_of(self, values: Array, *, normal: bool = False) -> ColourScale:
+        """Give the colours of errors beside the map: its own, of both signs along a normal."""
+        if not (normal or self.tilts):
+            return self.scale
+        component = "x" if normal else self.component
+        end = None if self.tilts else self.scale.high
+        return build_scale(float(np.abs(values).max()), component, end=end)
 
     @cached_property
     def worst_node(self) -> int:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.forms import option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.evaluate import build_basis
@@ -18,10 +19,13 @@ from warpspace.geometry.colour import component_values
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.parts.control import read_program
 from warpspace.parts.part import PartMesh, find_place, make_points, place_part
+from warpspace.parts.program import Program, trace_program
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
+AT_LINE = "program.at_line"  # the form that names a line of the program
 CACHE_BYTES = 300_000_000
 MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app draws
 PIECE = 20_000  # vertices that are worked on at once: what lies between needs memory, too
@@ -110,11 +114,30 @@ class Clamped:
 
 
 @dataclass(frozen=True, eq=False)
-class PartPicture:
-    """A part with the errors of a state."""
+class Moved:
+    """Points with the errors of a state."""
+
+    points: Points
+    error_um: Floats  # [n, 3]; of the tool against the workpiece, in R as drawn
+
+    @cached_property
+    def norm_um(self) -> Floats:
+        return component_values(self.error_um, "norm")
+
+    def drawn_mm(self, exaggeration: float) -> Floats:
+        """Give where they are, [n, 3], exaggerated."""
+        return self.points.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
+
+    def component_um(self, component: str) -> Floats:
+        """Give what a map shows of them, [n]."""
+        return self.norm_um if component == "norm" else component_values(self.error_um, component)
+
+
+@dataclass(frozen=True, eq=False)
+class PartPicture(Moved):
+    """A part with the errors of a state, at its vertices."""
 
     clamped: Clamped
-    error_um: Floats  # [V, 3]; of the tool against the workpiece, in R as drawn
 
     @cached_property
     def normal_um(self) -> Floats:
@@ -122,22 +145,10 @@ class PartPicture:
         at = self.clamped.mesh.corners.corner_of
         return np.einsum("ij,ij->i", self.error_um[at], self.clamped.normals)
 
-    @cached_property
-    def norm_um(self) -> Floats:
-        return component_values(self.error_um, "norm")
-
     def values(self, component: str, *, normal: bool) -> Floats:
         """Give what is coloured at each corner, [W], µm."""
-        if normal:
-            return self.normal_um
-        is_norm = component == "norm"
-        found = self.norm_um if is_norm else component_values(self.error_um, component)
-        return found[self.clamped.mesh.corners.corner_of]
-
-    def drawn_mm(self, exaggeration: float) -> Floats:
-        """Give the corners of the part as cut, [W, 3], exaggerated."""
-        moved = np.float32(exaggeration * MM_PER_UM) * self.error_um
-        return (self.clamped.points.nominal_mm + moved)[self.clamped.mesh.corners.corner_of]
+        at = self.clamped.mesh.corners.corner_of
+        return self.normal_um if normal else self.component_um(component)[at]
 
 
 _KEPT: Cache[Clamped] = Cache(CACHE_BYTES)
@@ -184,20 +195,56 @@ def _held(state: AppState) -> tuple[Hashable, ...]:
 
 def part_picture(state: AppState) -> PartPicture | None:
     """Give the part with the errors of a state; None where none is drawn, or it cannot be."""
-    if not state.part.is_drawn:
-        return None
     try:
-        found = clamped_part(state)
-        return found and PartPicture(found, found.points.error_um(state))
+        found = clamped_part(state) if state.part.shown else None
+        return found and PartPicture(found.points, found.points.error_um(state), found)
     except WarpspaceError:  # its section says it
         return None
 
 
-def part_change(a: PartPicture | None, b: PartPicture | None) -> PartPicture | None:
-    """Give the change of a part from one machine to another; None where there is none."""
-    if a is None or b is None or a.error_um.shape != b.error_um.shape:
+# --- The path of a program ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class PathPicture(Moved):
+    """The path of a program with the errors of a state, at its samples."""
+
+    line: NDArray[np.int64]  # [n]; of the program
+    ends: NDArray[np.intp]  # [S]; samples that a piece of the path leads to from the one before
+
+
+_PATHS: Cache[PathPicture] = Cache(CACHE_BYTES // 2)
+
+
+def path_picture(state: AppState) -> PathPicture | None:
+    """Give the path of the program with the errors of a state; None where there is none."""
+    held, told = state.part.program, option_values(state, Program.name)
+    if held is None:
         return None
-    return PartPicture(b.clamped, b.error_um - a.error_um)
+
+    def trace() -> PathPicture:
+        scene = clamped_scene(state)
+        asked = read_form(
+            Program, [one for one in Program.options() if one.name != "file"], told, scene
+        )
+        read = read_program(scene, held[1].splitlines(), asked, held[0])
+        path = trace_program(scene, read, chord_mm=asked.chord_mm)
+        if len(path.line) > MOST_POINTS:
+            raise OptionError(
+                f"the path has {len(path.line):,} points; expected at most {MOST_POINTS:,}"
+                " in the app: a larger chord makes fewer"
+            )
+        points = respond(scene, path.tip_mm, path.coordinates, path.outside)
+        (ends,) = path.step_mm.any(axis=1).nonzero()
+        return PathPicture(points, points.nominal_mm, path.line, ends)
+
+    told.pop("at_line", None)
+    key = (*_held(state), Identity(held), tuple(sorted(told.items())))
+    try:
+        found = _PATHS.get(key, trace, lambda one: one.points.response.nbytes)
+        return replace(found, error_um=found.points.error_um(state))
+    except WarpspaceError:
+        return None
 
 
 # --- Where it is clamped --------------------------------------------------------------------------

@@ -31,11 +31,13 @@ from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.drawing.part import PartLayer
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Layer
-from warpspace.app.evaluation.budget import pick, with_clicked
+from warpspace.app.evaluation.budget import pick, pick_line, with_clicked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.part import AT_LINE
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.forms import with_form
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.catalogue import build_parts
@@ -327,6 +329,9 @@ class Session:
         if picture is None or context.telling is not None:
             return
         ray = np.array([origin, direction], dtype=float)
+        if line := pick_line(picture, ray[0] / SCENE_PER_MM, ray[1]):
+            context.post(partial(with_form, name=AT_LINE, text=str(line)))
+            return
         found = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         if found is not None:
             context.post(lambda state: with_clicked(state, found[0]))

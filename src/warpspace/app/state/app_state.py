@@ -175,6 +175,9 @@ class PartLook:
         hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
         " degrees about the fixed x, y and z, in that order; empty for the usual place.",
     )
+    # name and text of a program that is run on the machine, as the mesh is kept
+    program: "tuple[str, str] | None" = None
+    program_name: str = described("", "Program", linked="program")
     shown: bool = described(
         True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
     )
