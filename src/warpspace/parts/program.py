@@ -4,7 +4,7 @@ Lengths of errors are weighed by the way: mean, RMS and P95 do not depend on whe
 Geometry only: no forces, heat, wear or servo.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import Any
@@ -205,9 +205,7 @@ class Program(Setup, Analysis):
 
     def lines(self) -> Iterable[str]:
         """Give the lines of the program."""
-        if self.file is None:
-            raise OptionError("{file} is missing; expected a program")
-        return program_lines(self.file)
+        return program_lines(self.file or "")
 
     def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
         if self.file is None:

@@ -55,20 +55,21 @@ def safe_file_name(name: str) -> str:
 
 
 PART_ENDINGS = (".stl", ".obj", ".ply", ".glb")
+PROGRAM_ENDINGS = (".ngc", ".nc", ".tap")
 
 
 def read_upload(value: str, most_bytes: int = 0, what: str = "") -> tuple[str, bytes]:
     """Give name and bytes of a file that a page has sent; it sends none of one too large.
 
-    It is a scene file or the mesh of a part, by its ending, where nothing else is said.
+    It is a scene file, a mesh of a part or a program, by its ending, where nothing else is said.
     """
     told, _, rest = value.partition("\n")
     name, _, coded = rest.rpartition("\n")
     name = safe_file_name(name)
     if not most_bytes:
-        is_part = name.lower().endswith(PART_ENDINGS)
+        is_part = name.lower().endswith((*PART_ENDINGS, *PROGRAM_ENDINGS))
         most_bytes = MAX_UPLOAD_BYTES if is_part else MAX_SCENE_BYTES
-        what = "mesh" if is_part else "scene file"
+        what = "mesh or program" if is_part else "scene file"
     try:
         content = base64.b64decode(coded)
         size = max(int(told[:LONGEST_SIZE]), len(content))

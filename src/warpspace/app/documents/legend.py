@@ -7,7 +7,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.statistics import P95, share_below, share_within, volume_mean
-from warpspace.app.browser.html import fill, join, lowered, number, tag
+from warpspace.app.browser.html import EMPTY, fill, join, lowered, number, tag
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import axis_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
@@ -109,24 +109,27 @@ def _stops(scale: ColourScale) -> str:
     return ",".join(f"rgb({r},{g},{b}) {at:.1f}%" for r, g, b in colours)
 
 
-def part_words(picture: LivePicture) -> str:
-    """Say how far the part is off where it is drawn, and what it leaves out."""
-    found = picture.part
-    if found is None:
-        return ""
-    most, normal, outside = (
-        found.norm_um.max(),
-        found.normal_um,
-        int(found.clamped.points.outside.sum()),
-    )
+def part_html(picture: LivePicture) -> Markup:
+    """Say how far part and program are off where they are drawn, and what that leaves out."""
+    part, path, look, said = picture.part, picture.path, picture.state.part, list[Markup]()
     change = "changes " if picture.is_difference else ""
-    said = [
-        f"Part {picture.state.part.name} {change}up to {number(float(most))} µm",
-        f"{number(float(normal.min()))} to {number(float(normal.max()))} µm along its normal",
-    ]
-    if outside:
-        said.append(f"{spell_count(outside)} of its points are beyond the travel")
-    return f"{', '.join(said)}. {GEOMETRY_ONLY}."
+    for what, found in ((f"Part {look.name}", part), (f"Program {look.program_name}", path)):
+        if found is not None:
+            most, out = float(found.norm_um.max(initial=0.0)), int(found.points.outside.sum())
+            more = f", {spell_count(out)} points beyond the travel" if out else ""
+            said.append(join([f"{what} {change}up to {number(most)} µm{more}"]))
+    if part is not None:
+        low, high = (number(float(at)) for at in (part.normal_um.min(), part.normal_um.max()))
+        said[0] += f", {low} to {high} µm along its normal"
+        if look.normal:
+            scale = picture.scale_of(part.normal_um, normal=True)
+            bar = tag("i", "", class_="ws-strip",
+                      style=f"background:linear-gradient(to right,{_stops(scale)})")  # fmt: skip
+            ends = [spell_short(end) for end in (scale.low, scale.high)]
+            said[0] += join((": ", ends[0], " ", bar, f" {ends[1]} µm"))
+    return (
+        tag("p", Markup("<br>").join((*said, GEOMETRY_ONLY)), class_="ws-part") if said else EMPTY
+    )
 
 
 # --- The heading ----------------------------------------------------------------------------------

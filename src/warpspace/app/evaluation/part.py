@@ -224,9 +224,8 @@ def path_picture(state: AppState) -> PathPicture | None:
 
     def trace() -> PathPicture:
         scene = clamped_scene(state)
-        asked = read_form(
-            Program, [one for one in Program.options() if one.name != "file"], told, scene
-        )
+        options = [one for one in Program.options() if one.name in told]
+        asked = read_form(Program, options, told, scene)
         read = read_program(scene, held[1].splitlines(), asked, held[0])
         path = trace_program(scene, read, chord_mm=asked.chord_mm)
         if len(path.line) > MOST_POINTS:
@@ -235,7 +234,7 @@ def path_picture(state: AppState) -> PathPicture | None:
                 " in the app: a larger chord makes fewer"
             )
         points = respond(scene, path.tip_mm, path.coordinates, path.outside)
-        (ends,) = path.step_mm.any(axis=1).nonzero()
+        ends = np.flatnonzero(path.step_mm.any(axis=1))
         return PathPicture(points, points.nominal_mm, path.line, ends)
 
     told.pop("at_line", None)

@@ -22,7 +22,7 @@ from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
 from warpspace.app.tasks.measure import CalibratePart, TestsPart
 from warpspace.app.tasks.notes import NoteNumbersPart, NotesPart
 from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart, RoomPart
-from warpspace.app.tasks.part import PartPart
+from warpspace.app.tasks.part import PartPart, ProgramPart
 from warpspace.app.tasks.parts import Part, Section
 from warpspace.app.tasks.story import StoryPart
 from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
@@ -31,7 +31,7 @@ from warpspace.app.tasks.understand import DistancePart, VolumePart, WorstPart
 HOOKS: dict[str, type[AnalysisPart]] = {
     "calibrate": CalibratePart, "repair": RepairPart, "compensate": CompensatePart,
     "allocate": TolerancesPart, "concepts": ConceptsPart, "distance": DistancePart,
-    "part": PartPart,
+    "part": PartPart, "program": ProgramPart,
 }  # fmt: skip
 """Parts of analyses that do more than their description says, by name."""
 FIRST = ("compensate", "concepts", "allocate")

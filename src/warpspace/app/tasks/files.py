@@ -34,7 +34,7 @@ PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their 
 
 def accepted_endings() -> str:
     """List the endings of files that can be given to the page."""
-    own = (".toml", ".urdf", *files.PART_ENDINGS)
+    own = (".toml", ".urdf", *files.PART_ENDINGS, *files.PROGRAM_ENDINGS)
     endings = dict.fromkeys((*own, *(end for one in formats() for end in one.endings)))
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 

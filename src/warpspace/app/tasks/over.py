@@ -13,7 +13,7 @@ from warpspace.app.documents.legend import (
     legend_html,
     numbers_words,
     order_conditions,
-    part_words,
+    part_html,
     place_words,
     subject_words,
 )
@@ -39,7 +39,7 @@ class HeadPart(Part):
     follows = "at once"
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        words, place, part = subject_words(picture), place_words(picture), part_words(picture)
+        words, place, part = subject_words(picture), place_words(picture), part_html(picture)
         head = fill(
             '<div data-piece="reopened"></div><h1>{numbers}</h1>'
             '<div>{place}<span data-piece="head.kept"></span>'
@@ -47,7 +47,7 @@ class HeadPart(Part):
             '<div data-piece="head.order"></div>',
             numbers=numbers_words(picture), place=place,
             words=tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY,
-            part=tag("p", part, class_="ws-part") if part else EMPTY,
+            part=part,
         )  # fmt: skip
         return {"head": head}
 

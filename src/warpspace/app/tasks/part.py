@@ -1,125 +1,224 @@
-"""The part in the box: its file, where it is clamped, what an inspector would measure."""
+"""A part in the box, where it is clamped, what an inspector would measure; and a program."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 from markupsafe import Markup
 
 from warpspace.analysis.catalogue import Entry
-from warpspace.analysis.description import Analysis
+from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
-from warpspace.app.browser.html import button, join, tag, text_box, upload_button
+from warpspace.app.browser.html import (
+    EMPTY,
+    button,
+    join,
+    number,
+    rows,
+    signed,
+    tag,
+    text_box,
+    upload_button,
+)
 from warpspace.app.browser.html import field as labelled
-from warpspace.app.documents.files import PART_ENDINGS, read_upload
-from warpspace.app.evaluation.part import clamped_part, clamped_scene, turned_place
+from warpspace.app.browser.incoming import index_of
+from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, read_upload
+from warpspace.app.evaluation.part import AT_LINE, clamped_part, clamped_scene, turned_place
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
-from warpspace.app.state.forms import option_values
+from warpspace.app.state.forms import option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, spell
 from warpspace.app.tasks.analysis import Question
+from warpspace.app.tasks.charts import details_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.measure import FilesPart
 from warpspace.app.tasks.parts import actions
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 from warpspace.parts.part import find_place, parse_part
+from warpspace.parts.program import Program, ProgramResult
 from warpspace.scene.model import Scene
 
-OFFERED = (
-    "A mesh of your part (STL, OBJ, PLY, GLB) stands in the box as this machine would cut it."
-    " Files can also be dropped on the page."
-)
 SWITCHES = ("part.shown", "part.normal", "part.moved")
 TURNS = {
     f"{axis} {angle}": f"{axis} {sign}90°"
     for axis in "xyz"
     for angle, sign in ((90, "+"), (-90, "−"))
 }
+MOST_LETTERS, MOST_SHARES = 200, 2  # of a line that is shown; errors that a block is split into
 
 
-class PartPart(FilesPart):
-    """A part that a page has sent, or the scene's own: clamped, and measured as it is cut."""
+class InBoxPart(FilesPart):
+    """Something to be made, which a page has sent: it stands in the box."""
 
     at_once = True
+    endings: tuple[str, ...] = ()
+    invitation = ""  # what is said where there is none
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
-        self._sent: tuple[str, bytes] | None = None  # read again with another unit
-        for ending in PART_ENDINGS:
-            context.offers[ending] = lambda name, data: self.attempt(
-                partial(self.received, name, data)
-            )
+        # dropped on the page, or opened
+        context.offers |= dict.fromkeys(
+            self.endings, lambda name, data: self.attempt(partial(self.received, name, data))
+        )
+
+    def held(self, state: AppState) -> tuple[object, str]:
+        """Give what is there, if anything, and the name of its file."""
+        raise NotImplementedError
+
+    def about(self, state: AppState) -> Markup:
+        """Say what is to be known of it, and set."""
+        raise NotImplementedError
+
+    def question(self, state: AppState) -> Question:
+        return (*super().question(state), Identity(self.held(state)[0]), state.part.place)
+
+    def is_ready(self, state: AppState) -> bool:
+        return self.held(state)[0] is not None
+
+    def before_result(self, state: AppState) -> Markup:
+        held, name = self.held(state)
+        first = held is None
+        words = f"{self.title} …" if first else f"Another {self.name} …"
+        upload = upload_button(
+            words, self.name, MAX_UPLOAD_BYTES, ",".join(self.endings),
+            kind="main" if first else "", hint=f"At most {MAX_UPLOAD_BYTES >> 20} MB",
+        )  # fmt: skip
+        said = f"{self.invitation} Files can also be dropped on the page."
+        if name:
+            said = f"{name} is not here: links and saved scenes hold only its name."
+        about = tag("p", said, class_="ws-quiet")
+        if not first:
+            remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
+            about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
+        return join((about, self.files_html(), actions(upload)))
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word != "file":
+            return super().take(state, word, value)
+        self.attempt(lambda: self.received(*read_upload(value)))
+        return state
+
+    def show(self, **held: Any) -> None:
+        """Take something in, see it through the box, and unfold the section."""
+
+        def shown(state: AppState) -> AppState:
+            opened = state.page.open | {self.name}
+            page = replace(state.page, task=self.task, open=opened, window="")
+            found = replace(state, part=replace(state.part, shown=True, **held), page=page)
+            return edits.with_sight(found, inside=True)
+
+        self.context.post(shown)
+
+
+class PartPart(InBoxPart):
+    """A part: clamped, and measured as it is cut."""
+
+    endings = PART_ENDINGS
+    invitation = "A mesh of your part (STL, OBJ, PLY, GLB), as this machine would cut it."
+    _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
         return [one for one in super().options() if one.name != "place"]
 
-    def question(self, state: AppState) -> Question:
-        return (*super().question(state), Identity(state.part.mesh), state.part.place)
-
-    def is_ready(self, state: AppState) -> bool:
-        return state.part.mesh is not None
+    def held(self, state: AppState) -> tuple[object, str]:
+        return state.part.mesh, state.part.name
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked = super().ask(state, values, scenes)
         return replace(asked, place=state.part.place, mesh=state.part.mesh)
 
-    def before_result(self, state: AppState) -> Markup:
-        part, words = state.part, OFFERED
-        upload = upload_button(
-            "Another part …" if part.mesh else "Part …", self.name, MAX_UPLOAD_BYTES,
-            ",".join(PART_ENDINGS), kind="" if part.mesh else "main", hint="A closed mesh",
-        )  # fmt: skip
-        if part.mesh is None:
-            if part.name:
-                words = f"The part {part.name} is not here: links and files hold only its name."
-            said = tag("p", words, class_="ws-quiet")
-            return join((said, self.files_html(), actions(upload)))
+    def about(self, state: AppState) -> Markup:
+        mesh, scene = state.part.mesh, clamped_scene(state)
+        assert mesh is not None  # noqa: S101 - said of one that is there
         turns = join(button(said, f"{self.name}:turn", value, kind="choice")
                      for value, said in TURNS.items())  # fmt: skip
-        where = ",".join(f"{at:.6g}" for at in find_place(part.mesh, clamped_scene(state), None))
+        usual = ",".join(f"{at:.6g}" for at in find_place(mesh, scene, None))
         leaf, name = leaves(state)["part.place"], "state:set.part.place"
-        box = text_box(name, spell(state, "part.place"), placeholder=where)
-        remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {part.name}")
+        box = text_box(name, spell(state, "part.place"), placeholder=usual)
         return join((
-            tag("p", join((tag("b", part.name), " ", remove))), self.files_html(),
-            *(tag("p", one, class_="ws-doubt") for one in part.mesh.warnings),
+            *(tag("p", one, class_="ws-doubt") for one in mesh.warnings),
             labelled(leaf.label, box, name, "mm, °", leaf.hint),
             labelled("Turn", tag("div", turns, class_="ws-choices"), "part.turn",
                      hint="About an axis of the workpiece, in place"),
-            *(setting(state, path) for path in SWITCHES), actions(upload),
+            *(setting(state, path) for path in SWITCHES),
         ))  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "file":
-            self.attempt(lambda: self.received(*read_upload(value)))
-        elif word == "remove":
-            self._sent, self._answer = None, None
-            return edits.with_sight(replace(state, part=PartLook()), inside=False)
-        elif word == "turn" and value in TURNS and (clamped := clamped_part(state)) is not None:
+        if word == "remove":
+            self._sent = self._answer = None
+            left = PartLook(program=state.part.program, program_name=state.part.program_name)
+            found = replace(state, part=left)
+            return edits.with_sight(found, inside=left.program is not None)
+        if word == "turn" and value in TURNS and (clamped := clamped_part(state)) is not None:
             axis, angle = value.split()
             place = turned_place(clamped, axis, float(angle))
             return replace(state, part=replace(state.part, place=place))
-        elif word == "set.unit" and self._sent is not None:
+        if word == "set.unit" and self._sent is not None:
             self.attempt(partial(self.received, *self._sent))
-        else:
-            return super().take(state, word, value)
-        return super().take(state, word, value) if word == "set.unit" else state
+        return super().take(state, word, value)
 
     def received(self, name: str, content: bytes) -> None:
-        """Take in a mesh; it is clamped at its usual place, and seen through the box."""
-        self._sent = name, content
-        unit = option_values(self.context.state, self.name).get("unit") or None
-        mesh = parse_part(content, name, unit)
+        """Take in a mesh; one of another name is clamped at its usual place."""
+        self._sent, state = (name, content), self.context.state
+        mesh = parse_part(content, name, option_values(state, self.name).get("unit") or None)
+        place = state.part.place if name == state.part.name else None
+        self.show(mesh=mesh, name=name, place=place)
 
-        def show(state: AppState) -> AppState:
-            page = replace(
-                state.page, task=self.task, open=state.page.open | {self.name}, window=""
-            )
-            part = replace(state.part, mesh=mesh, name=name, shown=True)
-            if name != state.part.name:
-                part = replace(part, place=None)
-            return edits.with_sight(replace(state, part=part, page=page), inside=True)
 
-        self.context.post(show)
+@dataclass(frozen=True, kw_only=True)
+class HeldProgram(Program):
+    """A program out of the text of a file."""
+
+    held: tuple[str, ...] = ()
+
+    def lines(self) -> Sequence[str]:
+        return self.held
+
+
+class ProgramPart(InBoxPart):
+    """A program: a line and its place in the drawing find each other."""
+
+    endings = PROGRAM_ENDINGS
+    invitation = (
+        "A program (G-code): the path of the tool over the workpiece, and its worst blocks."
+    )
+
+    def held(self, state: AppState) -> tuple[object, str]:
+        return state.part.program, state.part.program_name
+
+    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
+        name, text = state.part.program or ("", "")
+        asked = read_form(HeldProgram, self.options(), values, scenes[0])
+        return replace(asked, file=name, held=tuple(text.splitlines()))
+
+    def about(self, state: AppState) -> Markup:
+        line, text = state.forms.get(AT_LINE, ""), (state.part.program or ("", ""))[1].splitlines()
+        if not (at := index_of(line, len(text) + 1)):
+            return EMPTY
+        return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
+
+    def result_html(self, found: Result) -> Markup:
+        assert isinstance(found, ProgramResult)  # noqa: S101 - of this analysis
+        worst: list[tuple[Markup, str]] = []
+        for one in found.worst:
+            line = button(f"line {one.line}", f"{self.name}:set.at_line", one.line, kind="link",
+                          hint="Show it in the drawing")  # fmt: skip
+            most = sorted(one.budget.items(), key=lambda share: -share[1])[:MOST_SHARES]
+            shares = ", ".join(f"{key} {signed(um)}" for key, um in most)
+            worst.append((line, f"{number(one.um)} µm: {shares}"))
+        words = tag("p", "Click a line, or the path in the drawing.", class_="ws-tiny")
+        rest = details_html(one for one in found.blocks() if not isinstance(one, str))
+        return join((tag("h4", "Worst blocks"), words, rows(worst), rest))
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word != "remove":
+            return super().take(state, word, value)
+        self._answer = None
+        return replace(state, part=replace(state.part, program=None, program_name=""))
+
+    def received(self, name: str, content: bytes) -> None:
+        """Take in a program, and run it."""
+        self.show(program=(name, content.decode("utf-8-sig", "replace")), program_name=name)
