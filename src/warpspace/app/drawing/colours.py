@@ -66,8 +66,9 @@ def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
 
 @cache
 def level_line_colours(*, diverging: bool) -> NDArray[np.uint8]:
-    """Give the bytes for lines of all levels of a scale, [LEVELS, 3]."""
-    return np.stack([line_colour(tuple(rgb)) for rgb in colour_table(diverging=diverging).tolist()])
+    """Give the bytes for ends of lines of all levels, [LEVELS, 3]: viser takes them as linear."""
+    linear = np.clip(level_colours(diverging=diverging), 0.0, 1.0)
+    return np.rint(255.0 * linear).astype(np.uint8)
 
 
 # --- Colours of lines, on a light ground and on a dark one ----------------------------------------

@@ -189,8 +189,9 @@ class PartLook:
     )
 
     @property
-    def is_drawn(self) -> bool:
-        return self.mesh is not None and self.shown
+    def is_empty(self) -> bool:
+        """Whether nothing of it stands in the box."""
+        return (self.mesh is None or not self.shown) and self.program is None
 
 
 @dataclass(frozen=True, slots=True)
