@@ -123,11 +123,7 @@ class Feature:
     vertices: NDArray[np.int32]  # [n], of the mesh
     triangles: Indices  # [m], of the mesh
     area_mm2: float
-    residual_mm: float  # largest distance of a vertex
-
-    @property
-    def kind(self) -> str:
-        return self.shape.kind
+    away_mm: Array  # [n], distances of its vertices in the file
 
 
 def find_features(mesh: PartMesh) -> tuple[Feature, ...]:
@@ -146,8 +142,8 @@ def find_features(mesh: PartMesh) -> tuple[Feature, ...]:
     counts = dict.fromkeys(FREE, 0)
     named: list[Feature] = []
     for feature in sorted(_Surfaces(mesh).features(), key=order)[:MAX_FEATURES]:
-        counts[feature.kind] += 1
-        named.append(replace(feature, name=f"{feature.kind} {counts[feature.kind]}"))
+        counts[kind := feature.shape.kind] += 1
+        named.append(replace(feature, name=f"{kind} {counts[kind]}"))
     return tuple(named)
 
 
@@ -249,10 +245,10 @@ class _Surfaces:
         if not is_alike(start, 2.0 * ALIKE_DEG):
             return None
         shape = fit_shape(start, points)
-        residual = float(np.abs(shape.respond(points).distance_mm).max())
-        if residual > CLOSE * extent + self.rounding_mm or not is_alike(shape, ALIKE_DEG):
+        away = shape.respond(points).distance_mm
+        if np.abs(away).max() > CLOSE * extent + self.rounding_mm or not is_alike(shape, ALIKE_DEG):
             return None
-        return Feature("", shape, vertices, part, float(area.sum()), residual)
+        return Feature("", shape, vertices, part, float(area.sum()), away)
 
 
 def _frame(axis: Array) -> Array:

@@ -6,8 +6,7 @@ measure by where all errors are half as large, so that the parts add up.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -130,84 +129,62 @@ def inspect(
     Tolerances are a TOML file that names features and says what they have to keep; SceneError says
     all that is wrong with it.
     """
-    features = find_features(mesh)
+    features, points = find_features(mesh), mesh.vertices_mm
     names = [one.name for one in features]
     asked = {} if tolerances is None else _read(Path(tolerances), features, names)
     wanted = [
         asked.pop((kind, (at,)), Wanted(kind, (at,), kind))
         for at, feature in enumerate(features)
         for kind, row in KINDS.items()
-        if feature.kind in row.features and not row.others[0]
+        if feature.shape.kind in row.features and not row.others[0]
     ]
-    gauge = _Gauge(
-        made.point_mm, features, _posed(features, mesh, made), [*wanted, *asked.values()]
+    wanted += asked.values()
+    turns = np.linalg.svd(
+        (made.point_mm - made.point_mm.mean(axis=0)).T @ (points - points.mean(0))
     )
-    rest = fit_out(made.point_mm, made.error_um)
-    values = [gauge.measure(moved) for moved in (0.0 * rest, made.error_um, rest)]
-    if any(one.tolerance for one in gauge.wanted):
+    sides = [1.0, 1.0, np.sign(np.linalg.det(turns[0] @ turns[2]))]
+    turn = turns[0] * sides @ turns[2]  # from the frame of the part to that of the workpiece
+
+    def measure(moved_um: Array) -> Array:
+        return _measure(features, wanted, points + moved_um * MM_PER_UM)
+
+    rest = fit_out(points, made.error_um @ turn)
+    values = [measure(moved) for moved in (0.0 * rest, made.error_um @ turn, rest)]
+    if any(one.tolerance for one in wanted):
         at = made.coordinates
         exact = evaluate(scene, at=at, loop=Loop.RELATIVE, frame="workpiece", exact=True)
-        values.append(gauge.measure(fit_out(made.point_mm, exact.error_um)))
+        values.append(measure(fit_out(points, exact.error_um @ turn)))
     keys = [key for key in scene.parameter_keys if scene.errors.amplitude(key) != 0.0]
     parts: list[Array] = []
     for some in (keys[first : first + KEYS_AT_ONCE] for first in range(0, len(keys), KEYS_AT_ONCE)):
-        moved = point_basis(scene, made, some).position
+        moved = point_basis(scene, made, some).position @ turn
         for amplitude, one in zip(amplitudes_of(scene.errors, some), moved, strict=True):
-            step = NUDGE * amplitude * fit_out(made.point_mm, one)
-            up, down = (gauge.measure(rest / 2.0 + way * step) for way in (1.0, -1.0))
-            parts.append((up - down) / (2.0 * NUDGE))
+            step = NUDGE * amplitude * fit_out(points, one)
+            parts.append((measure(rest / 2.0 + step) - measure(rest / 2.0 - step)) / (2.0 * NUDGE))
     measures: list[dict[str, Mapping[str, Any]]] = [{} for _ in features]
-    for index, one in enumerate(gauge.wanted):
+    for index, one in enumerate(wanted):
         split = {key: float(part[index]) for key, part in zip(keys, parts, strict=True)}
         measures[one.of[0]][one.name] = _numbers(one, [float(row[index]) for row in values], split)
     results: list[FeatureResult] = []
     for name, feature, found in zip(names, features, measures, strict=True):
         of = next((key for key, one in found.items() if "tolerance_um" in one), "position")
-        results.append(FeatureResult(name, feature.kind, found, of, found[of]["budget"]))
+        results.append(FeatureResult(name, feature.shape.kind, found, of, found[of]["budget"]))
     return tuple(results)
 
 
-def _posed(features: Sequence[Feature], mesh: PartMesh, made: Made) -> list[Shape]:
-    """Give the shapes of features where the part has been put."""
-    middle, there = mesh.vertices_mm.mean(axis=0), made.point_mm.mean(axis=0)
-    first, _, second = np.linalg.svd((mesh.vertices_mm - middle).T @ (made.point_mm - there))
-    turn = (first * [1.0, 1.0, np.sign(np.linalg.det(first @ second))] @ second).T
-    return [
-        replace(
-            shape, centre_mm=turn @ (shape.centre_mm - middle) + there, frame=turn @ shape.frame
-        )
-        for shape in (feature.shape for feature in features)
-    ]
-
-
-@dataclass(frozen=True)
-class _Gauge:
-    """Takes measures of a part whose points are moved."""
-
-    point_mm: Array  # [V, 3], nominal
-    features: Sequence[Feature]
-    nominal: Shapes
-    wanted: Sequence[Wanted]
-
-    @cached_property
-    def still(self) -> list[Array]:
-        """How far the vertices of each feature are off it in the file: no error of the machine."""
-        both = zip(self.nominal, self.features, strict=True)
-        return [shape.respond(self.point_mm[one.vertices]).distance_mm for shape, one in both]
-
-    def measure(self, moved_um: Array) -> Array:
-        """Take all measures, [m], µm or µrad, where points are moved by [V, 3]."""
-        points, shapes, forms = self.point_mm + moved_um * MM_PER_UM, list[Shape](), list[float]()
-        for feature, shape, still in zip(self.features, self.nominal, self.still, strict=True):
-            shapes.append(fit_shape(shape, points[feature.vertices]))
-            away = shapes[-1].respond(points[feature.vertices]).distance_mm
-            forms.append(float(np.ptp(away - still)))
-        found = np.empty(len(self.wanted))
-        for index, (name, of, *_) in enumerate(self.wanted):
-            kind, chosen = KINDS[name], ([both[at] for at in of] for both in (shapes, self.nominal))
-            value = kind.take(*chosen) if kind.take else forms[of[0]]
-            found[index] = value * (URAD_PER_RAD if kind.is_angle else UM_PER_MM)
-        return found
+def _measure(features: Sequence[Feature], wanted: Sequence[Wanted], point_mm: Array) -> Array:
+    """Take all measures, [m], µm or µrad, where the vertices of a part are, [V, 3]."""
+    points = [point_mm[one.vertices] for one in features]
+    shapes = [fit_shape(one.shape, seen) for one, seen in zip(features, points, strict=True)]
+    found = np.empty(len(wanted))
+    for index, (name, of, *_) in enumerate(wanted):
+        kind, at = KINDS[name], of[0]
+        if kind.take:
+            value = kind.take([shapes[at] for at in of], [features[at].shape for at in of])
+        else:  # what the file itself has rounded is no error of the machine
+            value = np.ptp(shapes[at].respond(points[at]).distance_mm - features[at].away_mm)
+        found[index] = value * (URAD_PER_RAD if kind.is_angle else UM_PER_MM)
+    return found
 
 
 def _numbers(wanted: Wanted, values: Sequence[float], split: Mapping[str, float]) -> dict[str, Any]:
@@ -243,7 +220,7 @@ def _read(
             away = {
                 float(np.linalg.norm(one.shape.centre_mm - entry["near"])): one.name
                 for one in features
-                if one.kind == entry["is"]
+                if one.shape.kind == entry["is"]
             }
             chosen[0] = away[min(away)] if away else entry["is"]
         problems.only(where, chosen, known, "feature")

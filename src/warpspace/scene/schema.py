@@ -311,19 +311,13 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     return -most, most
 
 
-def _names(reader: ValueReader, value: Any, path: Path) -> tuple[str, ...]:
-    if isinstance(value, str):
-        return (reader.text(value, path, 100),)
-    return _list(_text(100, 1), 6, 1)(reader, value, path)
-
-
 _FEATURE = Section(
     {
         "name": (_text(100, 1, *_PLAIN), ""),
         "is": (_text(100, 1), MISSING),
         "near": (POINT, None),
         "measure": (_text(100), ""),
-        "to": (_names, ()),
+        "to": (_list(_text(100, 1), 6), ()),
         "tolerance_um": (_band, None),
         "tolerance_urad": (_band, None),
     }

@@ -52,13 +52,13 @@ def test_surfaces_are_found_wherever_they_lie(mesh, found, digits):
     mesh.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1, 2, 3], [50, 0, 0]))
     if digits:  # as in files that round
         mesh.vertices = np.round(mesh.vertices, digits)
-    kinds = [one.kind for one in find_features(part_of(mesh))]
+    kinds = [one.shape.kind for one in find_features(part_of(mesh))]
     assert {kind: kinds.count(kind) for kind in kinds} == found
 
 
 def test_names_go_by_size_and_by_place():
     plate = find_features(part_of(plate_of_holes()))
-    holes = [one for one in plate if one.kind == "cylinder"]
+    holes = [one for one in plate if one.shape.kind == "cylinder"]
     assert [one.name for one in holes] == [f"cylinder {number}" for number in range(1, 10)]
     assert [one.shape.centre_mm[0] for one in holes] == pytest.approx(np.repeat([-60, 0, 60], 3))
     assert all(one.shape.radius_mm == pytest.approx(8.0) for one in holes)

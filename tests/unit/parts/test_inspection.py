@@ -39,7 +39,7 @@ BESIDE = entry(**{"is": "plane", "near": [0, 50, 0], "name": "back"})
 
 
 def test_the_squareness_of_a_cube_is_that_of_the_machine(tmp_path):
-    asked = entry(**{"is": "plane", "near": [50, 0, 0], "measure": "squareness", "to": "back",
+    asked = entry(**{"is": "plane", "near": [50, 0, 0], "measure": "squareness", "to": ["back"],
                      "tolerance_urad": 30})  # fmt: skip
     found = inspected(scene_with(EC0Y=40.0), CUBE, tmp_path, BESIDE + asked)
     (one,) = (row for part in found.values() for name, row in part.measures.items() if "to" in name)
@@ -78,9 +78,15 @@ def test_a_doubtful_verdict_is_none(tmp_path):
 @pytest.mark.parametrize("name", ["dvf5000_first", "dvf5000_second"])
 @pytest.mark.parametrize("place", [None, (60.0, -40.0, 250.0, 0.0, 0.0, 90.0)])
 @pytest.mark.parametrize(
-    "mesh", [plate_of_holes(), rounded(plate_of_holes()), trimesh.creation.icosphere(3, 80.0),
-             trimesh.creation.revolve(FRUSTUM, sections=90)], ids=["plate", "rounded plate", "ball", "frustum"]
-)  # fmt: skip
+    "mesh",
+    [
+        plate_of_holes(),
+        rounded(plate_of_holes()),
+        trimesh.creation.icosphere(3, 80.0),
+        trimesh.creation.revolve(FRUSTUM, sections=90),
+    ],
+    ids=["plate", "rounded plate", "ball", "frustum"],
+)
 def test_budgets_close(name, place, mesh, tmp_path):
     asked = entry(**{"is": "cylinder 3", "measure": "position",
                      "to": ["plane 1", "plane 3", "plane 4"]})  # fmt: skip
@@ -116,9 +122,9 @@ def test_a_plate_of_holes_is_the_ball_plate_of_the_bench():
         (entry(**{"is": "plane 1", "mesure": "flatness"}), "did you mean 'measure'"),
         (entry(**{"is": "plane 1", "measure": "diameter"}), "diameter of a plane; expected a"),
         (entry(**{"is": "plane 1", "measure": "angle"}), "angle to 0 features; expected 1"),
-        (entry(**{"is": "plane 1", "measure": "angle", "to": "plane 2", "tolerance_um": 1}),
+        (entry(**{"is": "plane 1", "measure": "angle", "to": ["plane 2"], "tolerance_um": 1}),
          "tolerance_um of angle; expected tolerance_urad"),
-        (entry(**{"is": "plane 1", "measure": "squareness", "to": "plane 1"}),
+        (entry(**{"is": "plane 1", "measure": "squareness", "to": ["plane 1"]}),
          "squareness at a nominal angle of 180°"),
         (entry(**{"is": "plane 1", "tolerance_um": 1}), "expected a measure"),
         (entry(**{"is": "plane 1", "name": "plane 2"}), "another feature has it"),
