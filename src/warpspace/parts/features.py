@@ -23,7 +23,7 @@ SMOOTH_DEG = 30.5  # triangles meeting at less may belong to one curved surface:
 FLAT_RAD = 1e-3  # triangles meeting at less lie in one facet
 FINE = 5e-6  # share of the largest coordinate that vertices are rounded by: files of six digits
 CLOSE = 2e-5  # share of its extent that a feature's vertices may be off its shape, beside rounding
-ALIKE_DEG = 8.0  # angle between triangles and the shape below them, at most
+ALIKE_DEG = 12.0  # angle between triangles and the first guess of the shape, at most
 FACETS = 4  # of a curved surface, at least: fewer lie on many shapes
 BROAD = 3.0  # a facet so many times larger than those that it runs into is a plane of its own
 ODD = 0.01  # share of its area that may lean otherwise: slivers
@@ -210,50 +210,39 @@ class _Surfaces:
         normal, weight = self.mesh.normals[part], self.area[part] / self.area[part].sum()
         place = self.mesh.vertices_mm[self.mesh.triangles[part]].mean(axis=1)
         centre, mean = weight @ place, weight @ normal
-        if kind == "plane":
-            return Shape(kind, centre, _frame(mean), angle_rad=-np.pi / 2.0)
         # normals are square to the axis of a cylinder, and on a circle about that of a cone
-        spread = (weight * normal.T) @ normal - (kind == "cone") * np.outer(mean, mean)
-        frame = _frame(np.linalg.eigh(spread)[1][:, 0])
+        same, spread = np.outer(mean, mean), (weight * normal.T) @ normal
+        apart = {"plane": same, "cone": same - spread}.get(kind, -spread)
+        frame = np.linalg.eigh(apart)[1]
+        lean = float(mean @ frame[:, 2])
+        if kind == "plane":
+            return Shape(
+                kind, centre, frame * np.copysign(1.0, [1.0, 1.0, lean]), 0.0, -np.pi / 2.0
+            )
         across = frame[:, : 3 if kind == "sphere" else 2]
         flat = normal @ across
         flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
         ways = np.eye(across.shape[1]) - flat[:, :, None] * flat[:, None, :]
         beside = np.einsum("t,tij,tj->i", weight, ways, (place - centre) @ across)
-        nearest = np.linalg.pinv(np.einsum("t,tij->ij", weight, ways)) @ beside
-        centre = centre + across @ nearest
+        centre = centre + across @ np.linalg.pinv(np.einsum("t,tij->ij", weight, ways)) @ beside
         radius = float(weight @ np.sum((place - centre) @ across * flat, axis=1))
-        angle = 0.0
-        if kind == "cone":  # the normals of a hole point to its axis
-            lean = float(mean @ frame[:, 2]) * np.sign(radius)
-            frame = frame * ([1.0, -1.0, -1.0] if lean > 0.0 else [1.0, 1.0, 1.0])
-            angle = float(np.arcsin(min(abs(lean), 1.0)))
-        return Shape(kind, centre, frame, abs(radius), angle)
+        angle = float(np.arcsin(min(abs(lean), 1.0))) if kind == "cone" else 0.0
+        widens = np.copysign(1.0, [1.0, 1.0, -lean * radius])  # normals of a hole point inwards
+        return Shape(kind, centre, frame * widens, abs(radius), angle)
 
     def _fitted(self, start: Shape, part: Indices) -> Feature | None:
-        """Fit a shape; None where vertices or normals of the triangles are off it."""
+        """Fit a shape; None where normals of the triangles or vertices are off it."""
         triangles, area = self.mesh.triangles[part], self.area[part]
-        vertices = np.unique(triangles)
-        points, middle = self.mesh.vertices_mm[vertices], self.mesh.vertices_mm[triangles].mean(1)
-        extent = float(np.linalg.norm(np.ptp(points, axis=0)))
-
-        def is_alike(shape: Shape, most_deg: float) -> bool:
-            turned = np.sum(shape.respond(middle).normal * self.mesh.normals[part], axis=1)
-            off = turned * np.sign(area @ turned) < np.cos(np.deg2rad(most_deg))
-            return bool(area @ off < ODD * area.sum())
-
-        if not is_alike(start, 2.0 * ALIKE_DEG):
+        below = start.respond(self.mesh.vertices_mm[triangles].mean(axis=1)).normal
+        turned = np.sum(below * self.mesh.normals[part], axis=1)
+        odd = turned * np.sign(area @ turned) < np.cos(np.deg2rad(ALIKE_DEG))
+        if area @ odd > ODD * area.sum():
             return None
+        vertices = np.unique(triangles)
+        points = self.mesh.vertices_mm[vertices]
         shape = fit_shape(start, points)
         away = shape.respond(points).distance_mm
-        if np.abs(away).max() > CLOSE * extent + self.rounding_mm or not is_alike(shape, ALIKE_DEG):
+        most = CLOSE * float(np.linalg.norm(np.ptp(points, axis=0))) + self.rounding_mm
+        if np.abs(away).max() > most:
             return None
         return Feature("", shape, vertices, part, float(area.sum()), away)
-
-
-def _frame(axis: Array) -> Array:
-    """Build a right-handed frame, [3, 3], whose third column is along a direction, or z."""
-    third = axis / np.linalg.norm(axis) if axis.any() else np.array([0.0, 0.0, 1.0])
-    first = np.cross(np.eye(3)[(np.argmax(np.abs(third)) + 1) % 3], third)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(third, first), third], axis=-1)
