@@ -61,8 +61,8 @@ def _offsets(text: str, scene: Scene) -> tuple[tuple[str, str, float], ...]:
         system = given or system
         read = re.fullmatch(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))", word)
         if system not in SYSTEMS or not read or read[1] not in scene.machine.axes:
-            axes = "".join(f",{name}.." for name in scene.machine.axes)[1:]
-            raise ValueError(f"{part!r} cannot be read; expected {', '.join(SYSTEMS)}={axes}")
+            known = f"G54 to G59 and axes of {', '.join(scene.machine.axes)}"
+            raise ValueError(f"{part!r}; expected {known}, for instance G54=X10,Y-5.5")
         found.append((system, read[1], float(read[2])))
     return tuple(found)
 

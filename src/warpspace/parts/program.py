@@ -214,7 +214,7 @@ class Program(Setup, Analysis):
         watch(0.3)
         path = trace_program(scene, read, chord_mm=self.chord_mm)
         watch(0.9)
-        norm = np.linalg.norm(path.error_um, axis=1)
+        norm, across = (np.linalg.norm(one, axis=1) for one in (path.error_um, path.across_um))
         order = np.lexsort((-norm, path.line))
         block = order[np.unique(path.line[order], return_index=True)[1]]
         mean, rms, p95, largest = astuple(path.summary(norm))
@@ -223,7 +223,8 @@ class Program(Setup, Analysis):
             read=read,
             path=path,
             deviation=Deviation(mean, rms, p95, largest, (x, y, z)),
-            across=path.summary(np.linalg.norm(path.across_um, axis=1)),
+            along=path.summary(np.sqrt(np.maximum(norm**2 - across**2, 0.0))),
+            across=path.summary(across),
             worst=_split(scene, path, block[np.argsort(-norm[block], kind="stable")][:WORST]),
             line=None if self.at_line is None else _end_of(path, self.at_line),
             of_lines=block,
@@ -253,15 +254,11 @@ def _split(scene: Scene, path: ToolPath, chosen: NDArray[np.int64]) -> tuple[Wor
     norm = np.linalg.norm(error, axis=1)
     along = error / np.where(norm > 0.0, norm, 1.0)[:, None]
     share = amplitudes_of(scene.errors, keys)[:, None] * np.sum(basis.position * along, axis=-1)
+    budgets = (dict(zip(keys, parts, strict=True)) for parts in share.T.tolist())
+    rows = zip(chosen, norm.tolist(), error, budgets, strict=True)
     return tuple(
-        WorstBlock(
-            int(path.line[sample]),
-            float(norm[row]),
-            path.axes_at(sample),
-            error[row],
-            dict(zip(keys, share[:, row].tolist(), strict=True)),
-        )
-        for row, sample in enumerate(chosen)
+        WorstBlock(int(path.line[at]), um, path.axes_at(at), errors, parts)
+        for at, um, errors, parts in rows
     )
 
 
@@ -277,6 +274,7 @@ class ProgramResult(Result):
     read: ReadProgram
     path: ToolPath
     deviation: Deviation
+    along: Summary
     across: Summary
     worst: tuple[WorstBlock, ...]
     line: Mapping[str, Any] | None  # axes and error at the end of the line asked for
@@ -290,6 +288,7 @@ class ProgramResult(Result):
             "outside": self.path.outside.sum(),
             "refused": self.read.refused,
             "deviation": self.deviation,
+            "along": self.along,
             "across": self.across,
             "worst": self.worst,
         }
@@ -310,8 +309,8 @@ class ProgramResult(Result):
         yield "  relative error in the workpiece frame"
         yield "  Geometry only: no forces, heat, wear or servo"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
-        both = ("error", self.deviation), ("across the path", self.across)
-        rows = [(word, *astuple(one)[:4]) for word, one in both]
+        names = {"error": self.deviation, "along the path": self.along, "across it": self.across}
+        rows = [(name, *astuple(one)[:4]) for name, one in names.items()]
         yield Table((Column("", leads=True), *heads), rows)
         if self.line:
             said = ", ".join(f"{value:.2f}" for value in self.line["error_um"])
@@ -329,15 +328,17 @@ class ProgramResult(Result):
         """Give the places of samples, their errors and, unless it is for a file, whose they are."""
         path = self.path
         both = (np.linalg.norm(error, axis=1) for error in (path.error_um, path.across_um))
-        places = *path.coordinates.values(), *path.tip_mm.T, *path.error_um.T, path.outside
+        places = *path.coordinates.values(), *path.tip_mm.T, *path.error_um.T
         hidden = [f"{name}_{'mm' if is_linear(name) else 'deg'}" for name in path.coordinates]
-        hidden += ["x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um", "outside"]
+        hidden += ["x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um"]
         columns = (
             Column("line", "d", key="line", leads=True),
             *number_columns(("|E|", "across"), ".2f", "µm", ("norm_um", "across_um")),
             *(Column(key=key, shows=False) for key in hidden),
+            Column(key="outside", shows=False),
             Column("most of it", _most, "µm"),
         )
         numbers = np.column_stack([values[samples] for values in (*both, *places)]).tolist()
-        told = zip(path.line[samples].tolist(), numbers, budgets, strict=True)
-        return Table(columns, [[line, *row, budget] for line, row, budget in told], "Worst blocks")
+        told = (path.line[samples].tolist(), numbers, path.outside[samples].tolist(), budgets)
+        rows = [(line, *row, outside, of) for line, row, outside, of in zip(*told, strict=True)]
+        return Table(columns, rows, "Worst blocks")
