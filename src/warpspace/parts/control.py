@@ -101,8 +101,8 @@ class ReadProgram:
     kind: NDArray[np.int64]  # [m]; STAND, RAPID, FEED or ARC
     tcp: NDArray[np.bool_]  # [m]
     length_mm: Array  # [m], of the tool
-    # [m, a], mm and degrees; axis positions. With TCP those of the linear axes are what the scene's
-    # tool point has where the tip is, rotary axes at zero: `Frame` takes them to the workpiece
+    # [m, a], mm and degrees; axis positions. With TCP those of the linear axes bring the scene's
+    # tool point to where the tip is while rotary axes are at zero: see `upright`
     end: Array
     across: NDArray[np.int64]  # [m]; direction 0 to 2 about which an arc turns
     turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
@@ -135,25 +135,10 @@ class ReadProgram:
         return at
 
 
-class Frame:
-    """Where words with TCP are on the workpiece: the tool point, rotary axes at zero."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.names, axes = following_axes(scene.model), scene.machine.axes
-        still = [name for name in axes if name in self.names or not axes[name].is_linear]
-        stand = {**scene.workspace.positions, **dict.fromkeys(still, 0.0)}
-        at = complete_coordinates(scene.machine, stand)
-        far = np.asarray(1024.0)  # a power of two: differences keep their digits
-        ends = [ball_point(scene.model, {**at, name: far}) for name in self.names]
-        self.origin_mm = ball_point(scene.model, at)
-        self.directions = (np.stack(ends, axis=-1) - self.origin_mm[:, None]) / far
-
-    def to_workpiece(self, words_mm: Array) -> Array:
-        """Give points of w, [..., 3], of words of the three axes, [..., 3]."""
-        return self.origin_mm + words_mm @ self.directions.T
-
-    def to_words(self, point_mm: Array) -> Array:
-        return (point_mm - self.origin_mm) @ np.linalg.inv(self.directions).T
+def upright(model: Model, words: Mapping[str, Array]) -> dict[str, Array]:
+    """Give where the axes stand at words of a program with TCP, were its rotary axes at zero."""
+    axes = model.machine.axes
+    return {name: at if axes[name].is_linear else np.zeros(()) for name, at in words.items()}
 
 
 def with_length(model: Model, length_mm: float) -> Model:
@@ -248,14 +233,15 @@ class _Control:
     def switch(self, *, tcp: bool, length_mm: float) -> None:
         """Say where the axes stand in the words of another mode; nothing moves."""
         if (tcp or self.tcp) and (tcp, length_mm) != (self.tcp, self.length_mm):
-            frame = Frame(self.scene)
             at = {axis: np.asarray(q) for axis, q in zip(self.names, self.at, strict=True)}
+            model = self.scene.model
             if self.tcp:
-                tip = frame.to_workpiece(np.array([at[axis] for axis in frame.names]))
-                at = follow(with_length(self.scene.model, self.length_mm), at, tip)
+                tip = ball_point(model, upright(model, at))
+                at = follow(with_length(model, self.length_mm), at, tip)
             if tcp:
-                tip = ball_point(with_length(self.scene.model, length_mm), at)
-                at |= dict(zip(frame.names, frame.to_words(tip), strict=True))
+                tip = ball_point(with_length(model, length_mm), at)
+                words = follow(model, upright(model, at), tip)
+                at |= {name: words[name] for name in following_axes(model)}
             self.at, self.tcp, self.length_mm = [*map(float, at.values())], tcp, length_mm
             self.record(STAND)
         self.length_mm = length_mm

@@ -26,7 +26,7 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Axis
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
-from warpspace.parts.control import Frame, ReadProgram, Setup, read_program, with_length
+from warpspace.parts.control import ReadProgram, Setup, read_program, upright, with_length
 from warpspace.parts.part import Deviation
 from warpspace.parts.words import program_lines
 from warpspace.scene.model import Scene, check_magnitude, second_order
@@ -152,9 +152,8 @@ def _along(
         for part in np.array_split(same, -(-len(same) // MOST_AT_ONCE)):
             here = {name: values[part] for name, values in found.items()}
             if tcp:
-                frame = Frame(scene)
-                words = np.stack([here[name] for name in frame.names], axis=-1)
-                here = follow(model, here, frame.to_workpiece(words))
+                target = ball_point(scene.model, upright(scene.model, here))
+                here = follow(model, here, target)
             for name, axis in scene.machine.axes.items():
                 found[name][part] = here[name] = _unwound(axis, here[name])
             check_magnitude(scene, here)
