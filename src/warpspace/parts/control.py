@@ -289,8 +289,8 @@ class _Control:
         self.begun = True
 
     def go_home(self, letters: Iterable[str]) -> None:
-        if letters:
-            self.line_to(self.target(), RAPID)
+        if letters and (over := self.target()) != self.at:
+            self.line_to(over, RAPID)
         with self.bare_axes():
             to = self.at.copy()
             for letter in letters or self.index:

@@ -23,13 +23,13 @@ _WORD = re.compile(
 )
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 UNDERSTOOD = _codes(
-    "0 1 2 3 4 17 18 19 20 21 28 40 43 43.4 49 53 54 55 56 57 58 59 61 61.1 64 80 81 82 83 90 90.1"
-    " 91 91.1 93 94 95 96 97 98 99"
+    "0 1 2 3 4 9 15 17 18 19 20 21 28 40 43 43.4 49 50 53 54 55 56 57 58 59 61 61.1 64 67 69 80 81"
+    " 82 83 90 90.1 91 91.1 93 94 95 96 97 98 99"
 )
 REFUSED = {"M96", "M97", "M98", "M99"} | _codes(
-    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5 5.1 5.2 5.3 6.2 7 10 12 12.1 13 16 30 33 33.1 38.2 38.3 38.4"
-    " 38.5 41 41.1 42 42.1 43.1 43.2 43.5 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65 66 68 68.2"
-    " 68.3 72 73 74 76 84 85 86 87 88 89 92"
+    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 30 33 33.1 38.2 38.3 38.4 38.5"
+    " 41 41.1 42 42.1 43.1 43.2 43.5 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65 66 68 68.2 68.3 72"
+    " 73 74 76 84 85 86 87 88 89 92"
 )
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
 MOST_SAID = 1000  # refused and unknown words that are listed
@@ -96,6 +96,8 @@ class Reader:
                     self.take(block, letter, number)
                 elif other:
                     self.take_other(block, other)
+            if {"G5", "G5.1"} & {*block.codes} and {"X", "Y", "Z"} & block.numbers.keys():
+                self.refused.append(Refused(line, "G5"))  # a spline; without a place a look-ahead
             begun = begun or bool(block.codes or block.numbers)
             if not self.refused:
                 yield block

@@ -197,7 +197,8 @@ def test_json_holds_together(dvf: Scene, tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "word"),
     [("#1=5", "#1=5"), ("G1 X[1+2]", "X[1+2]"), ("X#3", "X#3"), ("M98 P100", "M98"),
-     ("G41 D1 X5", "G41"), ("O100 sub", "O100"), ("IF [#1 GT 2] GOTO 5", "IF"), ("G68 R30", "G68")],
+     ("G41 D1 X5", "G41"), ("O100 sub", "O100"), ("IF [#1 GT 2] GOTO 5", "IF"), ("G68 R30", "G68"),
+     ("G05.1 X5", "G5")],
 )  # fmt: skip
 def test_what_is_refused_ends_the_path(dvf: Scene, text: str, word: str):
     read, _ = run(dvf, f"G0 X1 Y1 Z-200\n{text}\nG1 X50\nM98 P5")
