@@ -68,27 +68,22 @@ class DrawingClicked(_Said, tag="ScenePointerMessage"):
     modifier: Annotated[str, Meta(max_length=40)] | None
 
 
-class PartMoved(_Said, tag="TransformControlsUpdateMessage"):
-    """What moves the part, while it is dragged."""
-
-    name: Name
-    wxyz: tuple[Number, Number, Number, Number]
-    position: Vector
-    owner: Name = ""
-
-
-class PartHeld(_Said, tag="TransformControlsDragStartMessage"):
+class PartHeld(_Said, tag="TransformControlsDragStartMessage", kw_only=True):
     """What moves the part, as it is seized."""
 
     name: Name
     owner: Name = ""
 
 
-class PartLetGo(_Said, tag="TransformControlsDragEndMessage"):
-    """What moves the part, as it is let go."""
+class PartLetGo(PartHeld, tag="TransformControlsDragEndMessage"):
+    """The same, as it is let go."""
 
-    name: Name
-    owner: Name = ""
+
+class PartMoved(PartHeld, tag="TransformControlsUpdateMessage", kw_only=True):
+    """The same, while it is dragged."""
+
+    wxyz: tuple[Number, Number, Number, Number]
+    position: Vector
 
 
 class PictureRendered(_Said, tag="GetRenderResponseMessage"):

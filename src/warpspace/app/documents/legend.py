@@ -122,7 +122,7 @@ def part_html(picture: LivePicture) -> Markup:
         low, high = (number(float(at)) for at in (part.normal_um.min(), part.normal_um.max()))
         said[0] += f", {low} to {high} µm along its normal"
         if look.normal:
-            scale = picture.scale_of(part.normal_um, normal=True)
+            _, scale = picture.coloured(part)
             bar = tag("i", "", class_="ws-strip",
                       style=f"background:linear-gradient(to right,{_stops(scale)})")  # fmt: skip
             ends = [spell_short(end) for end in (scale.low, scale.high)]

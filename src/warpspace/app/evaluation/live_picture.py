@@ -10,6 +10,7 @@ import numpy as np
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.bench import BenchPicture, bench_picture
 from warpspace.app.evaluation.part import (
+    NORMAL,
     Moved,
     PartPicture,
     PathPicture,
@@ -84,13 +85,14 @@ class LivePicture(Picture):
             return None
         return replace(b, error_um=b.error_um - a.error_um)
 
-    def scale_of(self, values: Array, *, normal: bool = False) -> ColourScale:
-        """Give the colours of errors beside the map: its own, of both signs along a normal."""
+    def coloured(self, found: Moved) -> tuple[Array, ColourScale]:
+        """Give what is coloured beside the map, in its colours; of both signs along normals."""
+        normal = self.state.part.normal and isinstance(found, PartPicture)
+        values = found.values_um(NORMAL if normal else self.component)
         if not (normal or self.tilts):
-            return self.scale
-        component = "x" if normal else self.component
-        end = None if self.tilts else self.scale.high
-        return build_scale(float(np.abs(values).max()), component, end=end)
+            return values, self.scale
+        end, largest = None if self.tilts else self.scale.high, float(np.abs(values).max())
+        return values, build_scale(largest, "x" if normal else self.component, end=end)
 
     @cached_property
     def worst_node(self) -> int:

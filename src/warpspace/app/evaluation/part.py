@@ -1,4 +1,4 @@
-"""The part in the box: responses of its vertices are kept, a slider move is a product."""
+"""The part in the box, and the path of a program: responses are kept, a slider move is a product."""
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +14,6 @@ from warpspace.app.state.forms import option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.evaluate import build_basis
-from warpspace.formats.compensation.controller import Corrected
 from warpspace.geometry.colour import component_values
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
@@ -26,13 +25,13 @@ from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
 AT_LINE = "program.at_line"  # the form that names a line of the program
-CACHE_BYTES = 300_000_000
+NORMAL = "normal"  # beside the components of a map: the deviation along the normal of a part
 MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app draws
-PIECE = 20_000  # vertices that are worked on at once: what lies between needs memory, too
-MOST_EDGES = 60_000  # of the creases of a part: those of a rough scan are left out
+PIECE = 20_000  # points that are worked on at once: what lies between needs memory, too
 STEEP = 1e-9  # cosine of a turn about y below which those about x and z are one
 Floats: TypeAlias = NDArray[Any]
 """Of 4 bytes: half the memory, and enough to be drawn."""
+_KEPT: Cache[Any] = Cache(400_000_000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +40,7 @@ class Points:
 
     nominal_mm: Floats  # [n, 3]
     response: Floats  # [K, n * 3], µm per µm or µrad
-    coordinates: dict[str, Array]  # [n] each: where the axes stand
+    coordinates: Mapping[str, Array]  # [n] each: where the axes stand
     own_mm: Array  # [n, 3]; in the workpiece frame
     pose: Array  # [4, 4]; of the workpiece frame as drawn
     outside: NDArray[np.bool_]  # [n]; beyond the travel
@@ -54,7 +53,7 @@ class Points:
             return (amplitudes @ self.response).reshape(-1, 3)
         here = branch_pose(scene.model, "workpiece", at)
         point = transforms.apply(here, self.own_mm)
-        kept = _CORRECTED.get(
+        kept = _KEPT.get(
             (Identity(controller), Identity(self)),
             lambda: controller.at(at, point, scene, Loop.RELATIVE, point),
             lambda found: found.nbytes,
@@ -63,14 +62,13 @@ class Points:
         return transforms.rotate(turn, kept.field(scene.errors).error_um).astype(np.float32)
 
 
-_CORRECTED: Cache[Corrected] = Cache(CACHE_BYTES // 2)
-
-
 def respond(
     scene: Scene, own_mm: Array, coordinates: Mapping[str, Array], outside: NDArray[np.bool_]
 ) -> Points:
     """Work out what does not depend on errors, of points of the workpiece frame, [n, 3]."""
     count, keys = len(own_mm), scene.parameter_keys
+    if count > MOST_POINTS:
+        raise OptionError(f"{count:,} points; expected at most {MOST_POINTS:,} in the app")
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
     pose = np.asarray(branch_pose(scene.model, "workpiece", stand))
     at = {name: np.broadcast_to(values, count) for name, values in coordinates.items()}
@@ -87,33 +85,6 @@ def respond(
 
 
 @dataclass(frozen=True, eq=False)
-class Clamped:
-    """A part where it is clamped."""
-
-    points: Points  # its vertices, [V]
-    mesh: PartMesh  # in the workpiece frame
-    middle_mm: Array  # [3]; of the box of the part, in its own frame
-    pose: Array  # [4, 4]; takes the part's own frame to where it is drawn
-
-    @cached_property
-    def normals(self) -> Floats:
-        """Unit normals of the corners as drawn, [W, 3]."""
-        return (self.mesh.corners.normals @ self.points.pose[:3, :3].T).astype(np.float32)
-
-    @cached_property
-    def edges(self) -> NDArray[np.int32]:
-        """Creases and rims as pairs of corners, [S, 2]; none where there are too many."""
-        found = self.mesh.corners
-        pairs = np.stack([found.triangles, np.roll(found.triangles, -1, axis=1)], -1).reshape(-1, 2)
-        ends = np.sort(pairs, axis=1).astype(np.int64) @ [len(found.corner_of), 1]
-        _, first, count = np.unique(ends, return_index=True, return_counts=True)
-        rims = pairs[first[count == 1]]  # of two smooth faces that meet, one each
-        ends = np.sort(found.corner_of[rims], axis=1).astype(np.int64)
-        rims = rims[np.unique(ends @ [len(self.mesh.vertices_mm), 1], return_index=True)[1]]
-        return rims[: len(rims) * (len(rims) <= MOST_EDGES)]
-
-
-@dataclass(frozen=True, eq=False)
 class Moved:
     """Points with the errors of a state."""
 
@@ -124,85 +95,42 @@ class Moved:
     def norm_um(self) -> Floats:
         return component_values(self.error_um, "norm")
 
+    def values_um(self, component: str) -> Floats:
+        """Give what is coloured of them."""
+        return self.norm_um if component == "norm" else component_values(self.error_um, component)
+
     def drawn_mm(self, exaggeration: float) -> Floats:
         """Give where they are, [n, 3], exaggerated."""
         return self.points.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
 
-    def component_um(self, component: str) -> Floats:
-        """Give what a map shows of them, [n]."""
-        return self.norm_um if component == "norm" else component_values(self.error_um, component)
+
+@dataclass(frozen=True, eq=False)
+class Clamped:
+    """A part where it is clamped."""
+
+    points: Points  # its vertices, [V]
+    mesh: PartMesh  # in the workpiece frame
+    middle_mm: Array  # [3]; of the box of the part, in its own frame
+    pose: Array  # [4, 4]; takes the part's own frame to where it is drawn
 
 
 @dataclass(frozen=True, eq=False)
 class PartPicture(Moved):
-    """A part with the errors of a state, at its vertices."""
+    """A part with the errors of a state, at its vertices; coloured at its corners, [W]."""
 
     clamped: Clamped
 
     @cached_property
     def normal_um(self) -> Floats:
         """Deviation along the normal of each corner, [W]."""
-        at = self.clamped.mesh.corners.corner_of
-        return np.einsum("ij,ij->i", self.error_um[at], self.clamped.normals)
+        corners, turn = self.clamped.mesh.corners, self.points.pose[:3, :3]
+        error = self.error_um[corners.corner_of]
+        return np.einsum("ij,ij->i", error, (corners.normals @ turn.T).astype(np.float32))
 
-    def values(self, component: str, *, normal: bool) -> Floats:
-        """Give what is coloured at each corner, [W], µm."""
-        at = self.clamped.mesh.corners.corner_of
-        return self.normal_um if normal else self.component_um(component)[at]
-
-
-_KEPT: Cache[Clamped] = Cache(CACHE_BYTES)
-
-
-def clamped_scene(state: AppState) -> Scene:
-    """Give the scene that the part is clamped in: with the rotary axes where they stand."""
-    workspace = state.scene.workspace.moved(state.positions)
-    return replace(state.scene, workspace=workspace, placed=state.placed)
-
-
-def clamped_part(state: AppState) -> Clamped | None:
-    """Give the part that a state holds, where it is clamped; None where it holds none.
-
-    Raises
-    ------
-    WarpspaceError
-        If the machine cannot follow it, or it is too large to be drawn.
-    """
-    mesh, place = state.part.mesh, state.part.place
-    if mesh is None:
-        return None
-
-    def clamp() -> Clamped:
-        count, scene = len(mesh.vertices_mm), clamped_scene(state)
-        if count > MOST_POINTS:
-            raise OptionError(
-                f"{mesh.name} has {count:,} vertices; expected at most {MOST_POINTS:,} in the app"
-            )
-        at = find_place(mesh, scene, place)
-        part = place_part(mesh, scene, at)
-        made = make_points(scene, part.vertices_mm)
-        points = respond(scene, made.point_mm, made.coordinates, made.outside)
-        middle = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
-        return Clamped(points, part, middle, points.pose @ transforms.placed(at[:3], at[3:]))
-
-    key = (*_held(state), Identity(mesh), place)
-    return _KEPT.get(key, clamp, lambda found: found.points.response.nbytes)
-
-
-def _held(state: AppState) -> tuple[Hashable, ...]:
-    return Identity(state.scene), tuple(state.positions.items()), state.placed
-
-
-def part_picture(state: AppState) -> PartPicture | None:
-    """Give the part with the errors of a state; None where none is drawn, or it cannot be."""
-    try:
-        found = clamped_part(state) if state.part.shown else None
-        return found and PartPicture(found.points, found.points.error_um(state), found)
-    except WarpspaceError:  # its section says it
-        return None
-
-
-# --- The path of a program ------------------------------------------------------------------------
+    def values_um(self, component: str) -> Floats:
+        if component == NORMAL:
+            return self.normal_um
+        return super().values_um(component)[self.clamped.mesh.corners.corner_of]
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +141,42 @@ class PathPicture(Moved):
     ends: NDArray[np.intp]  # [S]; samples that a piece of the path leads to from the one before
 
 
-_PATHS: Cache[PathPicture] = Cache(CACHE_BYTES // 2)
+def clamped_scene(state: AppState) -> Scene:
+    """Give the scene that the part is clamped in: with the rotary axes where they stand."""
+    workspace = state.scene.workspace.moved(state.positions)
+    return replace(state.scene, workspace=workspace, placed=state.placed)
+
+
+def clamped_part(state: AppState) -> Clamped | None:
+    """Give the part of a state where it is clamped; raises where the machine cannot follow it."""
+    mesh, place = state.part.mesh, state.part.place
+    if mesh is None:
+        return None
+
+    def clamp() -> Clamped:
+        scene = clamped_scene(state)
+        at = find_place(mesh, scene, place)
+        part = place_part(mesh, scene, at)
+        made = make_points(scene, part.vertices_mm)
+        points = respond(scene, made.point_mm, made.coordinates, made.outside)
+        middle = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
+        return Clamped(points, part, middle, points.pose @ transforms.placed(at[:3], at[3:]))
+
+    key = (*_stand(state), Identity(mesh), place)
+    return _KEPT.get(key, clamp, lambda found: found.points.response.nbytes)
+
+
+def _stand(state: AppState) -> tuple[Hashable, ...]:
+    return Identity(state.scene), tuple(state.positions.items()), state.placed
+
+
+def part_picture(state: AppState) -> PartPicture | None:
+    """Give the part with the errors of a state; None where none is drawn, or it cannot be."""
+    try:
+        found = clamped_part(state) if state.part.shown else None
+        return found and PartPicture(found.points, found.points.error_um(state), found)
+    except WarpspaceError:  # its section says it
+        return None
 
 
 def path_picture(state: AppState) -> PathPicture | None:
@@ -228,19 +191,14 @@ def path_picture(state: AppState) -> PathPicture | None:
         asked = read_form(Program, options, told, scene)
         read = read_program(scene, held[1].splitlines(), asked, held[0])
         path = trace_program(scene, read, chord_mm=asked.chord_mm)
-        if len(path.line) > MOST_POINTS:
-            raise OptionError(
-                f"the path has {len(path.line):,} points; expected at most {MOST_POINTS:,}"
-                " in the app: a larger chord makes fewer"
-            )
         points = respond(scene, path.tip_mm, path.coordinates, path.outside)
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return PathPicture(points, points.nominal_mm, path.line, ends)
 
     told.pop("at_line", None)
-    key = (*_held(state), Identity(held), tuple(sorted(told.items())))
+    key = (*_stand(state), Identity(held), tuple(sorted(told.items())))
     try:
-        found = _PATHS.get(key, trace, lambda one: one.points.response.nbytes)
+        found = _KEPT.get(key, trace, lambda one: one.points.response.nbytes)
         return replace(found, error_um=found.points.error_um(state))
     except WarpspaceError:
         return None
@@ -249,14 +207,12 @@ def path_picture(state: AppState) -> PathPicture | None:
 # --- Where it is clamped --------------------------------------------------------------------------
 
 
-def place_of(pose: Array) -> tuple[float, ...]:
-    """Give the place of a part, mm and degrees, for the pose of its frame in w, [4, 4]."""
-    turn = pose[:3, :3]
-    flat = float(np.hypot(turn[2, 1], turn[2, 2]))
-    if flat > STEEP:
-        about_x = np.arctan2(turn[2, 1], turn[2, 2])
-        about_z = np.arctan2(turn[1, 0], turn[0, 0])
-    else:
+def place_of(clamped: Clamped, drawn: Array) -> tuple[float, ...]:
+    """Give the place of a part, mm and degrees, for the pose that it is drawn in, [4, 4]."""
+    pose = transforms.inverse(clamped.points.pose) @ drawn
+    turn, flat = pose[:3, :3], float(np.hypot(*pose[2, 1:3]))
+    about_x, about_z = np.arctan2(turn[2, 1], turn[2, 2]), np.arctan2(turn[1, 0], turn[0, 0])
+    if flat < STEEP:
         about_x, about_z = np.arctan2(-turn[1, 2], turn[1, 1]), 0.0
     angles = np.rad2deg([about_x, np.arctan2(-turn[2, 0], flat), about_z])
     return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())
@@ -264,9 +220,8 @@ def place_of(pose: Array) -> tuple[float, ...]:
 
 def turned_place(clamped: Clamped, axis: str, angle_deg: float) -> tuple[float, ...]:
     """Turn a part about its middle and an axis of the workpiece frame."""
-    own = transforms.inverse(clamped.points.pose) @ clamped.pose
-    middle = transforms.apply(own, clamped.middle_mm)
-    turn = transforms.rigid(
-        transforms.axis_rotation("xyz".index(axis), np.deg2rad(angle_deg)), np.zeros(3)
-    )
-    return place_of(transforms.translation(middle) @ turn @ transforms.translation(-middle) @ own)
+    middle = transforms.apply(clamped.pose, clamped.middle_mm)
+    about = clamped.points.pose[:3, "xyz".index(axis)]
+    turn = transforms.vector_rotation(np.deg2rad(angle_deg) * about)
+    own = transforms.translation(-middle) @ clamped.pose
+    return place_of(clamped, transforms.rigid(turn, middle) @ own)
