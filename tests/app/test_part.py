@@ -42,10 +42,10 @@ def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> No
     assert found is not None
     scene = clamped_scene(replace(state, scene=state.active_scene()))
     made = make_points(scene, place_part(MESH, scene, state.part.place).vertices_mm)
-    back = np.linalg.inv(found.clamped.points.pose)
+    back = np.linalg.inv(found.points.pose)
     np.testing.assert_allclose(found.error_um @ back[:3, :3].T, made.error_um, atol=1e-4)
     np.testing.assert_allclose(
-        transforms.apply(back, found.clamped.points.nominal_mm), made.point_mm, atol=1e-3
+        transforms.apply(back, found.points.nominal_mm), made.point_mm, atol=1e-3
     )
     drawn = found.drawn_mm(1.0) - found.drawn_mm(0.0)
     np.testing.assert_allclose(drawn, 1e-3 * found.error_um, atol=1e-4)
@@ -54,7 +54,7 @@ def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> No
 def test_a_part_in_the_middle_stands_in_the_middle_of_the_box() -> None:
     picture = LIVE.evaluate(STATE)
     assert picture.part is not None
-    middle = picture.part.clamped.points.nominal_mm
+    middle = picture.part.points.nominal_mm
     middle = (middle.min(axis=0) + middle.max(axis=0)) / 2.0
     np.testing.assert_allclose(middle, picture.grid.bounds_mm.mean(axis=0), atol=1e-3)
 
@@ -86,9 +86,9 @@ def test_turns_keep_the_middle_and_add_up() -> None:
             )  # fmt: skip
         np.testing.assert_allclose(again.pose, placed.pose, atol=5e-3)
     for angle in (90.0, -90.0):
-        place = place_of(transforms.placed((1, 2, 3), (20, angle, 30)))
-        back = transforms.placed(place[:3], place[3:])
-        np.testing.assert_allclose(back, transforms.placed((1, 2, 3), (20, angle, 30)), atol=1e-4)
+        pose = transforms.placed((1, 2, 3), (20, angle, 30))
+        place = place_of(placed, placed.points.pose @ pose)
+        np.testing.assert_allclose(transforms.placed(place[:3], place[3:]), pose, atol=1e-4)
 
 
 def test_a_place_is_typed_linked_and_undone() -> None:
@@ -128,7 +128,7 @@ def test_a_slider_moves_a_large_part_in_60_ms() -> None:
         state, began = put(state, "amplitudes.EA0Z", str(value)), time.process_time()
         part = LIVE.evaluate(state).part
         assert part is not None
-        part.values("norm", normal=False)
+        part.values_um("norm")
         part.drawn_mm(1000.0)
         best = min(best, time.process_time() - began)
     assert best < 0.06

@@ -34,6 +34,7 @@ class Corners(NamedTuple):
     corner_of: NDArray[np.int32]  # [W], number of the vertex of each corner
     triangles: NDArray[np.int32]  # [T, 3], numbers of corners
     normals: Array  # [W, 3], unit vectors; zero where all triangles are slivers
+    creases: NDArray[np.int32]  # [S, 2], corners at the ends of the edges where smooth faces meet
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ class PartMesh:
         one, other = self.neighbours
         cosine = np.sum(self.normals[one // 3] * self.normals[other // 3], axis=1)
         joined = cosine > np.cos(np.deg2rad(CREASE_DEG))
-        one, other = one[joined], other[joined]
+        sharp, one, other = one[~joined], one[joined], other[joined]
         # an edge begins at its corner of the triangle and ends at the following one
         begin, end = other, other // 3 * 3 + (other % 3 + 1) % 3
         turned = self.triangles.reshape(-1)[one] != self.triangles.reshape(-1)[other]
@@ -95,6 +96,7 @@ class PartMesh:
             vertex,
             label.reshape(-1, 3).astype(np.int32),
             normals / np.where(length > 0.0, length, 1.0),
+            label[np.stack([sharp, sharp // 3 * 3 + (sharp % 3 + 1) % 3], -1)].astype(np.int32),
         )
 
 

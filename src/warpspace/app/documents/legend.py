@@ -113,7 +113,8 @@ def part_html(picture: LivePicture) -> Markup:
     """Say how far part and program are off where they are drawn, and what that leaves out."""
     part, path, look, said = picture.part, picture.path, picture.state.part, list[Markup]()
     change = "changes " if picture.is_difference else ""
-    for what, found in ((f"Part {look.name}", part), (f"Program {look.program_name}", path)):
+    program = (look.program or ("",))[0]
+    for what, found in ((f"Part {look.name}", part), (f"Program {program}", path)):
         if found is not None:
             most, out = float(found.norm_um.max(initial=0.0)), int(found.points.outside.sum())
             more = f", {spell_count(out)} points beyond the travel" if out else ""

@@ -64,8 +64,8 @@ class PartLayer:
             return
         points, levels = _drawn(picture, part)
         palette = level_colours(diverging=picture.coloured(part)[1].diverging)
-        ends = _edges(part)
-        self._nodes.draw(part_shapes(picture, part, points, palette[levels], points[ends]))
+        ends = part.clamped.mesh.corners.creases
+        self._nodes.draw(part_shapes(picture, part, points, palette[levels]))
         lifts = packed(np.zeros((ends.size, 3), "<f4"))
         facts = {"surface": SURFACE, "count": len(points), "palette": packed(palette),
                  "lines": {EDGES: (packed(ends.astype("<u4")), lifts)}}  # fmt: skip
@@ -105,31 +105,23 @@ def _drawn(picture: LivePicture, part: PartPicture) -> tuple[Array, Any]:
     return drawn[corners.corner_of], colour_levels(scale, values)
 
 
-def _edges(part: PartPicture) -> Any:
-    """Give the creases of a part as pairs of corners, [S, 2]."""
-    mesh = part.clamped.mesh
-    _, first = np.unique(mesh.corners.corner_of, return_index=True)
-    return first[mesh.creases]
-
-
-def part_shapes(
-    picture: LivePicture, part: PartPicture, points: Array, colours: Array, edges: Array
-) -> Shapes:
+def part_shapes(picture: LivePicture, part: PartPicture, points: Array, colours: Any) -> Shapes:
     """Draw a part as cut, its creases, those of the nominal one, and what is out of reach."""
-    clamped, ghost = part.clamped, colour(picture, "ghost")
+    clamped, corners, ghost = part.clamped, part.clamped.mesh.corners, colour(picture, "ghost")
+    ends = corners.corner_of[corners.creases]
     nominal, away = part.points.nominal_mm, part.points.nominal_mm[part.points.outside]
     surface = _template(Identity(clamped)).fill(points, colours)
     found = {
         SURFACE: Shape("add_glb", UNLIT, {"glb_data": surface}),
-        EDGES: lines(edges, colour(picture, "edge"), 1.4),
+        EDGES: lines(points[corners.creases], colour(picture, "edge"), 1.4),
         "/part/outside": dots(away[:: 1 + len(away) // MOST_OUTSIDE],
                               OUTSIDE_SIZE * picture.size_mm, ACCENT),
     }  # fmt: skip
     if picture.state.shown.ghost:
-        found["/part/nominal"] = lines(nominal[clamped.mesh.creases], ghost, 1.2)
+        found["/part/nominal"] = lines(nominal[ends], ghost, 1.2)
     if picture.state.part.moved:
         own = transforms.apply(transforms.inverse(clamped.pose), nominal) - clamped.middle_mm
-        found[f"{GIZMO}/nominal"] = lines(own[clamped.mesh.creases], ghost, 1.2)
+        found[f"{GIZMO}/nominal"] = lines(own[ends], ghost, 1.2)
     return found
 
 

@@ -1,4 +1,4 @@
-"""The part in the box, and the path of a program: responses are kept, a slider move is a product."""
+"""What stands in the box, part and path: responses are kept, a slider move is a product."""
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace

@@ -177,7 +177,6 @@ class PartLook:
     )
     # name and text of a program that is run on the machine, as the mesh is kept
     program: "tuple[str, str] | None" = None
-    program_name: str = described("", "Program", linked="program")
     shown: bool = described(
         True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
     )

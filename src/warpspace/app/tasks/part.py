@@ -10,18 +10,8 @@ from markupsafe import Markup
 from warpspace.analysis.catalogue import Entry
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
-from warpspace.app.browser.html import (
-    EMPTY,
-    button,
-    join,
-    number,
-    rows,
-    signed,
-    tag,
-    text_box,
-    upload_button,
-)
-from warpspace.app.browser.html import field as labelled
+from warpspace.app.browser import html
+from warpspace.app.browser.html import EMPTY, button, join, number, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, read_upload
 from warpspace.app.evaluation.part import AT_LINE, clamped_part, clamped_scene, turned_place
@@ -29,7 +19,6 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.forms import option_values, read_form
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.tree import leaves, spell
 from warpspace.app.tasks.analysis import Question
 from warpspace.app.tasks.charts import details_html
 from warpspace.app.tasks.context import Context
@@ -41,12 +30,7 @@ from warpspace.parts.part import find_place, parse_part
 from warpspace.parts.program import Program, ProgramResult
 from warpspace.scene.model import Scene
 
-SWITCHES = ("part.shown", "part.normal", "part.moved")
-TURNS = {
-    f"{axis} {angle}": f"{axis} {sign}90°"
-    for axis in "xyz"
-    for angle, sign in ((90, "+"), (-90, "−"))
-}
+SETTINGS = ("part.place", "part.shown", "part.normal", "part.moved")
 MOST_LETTERS, MOST_SHARES = 200, 2  # of a line that is shown; errors that a block is split into
 
 
@@ -55,7 +39,7 @@ class InBoxPart(FilesPart):
 
     at_once = True
     endings: tuple[str, ...] = ()
-    invitation = ""  # what is said where there is none
+    invitation = ""
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
@@ -80,17 +64,14 @@ class InBoxPart(FilesPart):
 
     def before_result(self, state: AppState) -> Markup:
         held, name = self.held(state)
-        first = held is None
-        words = f"{self.title} …" if first else f"Another {self.name} …"
-        upload = upload_button(
-            words, self.name, MAX_UPLOAD_BYTES, ",".join(self.endings),
-            kind="main" if first else "", hint=f"At most {MAX_UPLOAD_BYTES >> 20} MB",
+        upload = html.upload_button(
+            f"Another {self.name} …" if held else f"{self.title} …", self.name, MAX_UPLOAD_BYTES,
+            ",".join(self.endings), kind="" if held else "main",
+            hint=f"At most {MAX_UPLOAD_BYTES >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
-        said = f"{self.invitation} Files can also be dropped on the page."
-        if name:
-            said = f"{name} is not here: links and saved scenes hold only its name."
-        about = tag("p", said, class_="ws-quiet")
-        if not first:
+        missing = f"{name} is not here: links and saved scenes hold only its name."
+        about = tag("p", missing if name else self.invitation, class_="ws-quiet")
+        if held:
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
         return join((about, self.files_html(), actions(upload)))
@@ -112,6 +93,12 @@ class InBoxPart(FilesPart):
 
         self.context.post(shown)
 
+    def removed(self, state: AppState, part: PartLook) -> AppState:
+        """Take it out of the box."""
+        self._answer = None
+        found = replace(state, part=part)
+        return edits.with_sight(found, inside=not part.is_empty)
+
 
 class PartPart(InBoxPart):
     """A part: clamped, and measured as it is cut."""
@@ -131,40 +118,34 @@ class PartPart(InBoxPart):
         return replace(asked, place=state.part.place, mesh=state.part.mesh)
 
     def about(self, state: AppState) -> Markup:
-        mesh, scene = state.part.mesh, clamped_scene(state)
-        assert mesh is not None  # noqa: S101 - said of one that is there
-        turns = join(button(said, f"{self.name}:turn", value, kind="choice")
-                     for value, said in TURNS.items())  # fmt: skip
-        usual = ",".join(f"{at:.6g}" for at in find_place(mesh, scene, None))
-        leaf, name = leaves(state)["part.place"], "state:set.part.place"
-        box = text_box(name, spell(state, "part.place"), placeholder=usual)
+        warnings = state.part.mesh.warnings if state.part.mesh else ()
+        turns = join(button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
+                            hint=f"Turn it about {axis} of the workpiece, in place")
+                     for axis in "xyz")  # fmt: skip
         return join((
-            *(tag("p", one, class_="ws-doubt") for one in mesh.warnings),
-            labelled(leaf.label, box, name, "mm, °", leaf.hint),
-            labelled("Turn", tag("div", turns, class_="ws-choices"), "part.turn",
-                     hint="About an axis of the workpiece, in place"),
-            *(setting(state, path) for path in SWITCHES),
+            *(tag("p", one, class_="ws-doubt") for one in warnings),
+            html.field("Turn", tag("div", turns, class_="ws-choices"), "part.turn"),
+            *(setting(state, path) for path in SETTINGS),
         ))  # fmt: skip
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "remove":
-            self._sent = self._answer = None
-            left = PartLook(program=state.part.program, program_name=state.part.program_name)
-            found = replace(state, part=left)
-            return edits.with_sight(found, inside=left.program is not None)
-        if word == "turn" and value in TURNS and (clamped := clamped_part(state)) is not None:
-            axis, angle = value.split()
-            place = turned_place(clamped, axis, float(angle))
+            self._sent = None
+            return self.removed(state, PartLook(program=state.part.program))
+        if word == "turn" and value in ("x", "y", "z") and (clamped := clamped_part(state)):
+            place = turned_place(clamped, value, 90.0)
             return replace(state, part=replace(state.part, place=place))
         if word == "set.unit" and self._sent is not None:
             self.attempt(partial(self.received, *self._sent))
         return super().take(state, word, value)
 
     def received(self, name: str, content: bytes) -> None:
-        """Take in a mesh; one of another name is clamped at its usual place."""
+        """Take in a mesh; one of another name is clamped in the middle of the volume."""
         self._sent, state = (name, content), self.context.state
         mesh = parse_part(content, name, option_values(state, self.name).get("unit") or None)
         place = state.part.place if name == state.part.name else None
+        if place is None:
+            place = tuple(round(at, 3) for at in find_place(mesh, clamped_scene(state), None))
         self.show(mesh=mesh, name=name, place=place)
 
 
@@ -182,12 +163,10 @@ class ProgramPart(InBoxPart):
     """A program: a line and its place in the drawing find each other."""
 
     endings = PROGRAM_ENDINGS
-    invitation = (
-        "A program (G-code): the path of the tool over the workpiece, and its worst blocks."
-    )
+    invitation = "A program (G-code): its path over the workpiece, and its worst blocks."
 
     def held(self, state: AppState) -> tuple[object, str]:
-        return state.part.program, state.part.program_name
+        return state.part.program, (state.part.program or ("",))[0]
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         name, text = state.part.program or ("", "")
@@ -207,18 +186,17 @@ class ProgramPart(InBoxPart):
             line = button(f"line {one.line}", f"{self.name}:set.at_line", one.line, kind="link",
                           hint="Show it in the drawing")  # fmt: skip
             most = sorted(one.budget.items(), key=lambda share: -share[1])[:MOST_SHARES]
-            shares = ", ".join(f"{key} {signed(um)}" for key, um in most)
+            shares = ", ".join(f"{key} {html.signed(um)}" for key, um in most)
             worst.append((line, f"{number(one.um)} µm: {shares}"))
         words = tag("p", "Click a line, or the path in the drawing.", class_="ws-tiny")
         rest = details_html(one for one in found.blocks() if not isinstance(one, str))
-        return join((tag("h4", "Worst blocks"), words, rows(worst), rest))
+        return join((tag("h4", "Worst blocks"), words, html.rows(worst), rest))
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word != "remove":
-            return super().take(state, word, value)
-        self._answer = None
-        return replace(state, part=replace(state.part, program=None, program_name=""))
+        if word == "remove":
+            return self.removed(state, replace(state.part, program=None))
+        return super().take(state, word, value)
 
     def received(self, name: str, content: bytes) -> None:
         """Take in a program, and run it."""
-        self.show(program=(name, content.decode("utf-8-sig", "replace")), program_name=name)
+        self.show(program=(name, content.decode("utf-8-sig", "replace")))
