@@ -67,6 +67,8 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
      "Write the errors of SCENE in another convention."),
     ("calibrate", "measure", "calibration.calibrate:Calibrate",
      "Find the errors of the machine of SCENE in measured data."),
+    ("part", "measure", "parts.as_cut:Part",
+     "Show a part, a mesh, as the machine of SCENE cuts it."),
     ("program", "measure", "parts.program:Program",
      "Run a program on SCENE: the path of the tool and its errors."),
     ("compensate", "improve", "formats.compensation.compensate:Compensate",

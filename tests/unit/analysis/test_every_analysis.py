@@ -22,7 +22,8 @@ from warpspace.exceptions import OptionError, WarpspaceError
 
 SCENES = ("dvf5000_first", "teach_squareness", "machine_printer_3d")
 EVERY = pytest.mark.parametrize("entry", entries(), ids=lambda entry: entry.name)
-CONTOUR = str(Path(__file__).parents[1] / "parts" / "contour.ngc")
+PARTS = Path(__file__).parents[1] / "parts"
+CONTOUR, PLATE = str(PARTS / "contour.ngc"), str(PARTS / "plate.stl")
 NEEDED = {
     "convert": (
         "dvf5000_first",
@@ -36,6 +37,7 @@ NEEDED = {
     ),
     "allocate": ("dvf5000_general", {"limit_um": 60.0}, ["--limit", "60"]),
     "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
+    "part": ("dvf5000_first", {"file": PLATE}, [PLATE]),
     "program": ("dvf5000_first", {"file": CONTOUR, "length_mm": 80.0}, [CONTOUR, "--length", "80"]),
 }
 """Scene, options and what is typed, of analyses that answer nothing without."""
@@ -67,7 +69,7 @@ def test_the_list_says_what_the_analysis_says(entry):
 def test_every_option_has_help_and_a_range_it_keeps(entry):
     kind = entry.load()
     others = {one.name for one in fields(kind)} - {one.name for one in options_of(kind)}
-    assert others <= ({"stem"} if kind.file_help else set())
+    assert others <= ({"stem"} if kind.file_help else {"mesh"} if kind.name == "part" else set())
     for one in options_of(kind):
         assert one.about.rstrip(".") == one.about != "", one.name
         assert one.flag.startswith("--")

@@ -6,8 +6,10 @@ import trimesh
 
 from bench_scenes import scene_with
 from warpspace import load_scene
+from warpspace.analysis.description import silent
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
+from warpspace.parts.as_cut import Part
 from warpspace.parts.part import (
     deviation_of,
     fit_out,
@@ -90,3 +92,35 @@ def test_a_location_error_is_fitted_out_and_a_squareness_is_not():
     left = fit_out(square.point_mm, square.error_um)
     # 100 µrad over ±50 mm: half of it is a rotation, the other half a shear of ±2.5 µm
     assert np.linalg.norm(left, axis=1).max() == pytest.approx(2.5, rel=0.01)
+
+
+def cut(mesh, place, **errors):
+    return Part(mesh=mesh_of(mesh), place=place).run(scene_with(**errors), silent)
+
+
+def test_what_is_off_is_told_by_closed_forms():
+    located = cut(BOX, (0.0, 0.0, 0.0), EZ0C=10.0, EA0C=100.0)  # the workpiece rises and tilts
+    # y: 0.1 z, z: −(10 + 0.1 y), to the top and bottom along the normal
+    assert located.deviation.max_um == pytest.approx(np.hypot(13.0, 2.0))
+    assert (located.normal.min_um, located.normal.max_um) == pytest.approx((-13.0, 13.0))
+    assert located.placed.deviation.max_um < 1e-9
+    assert located.placed.normal.max_um < 1e-9
+    square = cut(BALL, None, EC0Y=100.0).placed  # −0.1 y along x: half a turn, half a shear
+    assert (square.normal.min_um, square.normal.max_um) == pytest.approx((-2.5, 2.5), abs=0.1)
+    # 0.1 µm for each mm of X, along the normal 0.1 x² / 50 mm
+    scale = cut(BALL, None, EXX=(0.0, 55.0)).placed
+    assert (scale.normal.min_um, scale.normal.max_um) == pytest.approx((0.0, 5.0), abs=0.1)
+
+
+def test_a_pitch_over_the_travel_shears_what_is_high():
+    made = cut(BOX, None, EBX=(0.0, 550.0)).made  # 1 µrad for each mm
+    sides = np.sign(made.point_mm - made.point_mm.mean(axis=0))
+    assert np.sum(sides[:, 0] * sides[:, 2] * made.error_um[:, 0]) / 2 == pytest.approx(4.0)
+
+
+def test_a_part_beyond_the_travel_is_counted_and_said():
+    far = cut(BOX, (270.0, 0.0, 120.0))
+    assert 0 < far.outside < far.vertices
+    assert any("beyond the travel" in said for said in far.doubts())
+    with pytest.raises(OptionError, match="expected a mesh"):
+        Part().run(scene_with(), silent)
