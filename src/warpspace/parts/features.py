@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.kinematics.transforms import vector_rotation
-from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
 from warpspace.parts.part import PartMesh
 from warpspace.units import Array
 
@@ -56,7 +55,7 @@ class Shape:
 
     kind: str
     centre_mm: Array  # [3]; on the plane or axis, amid the points that it was fitted to
-    frame: Array  # [3, 3], columns u, v and axis; the axis of a plane is its outward normal
+    frame: Array  # [3, 3], right-handed columns u, v, axis; that of a plane is its outward normal
     radius_mm: float = 0.0  # at the centre
     angle_rad: float = 0.0  # half angle of a cone, along whose axis the radius grows
 
@@ -67,17 +66,18 @@ class Shape:
 
     def respond(self, point_mm: Array) -> Response:
         """Measure points, [n, 3], against the shape."""
-        arm = point_mm - self.centre_mm
+        arm = (point_mm - self.centre_mm) @ self.frame
         sine, cosine = np.sin(self.angle_rad), np.cos(self.angle_rad)
-        height = np.zeros(len(arm)) if self.kind == "sphere" else arm @ self.axis
-        radial = arm - height[:, None] * self.axis
-        length = np.linalg.norm(radial, axis=1)
-        normal = radial / np.maximum(length, 1e-300)[:, None] * cosine - sine * self.axis
+        x, y, z = arm.T
+        height, radial = (0.0 * z, arm) if self.kind == "sphere" else (z, arm * [1.0, 1.0, 0.0])
+        length = np.sqrt(np.sum(radial * radial, axis=1))
+        normal = radial * (cosine / np.maximum(length, 1e-300))[:, None] - [0.0, 0.0, sine]
+        u, v, w = normal.T
         beyond = length - self.radius_mm
-        turned = np.cross(arm, normal) @ self.frame
+        turned = y * w - z * v, z * u - x * w, x * v - y * u
         opening = beyond * sine + height * cosine
-        columns = [normal @ self.frame, turned, np.full(len(arm), cosine), opening]
-        return Response(beyond * cosine - height * sine, normal, -np.column_stack(columns))
+        design = -np.column_stack([normal, *turned, np.full(len(arm), cosine), opening])
+        return Response(beyond * cosine - height * sine, normal @ self.frame.T, design)
 
     def moved(self, step: Array) -> "Shape":
         """Give the shape after a step, [8], mm and rad, of its freedoms."""
@@ -97,8 +97,7 @@ def fit_shape(start: Shape, point_mm: Array) -> Shape:
         found = shape.respond(point_mm)
         step = np.zeros(FREEDOMS)
         design = found.design[:, free]
-        normal = np.linalg.pinv(design.T @ design, rcond=1e-13, hermitian=True)
-        step[free] = -normal @ (design.T @ found.distance_mm)
+        step[free] = -np.linalg.lstsq(design.T @ design, design.T @ found.distance_mm, 1e-13)[0]
         if not np.abs(step).max() < FAR:
             break
         shape = shape.moved(step)
@@ -130,10 +129,8 @@ def find_features(mesh: PartMesh) -> tuple[Feature, ...]:
     """Find the shapes that the surface of a part consists of, the largest first in each kind.
 
     Equally large ones are in the order of their places, x before y before z. A surface that is none
-    of them, within `CLOSE` of its extent, is no feature; a mesh that is too large has none.
+    of them, within `CLOSE` of its extent, is no feature.
     """
-    if len(mesh.triangles) > MAX_FEATURE_TRIANGLES:
-        return ()
 
     def order(feature: Feature) -> tuple[float, ...]:
         place = np.round(feature.shape.centre_mm, 3) + 0.0  # −0 becomes 0
@@ -214,10 +211,11 @@ class _Surfaces:
         same, spread = np.outer(mean, mean), (weight * normal.T) @ normal
         apart = {"plane": same, "cone": same - spread}.get(kind, -spread)
         frame = np.linalg.eigh(apart)[1]
+        frame[:, 0] *= np.linalg.det(frame)  # right-handed
         lean = float(mean @ frame[:, 2])
         if kind == "plane":
             return Shape(
-                kind, centre, frame * np.copysign(1.0, [1.0, 1.0, lean]), 0.0, -np.pi / 2.0
+                kind, centre, frame * np.copysign(1.0, [1.0, lean, lean]), 0.0, -np.pi / 2.0
             )
         across = frame[:, : 3 if kind == "sphere" else 2]
         flat = normal @ across
@@ -227,7 +225,8 @@ class _Surfaces:
         centre = centre + across @ np.linalg.pinv(np.einsum("t,tij->ij", weight, ways)) @ beside
         radius = float(weight @ np.sum((place - centre) @ across * flat, axis=1))
         angle = float(np.arcsin(min(abs(lean), 1.0))) if kind == "cone" else 0.0
-        widens = np.copysign(1.0, [1.0, 1.0, -lean * radius])  # normals of a hole point inwards
+        # normals of a hole point inwards
+        widens = np.copysign(1.0, [1.0, -lean * radius, -lean * radius])
         return Shape(kind, centre, frame * widens, abs(radius), angle)
 
     def _fitted(self, start: Shape, part: Indices) -> Feature | None:
