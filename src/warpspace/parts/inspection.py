@@ -28,6 +28,7 @@ RIGHT_RAD = 1e-4  # a nominal angle this close to 90° or to 0 has a squareness 
 NUDGE = 0.01  # share of an error by which points are moved to find what it adds
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
 KEYS_AT_ONCE = 8  # parameters whose responses of all points are in memory
+SHOWN = 0.005  # µm or µrad that a table names a parameter for
 Shapes = Sequence[Shape]
 
 
@@ -270,12 +271,10 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
     rows: list[tuple[Any, ...]] = []
     for result in results:
         for name, one in result.measures.items():
-            is_angle = "nominal_deg" in one
-            large, small = ("deg", "urad") if is_angle else ("mm", "um")
-            most = [*one["budget"].items()][:3]
-            words = f"{result.name} · {name.replace('_', ' ')}"
+            large, small = ("deg", "urad") if "nominal_deg" in one else ("mm", "um")
+            most = [pair for pair in one["budget"].items() if abs(pair[1]) >= SHOWN][:3]
             rows.append((
-                f"{words} [{'°, µrad' if is_angle else 'mm, µm'}]",
+                f"{result.name} · {name.replace('_', ' ')}",
                 *(one[f"{key}_{large}"] for key in ("nominal", "placed")),
                 *(one[f"{key}_{small}"] for key in ("difference", "placed_difference")),
                 " … ".join(map(spell_signed, one.get(f"tolerance_{small}", ()))),
@@ -284,8 +283,8 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
             ))  # fmt: skip
     columns = (
         Column("measure", key="measure", leads=True, wraps=True),
-        *number_columns(("nominal", "placed"), ".4f", keys=("nominal", "actual_placed")),
-        *number_columns(("deviation", "placed"), "+.2f", keys=("deviation", "placed")),
+        *number_columns(("nominal", "placed"), ".4f", "mm, °", ("nominal", "actual")),
+        *number_columns(("deviation", "placed"), "+.2f", "µm, µrad", ("deviation", "placed")),
         Column("tolerance", key="tolerance"),
         Column("verdict", key="verdict"),
         Column("most of it", key="most_of_it", wraps=True),
