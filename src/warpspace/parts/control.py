@@ -152,7 +152,7 @@ def read_program(
 ) -> ReadProgram:
     """Run the lines of a program on the control of a machine; a `SceneError` names its line."""
     reader = Reader(name)
-    control = _Control(scene, setup or Setup(), reader)
+    control = Control(scene, setup or Setup(), reader)
     for block in reader.blocks(lines):
         control.run(block)
     rows = np.frombuffer(control.rows).reshape(-1, 8 + len(control.names))
@@ -164,7 +164,7 @@ def read_program(
     )  # fmt: skip
 
 
-class _Control:
+class Control:
     """Modal words of a control, and where its axes stand."""
 
     def __init__(self, scene: Scene, setup: Setup, reader: Reader) -> None:
@@ -264,6 +264,11 @@ class _Control:
         shift = self.offset.get((self.system, letter), 0.0)
         return value + shift + (self.length_mm if is_longer else 0.0)
 
+    def word(self, letter: str, position: float) -> float:
+        """Give the absolute word that leads an axis to a position."""
+        value = position - self.place(letter, 0.0)
+        return value if letter in "ABC" else value / self.unit_mm
+
     def target(self, without: str = "", *, bare: bool = False) -> list[float]:
         """Give where the words of the block lead; after G53 they are axis positions."""
         to = self.at.copy()
@@ -281,11 +286,10 @@ class _Control:
     def line_to(self, to: list[float], kind: int | None = None) -> None:
         if kind is None:
             kind = RAPID if self.motion == "G0" else FEED
-        if not self.begun or to != self.at:
-            self.at = to
-            if not self.begun:
-                self.record(STAND)
-            self.record(kind)
+        moves, self.at = not self.begun or to != self.at, to
+        if not self.begun:
+            self.record(STAND)
+        self.record(kind if moves else STAND)
         self.begun = True
 
     def go_home(self, letters: Iterable[str]) -> None:

@@ -94,14 +94,14 @@ def trace_program(
     Between samples a bent path leaves its chord by `chord_mm` at most, rotary axes and arcs turn by
     `turn_deg` at most, and linear axes move by `step_mm` at most.
     """
-    count = _samples_of_moves(scene, read, chord_mm, turn_deg, step_mm)
+    count = samples_of_moves(scene, read, chord_mm, turn_deg, step_mm)
     if count.sum() > MAX_PATH_POINTS:
         raise OptionError(
             f"the path has {count.sum():,} points; expected at most {MAX_PATH_POINTS:,}"
         )
     move = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(move)) - (np.cumsum(count) - count)[move] + 1.0) / count[move]
-    coordinates, tip, error = _along(scene, read, move, share)
+    coordinates, tip, error = along_moves(scene, read, move, share)
     line = read.line[move]
     same_tool = np.diff(read.length_mm[move], prepend=read.length_mm[move[:1]]) == 0.0
     return ToolPath(
@@ -116,9 +116,10 @@ def trace_program(
     )
 
 
-def _samples_of_moves(
+def samples_of_moves(
     scene: Scene, read: ReadProgram, chord_mm: float, turn_deg: float, step_mm: float
 ) -> NDArray[np.int64]:
+    """Count the samples of each move, [m]; 0 where nothing moves."""
     is_rotary = np.array([not scene.machine.axes[name].is_linear for name in read.axes])
     change = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1]))
     way, turn = np.linalg.norm(change[:, ~is_rotary], axis=1), change[:, is_rotary]
@@ -131,16 +132,25 @@ def _samples_of_moves(
     (bent,) = np.nonzero(is_bent & read.moves)
     if len(bent):  # how far the middle of a piece is from the line between its ends
         half = 0.5 / count[bent]
-        start, middle, end = (_along(scene, read, bent, 0.5 + at)[1] for at in (-half, 0, half))
+        start, middle, end = (
+            along_moves(scene, read, bent, 0.5 + at)[1] for at in (-half, 0, half)
+        )
         away = np.linalg.norm(middle - (start + end) / 2.0, axis=1)
         count[bent] = np.ceil(count[bent] * np.maximum(1.0, np.sqrt(away / chord_mm)))
     return count.astype(np.int64)
 
 
-def _along(
-    scene: Scene, read: ReadProgram, move: NDArray[np.int64], share: Array | float
+def along_moves(
+    scene: Scene,
+    read: ReadProgram,
+    move: NDArray[np.int64],
+    share: Array | float,
+    shift_mm: Array | None = None,
 ) -> tuple[dict[str, Array], Array, Array]:
-    """Give positions of axes, tip and error at shares of moves, [n]."""
+    """Give positions of axes, tip and error at shares of moves, [n].
+
+    A shift of the tip, [n, 3] in w, is made by the linear axes.
+    """
     at = read.positions(move, np.broadcast_to(share, move.shape))
     found = dict(zip(read.axes, at.T, strict=True))
     tip, error = np.empty((len(move), 3)), np.empty((len(move), 3))
@@ -156,6 +166,10 @@ def _along(
                 here = follow(model, here, target)
             for name, axis in scene.machine.axes.items():
                 found[name][part] = here[name] = _unwound(axis, here[name])
+            if shift_mm is not None:
+                here = follow(model, here, ball_point(model, here) + shift_mm[part])
+                for name in here:
+                    found[name][part] = here[name]
             check_magnitude(scene, here)
             tip[part] = ball_point(model, here)
             error[part] = evaluate_first_order(model, scene.errors, here, view).error_um
@@ -194,12 +208,20 @@ class Program(Setup, Analysis):
     name = "program"
     task = "measure"
     has_table = True
+    file_help = "Corrected program to write: this machine cuts the nominal path with it."
     file: File = option(None, "Program, G-code", positional=True, required=True)
     chord_mm: float = option(
         0.01, "How far the path may bend between samples", unit="mm", low=1e-5, high=10.0
     )
     at_line: int | None = option(
         None, "Line whose end is told", low=1, high=MAX_LINES, unset="none"
+    )
+    within_um: float = option(
+        1.0, "How far a corrected program may be from the nominal path between its points",
+        unit="µm", low=0.01, high=1000.0,
+    )  # fmt: skip
+    decimals: int = option(
+        4, "Decimals of corrected words in mm; in inches one more, in degrees two", low=1, high=9
     )
 
     def lines(self) -> Iterable[str]:
@@ -227,7 +249,8 @@ class Program(Setup, Analysis):
             worst=_split(scene, path, block[np.argsort(-norm[block], kind="stable")][:WORST]),
             line=None if self.at_line is None else _end_of(path, self.at_line),
             of_lines=block,
-            title=scene.title,
+            scene=scene,
+            asked=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
 
@@ -278,7 +301,14 @@ class ProgramResult(Result):
     worst: tuple[WorstBlock, ...]
     line: Mapping[str, Any] | None  # axes and error at the end of the line asked for
     of_lines: NDArray[np.int64]  # the worst sample of each line
-    title: str
+    scene: Scene
+    asked: Program
+
+    def texts(self) -> Mapping[str, str]:
+        from warpspace.parts.correction import correct_program
+
+        lines = [*program_lines(self.asked.file or "")]
+        return {"": "\n".join([*correct_program(self.scene, lines, self.read, self.asked), ""])}
 
     def as_plain(self) -> dict[str, Any]:
         said = {
@@ -304,7 +334,7 @@ class ProgramResult(Result):
             yield "no block moves an axis: the errors are those where the axes stand"
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.title} · {self.read.blocks} blocks, {self.path.way_mm[-1]:.1f} mm"
+        yield f"{self.scene.title} · {self.read.blocks} blocks, {self.path.way_mm[-1]:.1f} mm"
         yield "  relative error in the workpiece frame"
         yield "  Geometry only: no forces, heat, wear or servo"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")

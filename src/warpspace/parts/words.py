@@ -16,10 +16,11 @@ def _codes(numbers: str) -> frozenset[str]:
     return frozenset(f"G{number}" for number in numbers.split())
 
 
-_WORD = re.compile(
+WORD = re.compile(
     r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=])"  # a letter and its number
     r"|\([^()]*\)|;.*"  # comments
-    r"|(\S[^\s(;]*)"  # anything else
+    r"|(\S[^\s(;]*)",  # anything else
+    re.IGNORECASE,
 )
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 UNDERSTOOD = _codes(
@@ -89,7 +90,7 @@ class Reader:
             if text.startswith("/"):
                 self.unknown.setdefault("/", line)
                 text = text.lstrip("/0123456789")
-            for letter, number, other in _WORD.findall(text.lstrip("%")):
+            for letter, number, other in WORD.findall(text.lstrip("%")):
                 if letter == "O" and not begun and text.split("(")[0].strip() == "O" + number:
                     continue
                 if letter:

@@ -164,7 +164,7 @@ def test_modal_words(dvf: Scene):
 def test_holes(dvf: Scene):
     text = "G0 X0 Y0 Z-100\nG99 G83 X10 Z-112 R-102 Q4\nX20\nG98 G81 X30\nG80 G0 X40"
     read, path = run(dvf, text)
-    z = [read.end[read.line == line, 2].tolist() for line in (2, 3, 4)]
+    z = [read.end[read.moves & (read.line == line), 2].tolist() for line in (2, 3, 4)]
     hole = [-106, -102, -106, -110, -102, -110, -112, -102]
     assert z == [[-100, -102, *hole], [-102, *hole], [-102, -112, -100]]
     assert path.coordinates["Z"][path.is_end].tolist() == [-100.0, -102.0, -102.0, -100.0, -100.0]

@@ -1,0 +1,146 @@
+"""Corrected programs: read back and run on the model, they leave what their words cannot say."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import warpspace
+from warpspace.cli.main import cli
+from warpspace.exceptions import OptionError, SceneError
+from warpspace.parts.control import read_program
+from warpspace.parts.correction import correct_program
+from warpspace.parts.program import Program, ToolPath, trace_program
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import Scene
+
+CONTOUR = Path(__file__).parent / "contour.ngc"
+
+
+@pytest.fixture(scope="module")
+def dvf() -> Scene:
+    return warpspace.load_scene("dvf5000_first")
+
+
+def correct(scene: Scene, lines: Sequence[str], **asked) -> list[str]:
+    program = Program(**asked)
+    return [*correct_program(scene, lines, read_program(scene, lines, program), program)]
+
+
+def trace(scene: Scene, lines: Sequence[str], chord_mm=0.1, **asked) -> ToolPath:
+    return trace_program(scene, read_program(scene, lines, Program(**asked)), chord_mm=chord_mm)
+
+
+def actual(path: ToolPath) -> np.ndarray:
+    return path.tip_mm + path.error_um / 1e3
+
+
+def random_scene(seed: int) -> Scene:
+    rng = np.random.default_rng(seed)
+    rotary = "".join(rng.permutation(list("ABC"))[:2])
+    axes = "".join(rng.permutation(list("XYZ" + rotary)))
+    cut = int(rng.integers(0, 6))
+    text = [f'title = "r"\n[machine]\nchain = "w{axes[:cut]}F{axes[cut:]}t"\n[machine.offset_mm]']
+    text += [f"{axis} = {rng.uniform(-300, 300, 3).tolist()}" for axis in axes]
+    text += ["[machine.direction]", *(f"{axis} = {rng.choice([-1, 1])}" for axis in axes)]
+    text += ["[workspace]", "X = [-300, 300]\nY = [-300, 300]\nZ = [-300, 300]"]
+    text += [*(f"{axis} = 0" for axis in rotary), "[errors]"]
+    for key in rng.permutation(parse_scene("\n".join(text), "r").parameter_keys)[:12]:
+        low, high = rng.normal(0.0, 60.0, 2)
+        table = "" if "0" in key else f"{{ table = [[-100, {low}], [80, {high}]] }}"
+        text.append(f"{key} = {table or low}")
+    return parse_scene("\n".join(text), "random")
+
+
+@pytest.mark.parametrize("tcp", ["always", "never"])
+def test_a_hundred_machines_cut_the_nominal_points(tcp: str):
+    for seed in range(100):
+        scene = random_scene(seed)
+        turn = next(axis for axis in "ABC" if axis in scene.machine.axes)
+        lines = [
+            f"G55 G0 X1 Y2 Z-3 {turn}0", f"G43.4 H1 G1 X9 Y1 Z4 {turn}12.5 F500",
+            f"G91 X30.5 Z-20 {turn}12.5", f"G90 G20 X.5 Y-1 Z2 {turn}-70",
+            "N5 G21 G54 X-80 Y40 Z-50 M9", "G2 X-70 Y50 I10", "G1 X-70 Y50", "G49 X-80 Y40 Z9",
+        ]  # fmt: skip
+        offset = ("G54", "X", 3.0), ("G55", "Y", -7.25), ("G55", turn, 20.0)
+        asked = {"tcp": tcp, "length_mm": 60.0, "offset": offset, "within_um": 100.0, "decimals": 5}
+        wanted, found = (
+            trace(scene, some, **asked) for some in (lines, correct(scene, lines, **asked))
+        )
+        left = actual(found)[found.is_end] - wanted.tip_mm[wanted.is_end][:, None]
+        left_um = 1e3 * np.linalg.norm(left, axis=-1).min(axis=1)
+        assert left_um.max() <= 0.1 + np.sqrt(3.0) * 0.127, seed  # the word in inches, 1e-5
+
+
+def test_between_its_points_it_stays_within(dvf: Scene):
+    lines, asked = CONTOUR.read_text().splitlines(), {"length_mm": 80.0, "within_um": 0.5}
+    wanted, found = (
+        trace(dvf, some, 1e-4, **asked) for some in (lines, correct(dvf, lines, **asked))
+    )
+    cut = np.isin(wanted.line, [*range(7, 12)])
+    fine, here = wanted.tip_mm[cut], actual(found)[np.abs(found.tip_mm[:, 2] + 220.0) < 1.0]
+    start, way = fine[:-1], np.diff(fine, axis=0)
+    for point in here[::7]:
+        share = np.clip(np.sum((point - start) * way, 1) / np.sum(way * way, 1), 0.0, 1.0)
+        nearest = start + share[:, None] * way
+        assert np.linalg.norm(point - nearest, axis=1).min() <= 1e-3 * (0.5 + 0.1 + 0.1)
+
+
+def test_words_that_do_not_lead_are_kept(dvf: Scene):
+    text = """%
+    O0012 (a part)
+    N10 g91 (kept) g28 z0
+    N20 G90 G54 G0 X10 Y20 S900 M3 ; fast
+    N30 G43 H1 Z-100 M8
+    /N40 G99 G82 Z-120 R-102 P2
+    X30
+    N50 G80 (done)
+    G93 G1 X40 F2 M5
+    G2 X40 Y40 R10 F3
+    G53 G0 Z-80
+    G94 X50 M30
+    %
+    rest""".splitlines()
+    found = [line.strip() for line in correct(dvf, [line.strip() for line in text], decimals=1)]
+    assert found[:2] == ["%", "O0012 (a part)"]
+    assert found[2].startswith("(corrected for DVF5000, first machine measured, chain wCBFXYZt")
+    assert found[5:10] == [
+        "G90", "G91 N10 (kept) g28 z0", "G90", "N20 G0 X10. Y20. G54 S900 M3 ; fast",
+        "N30 G43 H1 G0 X10. Y20. Z-100. M8",
+    ]  # fmt: skip
+    assert found[10] == "/N40 G99 G0 X10. Y20. Z-102."
+    assert found[11:16] == [
+        "/G1 X10. Y20. Z-120.", "/G4 P2", "/G0 X10. Y20. Z-102.", "G0 X30. Y20. Z-102.",
+        "G1 X30. Y20. Z-120.",
+    ]  # fmt: skip
+    assert found[18:20] == ["N50 G80 (done)", "G93 G1 X40. Y20. Z-102. F2. M5"]
+    arc = [line for line in found if "F" in line and line.startswith("G1")]
+    assert len(arc) > 2
+    assert {re.findall(r"F(.*)", line)[0] for line in arc} == {f"{3 * len(arc)}."}
+    assert found[-4:] == ["G53 G0 Z-80", "G94 G0 X50. Y40. M30", "%", "rest"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G91 G1 X1"], "moves X from a place"),
+     (["G0 X1 Z1", "G2 X1 I5"], "moves Y from a place"),
+     (["G90 X1 Y1 Z1", "G55 G91 Z1"], "line 2: moves Z")],
+)  # fmt: skip
+def test_what_cannot_be_corrected_is_said(dvf: Scene, lines: list[str], said: str):
+    with pytest.raises((OptionError, SceneError), match=said):
+        correct(dvf, lines)
+
+
+def test_the_command_keeps_what_it_reads(tmp_path: Path):
+    file, other = tmp_path / "a.ngc", tmp_path / "b.ngc"
+    file.write_text(CONTOUR.read_text())
+    arguments = ["program", "dvf5000_first", str(file), "--length", "80", "-o"]
+    assert CliRunner().invoke(cli, [*arguments, str(file), "--force"]).exit_code != 0
+    assert file.read_text() == CONTOUR.read_text()
+    assert CliRunner().invoke(cli, [*arguments, str(other)]).exit_code == 0
+    first = other.read_text()
+    assert CliRunner().invoke(cli, [*arguments, str(other), "--force"]).exit_code == 0
+    assert other.read_text() == first
