@@ -102,7 +102,7 @@ def test_a_place_is_typed_linked_and_undone() -> None:
     assert opened.part == replace(store.state.part, mesh=None)
     assert store.undo() == "place"
     assert store.state.part.place is None
-    assert "expected three numbers" in put(STATE, "part.place", "1,2").notes[0]
+    assert "expected three numbers, or six" in put(STATE, "part.place", "1,2").notes[0]
 
 
 def test_what_leaves_the_travel_is_said() -> None:

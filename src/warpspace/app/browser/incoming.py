@@ -71,7 +71,7 @@ class DrawingClicked(_Said, tag="ScenePointerMessage"):
 class PartHeld(_Said, tag="TransformControlsDragStartMessage", kw_only=True):
     """What moves the part, as it is seized."""
 
-    name: Name
+    name: Annotated[str, Meta(pattern="^/part/gizmo$")]
     owner: Name = ""
 
 

@@ -12,7 +12,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Side
 from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.exceptions import OptionError
-from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
+from warpspace.machine.limits import MAX_SCENE_BYTES
 
 # --- Links: a state as one word in the page's address ---------------------------------------------
 # It consists of letters and digits only, since viser's client writes the address anew when it
@@ -58,18 +58,13 @@ PART_ENDINGS = (".stl", ".obj", ".ply", ".glb")
 PROGRAM_ENDINGS = (".ngc", ".nc", ".tap")
 
 
-def read_upload(value: str, most_bytes: int = 0, what: str = "") -> tuple[str, bytes]:
-    """Give name and bytes of a file that a page has sent; it sends none of one too large.
-
-    It is a scene file, a mesh of a part or a program, by its ending, where nothing else is said.
-    """
+def read_upload(
+    value: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
+) -> tuple[str, bytes]:
+    """Give name and bytes of a file that a page has sent; it sends none of one too large."""
     told, _, rest = value.partition("\n")
     name, _, coded = rest.rpartition("\n")
     name = safe_file_name(name)
-    if not most_bytes:
-        is_part = name.lower().endswith((*PART_ENDINGS, *PROGRAM_ENDINGS))
-        most_bytes = MAX_UPLOAD_BYTES if is_part else MAX_SCENE_BYTES
-        what = "mesh or program" if is_part else "scene file"
     try:
         content = base64.b64decode(coded)
         size = max(int(told[:LONGEST_SIZE]), len(content))

@@ -25,7 +25,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.description import Vector
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
-from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, PROBABILITY
+from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBABILITY
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import KINDS, Mark, Note
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 AMPLITUDE = Span(-MAX_ERROR, MAX_ERROR, 0.1)
 NODES = Span(*LIVE_NODES, 2.0)  # grid nodes per axis: odd numbers
 EXAGGERATION = Span(*FACTORS, 1.0)
+PLACE = Span(-MAX_LENGTH_MM, MAX_LENGTH_MM, 1.0)  # mm and degrees
 LIMIT_UM = Span(1.0, 300.0, 0.5)
 PERCENT = Span(100.0 * PROBABILITY[0], 100.0 * PROBABILITY[1], 0.1)
 START_NODES, START_UM = 21, 50.0
@@ -171,6 +172,7 @@ class PartLook:
         None,
         "Place",
         kind="point",
+        span=PLACE,
         linked="place",
         hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
         " degrees about the fixed x, y and z, in that order; empty for the usual place.",

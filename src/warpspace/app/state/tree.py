@@ -26,11 +26,10 @@ from warpspace.app.state.leaf import (
     name_of,
 )
 from warpspace.app.state.look import linear_positions, linear_spans, slice_positions
-from warpspace.app.state.typed_numbers import SIGNS, read_list, read_positions, read_typed
+from warpspace.app.state.typed_numbers import read_list, read_positions, read_typed
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import axis_order, parameter
 from warpspace.machine.limits import COST, MAX_HALF_WIDTH, MIN_HALF_WIDTH
-from warpspace.parts.part import read_place
 
 LONGEST = 4000  # characters that are read
 SHOWN = 40  # characters of a text that a note shows
@@ -247,20 +246,9 @@ def _with_asked(state: AppState, leaf: Leaf, text: str) -> AppState:
     return replace(state, picked=replace(picked, at={**picked.at, axis: at})).noted(note)
 
 
-def _with_place(state: AppState, _leaf: Leaf, text: str) -> AppState:
-    plain = text.translate(SIGNS).replace(";", " ").strip()
-    words = ",".join(plain.replace(",", " ").split())
-    try:
-        found = read_place(words, None) if words else None
-    except ValueError as problem:
-        raise Unreadable(str(problem)) from None
-    return replace(state, part=replace(state.part, place=found))
-
-
 OWN: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
     "tolerances": _with_half_width,
     "specification.costs": _with_costs,
-    "part.place": _with_place,
     "picked": _with_point,
     "picked.trace": _with_trace,
     "picked.at": _with_asked,
@@ -321,10 +309,11 @@ def _number(leaf: Leaf, text: str) -> tuple[float, str]:
 
 
 def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
+    counts = (3, 6) if leaf.path == "part.place" else (3,)
     parts = text.replace(";", " ").split()
-    parts = parts if len(parts) == 3 else text.split(",")
-    if len(parts) != 3:
-        raise Unreadable("expected three numbers")
+    parts = parts if len(parts) in counts else text.split(",")
+    if len(parts) not in counts:
+        raise Unreadable(f"expected three numbers{', or six with turns' * (len(counts) > 1)}")
     found = [_number(leaf, part.strip().rstrip(",")) for part in parts]
     return tuple(kept for kept, _ in found), "; ".join(filter(None, (note for _, note in found)))
 

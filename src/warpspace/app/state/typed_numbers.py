@@ -10,7 +10,7 @@ from warpspace.machine.limits import MAX_TYPED_NUMBER
 from warpspace.picture.words import IN_R
 
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
-SIGNS = str.maketrans({"−": "-", "–": "-", "\u00a0": " ", "\u202f": " "})
+_SIGNS = str.maketrans({"−": "-", "–": "-", "\u00a0": " ", "\u202f": " "})
 """Signs and blanks that programs write in place of the plain ones."""
 _SHOWN = 40  # characters of a line that a message shows
 
@@ -18,7 +18,7 @@ _SHOWN = 40  # characters of a line that a message shows
 def read_typed(text: str, unit: str = "") -> float | None:
     if len(text) > MAX_TYPED_NUMBER:
         return None
-    plain = text.translate(SIGNS).strip()
+    plain = text.translate(_SIGNS).strip()
     if unit:
         plain = plain.replace("\u03bc", "µ").removesuffix(unit).strip()
     if _NUMBER.fullmatch(plain) is None:
@@ -33,7 +33,7 @@ def spell_typed(value: float) -> str:
 
 
 def read_rows(text: str) -> tuple[list[tuple[float, ...]], tuple[str, ...]]:
-    lines = [line.split("#", 1)[0].translate(SIGNS).strip(" \r") for line in text.splitlines()]
+    lines = [line.split("#", 1)[0].translate(_SIGNS).strip(" \r") for line in text.splitlines()]
     numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     remarks: tuple[str, ...] = ()
     if len(numbered) > 1 and _is_heading(numbered[0][1]):
@@ -90,7 +90,7 @@ MOST_HELD = 8  # positions that one axis can be held at while another one is tur
 
 def read_positions(text: str) -> dict[str, float] | None:
     """Read positions of axes in any of the ways in which they are spelt on the page."""
-    plain = text[:MOST_TYPED].translate(SIGNS).partition(IN_R)[0].strip()
+    plain = text[:MOST_TYPED].translate(_SIGNS).partition(IN_R)[0].strip()
     plain = plain.removeprefix("--at").lstrip(" =").removeprefix("axes")
     pairs = _PAIR.findall(plain)
     found = {name.upper(): float(value.replace(",", ".")) for name, value in pairs}

@@ -130,6 +130,10 @@ class FilesWindow(JobWindow):
 
     def _open(self, value: str) -> None:
         """Open a scene or a machine, or show what a file of measured data would bring."""
+        told = value.partition("\n")[2].partition("\n")[0]
+        if offer := self.context.offers.get(Path(told).suffix.lower()):
+            offer(value)
+            return
         name, content = files.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
@@ -137,8 +141,7 @@ class FilesWindow(JobWindow):
         elif name.lower().endswith(".toml"):
             text = files.upload_text(content, name)
         else:
-            offers = self.context.offers
-            offers.get(Path(name).suffix.lower(), offers[""])(name, content)
+            self.context.offer_import(name, content)
             return
         opened, camera = scene_file.open_text(text, files.safe_name(name), name)
         whole = is_robot or scene_file.settings_of(text) != ""

@@ -144,7 +144,7 @@ class ImportPart(FilesPart):
     def __init__(self, context: Context) -> None:
         words = "Measured errors, or a controller's table"
         super().__init__(context, Entry(NAME, "measure", words, f"{__name__}:Import"))
-        context.offers[""] = self.received
+        context.offer_import = self.received
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         """Leave out what the format has no choice of."""

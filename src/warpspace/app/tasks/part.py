@@ -43,10 +43,7 @@ class InBoxPart(FilesPart):
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
-        # dropped on the page, or opened
-        context.offers |= dict.fromkeys(
-            self.endings, lambda name, data: self.attempt(partial(self.received, name, data))
-        )
+        context.offers |= dict.fromkeys(self.endings, self.sent)
 
     def held(self, state: AppState) -> tuple[object, str]:
         """Give what is there, if anything, and the name of its file."""
@@ -79,8 +76,12 @@ class InBoxPart(FilesPart):
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word != "file":
             return super().take(state, word, value)
-        self.attempt(lambda: self.received(*read_upload(value)))
+        self.sent(value)
         return state
+
+    def sent(self, value: str) -> None:
+        """Take a file that a page has sent: chosen here, opened, or dropped."""
+        self.attempt(lambda: self.received(*read_upload(value, MAX_UPLOAD_BYTES, self.name)))
 
     def show(self, **held: Any) -> None:
         """Take something in, see it through the box, and unfold the section."""
