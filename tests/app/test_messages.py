@@ -91,6 +91,9 @@ def test_what_a_page_really_says_passes():
         CAMERA,
         {"type": "ScenePointerMessage", "event_type": "click", "ray_origin": [1, 2, 3.5],
          "ray_direction": [0, 0, 1], "screen_pos": [[0.5, 0.5]], "modifier": None},
+        {"type": "TransformControlsUpdateMessage", "name": "/part/gizmo", "wxyz": [1, 0, 0, 0],
+         "position": [1, 2, 3.5], "owner": ""},
+        {"type": "TransformControlsDragEndMessage", "name": "/part/gizmo", "owner": ""},
         said(("a:b", ""), ("errors:find", "x")),
         said(upload("x.csv", b"1" * 100_000)),
     ):  # fmt: skip

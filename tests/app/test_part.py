@@ -5,10 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
+from app.page_tab import Tab
 from app.parts import LIVE
 from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, state_to_link
+from warpspace.app.evaluation.budget import pick_line
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.part import clamped_part, clamped_scene, place_of, turned_place
 from warpspace.app.state.app_state import AppState, start_state
@@ -132,3 +135,62 @@ def test_a_slider_moves_a_large_part_in_60_ms() -> None:
         part.drawn_mm(1000.0)
         best = min(best, time.process_time() - began)
     assert best < 0.06
+
+
+# --- In the browser -------------------------------------------------------------------------------
+
+PROGRAM = b"G21 G90\nG0 X-60 Y-40 Z-250\nG1 X60 F500\nG2 X60 Y40 J40\nG1 X-60\nG1 Y-40\nM30\n"
+TOLERANCES = b'[[features]]\nname = "top"\nis = "plane 1"\nmeasure = "flatness"\ntolerance_um = 2\n'
+
+
+def opened(tab: Tab, name: str, content: bytes) -> None:
+    tab.give(name, content, tab.page.get_by_role("button", name="Open").first.click)
+
+
+def drawn_part(tab: Tab) -> bool:
+    """Whether the page draws what the session shows, a tenth of a millimetre apart at most."""
+    found, part = tab.drawn("/part/surface"), LIVE.evaluate(tab.state).part
+    if found is None or part is None:
+        return False
+    picture = LIVE.evaluate(tab.state)
+    wanted = part.drawn_mm(picture.exaggeration)[part.clamped.mesh.corners.corner_of]
+    return found.shape == wanted.shape and bool(np.abs(found - wanted).max() < 0.1)
+
+
+def test_a_part_is_opened_bent_by_a_slider_turned_and_judged(tab: Tab) -> None:
+    block = trimesh.creation.box((200, 150, 80)).export(file_type="stl")
+    opened(tab, "block.stl", block)
+    tab.says("Part block.stl up to")
+    tab.until(lambda: drawn_part(tab))
+    tab.says("as cut", within="[data-key=part]")  # measured by itself
+    before = tab.page.inner_text(".ws-part")
+    tab.send("state:set.amplitudes.EC0Y", 90)
+    tab.until(lambda: tab.page.inner_text(".ws-part") != before and drawn_part(tab))
+    place = tab.state.part.place
+    tab.click("x 90°")
+    tab.until(lambda: tab.state.part.place != place and drawn_part(tab))
+    tab.press("Control+z")
+    tab.until(lambda: tab.state.part.place == place and drawn_part(tab))
+    tab.give("top.toml", TOLERANCES,
+             tab.page.get_by_role("button", name="Tolerances …").first.click)  # fmt: skip
+    tab.says("top · flatness", within="[data-key=part]")
+    assert tab.errors == []
+
+
+def test_a_line_of_a_program_and_its_place_find_each_other(tab: Tab) -> None:
+    opened(tab, "ring.ngc", PROGRAM)
+    tab.says("Program ring.ngc up to")
+    tab.says("Worst blocks", within="[data-key=program]")
+    tab.click("line 4", within="[data-key=program]")
+    tab.says("G2 X60 Y40 J40", within="[data-key=program]")
+    tab.until(lambda: tab.drawn("/program/line") is not None)
+    picture = LIVE.evaluate(tab.state)
+    assert picture.path is not None
+    drawn = picture.path.drawn_mm(picture.exaggeration)
+    end = drawn[np.flatnonzero(picture.path.line == 3)[-1]]
+    np.testing.assert_allclose(
+        tab.drawn("/program/line"), drawn[np.flatnonzero(picture.path.line == 4)[-1:]], atol=0.1
+    )
+    eye = end + np.array([0.0, -500.0, 0.0])
+    assert pick_line(picture, eye, end - eye) == 3
+    assert tab.errors == []

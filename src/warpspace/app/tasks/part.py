@@ -3,17 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from markupsafe import Markup
 
 from warpspace.analysis.catalogue import Entry
-from warpspace.analysis.description import Analysis, Result
+from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.options import Option
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, number, tag
 from warpspace.app.browser.incoming import index_of
-from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, read_upload
+from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, read_upload, upload_text
 from warpspace.app.evaluation.part import AT_LINE, clamped_part, clamped_scene, turned_place
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
@@ -23,9 +25,10 @@ from warpspace.app.tasks.analysis import Question
 from warpspace.app.tasks.charts import details_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import setting
-from warpspace.app.tasks.measure import FilesPart
+from warpspace.app.tasks.measure import FilesPart, Held
 from warpspace.app.tasks.parts import actions
-from warpspace.machine.limits import MAX_UPLOAD_BYTES
+from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
+from warpspace.parts.as_cut import Part, PartResult
 from warpspace.parts.part import find_place, parse_part
 from warpspace.parts.program import Program, ProgramResult
 from warpspace.scene.model import Scene
@@ -101,6 +104,21 @@ class InBoxPart(FilesPart):
         return edits.with_sight(found, inside=not part.is_empty)
 
 
+@dataclass(frozen=True, kw_only=True)
+class HeldPart(Part):
+    """A part with tolerances out of the text of a file."""
+
+    tolerances: Held | None = None
+
+    def run(self, scene: Scene, watch: Watch, /) -> PartResult:
+        if self.tolerances is None:
+            return super().run(scene, watch)
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / self.tolerances.name
+            path.write_text(self.tolerances.content, "utf-8")
+            return replace(self, features=str(path), tolerances=None).run(scene, watch)
+
+
 class PartPart(InBoxPart):
     """A part: clamped, and measured as it is cut."""
 
@@ -115,22 +133,33 @@ class PartPart(InBoxPart):
         return state.part.mesh, state.part.name
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked = super().ask(state, values, scenes)
-        return replace(asked, place=state.part.place, mesh=state.part.mesh)
+        asked = read_form(HeldPart, self.options(), values, scenes[0])
+        return replace(asked, place=state.part.place, mesh=state.part.mesh,
+                       tolerances=next(iter(self._files), None))  # fmt: skip
 
     def about(self, state: AppState) -> Markup:
-        warnings = state.part.mesh.warnings if state.part.mesh else ()
         turns = join(button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
                             hint=f"Turn it about {axis} of the workpiece, in place")
                      for axis in "xyz")  # fmt: skip
         return join((
-            *(tag("p", one, class_="ws-doubt") for one in warnings),
             html.field("Turn", tag("div", turns, class_="ws-choices"), "part.turn"),
             *(setting(state, path) for path in SETTINGS),
+            html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
+                               hint="Names and tolerances of its features"),
         ))  # fmt: skip
 
+    def result_html(self, found: Result) -> Markup:
+        assert isinstance(found, PartResult)  # noqa: S101 - of this analysis
+        judged = [
+            (f"{one.name} · {name.replace('_', ' ')}", measure["verdict"])
+            for one in found.features
+            for name, measure in one.measures.items()
+            if "verdict" in measure
+        ]
+        return html.rows(judged) + super().result_html(found)
+
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "remove":
+        if word == "remove" and not value:
             self._sent = None
             return self.removed(state, PartLook(program=state.part.program))
         if word == "turn" and value in ("x", "y", "z") and (clamped := clamped_part(state)):
@@ -141,7 +170,10 @@ class PartPart(InBoxPart):
         return super().take(state, word, value)
 
     def received(self, name: str, content: bytes) -> None:
-        """Take in a mesh; one of another name is clamped in the middle of the volume."""
+        """Take in tolerances, or a mesh: of another name it is clamped in the middle."""
+        if name.lower().endswith(".toml"):
+            self._files = (Held(name, upload_text(content, name, "file of tolerances")),)
+            return
         self._sent, state = (name, content), self.context.state
         mesh = parse_part(content, name, option_values(state, self.name).get("unit") or None)
         place = state.part.place if name == state.part.name else None
