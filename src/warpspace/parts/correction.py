@@ -15,10 +15,10 @@ from collections.abc import Iterator, Sequence, Set
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.bench.placing import following_axes
+from warpspace.bench.placing import follow, following_axes
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_PATH_POINTS
-from warpspace.parts.control import PLANES, RAPID, STAND, Control, Frame, ReadProgram
+from warpspace.parts.control import PLANES, RAPID, STAND, Control, ReadProgram, upright
 from warpspace.parts.program import Program, along_moves, samples_of_moves
 from warpspace.parts.words import WORD, Block, Reader
 from warpspace.scene.model import Scene
@@ -95,10 +95,11 @@ def corrected_places(
         shift = -error_um / 1e3
     else:
         raise OptionError("the errors change too much from place to place to be corrected")
-    places, frame = read.positions(row, share), Frame(scene)
-    linear = np.stack([found[name] for name in frame.names], axis=-1)
-    linear = np.where(read.tcp[row, None], frame.to_words(tip), linear)
-    places[:, [read.axes.index(name) for name in frame.names]] = linear
+    places, names = read.positions(row, share), following_axes(scene.model)
+    words = follow(scene.model, upright(scene.model, found), tip)
+    moved, at = (np.stack([one[name] for name in names], axis=-1) for one in (words, found))
+    linear = np.where(read.tcp[row, None], moved, at)
+    places[:, [read.axes.index(name) for name in names]] = linear
     is_kept = _fewest(row, share, pieces, linear, within_mm) & (share > 0.0)
     return row[is_kept], places[is_kept]
 
