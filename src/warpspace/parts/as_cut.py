@@ -5,7 +5,7 @@ Geometry only: no forces, heat, wear or servo.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -79,8 +79,13 @@ class Part(Analysis):
     mesh: PartMesh | None = None  # one that is read already
 
     def run(self, scene: Scene, watch: Watch, /) -> "PartResult":
+        own = scene.part
         if self.mesh is None and self.file is None:
-            raise OptionError("{file} is missing; expected a mesh")
+            if (path := own.path("file")) is None:
+                raise OptionError("{file} is missing; expected a mesh")
+            beside = self.features or own.path("features")
+            unit: Any = self.unit or own.unit or None
+            return replace(self, file=path, features=beside, unit=unit).run(scene, watch)
         mesh = self.mesh or load_part(str(self.file), self.unit)
         watch(0.2)
         place = find_place(mesh, scene, self.place)

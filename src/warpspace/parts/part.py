@@ -179,6 +179,7 @@ Place: TypeAlias = Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", 
 
 def find_place(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> tuple[float, ...]:
     """Give all six numbers of a place, mm and degrees; see `place_part`."""
+    place = scene.part.place if place is None else place
     if place is not None:
         return (*place, 0.0, 0.0, 0.0)[:6]
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
@@ -194,8 +195,8 @@ def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> P
     mesh : PartMesh
     scene : Scene
     place : sequence of float, (3,) or (6,), or None
-        Shift in mm and turns in degrees about the fixed x, y, z in that order; None puts the middle
-        of its box into the middle of the working volume.
+        Shift in mm and turns in degrees about the fixed x, y, z in that order; None puts it
+        where the scene says, or the middle of its box into the middle of the working volume.
     """
     at = find_place(mesh, scene, place)
     pose = transforms.placed(at[:3], at[3:])

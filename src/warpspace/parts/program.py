@@ -5,7 +5,7 @@ Geometry only: no forces, heat, wear or servo.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -209,7 +209,7 @@ class Program(Setup, Analysis):
     task = "measure"
     has_table = True
     file_help = "Corrected program to write: this machine cuts the nominal path with it."
-    file: File = option(None, "Program, G-code", positional=True, required=True)
+    file: File = option(None, "Program, G-code", positional=True, unset="that of the scene")
     chord_mm: float = option(
         0.01, "How far the path may bend between samples", unit="mm", low=1e-5, high=10.0
     )
@@ -230,7 +230,10 @@ class Program(Setup, Analysis):
 
     def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
         if self.file is None:
-            raise OptionError("{file} is missing; expected a program")
+            if (path := scene.part.path("program")) is None:
+                raise OptionError("{file} is missing; expected a program")
+            tcp: Any = scene.part.tcp or self.tcp
+            return replace(self, file=path, tcp=tcp).run(scene, watch)
         read = read_program(scene, self.lines(), self, self.file)
         watch(0.3)
         path = trace_program(scene, read, chord_mm=self.chord_mm)

@@ -25,7 +25,7 @@ from warpspace.resources import scenes_dir
 from warpspace.scene import machines, schema
 from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.files import parse_toml, read_text
-from warpspace.scene.model import Scene, scene_notes
+from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.save import Notation, read_errors
 from warpspace.scene.schema import Problems
@@ -95,6 +95,7 @@ SECTIONS = (
     "uncertainty",
     "measured",
     "view",
+    "part",
     "notes",
 )
 OF_MACHINE = "axis of this machine"  # what a name is that is not known
@@ -113,6 +114,7 @@ def parse_scene(
     convention = problems.read(schema.CONVENTION, "convention", raw.get("convention", {}))
     points = problems.read(schema.POINTS, "points_mm", raw.get("points_mm", {}))
     view = problems.read(schema.VIEW, "view", raw.get("view", {}))
+    part = _part(problems.read(schema.PART, "part", raw.get("part", {})), folder, problems)
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     fixed = (convention or {}).get("reference_axis") == "fixed"
     document = _Document(raw, machine, workspace, machine.reference_keys * fixed, folder, problems)
@@ -146,7 +148,16 @@ def parse_scene(
         uncertainty=uncertainty,
         measured=measured,
         review=review,
+        part=part,
     )
+
+
+def _part(found: Mapping[str, Any] | None, folder: Path | None, problems: Problems) -> PartSource:
+    found = found or {}
+    for name in ("file", "features", "program"):
+        if found.get(name):
+            machines.path_beside(found[name], f"part.{name}", folder, problems)
+    return PartSource(**found, folder=str(folder or ""))
 
 
 def _machine(

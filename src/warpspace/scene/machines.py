@@ -38,16 +38,21 @@ def read_bodies(
         elif body.shape:
             found[frame] = description.BodySource(shape=body.shape)
         else:
-            found[frame] = replace(body, path=_path(body.file, where, folder, problems))
+            found[frame] = replace(body, path=_mesh_path(body.file, where, folder, problems))
     return found
 
 
-def _path(file: str, where: str, folder: Path | None, problems: Problems) -> str:
+def _mesh_path(file: str, where: str, folder: Path | None, problems: Problems) -> str:
     ending = Path(file).suffix.lower()
     if ending not in description.MESH_ENDINGS:
         known = ", ".join(description.MESH_ENDINGS)
         problems.add(where, f"unknown ending; expected a mesh that ends in {known}", file)
         return ""
+    return path_beside(file, where, folder, problems)
+
+
+def path_beside(file: str, where: str, folder: Path | None, problems: Problems) -> str:
+    """Find a file in the folder of a description, or note that it is not; empty without one."""
     if folder is None:
         return ""
     try:
@@ -57,7 +62,7 @@ def _path(file: str, where: str, folder: Path | None, problems: Problems) -> str
     except (OSError, ValueError):
         path, inside, there = folder, True, False
     if not inside:
-        problems.add(where, "leads out of the folder of this file; expected a mesh in it", file)
+        problems.add(where, "leads out of the folder of this file; expected one in it", file)
     elif not there:
         problems.add(where, "there is no such file beside this one", file)
     else:

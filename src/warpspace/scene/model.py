@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +27,24 @@ from warpspace.machine.description import Machine, Vector
 from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics, Measurement, ToleranceSet
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.notes import Note
+
+
+@dataclass(frozen=True, slots=True)
+class PartSource:
+    """What is to be made on a machine: files as a scene names them, and how they are meant."""
+
+    file: str = ""  # mesh
+    place: tuple[float, ...] | None = None  # (6,), mm and degrees; where it is clamped
+    unit: str = ""  # of the mesh; empty for the one of its format
+    features: str = ""  # names and tolerances
+    program: str = ""
+    tcp: str = ""  # how the program means its tool centre point
+    folder: str = field(default="", compare=False)  # of the scene; empty where it has none
+
+    def path(self, name: Literal["file", "features", "program"]) -> str | None:
+        """Say where a file is; None where none is named, or it cannot be read from here."""
+        named: str = getattr(self, name)
+        return str(Path(self.folder, named)) if named and self.folder else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +81,8 @@ class Scene:
         Largest length of an error that is accepted.
     review : tuple of Note
         What people have pinned, asked and decided.
+    part : PartSource
+        What is to be made.
     """
 
     name: str
@@ -79,6 +101,7 @@ class Scene:
     measured: Mapping[str, Measurement] = field(default_factory=dict[str, Measurement])
     limit_um: float | None = None
     review: tuple[Note, ...] = ()
+    part: PartSource = PartSource()
 
     @property
     def machine(self) -> Machine:

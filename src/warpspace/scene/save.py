@@ -146,6 +146,8 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         **({} if scene.limit_um is None else {"limit_um": scene.limit_um}),
     }
     parts.append(_section("view", view))
+    part = asdict(replace(scene.part, folder=""))
+    parts.append(_section("part", {name: value for name, value in part.items() if value}))
     parts += map(spell_note, scene.review)
     return "\n".join(part for part in parts if part)
 

@@ -250,6 +250,16 @@ VIEW = Section(
         "limit_um": (_number(*limits.LIMIT_UM), None),
     }
 )
+PART = Section(
+    {
+        "file": (_text(MAX_FILE_NAME), ""),
+        "place": (_numbers("[x, y, z, a, b, c]", *[limits.MAX_LENGTH_MM] * 6), None),
+        "unit": (_one_of(MESH_UNITS), ""),
+        "features": (_text(MAX_FILE_NAME), ""),
+        "program": (_text(MAX_FILE_NAME), ""),
+        "tcp": (_one_of(("program", "always", "never")), ""),
+    }
+)
 DEFAULTS = _by_name(_number(*_HALF_WIDTH), TOLERANCE_CLASSES)
 _RANGE = Section(
     {

@@ -7,7 +7,7 @@ import trimesh
 from bench_scenes import scene_with
 from warpspace import load_scene
 from warpspace.analysis.description import silent
-from warpspace.exceptions import OptionError
+from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
 from warpspace.parts.as_cut import Part
 from warpspace.parts.part import (
@@ -19,7 +19,10 @@ from warpspace.parts.part import (
     place_part,
     point_basis,
 )
+from warpspace.parts.program import Program
+from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
+from warpspace.scene.save import scene_to_toml
 
 
 def mesh_of(mesh, ending="ply"):
@@ -124,3 +127,27 @@ def test_a_part_beyond_the_travel_is_counted_and_said():
     assert any("beyond the travel" in said for said in far.doubts())
     with pytest.raises(OptionError, match="expected a mesh"):
         Part().run(scene_with(), silent)
+
+
+def test_a_scene_names_its_part(tmp_path):
+    BOX.export(tmp_path / "box.stl")
+    (tmp_path / "moves.ngc").write_text("G1 X10\n")
+    section = '[part]\nfile = "box.stl"\nplace = [0.0, 0.0, 120.0, 0.0, 0.0, 90.0]\nunit = "cm"\n'
+    text = section + 'program = "moves.ngc"\ntcp = "never"\n'
+    scene_file = tmp_path / "scene.toml"
+    scene_file.write_text(f'machine = "dvf5000"\n{text}')
+    scene = load_scene(scene_file)
+    found = Part().run(scene, silent)
+    assert found.place == scene.part.place
+    assert np.ptp(found.part.vertices_mm, axis=0) == pytest.approx([600.0, 1000.0, 400.0])
+    assert Program().run(scene, silent).read.blocks == 1
+    saved = scene_to_toml(scene)
+    assert text in saved
+    assert parse_scene(saved, "scene", folder=tmp_path) == scene
+    assert parse_scene(saved, "scene").part.path("file") is None  # an upload has no folder
+    wrong = {"tcp =": "tpc =", "box.": "none.", "[0.0, 0.0, 120": "[120", "moves.ngc": "../a.ngc"}
+    said = "did you mean 'tcp'", "no such file", r"expected \[x, y, z, a", "leads out of the folder"
+    for (old, new), words in zip(wrong.items(), said, strict=True):
+        scene_file.write_text(text.replace(old, new))
+        with pytest.raises(SceneError, match=words):
+            load_scene(scene_file)

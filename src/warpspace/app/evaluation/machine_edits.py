@@ -209,7 +209,8 @@ def _read(scene: Scene, raw: Tables, like: description.Machine) -> tuple[Scene, 
         bodies={frame: body for frame, body in like.bodies.items() if frame not in gone},
     )
     notes = (*read.notes, *body_notes(machine))
-    read = replace(read, model=replace(read.model, machine=machine), notes=notes)
+    model = replace(read.model, machine=machine)
+    read = replace(read, model=model, notes=notes, part=scene.part)
     return (scene, ()) if read == scene else (read, tuple(_left_out(scene, gone)))
 
 
