@@ -22,9 +22,9 @@ SMOOTH_DEG = 30.5  # triangles meeting at less may belong to one curved surface:
 FLAT_RAD = 1e-3  # triangles meeting at less lie in one facet
 FINE = 5e-6  # share of the largest coordinate that vertices are rounded by: files of six digits
 CLOSE = 2e-5  # share of its extent that a feature's vertices may be off its shape, beside rounding
-ALIKE_DEG = 12.0  # angle between triangles and the first guess of the shape, at most
+NEAR_DEG = 12.0  # angle between triangles and the first guess of the shape, at most
 FACETS = 4  # of a curved surface, at least: fewer lie on many shapes
-BROAD = 3.0  # a facet so many times larger than those that it runs into is a plane of its own
+ALIKE = 4.0  # facets within this ratio may belong to one surface that runs into others
 ODD = 0.01  # share of its area that may lean otherwise: slivers
 MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
 STEPS, STILL_MM = 40, 1e-11  # steps of a fit, and the change of a distance that ends it
@@ -158,17 +158,19 @@ class _Surfaces:
         self.facet_of = self._joined(self.pairs[cosine[is_smooth] > np.cos(FLAT_RAD)])
 
     def features(self) -> Iterator[Feature]:
-        """Classify what lies between creases; then what is left of it between broad facets."""
+        """Classify what lies between creases; then what is left of it by the size of its facets."""
         is_left = np.ones(len(self.area), dtype=bool)
         for part in self._largest(self._joined(self.pairs), is_left):
             if feature := self._classify(part):
                 is_left[part] = False
                 yield feature
-        is_broad = is_left & self._broad()
-        rest = is_left & ~is_broad
-        links = self._joined(self.pairs[rest[self.pairs].all(axis=1)])
-        for label, chosen in ((self.facet_of, is_broad), (links, rest)):
-            yield from filter(None, map(self._classify, self._largest(label, chosen)))
+        one, other = self.pairs.T
+        facet = np.bincount(self.facet_of, self.area)[self.facet_of]
+        is_like = np.maximum(facet[one], facet[other]) < ALIKE * np.minimum(
+            facet[one], facet[other]
+        )
+        links = self._joined(self.pairs[is_like & is_left[one] & is_left[other]])
+        yield from filter(None, map(self._classify, self._largest(links, is_left)))
 
     def _joined(self, pairs: Indices) -> Indices:
         """Give the same number, [T], to triangles that pairs of them connect."""
@@ -186,15 +188,6 @@ class _Surfaces:
         parts = np.split(part, np.flatnonzero(np.diff(label[part])) + 1)
         several = [one for one in parts if len(one) > 1]  # one is flat whatever the machine does
         return sorted(several, key=lambda one: -self.area[one].sum())[:MAX_FEATURES]
-
-    def _broad(self) -> NDArray[np.bool_]:
-        """Tell which triangles lie in facets much larger than all that these run into."""
-        one, other = self.facet_of[self.pairs].T
-        facet = np.bincount(self.facet_of, self.area)
-        beside = np.zeros(len(facet))
-        for here, there in ((one, other), (other, one)):
-            np.maximum.at(beside, here, np.where(here == there, 0.0, facet[there]))
-        return (facet > BROAD * beside)[self.facet_of]
 
     def _classify(self, part: Indices) -> Feature | None:
         """Take the first kind that fits."""
@@ -234,7 +227,7 @@ class _Surfaces:
         triangles, area = self.mesh.triangles[part], self.area[part]
         below = start.respond(self.mesh.vertices_mm[triangles].mean(axis=1)).normal
         turned = np.sum(below * self.mesh.normals[part], axis=1)
-        odd = turned * np.sign(area @ turned) < np.cos(np.deg2rad(ALIKE_DEG))
+        odd = turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))
         if area @ odd > ODD * area.sum():
             return None
         vertices = np.unique(triangles)

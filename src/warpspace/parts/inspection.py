@@ -25,7 +25,7 @@ from warpspace.scene.model import Scene, evaluate
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array, spell_signed
 
 RIGHT_RAD = 1e-4  # a nominal angle this close to 90° or to 0 has a squareness or a parallelism
-NUDGE = 0.01  # share of an error by which points are moved to find what it adds
+NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
 KEYS_AT_ONCE = 8  # parameters whose responses of all points are in memory
 SHOWN = 0.005  # µm or µrad that a table names a parameter for

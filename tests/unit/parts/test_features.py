@@ -23,10 +23,10 @@ def plate_of_holes():
     return trimesh.boolean.difference([make.box((200.0, 190.0, 20.0)), *holes])
 
 
-def rounded_box():
-    corners = [[x, y, z] for x in (-20, 20) for y in (-15, 15) for z in (-10, 10)]
-    balls = [make.icosphere(3, 5.0).apply_translation(corner) for corner in corners]
-    return trimesh.util.concatenate(balls).convex_hull
+def boss_with_fillet():
+    angle = np.linspace(0.0, np.pi / 2.0, 9)
+    fillet = np.stack([18.0 - 3.0 * np.sin(angle), 13.0 - 3.0 * np.cos(angle)], axis=-1)
+    return make.revolve([[0, 0], [30, 0], [30, 10], *fillet, [15, 40], [0, 40]], sections=60)
 
 
 FRUSTUM = np.array([[0.0, 0.0], [100.0, 0.0], [70.0, 60.0], [0.0, 60.0]])
@@ -43,7 +43,8 @@ FRUSTUM = np.array([[0.0, 0.0], [100.0, 0.0], [70.0, 60.0], [0.0, 60.0]])
         (make.icosphere(3, 20.0), {"sphere": 1}),
         (make.torus(30.0, 5.0), {}),
         (make.icosphere(4, 20.0).apply_scale([1.0, 1.01, 1.02]), {}),
-        (rounded_box(), {"plane": 6}),
+        (make.capsule(30.0, 10.0), {"cylinder": 1, "sphere": 2}),
+        (boss_with_fillet(), {"plane": 3, "cylinder": 2}),
     ],
 )
 @pytest.mark.parametrize("digits", [None, 3])
