@@ -16,6 +16,7 @@ from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, number, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, read_upload, upload_text
+from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.part import AT_LINE, clamped_part, clamped_scene, turned_place
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
@@ -58,6 +59,9 @@ class InBoxPart(FilesPart):
 
     def question(self, state: AppState) -> Question:
         return (*super().question(state), Identity(self.held(state)[0]), state.part.place)
+
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().concerns(picture), Identity(picture.state.part))
 
     def is_ready(self, state: AppState) -> bool:
         return self.held(state)[0] is not None
@@ -138,11 +142,11 @@ class PartPart(InBoxPart):
                        tolerances=next(iter(self._files), None))  # fmt: skip
 
     def about(self, state: AppState) -> Markup:
-        turns = join(button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
-                            hint=f"Turn it about {axis} of the workpiece, in place")
-                     for axis in "xyz")  # fmt: skip
+        turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
+                        hint=f"Turn it about {axis} of the workpiece, in place")
+                 for axis in "xyz")  # fmt: skip
         return join((
-            html.field("Turn", tag("div", turns, class_="ws-choices"), "part.turn"),
+            actions(tag("span", "Turn about"), *turns),
             *(setting(state, path) for path in SETTINGS),
             html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
                                hint="Names and tolerances of its features"),
