@@ -103,14 +103,11 @@ def fit_shape(start: Shape, point_mm: Array) -> Shape:
         shape = shape.moved(step)
         if np.abs(design @ step[free]).max() < STILL_MM:
             break
-    if shape.kind == "sphere":
-        return shape
-    away = point_mm.mean(axis=0) - shape.centre_mm
-    along = away @ shape.axis  # the centre stays amid the points
-    if shape.kind == "plane":
-        return replace(shape, centre_mm=shape.centre_mm + away - along * shape.axis)
-    radius = shape.radius_mm + along * np.tan(shape.angle_rad)
-    return replace(shape, centre_mm=shape.centre_mm + along * shape.axis, radius_mm=radius)
+    step, still = np.zeros(FREEDOMS), [at for at in range(3) if at not in free]
+    # along itself the shape stays amid the points
+    step[still] = ((point_mm.mean(axis=0) - shape.centre_mm) @ shape.frame)[still]
+    step[6] = step[2] * np.tan(shape.angle_rad)
+    return shape.moved(step)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,6 +65,22 @@ def test_a_scale_is_a_distance_and_a_location_is_no_error_of_a_part(tmp_path):
     assert max(row["placed_difference_um"] for row in rows) < 1e-6
 
 
+def test_a_scale_opens_holes_and_cones_and_moves_them(tmp_path):
+    scale = 2e-4
+    scene = scene_with(EXX=(0.0, 550e3 * scale), EYY=(0.0, 450e3 * scale))
+    hole = inspected(scene, plate_of_holes(), tmp_path)["cylinder 1"].measures
+    assert hole["diameter"]["placed_difference_um"] == pytest.approx(16e3 * scale, abs=1e-3)
+    assert hole["cylindricity"]["placed_difference_um"] == pytest.approx(0.0, abs=1e-3)
+    away = 60e3 * np.sqrt(2.0) * scale
+    assert hole["position"]["placed_difference_um"] == pytest.approx(away, abs=1e-3)
+    assert hole["position"]["budget"]["EXX"] == pytest.approx(away / 2.0, abs=1e-3)
+    cone = inspected(scene, trimesh.creation.revolve(FRUSTUM, sections=90), tmp_path)["cone 1"]
+    opened = cone.measures["half_angle"]
+    slope = 0.4 * scale * 1e6  # sin φ cos φ for tan φ = 30 / 60
+    assert abs(opened["placed_difference_urad"]) == pytest.approx(slope, abs=0.1)
+    assert opened["nominal_deg"] == pytest.approx(26.56505118)
+
+
 def test_a_doubtful_verdict_is_none(tmp_path):
     scene = scene_with(EXX=5000.0, EC0Y=4000.0, ECZ=3000.0, EAX=(0.0, 9000.0))
     plain = inspected(scene, plate_of_holes(), tmp_path)["cylinder 1"].measures["position"]
