@@ -12,7 +12,10 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.options import File, option
+from warpspace.bodies.gltf import to_gltf
+from warpspace.bodies.own_meshes import FORMATS, MM_PER_M, UNITS_MM
 from warpspace.exceptions import OptionError
+from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
@@ -31,7 +34,7 @@ from warpspace.parts.part import (
     place_part,
 )
 from warpspace.scene.model import Scene, second_order
-from warpspace.units import Array
+from warpspace.units import MM_PER_UM, Array
 
 AT_ONCE = 200_000  # triangles
 
@@ -82,7 +85,9 @@ class Part(Analysis):
         own = scene.part
         if self.mesh is None and self.file is None:
             if (path := own.path("file")) is None:
-                raise OptionError("{file} is missing; expected a mesh")
+                raise OptionError(
+                    "{file} is missing; expected a mesh, or a scene whose [part] has one"
+                )
             beside = self.features or own.path("features")
             unit: Any = self.unit or own.unit or None
             return replace(self, file=path, features=beside, unit=unit).run(scene, watch)
@@ -104,6 +109,7 @@ class Part(Analysis):
             features=found,
             title=scene.title,
             place=place,
+            unit=self.unit,
             part=part,
             made=made,
             second_order=second_order(scene, Loop.RELATIVE),
@@ -135,6 +141,7 @@ class PartResult(Result):
     features: Sequence[FeatureResult]
     title: str
     place: tuple[float, ...]  # (6,), mm and degrees
+    unit: str | None  # of the numbers in its file; None for that of the format
     part: PartMesh  # nominal, in the workpiece frame
     made: Made  # its vertices
 
@@ -162,3 +169,26 @@ class PartResult(Result):
         heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
         yield features_table(self.features)
+
+
+def bent_file(scene: Scene, found: PartResult, ending: str, *, predistorted: bool = False) -> bytes:
+    """Spell a part as it is cut, in its own frame and unit, as a file of this ending.
+
+    Predistorted it is the part to be asked for, so that the nominal one is cut.
+    """
+    import trimesh
+
+    nominal, moved = found.made.point_mm, found.made.error_um * MM_PER_UM
+    if predistorted:
+        for _ in range(2):
+            moved = -make_points(scene, nominal + moved).error_um * MM_PER_UM
+    own = transforms.inverse(transforms.placed(found.place[:3], found.place[3:]))
+    point = transforms.apply(own, nominal + moved)
+    unit, up = FORMATS[ending]
+    if up == "y":
+        point = to_gltf(point) * MM_PER_M
+    mesh = trimesh.Trimesh(
+        point / UNITS_MM[found.unit or unit], found.part.triangles, process=False
+    )
+    spelled: Any = mesh.export(file_type=ending[1:])
+    return spelled.encode() if isinstance(spelled, str) else spelled

@@ -9,7 +9,7 @@ from warpspace import load_scene
 from warpspace.analysis.description import silent
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
-from warpspace.parts.as_cut import Part
+from warpspace.parts.as_cut import Part, bent_file
 from warpspace.parts.part import (
     deviation_of,
     fit_out,
@@ -151,3 +151,21 @@ def test_a_scene_names_its_part(tmp_path):
         scene_file.write_text(text.replace(old, new))
         with pytest.raises(SceneError, match=words):
             load_scene(scene_file)
+
+
+@pytest.mark.parametrize("ending", [".stl", ".obj", ".ply", ".glb"])
+def test_a_bent_file_is_the_part_as_cut_and_a_predistorted_one_cuts_the_nominal_part(ending):
+    scene, place = load_scene("dvf5000_first"), (10.0, 20.0, 120.0, 30.0, 0.0, 90.0)
+    found = Part(mesh=mesh_of(BALL), place=place, unit="in").run(scene, silent)
+    bent, asked = (
+        parse_part(bent_file(scene, found, ending, predistorted=way), f"bent{ending}", "in")
+        for way in (False, True)
+    )
+    assert bent.warnings == asked.warnings == ()  # as closed as it was
+    moved = place_part(bent, scene, place)
+    nearest = np.linalg.norm(moved.vertices_mm[:, None] - found.made.point_mm, axis=-1).argmin(1)
+    error = 1e3 * (moved.vertices_mm - found.made.point_mm[nearest])
+    assert np.abs(error - found.made.error_um[nearest]).max() < 0.02  # of numbers in 4 bytes
+    made = make_points(scene, place_part(asked, scene, place).vertices_mm)
+    off = made.point_mm[:, None] + 1e-3 * made.error_um[:, None] - found.made.point_mm
+    assert np.linalg.norm(off, axis=-1).min(axis=1).max() < 2e-5
