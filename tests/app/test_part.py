@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,15 +11,16 @@ import trimesh
 from app.page_tab import Tab
 from app.parts import LIVE
 from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
-from warpspace.app.documents.scene_file import open_link, state_to_link
+from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.evaluation.budget import pick_line
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.part import clamped_part, clamped_scene, place_of, turned_place
-from warpspace.app.state.app_state import AppState, start_state
+from warpspace.app.state.app_state import AppState, PartLook, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.kinematics import transforms
 from warpspace.parts.part import PartMesh, make_points, place_part
+from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
 
 SCENE = load_scene("dvf5000_first")
@@ -106,6 +108,23 @@ def test_a_place_is_typed_linked_and_undone() -> None:
     assert store.undo() == "place"
     assert store.state.part.place is None
     assert "expected three numbers, or six" in put(STATE, "part.place", "1,2").notes[0]
+
+
+def test_the_part_of_a_scene_comes_and_goes_with_it(tmp_path: Path) -> None:
+    trimesh.creation.box((200, 150, 80)).export(tmp_path / "block.stl")
+    (tmp_path / "ring.ngc").write_bytes(PROGRAM)
+    text = (scenes_dir() / "dvf5000_first.toml").read_text("utf-8")
+    part = '[part]\nfile = "block.stl"\nplace = [0, 0, 140, 0, 0, 30]\nprogram = "ring.ngc"\n'
+    (tmp_path / "own.toml").write_text(f"{text}\n{part}", "utf-8")
+    own = start_state(load_scene(tmp_path / "own.toml"))
+    picture = LIVE.evaluate(own)
+    assert picture.part is not None and picture.path is not None  # noqa: PT018
+    assert (own.part.name, own.look.surface) == ("block.stl", "grid")
+    left = own.with_scene(SCENE)
+    assert (left.part, left.look.surface) == (PartLook(), "surface")
+    assert STATE.with_scene(SCENE).part == STATE.part  # of no scene
+    sent, _ = open_text(state_to_toml(own), "sent", "sent")
+    assert (sent.part.name, sent.part.is_empty) == ("block.stl", True)
 
 
 def test_what_leaves_the_travel_is_said() -> None:

@@ -179,9 +179,16 @@ def part_picture(state: AppState) -> PartPicture | None:
         return None
 
 
+def program_defaults(state: AppState) -> Mapping[str, str]:
+    """Give what the scene says of options of its program."""
+    tcp = state.scene.part.tcp
+    return {"tcp": tcp} if tcp else {}
+
+
 def path_picture(state: AppState) -> PathPicture | None:
     """Give the path of the program with the errors of a state; None where there is none."""
-    held, told = state.part.program, option_values(state, Program.name)
+    held, told = state.part.program, {**program_defaults(state)}
+    told |= option_values(state, Program.name)
     if held is None:
         return None
 

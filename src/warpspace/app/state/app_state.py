@@ -6,7 +6,10 @@ changed.
 """
 
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpspace.app.state.leaf import Span, described, error_names, said
@@ -19,6 +22,7 @@ from warpspace.app.state.look import (
     position_spans,
     slice_spans,
 )
+from warpspace.exceptions import WarpspaceError
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -26,12 +30,13 @@ from warpspace.machine.description import Vector
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBABILITY
+from warpspace.parts.part import PartMesh, load_part
+from warpspace.parts.words import program_lines
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import KINDS, Mark, Note
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
-    from warpspace.parts.part import PartMesh
 
 AMPLITUDE = Span(-MAX_ERROR, MAX_ERROR, 0.1)
 NODES = Span(*LIVE_NODES, 2.0)  # grid nodes per axis: odd numbers
@@ -56,7 +61,7 @@ LOOP_NAMES = {
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
-KEPT = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
+KEPT = ("component", "nodes", "shown", "look", "machine", "forms", "page")
 """What stays when another scene is shown."""
 SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
 """What can be drawn of a comparison; the difference is the change from A to B."""
@@ -166,7 +171,7 @@ class Picked:
 class PartLook:
     """The part that stands in the box, in place of the scene's own."""
 
-    mesh: "PartMesh | None" = None  # never saved or linked, but for its name
+    mesh: PartMesh | None = None  # never saved or linked, but for its name
     name: str = described("", "Part", linked="part")
     place: tuple[float, ...] | None = described(
         None,
@@ -177,8 +182,7 @@ class PartLook:
         hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
         " degrees about the fixed x, y and z, in that order; empty for the usual place.",
     )
-    # name and text of a program that is run on the machine, as the mesh is kept
-    program: "tuple[str, str] | None" = None
+    program: tuple[str, str] | None = None  # name and text; kept as the mesh is
     shown: bool = described(
         True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
     )
@@ -189,10 +193,29 @@ class PartLook:
         False, "Move in the drawing", hint="Arrows and arcs at the part.", linked=""
     )
 
+    @classmethod
+    def of_scene(cls, scene: Scene) -> "PartLook":
+        """Give what a scene names; of files that cannot be read from here their names."""
+        source, mesh, program = scene.part, None, None
+        with suppress(WarpspaceError):
+            mesh = _own_mesh(source.path("file"), source.unit or None)
+            program = _own_program(source.path("program"))
+        return cls(mesh, source.file, source.place, program)
+
     @property
     def is_empty(self) -> bool:
         """Whether nothing of it stands in the box."""
         return (self.mesh is None or not self.shown) and self.program is None
+
+
+@lru_cache(maxsize=4)
+def _own_mesh(path: str | None, unit: str | None) -> PartMesh | None:
+    return None if path is None else load_part(path, unit)
+
+
+@lru_cache(maxsize=4)
+def _own_program(path: str | None) -> tuple[str, str] | None:
+    return None if path is None else (Path(path).name, "".join(program_lines(path)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -426,12 +449,16 @@ class AppState:
 
     def with_scene(self, scene: Scene) -> "AppState":
         """Show another scene, in its own loop; component, density and switches stay."""
-        fresh = start_state(scene)
+        fresh, own = start_state(scene), PartLook.of_scene(self.scene)
+        left = not own.is_empty and own.mesh is self.part.mesh  # with the scene that names it
+        part, look = self.part, self.look
+        if left or not fresh.part.is_empty:
+            part, look = fresh.part, replace(look, surface=fresh.look.surface)
         shown = replace(
             fresh,
             specification=self.specification if scene.limit_um is None else fresh.specification,
             rotary=replace(self.rotary, off=frozenset()),
-            **{name: getattr(self, name) for name in KEPT},
+            **{**{name: getattr(self, name) for name in KEPT}, "part": part, "look": look},
         )
         return shown.within_reach()
 
@@ -474,6 +501,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
     start = {key: scene.errors.amplitude(key) for key in scene.parameter_keys}
     at = scene.workspace.positions
     positions = {axis: at.get(axis, 0.0) for axis in position_spans(scene)}
+    part = PartLook.of_scene(scene)
     state = AppState(
         scene,
         start,
@@ -485,6 +513,8 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         specification=Specification(START_UM if scene.limit_um is None else scene.limit_um),
         tolerances=scene.tolerances,
         review=scene.review,
+        part=part,
+        look=Look() if part.is_empty else Look(surface="grid"),
     )
     return replace(state, **changes)
 

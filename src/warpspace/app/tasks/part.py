@@ -17,7 +17,13 @@ from warpspace.app.browser.html import EMPTY, button, join, number, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, read_upload, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.part import AT_LINE, clamped_part, clamped_scene, turned_place
+from warpspace.app.evaluation.part import (
+    AT_LINE,
+    clamped_part,
+    clamped_scene,
+    program_defaults,
+    turned_place,
+)
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.forms import option_values, read_form
@@ -138,6 +144,8 @@ class PartPart(InBoxPart):
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked = read_form(HeldPart, self.options(), values, scenes[0])
+        if state.part.mesh is PartLook.of_scene(state.scene).mesh:
+            asked = replace(asked, features=state.scene.part.path("features"))
         return replace(asked, place=state.part.place, mesh=state.part.mesh,
                        tolerances=next(iter(self._files), None))  # fmt: skip
 
@@ -209,6 +217,9 @@ class ProgramPart(InBoxPart):
         name, text = state.part.program or ("", "")
         asked = read_form(HeldProgram, self.options(), values, scenes[0])
         return replace(asked, file=name, held=tuple(text.splitlines()))
+
+    def defaults(self, state: AppState) -> Mapping[str, str]:
+        return {**super().defaults(state), **program_defaults(state)}
 
     def about(self, state: AppState) -> Markup:
         line, text = state.forms.get(AT_LINE, ""), (state.part.program or ("", ""))[1].splitlines()
