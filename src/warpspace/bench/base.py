@@ -89,6 +89,10 @@ class BenchTest(Analysis):
         title = f"{cls.title} on SCENE ({cls.standard})."
         return f"{title}\n\n{cls.words}\n\nColumns of --data: {columns}."
 
+    def warnings(self, scene: Scene) -> tuple[str, ...]:  # noqa: ARG002
+        """Say nothing: a path beyond the travel is refused."""
+        return ()
+
     def run(self, scene: Scene, _watch: Watch, /) -> "BenchResult":
         return run_test(scene, self, self.data)
 
