@@ -64,6 +64,11 @@ class Shape:
         """Unit vector, [3]: normal of a plane, axis of a cylinder or cone."""
         return self.frame[:, 2]
 
+    @property
+    def across(self) -> Array:
+        """Directions in which it has a place, [3, n]: a plane only along its normal."""
+        return self.frame[:, [at for at in FREE[self.kind] if at < 3]]
+
     def respond(self, point_mm: Array) -> Response:
         """Measure points, [n, 3], against the shape."""
         arm = (point_mm - self.centre_mm) @ self.frame

@@ -35,13 +35,8 @@ Shapes = Sequence[Shape]
 def _distance(actual: Shapes, _nominal: Shapes) -> float:
     """Distance square to a plane; else square to an axis; else between centres."""
     away = actual[0].centre_mm - actual[1].centre_mm
-    kinds = [shape.kind for shape in actual]
-    if "plane" in kinds:
-        return abs(float(away @ actual[1 if kinds[1] == "plane" else 0].axis))
-    if kinds != ["sphere", "sphere"]:
-        axis = actual[1 if kinds[1] != "sphere" else 0].axis
-        away = away - (away @ axis) * axis
-    return float(np.linalg.norm(away))
+    shape = min(reversed(actual), key=lambda one: one.across.shape[1])
+    return float(np.linalg.norm(away @ shape.across))
 
 
 def _angle(actual: Shapes, nominal: Shapes) -> float:
@@ -72,9 +67,8 @@ def _position(actual: Shapes, nominal: Shapes) -> float:
         inverse = np.linalg.pinv(fixing, rcond=1e-6)
         found = found + left @ inverse @ (seen - rows @ found)
         left = left @ (np.eye(6) - inverse @ fixing)
-    fixed = [at for at in FREE[nominal[0].kind] if at < 3]
     away = actual[0].centre_mm - place - found[:3]
-    return float(np.linalg.norm(away @ nominal[0].frame[:, fixed]))
+    return float(np.linalg.norm(away @ nominal[0].across))
 
 
 class Kind(NamedTuple):
