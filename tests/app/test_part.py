@@ -172,7 +172,7 @@ def drawn_part(tab: Tab) -> bool:
     if found is None or part is None:
         return False
     picture = LIVE.evaluate(tab.state)
-    wanted = part.drawn_mm(picture.exaggeration)[part.clamped.mesh.corners.corner_of]
+    wanted = part.drawn_mm(picture.exaggeration)[part.mesh.corners.corner_of]
     return found.shape == wanted.shape and bool(np.abs(found - wanted).max() < 0.1)
 
 

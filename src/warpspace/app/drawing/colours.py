@@ -64,13 +64,6 @@ def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
     return found
 
 
-@cache
-def level_line_colours(*, diverging: bool) -> NDArray[np.uint8]:
-    """Give the bytes for ends of lines of all levels, [LEVELS, 3]: viser takes them as linear."""
-    linear = np.clip(level_colours(diverging=diverging), 0.0, 1.0)
-    return np.rint(255.0 * linear).astype(np.uint8)
-
-
 # --- Colours of lines, on a light ground and on a dark one ----------------------------------------
 
 

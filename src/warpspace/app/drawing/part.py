@@ -12,7 +12,7 @@ from viser import transforms as quaternions
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import ACCENT, ASKED
 from warpspace.app.drawing.box import packed
-from warpspace.app.drawing.colours import colour, colour_levels, level_colours, level_line_colours
+from warpspace.app.drawing.colours import colour, colour_levels, level_colours
 from warpspace.app.drawing.shapes import SCENE_PER_MM, UNLIT, Nodes, Shape, Shapes, dots, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.part import AT_LINE, PartPicture, place_of
@@ -39,7 +39,7 @@ class PartLayer:
     def show(self, picture: LivePicture) -> None:
         self._paths.draw(path_shapes(picture))
         part, state = picture.part, picture.state
-        held = part and (Identity(part.clamped), picture.coloured(part)[1].diverging, state.shown,
+        held = part and (Identity(part.points), picture.coloured(part)[1].diverging, state.shown,
                          picture.size_mm, state.part.moved)  # fmt: skip
         if held != self._held:
             self._held = held
@@ -64,7 +64,7 @@ class PartLayer:
             return
         points, levels = _drawn(picture, part)
         palette = level_colours(diverging=picture.coloured(part)[1].diverging)
-        ends = part.clamped.mesh.corners.creases
+        ends = part.mesh.corners.creases
         self._nodes.draw(part_shapes(picture, part, points, palette[levels]))
         lifts = packed(np.zeros((ends.size, 3), "<f4"))
         facts = {"surface": SURFACE, "count": len(points), "palette": packed(palette),
@@ -85,8 +85,8 @@ class PartLayer:
         if gizmo is not None:
             gizmo.visible = is_shown
         if gizmo is not None and part is not None:
-            pose = part.clamped.pose
-            gizmo.position = transforms.apply(pose, part.clamped.middle_mm) * SCENE_PER_MM
+            pose = part.pose
+            gizmo.position = transforms.apply(pose, part.middle_mm) * SCENE_PER_MM
             gizmo.wxyz = quaternions.SO3.from_matrix(pose[:3, :3]).wxyz
 
     def _drag(self, event: Any) -> None:
@@ -95,22 +95,22 @@ class PartLayer:
         if event.phase == "end" and part is not None:
             turn: Any = quaternions.SO3(event.target.wxyz).as_matrix()
             at = transforms.rigid(turn, event.target.position / SCENE_PER_MM)
-            drawn = at @ transforms.translation(-part.clamped.middle_mm)
-            self._moved(",".join(map(repr, place_of(part.clamped, drawn))))
+            drawn = at @ transforms.translation(-part.middle_mm)
+            self._moved(",".join(map(repr, place_of(part, drawn))))
 
 
 def _drawn(picture: LivePicture, part: PartPicture) -> tuple[Array, Any]:
-    corners, (values, scale) = part.clamped.mesh.corners, picture.coloured(part)
+    corners, (values, scale) = part.mesh.corners, picture.coloured(part)
     drawn = part.drawn_mm(picture.exaggeration).astype("<f4", copy=False)
     return drawn[corners.corner_of], colour_levels(scale, values)
 
 
 def part_shapes(picture: LivePicture, part: PartPicture, points: Array, colours: Any) -> Shapes:
     """Draw a part as cut, its creases, those of the nominal one, and what is out of reach."""
-    clamped, corners, ghost = part.clamped, part.clamped.mesh.corners, colour(picture, "ghost")
+    corners, ghost = part.mesh.corners, colour(picture, "ghost")
     ends = corners.corner_of[corners.creases]
     nominal, away = part.points.nominal_mm, part.points.nominal_mm[part.points.outside]
-    surface = _template(Identity(clamped)).fill(points, colours)
+    surface = _template(Identity(corners)).fill(points, colours)
     found = {
         SURFACE: Shape("add_glb", UNLIT, {"glb_data": surface}),
         EDGES: lines(points[corners.creases], colour(picture, "edge"), 1.4),
@@ -120,15 +120,14 @@ def part_shapes(picture: LivePicture, part: PartPicture, points: Array, colours:
     if picture.state.shown.ghost:
         found["/part/nominal"] = lines(nominal[ends], ghost, 1.2)
     if picture.state.part.moved:
-        own = transforms.apply(transforms.inverse(clamped.pose), nominal) - clamped.middle_mm
+        own = transforms.apply(transforms.inverse(part.pose), nominal) - part.middle_mm
         found[f"{GIZMO}/nominal"] = lines(own[ends], ghost, 1.2)
     return found
 
 
 @lru_cache(maxsize=4)
-def _template(clamped: Identity) -> GltfTemplate:
-    corners = clamped.thing.mesh.corners
-    return GltfTemplate("part", corners.triangles, len(corners.corner_of))
+def _template(corners: Identity) -> GltfTemplate:
+    return GltfTemplate("part", corners.thing.triangles, len(corners.thing.corner_of))
 
 
 def path_shapes(picture: LivePicture) -> Shapes:
@@ -138,7 +137,8 @@ def path_shapes(picture: LivePicture) -> Shapes:
         return {}
     drawn, (values, scale) = path.drawn_mm(picture.exaggeration), picture.coloured(path)
     pieces = np.stack([path.ends - 1, path.ends], axis=1)
-    table, levels = level_line_colours(diverging=scale.diverging), colour_levels(scale, values)
+    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # viser wants lines so
+    table, levels = (255.0 * linear).astype(np.uint8), colour_levels(scale, values)
     stays = {"thickness": 3.0, "thickness_units": "screen", "scale": SCENE_PER_MM}
     follows = {"points": drawn[pieces].astype(np.float32), "colors": table[levels[pieces]]}
     at = np.flatnonzero(path.line == int(picture.state.forms.get(AT_LINE) or 0))

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -11,11 +10,13 @@ from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.bench import BenchPicture, bench_picture
 from warpspace.app.evaluation.part import (
     NORMAL,
+    M,
     Moved,
     PartPicture,
     PathPicture,
-    part_picture,
-    path_picture,
+    clamped_part,
+    moved,
+    traced_path,
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.geometry.colour import ColourScale, build_scale
@@ -70,17 +71,17 @@ class LivePicture(Picture):
     @cached_property
     def part(self) -> PartPicture | None:
         """The part in the box; None where none is, or cannot be. Of a difference its change."""
-        return self._change(part_picture)
+        return self._moved(clamped_part)
 
     @cached_property
     def path(self) -> PathPicture | None:
         """The path of the program, likewise."""
-        return self._change(path_picture)
+        return self._moved(traced_path)
 
-    def _change(self, build: Callable[[AppState], Moved | None]) -> Any:
+    def _moved(self, find: Callable[[AppState], M | None]) -> M | None:
         if not self.is_difference or self.compared is None:
-            return build(self.drawn_state)
-        a, b = map(build, self.compared.sides)
+            return moved(self.drawn_state, find)
+        a, b = (moved(side, find) for side in self.compared.sides)
         if a is None or b is None or a.error_um.shape != b.error_um.shape:
             return None
         return replace(b, error_um=b.error_um - a.error_um)

@@ -1,9 +1,9 @@
 """What stands in the box, part and path: responses are kept, a slider move is a product."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,32 +105,24 @@ class Moved:
 
 
 @dataclass(frozen=True, eq=False)
-class Clamped:
-    """A part where it is clamped."""
+class PartPicture(Moved):
+    """A part where it is clamped, at its vertices; it is coloured at its corners, [W]."""
 
-    points: Points  # its vertices, [V]
     mesh: PartMesh  # in the workpiece frame
     middle_mm: Array  # [3]; of the box of the part, in its own frame
     pose: Array  # [4, 4]; takes the part's own frame to where it is drawn
 
-
-@dataclass(frozen=True, eq=False)
-class PartPicture(Moved):
-    """A part with the errors of a state, at its vertices; coloured at its corners, [W]."""
-
-    clamped: Clamped
-
     @cached_property
     def normal_um(self) -> Floats:
         """Deviation along the normal of each corner, [W]."""
-        corners, turn = self.clamped.mesh.corners, self.points.pose[:3, :3]
+        corners, turn = self.mesh.corners, self.points.pose[:3, :3]
         error = self.error_um[corners.corner_of]
         return np.einsum("ij,ij->i", error, (corners.normals @ turn.T).astype(np.float32))
 
     def values_um(self, component: str) -> Floats:
         if component == NORMAL:
             return self.normal_um
-        return super().values_um(component)[self.clamped.mesh.corners.corner_of]
+        return super().values_um(component)[self.mesh.corners.corner_of]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,42 +133,47 @@ class PathPicture(Moved):
     ends: NDArray[np.intp]  # [S]; samples that a piece of the path leads to from the one before
 
 
+M = TypeVar("M", bound=Moved)
+
+
 def clamped_scene(state: AppState) -> Scene:
     """Give the scene that the part is clamped in: with the rotary axes where they stand."""
     workspace = state.scene.workspace.moved(state.positions)
     return replace(state.scene, workspace=workspace, placed=state.placed)
 
 
-def clamped_part(state: AppState) -> Clamped | None:
-    """Give the part of a state where it is clamped; raises where the machine cannot follow it."""
-    mesh, place = state.part.mesh, state.part.place
-    if mesh is None:
+def moved(state: AppState, find: Callable[[AppState], M | None]) -> M | None:
+    """Give points with the errors of a state; None where there are none, or they cannot be."""
+    try:
+        found = find(state)
+        return found and replace(found, error_um=found.points.error_um(state))
+    except WarpspaceError:  # its section says it
         return None
 
-    def clamp() -> Clamped:
-        scene = clamped_scene(state)
+
+def _keep(state: AppState, own: tuple[Hashable, ...], build: Callable[[Scene], M]) -> M:
+    key = Identity(state.scene), tuple(state.positions.items()), state.placed, own
+    return _KEPT.get(
+        key, lambda: build(clamped_scene(state)), lambda found: found.points.response.nbytes
+    )
+
+
+def clamped_part(state: AppState) -> PartPicture | None:
+    """Give the part of a state where it is clamped, without errors."""
+    mesh, place = state.part.mesh, state.part.place
+
+    def clamp(scene: Scene) -> PartPicture:
+        assert mesh is not None  # noqa: S101 - as below
         at = find_place(mesh, scene, place)
         part = place_part(mesh, scene, at)
         made = make_points(scene, part.vertices_mm)
         points = respond(scene, made.point_mm, made.coordinates, made.outside)
         middle = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
-        return Clamped(points, part, middle, points.pose @ transforms.placed(at[:3], at[3:]))
+        pose = points.pose @ transforms.placed(at[:3], at[3:])
+        return PartPicture(points, points.nominal_mm, part, middle, pose)
 
-    key = (*_stand(state), Identity(mesh), place)
-    return _KEPT.get(key, clamp, lambda found: found.points.response.nbytes)
-
-
-def _stand(state: AppState) -> tuple[Hashable, ...]:
-    return Identity(state.scene), tuple(state.positions.items()), state.placed
-
-
-def part_picture(state: AppState) -> PartPicture | None:
-    """Give the part with the errors of a state; None where none is drawn, or it cannot be."""
-    try:
-        found = clamped_part(state) if state.part.shown else None
-        return found and PartPicture(found.points, found.points.error_um(state), found)
-    except WarpspaceError:  # its section says it
-        return None
+    is_drawn = mesh is not None and state.part.shown
+    return _keep(state, (Identity(mesh), place), clamp) if is_drawn else None
 
 
 def program_defaults(state: AppState) -> Mapping[str, str]:
@@ -185,38 +182,30 @@ def program_defaults(state: AppState) -> Mapping[str, str]:
     return {"tcp": tcp} if tcp else {}
 
 
-def path_picture(state: AppState) -> PathPicture | None:
-    """Give the path of the program with the errors of a state; None where there is none."""
-    held, told = state.part.program, {**program_defaults(state)}
-    told |= option_values(state, Program.name)
-    if held is None:
-        return None
+def traced_path(state: AppState) -> PathPicture | None:
+    """Give the path of the program of a state, without errors."""
+    held = state.part.program
+    told = {**program_defaults(state), **option_values(state, Program.name), "at_line": ""}
 
-    def trace() -> PathPicture:
-        scene = clamped_scene(state)
+    def trace(scene: Scene) -> PathPicture:
+        name, text = held or ("", "")
         options = [one for one in Program.options() if one.name in told]
         asked = read_form(Program, options, told, scene)
-        read = read_program(scene, held[1].splitlines(), asked, held[0])
+        read = read_program(scene, text.splitlines(), asked, name)
         path = trace_program(scene, read, chord_mm=asked.chord_mm)
         points = respond(scene, path.tip_mm, path.coordinates, path.outside)
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return PathPicture(points, points.nominal_mm, path.line, ends)
 
-    told.pop("at_line", None)
-    key = (*_stand(state), Identity(held), tuple(sorted(told.items())))
-    try:
-        found = _KEPT.get(key, trace, lambda one: one.points.response.nbytes)
-        return replace(found, error_um=found.points.error_um(state))
-    except WarpspaceError:
-        return None
+    return _keep(state, (Identity(held), *sorted(told.items())), trace) if held else None
 
 
 # --- Where it is clamped --------------------------------------------------------------------------
 
 
-def place_of(clamped: Clamped, drawn: Array) -> tuple[float, ...]:
+def place_of(part: PartPicture, drawn: Array) -> tuple[float, ...]:
     """Give the place of a part, mm and degrees, for the pose that it is drawn in, [4, 4]."""
-    pose = transforms.inverse(clamped.points.pose) @ drawn
+    pose = transforms.inverse(part.points.pose) @ drawn
     turn, flat = pose[:3, :3], float(np.hypot(*pose[2, 1:3]))
     about_x, about_z = np.arctan2(turn[2, 1], turn[2, 2]), np.arctan2(turn[1, 0], turn[0, 0])
     if flat < STEEP:
@@ -225,10 +214,10 @@ def place_of(clamped: Clamped, drawn: Array) -> tuple[float, ...]:
     return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())
 
 
-def turned_place(clamped: Clamped, axis: str, angle_deg: float) -> tuple[float, ...]:
+def turned_place(part: PartPicture, axis: str, angle_deg: float) -> tuple[float, ...]:
     """Turn a part about its middle and an axis of the workpiece frame."""
-    middle = transforms.apply(clamped.pose, clamped.middle_mm)
-    about = clamped.points.pose[:3, "xyz".index(axis)]
+    middle = transforms.apply(part.pose, part.middle_mm)
+    about = part.points.pose[:3, "xyz".index(axis)]
     turn = transforms.vector_rotation(np.deg2rad(angle_deg) * about)
-    own = transforms.translation(-middle) @ clamped.pose
-    return place_of(clamped, transforms.rigid(turn, middle) @ own)
+    own = transforms.translation(-middle) @ part.pose
+    return place_of(part, transforms.rigid(turn, middle) @ own)

@@ -196,11 +196,10 @@ class PartLook:
     @classmethod
     def of_scene(cls, scene: Scene) -> "PartLook":
         """Give what a scene names; of files that cannot be read from here their names."""
-        source, mesh, program = scene.part, None, None
+        source, held = scene.part, (None, None)
         with suppress(WarpspaceError):
-            mesh = _own_mesh(source.path("file"), source.unit or None)
-            program = _own_program(source.path("program"))
-        return cls(mesh, source.file, source.place, program)
+            held = _held(source.path("file"), source.unit or None, source.path("program"))
+        return cls(held[0], source.file, source.place, held[1])
 
     @property
     def is_empty(self) -> bool:
@@ -209,13 +208,11 @@ class PartLook:
 
 
 @lru_cache(maxsize=4)
-def _own_mesh(path: str | None, unit: str | None) -> PartMesh | None:
-    return None if path is None else load_part(path, unit)
-
-
-@lru_cache(maxsize=4)
-def _own_program(path: str | None) -> tuple[str, str] | None:
-    return None if path is None else (Path(path).name, "".join(program_lines(path)))
+def _held(
+    mesh: str | None, unit: str | None, program: str | None
+) -> tuple[PartMesh | None, tuple[str, str] | None]:
+    text = program and (Path(program).name, "".join(program_lines(program)))
+    return (load_part(mesh, unit) if mesh else None), text or None
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,6 +66,8 @@ class Held:
 class FilesPart(AnalysisPart):
     """An analysis of files that a page has sent."""
 
+    most_bytes, what = MOST_BYTES, WHAT
+
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
         self._files: tuple[Held, ...] = ()
@@ -80,6 +82,10 @@ class FilesPart(AnalysisPart):
     def received(self, name: str, content: bytes) -> None:
         """Take in a file."""
         raise NotImplementedError
+
+    def sent(self, value: str) -> None:
+        """Take a file that the page has sent."""
+        self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
 
     def files_html(self) -> Markup:
         """List the files, and say why the last one is not among them."""
@@ -112,7 +118,7 @@ class FilesPart(AnalysisPart):
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "file":
-            self.attempt(lambda: self.received(*read_upload(value, MOST_BYTES, WHAT)))
+            self.sent(value)
         elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
             self.context.act(self._again)

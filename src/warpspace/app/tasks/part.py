@@ -15,7 +15,7 @@ from warpspace.analysis.options import Option
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, number, tag
 from warpspace.app.browser.incoming import index_of
-from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, read_upload, upload_text
+from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.part import (
     AT_LINE,
@@ -48,6 +48,7 @@ class InBoxPart(FilesPart):
     """Something to be made, which a page has sent: it stands in the box."""
 
     at_once = True
+    most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
     endings: tuple[str, ...] = ()
     invitation = ""
 
@@ -75,7 +76,7 @@ class InBoxPart(FilesPart):
     def before_result(self, state: AppState) -> Markup:
         held, name = self.held(state)
         upload = html.upload_button(
-            f"Another {self.name} …" if held else f"{self.title} …", self.name, MAX_UPLOAD_BYTES,
+            f"Another {self.name} …" if held else f"{self.title} …", self.name, self.most_bytes,
             ",".join(self.endings), kind="" if held else "main",
             hint=f"At most {MAX_UPLOAD_BYTES >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
@@ -85,16 +86,6 @@ class InBoxPart(FilesPart):
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
         return join((about, self.files_html(), actions(upload)))
-
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word != "file":
-            return super().take(state, word, value)
-        self.sent(value)
-        return state
-
-    def sent(self, value: str) -> None:
-        """Take a file that a page has sent: chosen here, opened, or dropped."""
-        self.attempt(lambda: self.received(*read_upload(value, MAX_UPLOAD_BYTES, self.name)))
 
     def show(self, **held: Any) -> None:
         """Take something in, see it through the box, and unfold the section."""
@@ -174,8 +165,8 @@ class PartPart(InBoxPart):
         if word == "remove" and not value:
             self._sent = None
             return self.removed(state, PartLook(program=state.part.program))
-        if word == "turn" and value in ("x", "y", "z") and (clamped := clamped_part(state)):
-            place = turned_place(clamped, value, 90.0)
+        if word == "turn" and value in ("x", "y", "z") and (part := clamped_part(state)):
+            place = turned_place(part, value, 90.0)
             return replace(state, part=replace(state.part, place=place))
         if word == "set.unit" and self._sent is not None:
             self.attempt(partial(self.received, *self._sent))
