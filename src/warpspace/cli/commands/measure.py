@@ -20,6 +20,7 @@ from warpspace.cli.options import (
 )
 from warpspace.cli.tables import echo, print_table, print_text, progress
 from warpspace.exceptions import OptionError
+from warpspace.machine.limits import MAX_LENGTH_MM
 from warpspace.scene.files import parse_number
 
 if TYPE_CHECKING:
@@ -390,3 +391,26 @@ def _list_formats(*, as_json: bool) -> None:
             if text
         ]
     print_table((Column(leads=True), Column(), Column(wraps=True)), rows, indent=0)
+
+
+@click.command()
+@click.argument("name", type=click.Choice(("contour", "cone", "plate", "cube")))
+@output_option("File to write: mesh .stl, program .ngc, or features .toml.", ".stl", ".ngc", ".toml")
+@click.option(
+    "--size",
+    type=click.FloatRange(1.0, MAX_LENGTH_MM),
+    help="Its length or diameter across, mm.  [100 to 240, by piece]",
+)
+@force_option
+def piece(name: str, output: str, size: float | None, *, force: bool) -> None:
+    """Write a piece to start with: mesh, program or features.
+
+    contour is a circle on a diamond on a square (after ISO 10791-7), cone a frustum (after NAS
+    979), plate one of nine holes. The frame of all files has its zero in the middle of the lower
+    side: what --place gives for the mesh, and the work offset G54 for the program.
+    """
+    from warpspace.parts.pieces import build_piece
+
+    made = build_piece(name, size)
+    write_text(output, made.texts()[Path(output).suffix.lower()], force=force)
+    print_text(f"{output}: {made.words}")
