@@ -70,7 +70,7 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("part", "measure", "parts.as_cut:Part",
      "Show a part, a mesh, as the machine of SCENE cuts it."),
     ("program", "measure", "parts.program:Program",
-     "Run a program on SCENE: the path of the tool and its errors."),
+     "Run a program on SCENE: the errors along its path."),
     ("compensate", "improve", "formats.compensation.compensate:Compensate",
      "Write a table of compensation, and say what it leaves."),
     ("montecarlo", "design", "analysis.machines:Machines",

@@ -1,7 +1,7 @@
 """Pieces to start with: a mesh, its features with tolerances, and a program that finishes it.
 
 The frame of a piece has its zero in the middle of its lower side; the words of its program are
-places in this frame, at the work offset G54. The tool has no radius there.
+places in this frame, unless its zero is put elsewhere. The tool has no radius there.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,6 +22,11 @@ PIECES = {
     "cube": ("cube", 100.0),
 }
 """What they are called, and their sizes where none is given, mm."""
+
+
+Vector = tuple[float, float, float]
+Feature = tuple[str, str, Vector, str, float, str]
+"""Name, kind, a point in mm, measure, tolerance in µm, µrad of angles, and a datum or nothing."""
 
 
 @dataclass(frozen=True)
@@ -47,20 +52,16 @@ class Outline:
         ring = self.half_mm * reach * np.stack([x, y, np.zeros(ON_RING)])
         return np.round(ring.T + np.array([*self.middle_mm, self.level_mm]), 9) + 0.0
 
-    def moves(self) -> Iterator[str]:
-        """Write the blocks that cut along it."""
-        ring, quarter = self.ring_mm, ON_RING // 4
+    def moves(self, zero_mm: Vector) -> Iterator[str]:
+        """Write the blocks that cut along it, where the zero of the piece is at some words."""
+        ring, quarter = self.ring_mm + zero_mm, ON_RING // 4
         corners = ring[quarter // 2 if self.kind == "square" else 0 :: quarter]
         words = [f"X{x:.4f} Y{y:.4f}" for x, y, _ in [*corners, corners[0]]]
-        yield from (f"({self.name})", f"G0 {words[0]}", f"G1 Z{self.level_mm:.4f} F600")
+        yield from (f"({self.name})", f"G0 {words[0]}", f"G1 Z{ring[0, 2]:.4f} F600")
         if self.kind == "circle":
             yield f"G3 {words[0]} I{-self.half_mm:.4f} J0"
         else:
             yield from (f"G1 {word}" for word in words[1:])
-
-
-Feature = tuple[str, str, tuple[float, float, float], str, float, str]
-"""Name, kind, a point in mm, measure, tolerance in µm, µrad of angles, and a datum or nothing."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,8 @@ class Piece:
     contours: list[Outline]
     features: list[Feature]
 
-    def texts(self) -> Mapping[str, str]:
-        """Give its files by their endings."""
+    def texts(self, zero_mm: Vector = (0.0, 0.0, 0.0)) -> Mapping[str, str]:
+        """Give its files by their endings; in the program its zero is at some words."""
         triangles = self.walls_mm[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
         is_flat = (triangles == np.roll(triangles, 1, axis=1)).all(axis=2).any(axis=1)
         facets = (
@@ -82,8 +83,8 @@ class Piece:
             + "endloop\nendfacet\n"
             for corners in triangles[~is_flat].tolist()
         )
-        above = f"G0 Z{self.walls_mm[..., 2].max() + ABOVE_MM:.4f}"
-        blocks = [line for one in self.contours for line in (*one.moves(), above)]
+        above = f"G0 Z{self.walls_mm[..., 2].max() + ABOVE_MM + zero_mm[2]:.4f}"
+        blocks = [line for one in self.contours for line in (*one.moves(zero_mm), above)]
         head = ["%", f"({self.words}; tool radius 0)", "G21 G17 G90 G40 G94 G54", above]
         return {
             ".stl": f"solid {self.words}\n{''.join(facets)}endsolid\n",

@@ -197,7 +197,7 @@ class WorstBlock:
 
 @dataclass(frozen=True, kw_only=True)
 class Program(Setup, Analysis):
-    """Run a program on SCENE: the path of the tool and its errors.
+    """Run a program on SCENE: the errors along its path.
 
     G-code: G0 to G3 in three planes, G17 to G21, G28, G43, G43.4, G49, G53 to G59, G80 to G83, G90,
     G91. Subprograms and variables are refused by line: the path ends before them. Errors are those
