@@ -23,7 +23,7 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
-from warpspace.app.state.app_state import start_state
+from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.table import without_table, without_words
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.analysis import Answer
@@ -35,6 +35,7 @@ from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import Compensate, compensate, read_points
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.charts.results import compensation_maps
+from warpspace.parts.part import PartMesh
 from warpspace.scene.library import load_scene
 
 SCENE = load_scene("dvf5000_first")
@@ -283,3 +284,12 @@ def test_nonsense_and_machines_with_nothing_to_correct_give_one_line(name, choic
         computed(start_state(still_scene(name)) if name else START, choice)
     assert len(str(raised.value)) < 300
     assert "\n" not in str(raised.value)
+
+
+def test_a_part_is_cut_with_the_table(left):
+    corners = np.array([[x, y, z] for x in (0, 200) for y in (0, 150) for z in (0, 80)], float)
+    mesh = PartMesh("box", corners, np.array([[0, 1, 2], [5, 6, 7]], "i4"))
+    cut = [
+        LIVE.evaluate(replace(state, part=PartLook(mesh, "box"))).part for state in (START, left)
+    ]
+    assert cut[1].norm_um.max() < 0.1 * cut[0].norm_um.max()

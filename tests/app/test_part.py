@@ -3,18 +3,20 @@
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import trimesh
 
-from app.page_tab import Tab
+from app.page_tab import Tab, open_page
 from app.parts import LIVE
 from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.evaluation.budget import pick_line
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.part import clamped_part, clamped_scene, place_of, turned_place
+from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, PartLook, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
@@ -22,6 +24,9 @@ from warpspace.kinematics import transforms
 from warpspace.parts.part import PartMesh, make_points, place_part
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 SCENE = load_scene("dvf5000_first")
 TRIANGLES = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
@@ -213,3 +218,11 @@ def test_a_line_of_a_program_and_its_place_find_each_other(tab: Tab) -> None:
     eye = end + np.array([0.0, -500.0, 0.0])
     assert pick_line(picture, eye, end - eye) == 3
     assert tab.errors == []
+
+
+def test_the_part_of_a_scene_is_drawn_as_the_app_opens(browser: "Browser") -> None:
+    with Viewer(load_scene("part_on_dvf5000")) as viewer:
+        tab = open_page(viewer, browser)
+        tab.until(lambda: drawn_part(tab))
+        assert tab.errors == []
+        tab.page.context.close()

@@ -316,6 +316,7 @@ class Session:
         with context.page.as_one():
             context.stage = MovingLayer(self._client, context.page, picture)
             part = PartLayer(self._client.scene, context.page, self._clamp)
+            part.show(picture)
             self.display.add(picture, [context.stage, part])
             context.page.call("stage", "open")
 

@@ -199,7 +199,7 @@ class PartLook:
         source, held = scene.part, (None, None)
         with suppress(WarpspaceError):
             held = _held(source.path("file"), source.unit or None, source.path("program"))
-        return cls(held[0], source.file, source.place, held[1])
+        return cls(held[0], Path(source.file).name, source.place, held[1])
 
     @property
     def is_empty(self) -> bool:
