@@ -54,13 +54,22 @@ def check_format(path: Path, unit: str | None, up: str | None = None) -> str:
     return f"{path.suffix[1:].upper()} file"
 
 
+def _joined(found: Any) -> Any:
+    nodes = found.graph.nodes_geometry
+    pose, name = found.graph[nodes[0]] if len(nodes) == 1 else (None, None)
+    if not hasattr(found.geometry.get(name), "faces"):
+        return found.to_mesh()
+    return found.geometry[name].apply_transform(pose)  # not copied
+
+
 def join_meshes(found: Any, path: Path, unit: str | None, up: str | None = None) -> Any:
     """Give what a file holds as one mesh of trimesh, in mm with z upwards."""
     standard_unit, standard_up = FORMATS[path.suffix.lower()]
-    mesh = found.to_mesh()
+    mesh = _joined(found)
     if not len(mesh.faces):
         raise OptionError(f"{path}: there are no triangles in it")
-    if not np.isfinite(mesh.vertices[mesh.faces]).all():
+    is_finite = np.isfinite(mesh.vertices).all(axis=1)
+    if not is_finite[mesh.faces].all():
         raise OptionError(f"{path}: a vertex is not finite")
     mesh.apply_scale(UNITS_MM[unit or standard_unit])
     if (up or standard_up) == "y":

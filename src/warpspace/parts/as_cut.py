@@ -36,8 +36,6 @@ from warpspace.parts.part import (
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MM_PER_UM, Array
 
-AT_ONCE = 200_000  # triangles
-
 
 @dataclass(frozen=True)
 class AlongNormal:
@@ -119,8 +117,7 @@ class Part(Analysis):
 def _off(part: PartMesh, *errors_um: Array) -> list[Off]:
     """Sum errors of the vertices up, [V, 3] each."""
     spans = np.array([[np.inf, -np.inf]] * len(errors_um))
-    for first in range(0, len(part.triangles), AT_ONCE):
-        some = replace(part, triangles=part.triangles[first : first + AT_ONCE])
+    for some in part.pieces():
         for span, error in zip(spans, errors_um, strict=True):
             away = np.einsum("tcx,tx->tc", error[some.triangles], some.normals)
             span[:] = min(span[0], away.min()), max(span[1], away.max())

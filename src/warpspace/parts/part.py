@@ -5,7 +5,7 @@ linear axes bring the tool to the point and the rotary axes stand as they do in 
 as cut is the nominal one plus that error. Geometry only: no forces, heat, wear or servo.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +27,8 @@ from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene, evaluate
 from warpspace.units import Array
 
+POINTS_AT_ONCE, TRIANGLES_AT_ONCE = 50_000, 200_000  # what lies between needs memory, too
+
 
 class Corners(NamedTuple):
     """Vertices once for each smooth face that they belong to, so that creases stay sharp."""
@@ -46,10 +48,18 @@ class PartMesh:
     triangles: NDArray[np.int32]  # [T, 3]
     warnings: tuple[str, ...] = ()  # open, inverted, crooked: shown and said
 
+    def pieces(self) -> "Iterator[PartMesh]":
+        """Give some triangles at a time: what is computed of them needs memory, too."""
+        for first in range(0, len(self.triangles), TRIANGLES_AT_ONCE):
+            some = self.triangles[first : first + TRIANGLES_AT_ONCE]
+            yield PartMesh(self.name, self.vertices_mm, some)
+
     @cached_property
     def areas_mm2(self) -> Array:
         """Area times unit normal of the triangles, [T, 3], outwards."""
-        first, second, third = (self.vertices_mm[self.triangles[:, at]] for at in range(3))
+        first, second, third = (
+            np.take(self.vertices_mm, self.triangles[:, at], axis=0) for at in range(3)
+        )
         return np.cross(second - first, third - first) / 2.0
 
     @cached_property
@@ -115,33 +125,49 @@ def parse_part(data: bytes, name: str, unit: str | None = None) -> PartMesh:
 
 
 def _build(mesh: Any, path: Path) -> PartMesh:
-    vertices, numbers = _merge(np.asarray(mesh.vertices, dtype=float))
-    triangles = numbers[mesh.faces]
-    following = np.roll(triangles, -1, axis=1)
-    is_flat = (triangles == following).any(axis=1)
-    triangles, following = triangles[~is_flat], following[~is_flat]
-    if not len(triangles):
+    vertices, triangles = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int32)
+    if len(vertices) > len(triangles) or len(loose := _loose_edges(triangles)):
+        vertices, numbers = _merge(vertices)
+        triangles = numbers[triangles]
+        loose = _loose_edges(triangles)
+    is_flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
+    if is_flat.all():
         raise OptionError(f"{path}: all of its triangles are points or lines")
-    there = np.sort((triangles * np.int64(len(vertices)) + following).reshape(-1))
-    back = np.sort((following * np.int64(len(vertices)) + triangles).reshape(-1))
-    is_closed = np.array_equal(there, back)
-    part = PartMesh(path.stem, vertices, triangles.astype(np.int32))
-    middle = vertices.mean(axis=0)
-    lever = part.vertices_mm[part.triangles[:, 0]] - middle
-    warnings: list[str] = []
-    if not is_closed:
-        alone = len(np.setdiff1d(there, back))
-        warnings.append(
+    if is_flat.any():
+        triangles = triangles[~is_flat]
+    part = PartMesh(path.stem, vertices, triangles)
+    if len(loose):
+        said = (
             f"{path}: the surface is not closed, or its triangles do not agree on the outside"
-            f" ({alone:,} edges); it is taken as it is"
+            f" ({len(loose):,} edges); it is taken as it is"
         )
-    elif np.sum(lever * part.areas_mm2) < 0.0:
-        warnings.append(f"{path}: its triangles face inwards; they are turned outwards")
-        triangles = triangles[:, ::-1]
-    return PartMesh(path.stem, vertices, triangles.astype(np.int32), tuple(warnings))
+        return replace(part, warnings=(said,))
+    volume = 0.0
+    for some in part.pieces():
+        lever = np.take(vertices, some.triangles[:, 0], axis=0) - vertices[0]
+        volume += float(np.einsum("ij,ij", lever, some.areas_mm2))
+    if volume >= 0.0:
+        return part
+    said = f"{path}: its triangles face inwards; they are turned outwards"
+    return PartMesh(path.stem, vertices, triangles[:, ::-1].copy(), (said,))
 
 
-def _merge(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
+def _loose_edges(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
+    """List edges that are not passed as often in one direction as in the other."""
+    end = np.roll(triangles, 1, axis=1)
+    edge = np.minimum(triangles, end) * (np.int64(triangles.max()) + 1)
+    edge += np.maximum(triangles, end)
+    there, back = edge[triangles < end], edge[triangles > end]
+    there.sort()
+    back.sort()
+    if np.array_equal(there, back):
+        return edge[:0, 0]
+    found, numbers = np.unique(edge, return_inverse=True)
+    balance = np.bincount(numbers.reshape(-1), np.sign(end - triangles).reshape(-1))
+    return found[balance != 0.0]
+
+
+def _merge(vertices: Array) -> tuple[Array, NDArray[np.int32]]:
     """Give each place once, and its number for each vertex; order by first appearance."""
     words = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # −0 becomes 0
     mixed = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
@@ -153,7 +179,7 @@ def _merge(vertices: Array) -> tuple[Array, NDArray[np.int64]]:
     order = np.argsort(first)
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    return vertices[first[order]], place[numbers.reshape(-1)]
+    return vertices[first[order]], place.astype(np.int32)[numbers.reshape(-1)]
 
 
 PLACE_HELP = (
@@ -216,10 +242,16 @@ class Made:
 def make_points(scene: Scene, point_mm: Array) -> Made:
     """Find where the axes stand at points of w, [n, 3], mm, and what error they have there."""
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-    coordinates = follow(scene.model, stand, point_mm)
-    field = evaluate(scene, at=coordinates, loop=Loop.RELATIVE, frame="workpiece")
-    inside = within_travel(scene.machine, coordinates)
-    return Made(point_mm, coordinates, field.error_um, ~np.broadcast_to(inside, len(point_mm)))
+    coordinates: dict[str, list[Array]] = {name: [] for name in scene.machine.axes}
+    error, inside = list[Array](), list[NDArray[np.bool_]]()
+    for some in np.array_split(point_mm, -(-len(point_mm) // POINTS_AT_ONCE) or 1):
+        here = follow(scene.model, stand, some)
+        error.append(evaluate(scene, at=here, loop=Loop.RELATIVE, frame="workpiece").error_um)
+        inside.append(np.broadcast_to(within_travel(scene.machine, here), len(some)))
+        for name, at in coordinates.items():
+            at.append(here[name])
+    joined = {name: np.concatenate(at) if at[0].ndim else at[0] for name, at in coordinates.items()}
+    return Made(point_mm, joined, np.concatenate(error), ~np.concatenate(inside))
 
 
 def point_basis(scene: Scene, made: Made, keys: Sequence[str] | None = None) -> ErrorBasis:
