@@ -1,0 +1,73 @@
+"""A mesh of a million vertices: read, made and summed up; a slider move of a tenth of it."""
+
+import tracemalloc
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import trimesh
+from table import Growth, Row, Section
+from timing import best
+
+from warpspace import load_scene
+from warpspace.analysis.description import silent
+from warpspace.parts.as_cut import Part
+from warpspace.parts.part import make_points, parse_part, point_basis
+
+AROUND = 1000  # vertices of a million
+GROWING = (400, 566, 800, 1000)  # above what features are looked for in
+MEGABYTE = 1e6
+
+
+def ball(around: int) -> trimesh.Trimesh:
+    """Make a closed ball of around × around vertices and two poles."""
+    height, turn = np.linspace(0.0, np.pi, around + 2)[1:-1], np.arange(around)
+    turn = turn * 2.0 * np.pi / around
+    rings = np.stack(np.broadcast_arrays(
+        np.sin(height)[:, None] * np.cos(turn), np.sin(height)[:, None] * np.sin(turn),
+        np.cos(height)[:, None],
+    ), axis=-1)  # fmt: skip
+    points = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+    number = np.arange(around * around).reshape(around, around)
+    beside = np.roll(number, -1, axis=1)
+    top, bottom = (np.full(around, around * around + pole) for pole in (0, 1))
+    quads = number[:-1], number[1:], beside[:-1], beside[:-1], number[1:], beside[1:]
+    triangles = np.concatenate([
+        np.stack(quads, axis=-1).reshape(-1, 3),
+        np.stack([top, number[0], beside[0]], axis=-1),
+        np.stack([bottom, beside[-1], number[-1]], axis=-1),
+    ])  # fmt: skip
+    return trimesh.Trimesh(80.0 * points, triangles, process=False)
+
+
+def measure() -> Section:
+    """Measure a part of a million vertices, and how time grows with them."""
+    scene = load_scene("dvf5000_first")
+    with TemporaryDirectory() as folder:
+        files = [Path(folder) / f"{around}.ply" for around in GROWING]
+        for around, path in zip(GROWING, files, strict=True):
+            ball(around).export(path)
+        costs = [best(lambda: Part(file=str(path)).run(scene, silent), 3) for path in files]  # noqa: B023
+        copied = best(lambda: trimesh.load_mesh(files[-1], process=False).copy(), 3)
+        tracemalloc.start()
+        found = Part(file=str(files[-1])).run(scene, silent)
+        most = tracemalloc.get_traced_memory()[1] / MEGABYTE
+        tracemalloc.stop()
+    own = (found.part.vertices_mm.nbytes + found.part.triangles.nbytes) / MEGABYTE
+    small = parse_part(ball(316).export(file_type="ply"), "ball.ply")
+    basis = point_basis(scene, make_points(scene, small.vertices_mm))
+    values = np.array([scene.errors.amplitude(key) for key in basis.keys])
+    moved = best(lambda: basis.evaluate(values))
+    copied_small = best(basis.position.copy)
+    rows = [
+        Row("part of 10⁶ vertices, PLY", costs[-1], "reading and copying it", copied, most=2.0),
+        Row("memory for it", most, "its vertices and triangles", own, "MB", most_ratio=8.0),
+        Row("slider move, 10⁵ vertices", moved, "copying their responses", copied_small, most=0.06),
+    ]
+    counts = [float(around * around + 2) for around in GROWING]
+    words = (
+        "A closed mesh, read, checked, clamped, moved vertex by vertex by the relative error, and"
+        " summed up as it is and after the best fit. The memory is the most that was held at once."
+    )
+    growth = [Growth("part as it is cut", "vertices", counts, costs)]
+    return Section("A part as it is cut", words, rows, growth)
