@@ -47,9 +47,10 @@ def ghost_dashes(picture: LivePicture) -> Array:
 
 def surface_glb(picture: LivePicture) -> bytes:
     """Write the coloured map of a picture, or its lines alone, vertices in mm."""
-    mesh = map_mesh(picture)
     if picture.state.look.surface == "grid":  # its lines would stand before the part
         mesh = line_mesh(picture, grid=picture.state.part.is_empty)
+    else:
+        mesh = map_mesh(picture)
     levels = colour_levels(picture.scale, mesh.values)
     colours = level_colours(diverging=picture.scale.diverging)[levels]
     return _template(Identity(mesh.triangles), len(mesh.vertices_mm)).fill(

@@ -9,6 +9,7 @@ import numpy as np
 from viser import SceneApi
 from viser import transforms as quaternions
 
+from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import ACCENT, ASKED
 from warpspace.app.drawing.box import packed
@@ -18,6 +19,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.part import AT_LINE, PartPicture, place_of
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfTemplate
+from warpspace.formats.source import MAX_LINES
 from warpspace.kinematics import transforms
 from warpspace.units import Array
 
@@ -141,7 +143,7 @@ def path_shapes(picture: LivePicture) -> Shapes:
     table, levels = (255.0 * linear).astype(np.uint8), colour_levels(scale, values)
     stays = {"thickness": 3.0, "thickness_units": "screen", "scale": SCENE_PER_MM}
     follows = {"points": drawn[pieces].astype(np.float32), "colors": table[levels[pieces]]}
-    at = np.flatnonzero(path.line == int(picture.state.forms.get(AT_LINE) or 0))
+    at = np.flatnonzero(path.line == index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES))
     return {
         "/program/nominal": lines(
             path.points.nominal_mm[pieces], colour(picture, "trace_nominal"), 1.2
