@@ -92,11 +92,8 @@ class LivePicture(Picture):
         values = found.values_um(NORMAL if normal else self.component)
         if not (normal or self.tilts):
             return values, self.scale
-        end, largest = (
-            None if self.tilts else self.scale.high,
-            float(np.abs(values).max(initial=0.0)),
-        )
-        return values, build_scale(largest, "x" if normal else self.component, end=end)
+        largest, end = np.abs(values).max(initial=0.0), None if self.tilts else self.scale.high
+        return values, build_scale(float(largest), "x" if normal else self.component, end=end)
 
     @cached_property
     def worst_node(self) -> int:

@@ -32,7 +32,7 @@ from warpspace.app.tasks.analysis import Question
 from warpspace.app.tasks.charts import details_html
 from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import setting
-from warpspace.app.tasks.measure import FilesPart, Held
+from warpspace.app.tasks.measure import MOST_BYTES, FilesPart, Held
 from warpspace.app.tasks.parts import actions
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
 from warpspace.parts.as_cut import Part, PartResult
@@ -78,7 +78,7 @@ class InBoxPart(FilesPart):
         upload = html.upload_button(
             f"Another {self.name} …" if held else f"{self.title} …", self.name, self.most_bytes,
             ",".join(self.endings), kind="" if held else "main",
-            hint=f"At most {MAX_UPLOAD_BYTES >> 20} MB; files can also be dropped on the page",
+            hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
         missing = f"{name} is not here: links and saved scenes hold only its name."
         about = tag("p", missing if name else self.invitation, class_="ws-quiet")
@@ -198,6 +198,7 @@ class HeldProgram(Program):
 class ProgramPart(InBoxPart):
     """A program: a line and its place in the drawing find each other."""
 
+    most_bytes = MOST_BYTES  # longer ones would hold up other tabs
     endings = PROGRAM_ENDINGS
     invitation = "A program (G-code): its path over the workpiece, and its worst blocks."
 
