@@ -71,6 +71,8 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
      "Show a part, a mesh, as the machine of SCENE cuts it."),
     ("program", "measure", "parts.program:Program",
      "Run a program on SCENE: the errors along its path."),
+    ("clamp", "improve", "parts.clamping:Clamp",
+     "Find where to clamp a part on the machine of SCENE."),
     ("compensate", "improve", "formats.compensation.compensate:Compensate",
      "Write a table of compensation, and say what it leaves."),
     ("montecarlo", "design", "analysis.machines:Machines",

@@ -37,6 +37,7 @@ NEEDED = {
     ),
     "allocate": ("dvf5000_general", {"limit_um": 60.0}, ["--limit", "60"]),
     "calibrate": ("fork_head_bc", {"data": ("tcp_on.csv",)}, ["--data", "tcp_on.csv"]),
+    "clamp": ("dvf5000_first", {"file": PLATE, "place": (0, 0, 50)}, [PLATE, "--place", "0,0,50"]),
     "part": ("dvf5000_first", {"file": PLATE}, [PLATE]),
     "program": ("dvf5000_first", {"file": CONTOUR, "length_mm": 80.0}, [CONTOUR, "--length", "80"]),
 }
