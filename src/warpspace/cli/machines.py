@@ -233,7 +233,14 @@ MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
     ),
     "part": (
         (
-            output_option("Part as cut.", ".stl", ".obj", ".ply", ".glb", required=False),
+            output_option(
+                "Part as cut: .stl, .obj, .ply or .glb.",
+                ".stl",
+                ".obj",
+                ".ply",
+                ".glb",
+                required=False,
+            ),
             click.option(
                 "--predistorted",
                 is_flag=True,
