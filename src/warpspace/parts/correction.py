@@ -5,7 +5,7 @@ rotary words stay. Words come out absolute (G90), arcs as lines, cycles as the m
 The other words, comments and the lines of G28 and G53 are kept.
 
 A linear axis is written from the line on that names it: where it stands before, nobody knows. The
-same holds behind G28 and G53, behind another work offset or mode, and for Z behind another length.
+same holds behind G28 and G53, another work offset or mode, and for Z behind another tool or length.
 """
 
 import re
@@ -28,6 +28,7 @@ ROUNDS = 20
 LEFT_UM = 1e-3  # of an error that is taken back
 SAMPLED = 4  # pieces that are looked at are shorter by the root of this than those that are written
 _MODES = {"G2", "G3", "G81", "G82", "G83", "G90", "G91"}  # not of the corrected program
+_OF_TOOL = {"M6", "G43", "G43.4", "G49"}
 _LAST = {"M0", "M1", "M2", "M5", "M9", "M30", "M60"}  # take effect when the axes have moved
 
 
@@ -133,16 +134,15 @@ class _Writer:
             if name[0] not in self.control.index:
                 raise OptionError(f"no word moves axis {name}; expected one axis of each letter")
         self.known: set[str] = set()
-        self.mode = "", False, 0.0
+        self.mode = "", False
         self.is_inverse, self.dwell = False, 0.0
 
     def rewrite(self, block: Block, raw: str, rows: list[int], places: Array) -> Iterator[str]:
         control, codes = self.control, {*block.codes}
         control.run(block)
-        mode = control.system, control.tcp, control.is_compensated * control.length_mm
-        self.known = set() if mode[:2] != self.mode[:2] else self.known
-        self.known -= {"Z"} if mode != self.mode else set()
-        self.mode = mode
+        if (mode := (control.system, control.tcp)) != self.mode:
+            self.mode, self.known = mode, set()
+        self.known -= {"Z"} if codes & _OF_TOOL else set()
         self.is_inverse = (self.is_inverse or "G93" in codes) and not codes & {"G94", "G95"}
         letters = block.numbers.keys() & control.index.keys()
         moving = [at for at, row in enumerate(rows) if self.kind[row] != STAND]
