@@ -3,7 +3,7 @@
 Geometry only: no forces, heat, wear or servo.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import Any, Literal
 
@@ -38,19 +38,11 @@ from warpspace.units import MM_PER_UM, Array
 
 
 @dataclass(frozen=True)
-class AlongNormal:
-    """Least and largest error along the normals of triangles, at their corners."""
-
-    min_um: float
-    max_um: float
-
-
-@dataclass(frozen=True)
 class Off:
     """How far the vertices of a part are from where they should be."""
 
     deviation: Deviation
-    normal: AlongNormal
+    normal: Mapping[str, float]  # min_um and max_um along normals of triangles, at their corners
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +114,10 @@ def _off(part: PartMesh, *errors_um: Array) -> list[Off]:
             away = np.einsum("tcx,tx->tc", error[some.triangles], some.normals)
             span[:] = min(span[0], away.min()), max(span[1], away.max())
     both = zip(errors_um, spans.tolist(), strict=True)
-    return [Off(deviation_of(part.vertices_mm, one), AlongNormal(*span)) for one, span in both]
+    return [
+        Off(deviation_of(part.vertices_mm, error), {"min_um": low, "max_um": high})
+        for error, (low, high) in both
+    ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,7 +128,7 @@ class PartResult(Result):
     vertices: int
     outside: int  # vertices beyond the travel
     deviation: Deviation
-    normal: AlongNormal
+    normal: Mapping[str, float]
     placed: Off
     features: Sequence[FeatureResult]
     title: str
@@ -162,7 +157,7 @@ class PartResult(Result):
         yield f"  largest |E| {self.deviation.max_um:.2f} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
         yield "  Geometry only: no forces, heat, wear or servo"
         both = ("as cut", Off(self.deviation, self.normal)), ("placed", self.placed)
-        rows = [(word, *astuple(one.deviation)[:4], *astuple(one.normal)) for word, one in both]
+        rows = [(word, *astuple(one.deviation)[:4], *one.normal.values()) for word, one in both]
         heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
         yield features_table(self.features)

@@ -167,18 +167,12 @@ def _loose_edges(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
 
 
 def _merge(vertices: Array) -> tuple[Array, NDArray[np.int32]]:
-    """Give each place once, and its number for each vertex; order by first appearance."""
-    words = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # −0 becomes 0
-    mixed = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
-    for at in (1, 2):
-        mixed = (mixed ^ (mixed >> np.uint64(29)) ^ words[:, at]) * np.uint64(0xBF58476D1CE4E5B9)
-    _, first, numbers = np.unique(mixed, return_index=True, return_inverse=True)
-    if not np.array_equal(vertices[first][numbers], vertices):  # two places with one hash
-        _, first, numbers = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return vertices[first[order]], place.astype(np.int32)[numbers.reshape(-1)]
+    """Give each place once, and its number for each vertex."""
+    order = np.lexsort(vertices.T)
+    is_first = np.append(True, np.diff(vertices[order], axis=0).any(axis=1))
+    numbers = np.empty(len(order), np.int32)
+    numbers[order] = np.cumsum(is_first) - 1
+    return vertices[order[is_first]], numbers
 
 
 PLACE_HELP = (

@@ -105,14 +105,14 @@ def test_what_is_off_is_told_by_closed_forms():
     located = cut(BOX, (0.0, 0.0, 0.0), EZ0C=10.0, EA0C=100.0)  # the workpiece rises and tilts
     # y: 0.1 z, z: −(10 + 0.1 y), to the top and bottom along the normal
     assert located.deviation.max_um == pytest.approx(np.hypot(13.0, 2.0))
-    assert (located.normal.min_um, located.normal.max_um) == pytest.approx((-13.0, 13.0))
+    assert tuple(located.normal.values()) == pytest.approx((-13.0, 13.0))
     assert located.placed.deviation.max_um < 1e-9
-    assert located.placed.normal.max_um < 1e-9
+    assert located.placed.normal["max_um"] < 1e-9
     square = cut(BALL, None, EC0Y=100.0).placed  # −0.1 y along x: half a turn, half a shear
-    assert (square.normal.min_um, square.normal.max_um) == pytest.approx((-2.5, 2.5), abs=0.1)
+    assert tuple(square.normal.values()) == pytest.approx((-2.5, 2.5), abs=0.1)
     # 0.1 µm for each mm of X, along the normal 0.1 x² / 50 mm
     scale = cut(BALL, None, EXX=(0.0, 55.0)).placed
-    assert (scale.normal.min_um, scale.normal.max_um) == pytest.approx((0.0, 5.0), abs=0.1)
+    assert tuple(scale.normal.values()) == pytest.approx((0.0, 5.0), abs=0.1)
 
 
 def test_a_pitch_over_the_travel_shears_what_is_high():
