@@ -120,7 +120,8 @@ def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> 
         raise OptionError(
             f"{', '.join(names)} move in one plane in some pose and cannot follow the point"
         )
-    steps = -transforms.rotate(np.linalg.inv(moves), gap(start))
+    back: Array = np.asarray(np.linalg.inv(moves), dtype=np.float64)
+    steps = -transforms.rotate(back, gap(start))
     for index, name in enumerate(names):
         start[name] = start[name] + steps[..., index]
     return start

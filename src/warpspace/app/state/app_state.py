@@ -171,7 +171,8 @@ class Picked:
 class PartLook:
     """The part that stands in the box, in place of the scene's own."""
 
-    mesh: PartMesh | None = None  # never saved or linked, but for its name
+    # never saved or linked, but for its name
+    mesh: PartMesh | None = field(default=None, metadata=said("Mesh of the part"))
     name: str = described("", "Part", linked="part")
     place: tuple[float, ...] | None = described(
         None,
@@ -182,7 +183,8 @@ class PartLook:
         hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
         " degrees about the fixed x, y and z, in that order; empty for the usual place.",
     )
-    program: tuple[str, str] | None = None  # name and text; kept as the mesh is
+    # name and text; kept as the mesh is
+    program: tuple[str, str] | None = field(default=None, metadata=said("Program"))
     shown: bool = described(
         True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
     )
