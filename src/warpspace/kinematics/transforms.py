@@ -4,6 +4,8 @@ Every function takes and gives arrays whose leading dimensions are any batch sha
 is [..., 4, 4] and acts on column vectors: ``T_parent_child`` takes child coordinates to parent.
 """
 
+import warnings
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -92,3 +94,12 @@ def apply(transform: Array, point_mm: ArrayLike) -> Array:
 def rotate(rotation: Array, vector: ArrayLike) -> Array:
     """Rotate vectors, [..., 3], by matrices, [..., 3, 3]."""
     return np.einsum("...ij,...j->...i", rotation, np.asarray(vector, dtype=float))
+
+
+def roll_pitch_yaw_deg(rotation: Array) -> Array:
+    """Give the rotations about the fixed x, y and z axes, [3], degrees, of a rotation, [3, 3]."""
+    from scipy.spatial.transform import Rotation
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of a pitch of 90°, where roll is set to 0
+        return Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)

@@ -310,7 +310,7 @@ class ProgramResult(Result):
     def texts(self) -> Mapping[str, str]:
         from warpspace.parts.correction import correct_program
 
-        lines = [*program_lines(self.asked.file or "")]
+        lines = [*self.asked.lines()]
         return {"": "\n".join([*correct_program(self.scene, lines, self.read, self.asked), ""])}
 
     def as_plain(self) -> dict[str, Any]:

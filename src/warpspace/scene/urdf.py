@@ -2,7 +2,6 @@
 
 import io
 import math
-import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +13,7 @@ import numpy as np
 from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Model
-from warpspace.kinematics.transforms import inverse
+from warpspace.kinematics.transforms import inverse, roll_pitch_yaw_deg
 from warpspace.machine import limits
 from warpspace.machine.axes import MAX_AXES, direction_index, is_axis_name, is_linear
 from warpspace.machine.description import (
@@ -197,15 +196,6 @@ def relative_places(
 def _rounded(values: Array, digits: int) -> Vector:
     x, y, z = (round(float(value), digits) + 0.0 for value in values)
     return x, y, z
-
-
-def roll_pitch_yaw_deg(rotation: Array) -> Array:
-    """Give the rotations about the fixed x, y and z axes, [3], degrees, of a rotation, [3, 3]."""
-    from scipy.spatial.transform import Rotation
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of a pitch of 90°, where roll is set to 0
-        return Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
 
 
 MOST_DEG = 720.0  # of a limit: an axis that turns further, ±4π, is likely to be in degrees

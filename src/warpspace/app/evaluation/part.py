@@ -28,7 +28,6 @@ AT_LINE = "program.at_line"  # the form that names a line of the program
 NORMAL = "normal"  # beside the components of a map: the deviation along the normal of a part
 MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app draws
 PIECE = 20_000  # points that are worked on at once: what lies between needs memory, too
-STEEP = 1e-9  # cosine of a turn about y below which those about x and z are one
 Floats: TypeAlias = NDArray[Any]
 """Of 4 bytes: half the memory, and enough to be drawn."""
 _KEPT: Cache[Any] = Cache(400_000_000)
@@ -206,11 +205,7 @@ def traced_path(state: AppState) -> PathPicture | None:
 def place_of(part: PartPicture, drawn: Array) -> tuple[float, ...]:
     """Give the place of a part, mm and degrees, for the pose that it is drawn in, [4, 4]."""
     pose = transforms.inverse(part.points.pose) @ drawn
-    turn, flat = pose[:3, :3], float(np.hypot(*pose[2, 1:3]))
-    about_x, about_z = np.arctan2(turn[2, 1], turn[2, 2]), np.arctan2(turn[1, 0], turn[0, 0])
-    if flat < STEEP:
-        about_x, about_z = np.arctan2(-turn[1, 2], turn[1, 1]), 0.0
-    angles = np.rad2deg([about_x, np.arctan2(-turn[2, 0], flat), about_z])
+    angles = transforms.roll_pitch_yaw_deg(pose[:3, :3])
     return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())
 
 
