@@ -5,6 +5,7 @@ Geometry only: no forces, heat, wear or servo.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +18,7 @@ from warpspace.bodies.own_meshes import FORMATS, MM_PER_M, UNITS_MM
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
-from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
+from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
 from warpspace.parts.part import (
     PLACE_HELP,
@@ -33,6 +34,7 @@ from warpspace.parts.part import (
     make_points,
     place_part,
 )
+from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MM_PER_UM, Array
 
@@ -70,6 +72,7 @@ class Part(Analysis):
         None, "Names and tolerances of its features, .toml", unset="all that are found"
     )
     mesh: PartMesh | None = None  # one that is read already
+    tolerances: tuple[str, str] | None = None  # name and text of features that are read already
 
     def run(self, scene: Scene, watch: Watch, /) -> "PartResult":
         own = scene.part
@@ -82,13 +85,16 @@ class Part(Analysis):
             unit: Any = self.unit or own.unit or None
             return replace(self, file=path, features=beside, unit=unit).run(scene, watch)
         mesh = self.mesh or load_part(str(self.file), self.unit)
+        tolerances = self.tolerances
+        if self.features and not tolerances:
+            tolerances = self.features, read_text(Path(self.features), MAX_SCENE_BYTES)
         watch(0.2)
         place = find_place(mesh, scene, self.place)
         part = place_part(mesh, scene, place)
         made = make_points(scene, part.vertices_mm)
         watch(0.5)
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        found = () if is_large else inspect(scene, mesh, made, self.features)
+        found = () if is_large else inspect(scene, mesh, made, tolerances)
         cut, placed = _off(part, made.error_um, fit_out(made.point_mm, made.error_um))
         return PartResult(
             vertices=len(mesh.vertices_mm),

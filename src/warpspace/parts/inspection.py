@@ -7,7 +7,6 @@ measure by where all errors are half as large, so that the parts add up.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,11 +15,10 @@ from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.field.evaluate import amplitudes_of
 from warpspace.kinematics.model import Loop
-from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.parts.features import FREE, Feature, Shape, find_features, fit_shape
 from warpspace.parts.part import Made, PartMesh, fit_out, point_basis
 from warpspace.scene import schema
-from warpspace.scene.files import parse_toml, read_text
+from warpspace.scene.files import parse_toml
 from warpspace.scene.model import Scene, evaluate
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array, spell_signed
 
@@ -117,16 +115,16 @@ class FeatureResult:
 
 
 def inspect(
-    scene: Scene, mesh: PartMesh, made: Made, tolerances: str | Path | None = None
+    scene: Scene, mesh: PartMesh, made: Made, tolerances: tuple[str, str] | None = None
 ) -> tuple[FeatureResult, ...]:
     """Measure the features of a part, in its own frame, and made at some place in a scene.
 
-    Tolerances are a TOML file that names features and says what they have to keep; SceneError says
-    all that is wrong with it.
+    Tolerances are the name and the text of a TOML file that names features and says what they have
+    to keep; SceneError says all that is wrong with it.
     """
     features, points = find_features(mesh), mesh.vertices_mm
     names = [one.name for one in features]
-    asked = {} if tolerances is None else _read(Path(tolerances), features, names)
+    asked = _read(*tolerances, features, names) if tolerances else {}
     wanted = [
         asked.pop((kind, (at,)), Wanted(kind, (at,), kind))
         for at, feature in enumerate(features)
@@ -201,11 +199,10 @@ def _numbers(wanted: Wanted, values: Sequence[float], split: Mapping[str, float]
 
 
 def _read(
-    path: Path, features: Sequence[Feature], names: list[str]
+    source: str, text: str, features: Sequence[Feature], names: list[str]
 ) -> dict[tuple[str, tuple[int, ...]], Wanted]:
     """Read tolerances, and names of features into the list of them; refuse what does not fit."""
-    source, problems = str(path), schema.Problems()
-    raw = parse_toml(read_text(path, MAX_SCENE_BYTES), source)
+    problems, raw = schema.Problems(), parse_toml(text, source)
     entries: Sequence[Any] = (problems.read(schema.FEATURES, "", raw) or {}).get("features", ())
     known = {one.name: at for at, one in enumerate(features)}
     wanted: list[Wanted] = []

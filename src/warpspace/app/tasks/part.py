@@ -3,14 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from markupsafe import Markup
 
 from warpspace.analysis.catalogue import Entry
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
 from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, number, tag
@@ -105,21 +103,6 @@ class InBoxPart(FilesPart):
         return edits.with_sight(found, inside=not part.is_empty)
 
 
-@dataclass(frozen=True, kw_only=True)
-class HeldPart(Part):
-    """A part with tolerances out of the text of a file."""
-
-    tolerances: Held | None = None
-
-    def run(self, scene: Scene, watch: Watch, /) -> PartResult:
-        if self.tolerances is None:
-            return super().run(scene, watch)
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / self.tolerances.name
-            path.write_text(self.tolerances.content, "utf-8")
-            return replace(self, features=str(path), tolerances=None).run(scene, watch)
-
-
 class PartPart(InBoxPart):
     """A part: clamped, and measured as it is cut."""
 
@@ -134,11 +117,12 @@ class PartPart(InBoxPart):
         return state.part.mesh, state.part.name
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked = read_form(HeldPart, self.options(), values, scenes[0])
+        asked = read_form(Part, self.options(), values, scenes[0])
         if state.part.mesh is PartLook.of_scene(state.scene).mesh:
             asked = replace(asked, features=state.scene.part.path("features"))
-        return replace(asked, place=state.part.place, mesh=state.part.mesh,
-                       tolerances=next(iter(self._files), None))  # fmt: skip
+        tolerances = next(((one.name, one.content) for one in self._files), None)
+        place, mesh = state.part.place, state.part.mesh
+        return replace(asked, place=place, mesh=mesh, tolerances=tolerances)
 
     def about(self, state: AppState) -> Markup:
         turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
