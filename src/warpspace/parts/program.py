@@ -223,10 +223,11 @@ class Program(Setup, Analysis):
     decimals: int = option(
         4, "Decimals of corrected words in mm; in inches one more, in degrees two", low=1, high=9
     )
+    text: str | None = None  # of one that is read already; `file` is then its name
 
     def lines(self) -> Iterable[str]:
         """Give the lines of the program."""
-        return program_lines(self.file or "")
+        return program_lines(self.file or "") if self.text is None else self.text.splitlines()
 
     def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
         if self.file is None:

@@ -169,16 +169,6 @@ class PartPart(InBoxPart):
         self.show(mesh=mesh, name=name, place=place)
 
 
-@dataclass(frozen=True, kw_only=True)
-class HeldProgram(Program):
-    """A program out of the text of a file."""
-
-    held: tuple[str, ...] = ()
-
-    def lines(self) -> Sequence[str]:
-        return self.held
-
-
 class ProgramPart(InBoxPart):
     """A program: a line and its place in the drawing find each other."""
 
@@ -191,8 +181,8 @@ class ProgramPart(InBoxPart):
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         name, text = state.part.program or ("", "")
-        asked = read_form(HeldProgram, self.options(), values, scenes[0])
-        return replace(asked, file=name, held=tuple(text.splitlines()))
+        asked = read_form(Program, self.options(), values, scenes[0])
+        return replace(asked, file=name, text=text)
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), **program_defaults(state)}
