@@ -21,6 +21,7 @@ from warpspace.bodies.own_meshes import check_format, join_meshes
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, build_basis
 from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.limits import MAX_LENGTH_MM
 from warpspace.scene.files import parse_number
@@ -247,12 +248,15 @@ def make_points(scene: Scene, point_mm: Array) -> Made:
     return Made(point_mm, joined, np.concatenate(error), ~np.concatenate(inside))
 
 
-def point_basis(scene: Scene, made: Made, keys: Sequence[str] | None = None) -> ErrorBasis:
-    """Give the response of the points to each parameter, [K, n, 3], in w: what a slider moves."""
+def point_basis(
+    scene: Scene, made: Made, keys: Sequence[str] | None = None, rows: Any = slice(None)
+) -> ErrorBasis:
+    """Give the response of points to each parameter, [K, n, 3], in w: what a slider moves."""
     keys = scene.parameter_keys if keys is None else keys
+    at = {name: of[rows] if np.ndim(of) else of for name, of in made.coordinates.items()}
+    point = transforms.apply(branch_pose(scene.model, "workpiece", at), made.point_mm[rows])
     view = scene.view(Loop.RELATIVE, "workpiece")
-    basis = build_basis(scene.model, scene.errors, keys, made.coordinates, view)
-    return replace(basis, nominal_mm=made.point_mm)
+    return build_basis(scene.model, scene.errors, keys, at, view, point)
 
 
 def fit_out(point_mm: Array, error_um: Array) -> Array:

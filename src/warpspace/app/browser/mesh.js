@@ -2,8 +2,7 @@
 // table of colours are sent once; what viser holds of it follows when the change has come to rest.
 (() => {
   if (window.warpspaceMesh) return;
-  const BOX = "/box/surface";
-  const known = {};  // by the name of a surface: number of points, table of colours, lines on it
+  const known = { lines: {}, palette: null, count: 0 };
   const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
   const floats = text => text.BYTES_PER_ELEMENT ? text : new Float32Array(bytes(text).buffer);
   const find = (name, wanted) => {
@@ -15,12 +14,12 @@
   };
   const follow = (attribute, values) => { attribute.array.set(values); attribute.needsUpdate = true; };
 
-  const draw = (mesh, { lines }, place, shade) => {
+  const draw = (mesh, place, shade) => {
     const at = mesh.geometry.attributes;
     follow(at.position, place);
     follow(at.color, shade);
     mesh.geometry.computeBoundingSphere();
-    for (const [name, { ends, lifts }] of Object.entries(lines)) {
+    for (const [name, { ends, lifts }] of Object.entries(known.lines)) {
       const line = find(name, part => part.geometry?.attributes.instanceStart);
       const data = line?.geometry.attributes.instanceStart.data;
       if (data?.array.length !== lifts.length) continue;
@@ -30,30 +29,32 @@
     }
     window.__viserMutable.requestRender?.();
   };
+  let turn = 0;
 
   window.warpspaceMesh = {
     glide: 0,  // how long the next changes take, ms; between steps of a story
     moves: 0,  // for whoever measures from outside
     // number of points, table of colours, per lines their ends' points and how far these are lifted
-    open({ surface = BOX, count, palette, lines }) {
-      known[surface] = { turn: 0, count, palette: floats(palette),
-        lines: Object.fromEntries(Object.entries(lines).map(([name, [ends, lifts]]) =>
-          [name, { ends: new Uint32Array(bytes(ends).buffer), lifts: floats(lifts) }])) };
+    open({ count, palette, lines }) {
+      known.count = count;
+      known.palette = floats(palette);
+      known.lines = Object.fromEntries(Object.entries(lines).map(([name, [ends, lifts]]) =>
+        [name, { ends: new Uint32Array(bytes(ends).buffer), lifts: floats(lifts) }]));
     },
-    bend(points, colours, surface = BOX) {
-      const mesh = find(surface, part => part.isMesh && part.geometry.attributes.color);
-      const at = mesh?.geometry.attributes, of = known[surface];
-      if (!at || at.position.count !== of?.count) return false;  // it comes with what is sent at rest
-      const place = floats(points), level = bytes(colours), { palette } = of;
+    bend(points, colours) {
+      const mesh = find("/box/surface", part => part.isMesh && part.geometry.attributes.color);
+      const at = mesh?.geometry.attributes;
+      if (!at || at.position.count !== known.count) return false;  // it comes with what is sent at rest
+      const place = floats(points), level = bytes(colours), { palette } = known;
       const size = at.color.itemSize, shade = at.color.array.slice();
       for (let i = 0; i < level.length; i++)
         for (let k = 0; k < 3; k++) shade[size * i + k] = palette[3 * level[i] + k];
-      const own = ++of.turn, was = this.glide && [at.position.array.slice(), at.color.array.slice()];
+      const own = ++turn, was = this.glide && [at.position.array.slice(), at.color.array.slice()];
       const mixed = (from, to, share) => share < 1 ? to.map((x, i) => from[i] + share * (x - from[i])) : to;
       this.eased(this.glide, share => {
-        if (own === of.turn) draw(mesh, of, mixed(was[0], place, share), mixed(was[1], shade, share));
+        if (own === turn) draw(mesh, mixed(was[0], place, share), mixed(was[1], shade, share));
       });
-      if (surface === BOX) this.moves++;
+      this.moves++;
       return true;
     },
     // calls with a share that goes from 0 to 1 in a time, ms

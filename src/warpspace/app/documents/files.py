@@ -54,8 +54,8 @@ def safe_file_name(name: str) -> str:
     return f"{safe_name(last, 'file')}.{safe_name(ending, 'txt')}"
 
 
-PART_ENDINGS = (".stl", ".obj", ".ply", ".glb")
-PROGRAM_ENDINGS = (".ngc", ".nc", ".tap")
+IN_BOX = {"part": (".stl", ".obj", ".ply", ".glb"), "program": (".ngc", ".nc", ".tap")}
+"""Endings of what stands in the box, by the part of the page that takes it."""
 
 
 def read_upload(

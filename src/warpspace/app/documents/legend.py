@@ -16,7 +16,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.table import table_words
 from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
-from warpspace.geometry.colour import ColourScale
+from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.picture import words
 from warpspace.picture.comparison import conditions_of_both
 from warpspace.scene.model import second_order
@@ -111,26 +111,23 @@ def _stops(scale: ColourScale) -> str:
 
 def part_html(picture: LivePicture) -> Markup:
     """Say how far part and program are off where they are drawn, and what that leaves out."""
-    part, path, look, said = picture.part, picture.path, picture.state.part, list[Markup]()
+    part, look, said = picture.part, picture.state.part, list[Markup]()
     change = "changes " if picture.is_difference else ""
-    program = (look.program or ("",))[0]
-    for what, found in ((f"Part {look.name}", part), (f"Program {program}", path)):
+    named = (f"Part {look.name}", part), (f"Program {look.program_name}", picture.path)
+    for what, found in named:
         if found is not None:
-            most, out = float(found.norm_um.max(initial=0.0)), int(found.points.outside.sum())
+            most = float(component_values(found.error_um, "norm").max(initial=0.0))
+            out = int(found.made.outside.sum())
             more = f", {spell_count(out)} points beyond the travel" if out else ""
             said.append(join([f"{what} {change}up to {number(most)} µm{more}"]))
-    if part is not None:
-        low, high = (number(float(at)) for at in (part.normal_um.min(), part.normal_um.max()))
-        said[0] += f", {low} to {high} µm along its normal"
-        if look.normal:
-            _, scale = picture.coloured(part)
-            bar = tag("i", "", class_="ws-strip",
-                      style=f"background:linear-gradient(to right,{_stops(scale)})")  # fmt: skip
-            ends = [spell_short(end) for end in (scale.low, scale.high)]
-            said[0] += join((": ", ends[0], " ", bar, f" {ends[1]} µm"))
-    return (
-        tag("p", Markup("<br>").join((*said, GEOMETRY_ONLY)), class_="ws-part") if said else EMPTY
-    )
+    if part is not None and look.normal:
+        scale = picture.coloured(part)[1]
+        bar = tag("i", "", class_="ws-strip",
+                  style=f"background:linear-gradient(to right,{_stops(scale)})")  # fmt: skip
+        ends = (f"{spell_short(end)} " for end in (scale.low, scale.high))
+        said.append(join(("Along its normal ", next(ends), bar, " ", next(ends), "µm")))
+    words = Markup("<br>").join((*said, GEOMETRY_ONLY))
+    return tag("p", words, class_="ws-part") if said else EMPTY
 
 
 # --- The heading ----------------------------------------------------------------------------------

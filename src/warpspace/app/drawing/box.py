@@ -20,6 +20,7 @@ from warpspace.app.drawing.shapes import UNLIT, Nodes, Shape, Shapes, dashes, li
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import GltfTemplate
+from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.surfaces import box_edges, is_thin
 from warpspace.picture.mesh import (
     edge_pieces,
@@ -45,17 +46,22 @@ def ghost_dashes(picture: LivePicture) -> Array:
     return dashes(np.array(edges).reshape(-1, 2, 3), DASH * longest, GAP * longest)
 
 
-def surface_glb(picture: LivePicture) -> bytes:
-    """Write the coloured map of a picture, or its lines alone, vertices in mm."""
+def surface(picture: LivePicture) -> Shape:
+    """Draw the coloured map of a picture, or its lines alone."""
     if picture.state.look.surface == "grid":  # its lines would stand before the part
         mesh = line_mesh(picture, grid=picture.state.part.is_empty)
     else:
         mesh = map_mesh(picture)
-    levels = colour_levels(picture.scale, mesh.values)
-    colours = level_colours(diverging=picture.scale.diverging)[levels]
-    return _template(Identity(mesh.triangles), len(mesh.vertices_mm)).fill(
-        mesh.vertices_mm, colours
-    )
+    return coloured_shape(mesh.vertices_mm, mesh.triangles, mesh.values, picture.scale)
+
+
+def coloured_shape(
+    points: Array, indices: NDArray[Any], values: Array, scale: ColourScale
+) -> Shape:
+    """Give a surface or lines, points in mm, in the colours of the values at their points."""
+    colours = level_colours(diverging=scale.diverging)[colour_levels(scale, values)]
+    filled = _template(Identity(indices), len(points)).fill(points, colours)
+    return Shape("add_glb", UNLIT, {"glb_data": filled})
 
 
 @lru_cache(maxsize=32)
@@ -65,8 +71,7 @@ def _template(triangles: Identity, count: int) -> GltfTemplate:
 
 def box(picture: LivePicture) -> Shapes:
     look, shown = picture.state.look, picture.state.shown
-    surface = Shape("add_glb", UNLIT, {"glb_data": surface_glb(picture)})
-    shapes: dict[str, Shape | None] = {SURFACE: surface}
+    shapes: dict[str, Shape | None] = {SURFACE: surface(picture)}
     if look.surface != "grid":
         shapes["/box/edges"] = lines(edge_pieces(picture), colour(picture, "edge"), 1.8)
         if shown.grid_lines:

@@ -8,6 +8,7 @@ from viser import ClientHandle
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import around, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
+from warpspace.app.drawing.part import part_shapes, path_shapes
 from warpspace.app.drawing.shapes import Nodes, Shape, Shapes, ball, lines, mesh
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies, played_position, tool_point
@@ -79,7 +80,7 @@ class MovingLayer:
         if not same or before.positions != now.positions:
             self._turned_at, self._turned_deg = None, 0.0
             self._stand({})
-        self._around.draw(around(picture))
+        self._around.draw({**around(picture), **part_shapes(picture), **path_shapes(picture)})
         self._draw_ghost(picture)
         self._draw_turning()
 

@@ -129,9 +129,8 @@ def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int |
     path = picture.path
     if path is None or not direction.any():
         return None
-    drawn = path.drawn_mm(picture.exaggeration)
-    found = pick_point(origin_mm, direction, drawn, TOLERANCE_RAD)
-    return None if found is None else int(path.line[found[0]])
+    found = pick_point(origin_mm, direction, path.drawn_mm(picture.exaggeration), TOLERANCE_RAD)
+    return None if found is None else int(path.of.line[found[0]])
 
 
 def _denser(samples: Array) -> Array:

@@ -3,24 +3,18 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.bench import BenchPicture, bench_picture
-from warpspace.app.evaluation.part import (
-    NORMAL,
-    M,
-    Moved,
-    PartPicture,
-    PathPicture,
-    clamped_part,
-    moved,
-    traced_path,
-)
+from warpspace.app.evaluation.part import InBox, T, normal_um, part_in_box, path_in_box
 from warpspace.app.state.app_state import AppState
-from warpspace.geometry.colour import ColourScale, build_scale
-from warpspace.picture.model import Picture, picture_size_mm
+from warpspace.geometry.colour import ColourScale, component_values
+from warpspace.parts.part import PartMesh
+from warpspace.parts.program import ToolPath
+from warpspace.picture.model import Picture, choose_scale, picture_size_mm
 from warpspace.picture.traces import TraceLine, TraceLines, is_moved, name_trace
 from warpspace.units import Array
 
@@ -69,31 +63,30 @@ class LivePicture(Picture):
         return None if self.is_difference else bench_picture(self.drawn_state)
 
     @cached_property
-    def part(self) -> PartPicture | None:
+    def part(self) -> InBox[PartMesh] | None:
         """The part in the box; None where none is, or cannot be. Of a difference its change."""
-        return self._moved(clamped_part)
+        return self._in_box(part_in_box)
 
     @cached_property
-    def path(self) -> PathPicture | None:
+    def path(self) -> InBox[ToolPath] | None:
         """The path of the program, likewise."""
-        return self._moved(traced_path)
+        return self._in_box(path_in_box)
 
-    def _moved(self, find: Callable[[AppState], M | None]) -> M | None:
+    def _in_box(self, find: Callable[[AppState], InBox[T] | None]) -> InBox[T] | None:
         if not self.is_difference or self.compared is None:
-            return moved(self.drawn_state, find)
-        a, b = (moved(side, find) for side in self.compared.sides)
+            return find(self.drawn_state)
+        a, b = map(find, self.compared.sides)
         if a is None or b is None or a.error_um.shape != b.error_um.shape:
             return None
         return replace(b, error_um=b.error_um - a.error_um)
 
-    def coloured(self, found: Moved) -> tuple[Array, ColourScale]:
-        """Give what is coloured beside the map, in its colours; of both signs along normals."""
-        normal = self.state.part.normal and isinstance(found, PartPicture)
-        values = found.values_um(NORMAL if normal else self.component)
-        if not (normal or self.tilts):
-            return values, self.scale
-        largest, end = np.abs(values).max(initial=0.0), None if self.tilts else self.scale.high
-        return values, build_scale(float(largest), "x" if normal else self.component, end=end)
+    def coloured(self, found: InBox[Any]) -> tuple[Array, ColourScale]:
+        """Give what is coloured of it, in the colours of the map; along normals in its own."""
+        if self.state.part.normal and isinstance(found.of, PartMesh):
+            values = normal_um(found)
+            return values, choose_scale([values], "x")
+        values = component_values(found.error_um, self.component)[found.at]
+        return values, choose_scale([values], self.component) if self.tilts else self.scale
 
     @cached_property
     def worst_node(self) -> int:

@@ -29,7 +29,7 @@ from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
-from warpspace.app.drawing.part import PartLayer
+from warpspace.app.drawing.part import PartGizmo
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Layer
 from warpspace.app.evaluation.budget import pick, pick_line, with_clicked
 from warpspace.app.evaluation.evaluate import LiveModel
@@ -314,10 +314,9 @@ class Session:
         self._around_at = None
         context = self.context
         with context.page.as_one():
+            gizmo = PartGizmo(self._client.scene, picture, self._clamp)  # it carries what is drawn
             context.stage = MovingLayer(self._client, context.page, picture)
-            part = PartLayer(self._client.scene, context.page, self._clamp)
-            part.show(picture)
-            self.display.add(picture, [context.stage, part])
+            self.display.add(picture, [gizmo, context.stage])
             context.page.call("stage", "open")
 
         @self._client.scene.on_click()

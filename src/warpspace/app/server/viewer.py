@@ -23,7 +23,7 @@ from warpspace.app.browser.page import page_script
 from warpspace.app.browser.viser_private import connection_of, send_script_to_all, serve_with
 from warpspace.app.documents.scene_file import SceneList
 from warpspace.app.documents.services import Services
-from warpspace.app.drawing.box import surface_glb
+from warpspace.app.drawing.box import surface
 from warpspace.app.drawing.shapes import light_scene
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.server.doors import Access, Doors, plain_address
@@ -290,7 +290,7 @@ class Viewer:
 
     def _warm(self) -> None:
         """Do before the first tab what it would have to wait for."""
-        surface_glb(self._live.evaluate(self._start))
+        surface(self._live.evaluate(self._start))
 
     async def _connect(self, client: viser.ClientHandle) -> None:
         connection = connection_of(self._server, client)

@@ -61,12 +61,13 @@ LOOP_NAMES = {
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
-KEPT = ("component", "nodes", "shown", "look", "machine", "forms", "page")
+KEPT = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
 """What stays when another scene is shown."""
 SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
 """What can be drawn of a comparison; the difference is the change from A to B."""
 PRESENT, NOBODY = "present errors", "nothing"
 """Names of what is steered, and of no other side."""
+_load_part = lru_cache(maxsize=4)(load_part)
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,8 +184,9 @@ class PartLook:
         hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
         " degrees about the fixed x, y and z, in that order; empty for the usual place.",
     )
-    # name and text; kept as the mesh is
-    program: tuple[str, str] | None = field(default=None, metadata=said("Program"))
+    # likewise
+    program: str | None = field(default=None, metadata=said("Program"))
+    program_name: str = field(default="", metadata=said("Program"))
     shown: bool = described(
         True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
     )
@@ -198,23 +200,18 @@ class PartLook:
     @classmethod
     def of_scene(cls, scene: Scene) -> "PartLook":
         """Give what a scene names; of files that cannot be read from here their names."""
-        source, held = scene.part, (None, None)
+        own, mesh, text = scene.part, None, None
         with suppress(WarpspaceError):
-            held = _held(source.path("file"), source.unit or None, source.path("program"))
-        return cls(held[0], Path(source.file).name, source.place, held[1])
+            if path := own.path("file"):
+                mesh = _load_part(path, own.unit or None)
+            if path := own.path("program"):
+                text = "".join(program_lines(path))
+        return cls(mesh, Path(own.file).name, own.place, text, Path(own.program).name)
 
     @property
     def is_empty(self) -> bool:
         """Whether nothing of it stands in the box."""
         return (self.mesh is None or not self.shown) and self.program is None
-
-
-@lru_cache(maxsize=4)
-def _held(
-    mesh: str | None, unit: str | None, program: str | None
-) -> tuple[PartMesh | None, tuple[str, str] | None]:
-    text = program and (Path(program).name, "".join(program_lines(program)))
-    return (load_part(mesh, unit) if mesh else None), text or None
 
 
 @dataclass(frozen=True, slots=True)
@@ -448,16 +445,15 @@ class AppState:
 
     def with_scene(self, scene: Scene) -> "AppState":
         """Show another scene, in its own loop; component, density and switches stay."""
-        fresh, own = start_state(scene), PartLook.of_scene(self.scene)
-        left = not own.is_empty and own.mesh is self.part.mesh  # with the scene that names it
-        part, look = self.part, self.look
-        if left or not fresh.part.is_empty:
-            part, look = fresh.part, replace(look, surface=fresh.look.surface)
+        fresh, kept = start_state(scene), {name: getattr(self, name) for name in KEPT}
+        if not fresh.part.is_empty:
+            kept["part"], kept["look"] = fresh.part, replace(self.look, surface="grid")
+            kept["forms"] = {**self.forms, **fresh.forms}
         shown = replace(
             fresh,
             specification=self.specification if scene.limit_um is None else fresh.specification,
             rotary=replace(self.rotary, off=frozenset()),
-            **{**{name: getattr(self, name) for name in KEPT}, "part": part, "look": look},
+            **kept,
         )
         return shown.within_reach()
 
@@ -514,6 +510,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         review=scene.review,
         part=part,
         look=Look() if part.is_empty else Look(surface="grid"),
+        forms={"program.tcp": scene.part.tcp} if scene.part.tcp else {},
     )
     return replace(state, **changes)
 

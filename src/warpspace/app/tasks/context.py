@@ -62,7 +62,6 @@ class Context:
         # what has been applied last: the state before it, and what it was in words
         self.decided: tuple[AppState, str] | None = None
         self.offer_import: Callable[[str, bytes], None] = lambda _name, _content: None
-        self.offers: dict[str, Callable[[str], None]] = {}  # by ending: takes what a page has sent
         self.changed_at = time.monotonic()
         self.unfolded = store.state.page  # of this page, also where the state is shared
         # what a step of a story shows in place of the present state, which it does not change

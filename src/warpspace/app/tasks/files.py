@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,7 @@ PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their 
 
 def accepted_endings() -> str:
     """List the endings of files that can be given to the page."""
-    own = (".toml", ".urdf", *files.PART_ENDINGS, *files.PROGRAM_ENDINGS)
+    own = (".toml", ".urdf", *(end for ends in files.IN_BOX.values() for end in ends))
     endings = dict.fromkeys((*own, *(end for one in formats() for end in one.endings)))
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
@@ -130,10 +129,11 @@ class FilesWindow(JobWindow):
 
     def _open(self, value: str) -> None:
         """Open a scene or a machine, or show what a file of measured data would bring."""
-        told = value.partition("\n")[2].partition("\n")[0]
-        if offer := self.context.offers.get(Path(told).suffix.lower()):
-            offer(value)
-            return
+        told = value.partition("\n")[2].partition("\n")[0].lower()
+        for part, endings in files.IN_BOX.items():
+            if told.endswith(endings):
+                self.context.send(f"{part}:file", value)
+                return
         name, content = files.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:

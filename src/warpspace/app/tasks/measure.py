@@ -83,10 +83,6 @@ class FilesPart(AnalysisPart):
         """Take in a file."""
         raise NotImplementedError
 
-    def sent(self, value: str) -> None:
-        """Take a file that the page has sent."""
-        self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
-
     def files_html(self) -> Markup:
         """List the files, and say why the last one is not among them."""
         lines = [
@@ -118,7 +114,7 @@ class FilesPart(AnalysisPart):
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "file":
-            self.sent(value)
+            self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
         elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
             self.context.act(self._again)

@@ -1,45 +1,44 @@
 """A part in the box, where it is clamped, what an inspector would measure; and a program."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
-from warpspace.analysis.catalogue import Entry
+from warpspace.analysis.blocks import Table
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
 from warpspace.app.browser import html
-from warpspace.app.browser.html import EMPTY, button, join, number, tag
+from warpspace.app.browser.html import EMPTY, button, join, tag
 from warpspace.app.browser.incoming import index_of
-from warpspace.app.documents.files import PART_ENDINGS, PROGRAM_ENDINGS, upload_text
+from warpspace.app.documents.files import IN_BOX, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.part import (
     AT_LINE,
-    clamped_part,
     clamped_scene,
-    program_defaults,
-    turned_place,
+    middle_mm,
+    moved_place,
+    part_in_box,
 )
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
-from warpspace.app.state.forms import option_values, read_form
-from warpspace.app.state.leaf import Identity
+from warpspace.app.state.forms import option_values
 from warpspace.app.tasks.analysis import Question
-from warpspace.app.tasks.charts import details_html
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.charts import block_html, details_html
 from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.measure import MOST_BYTES, FilesPart, Held
 from warpspace.app.tasks.parts import actions
+from warpspace.kinematics import transforms
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
-from warpspace.parts.as_cut import Part, PartResult
+from warpspace.parts.as_cut import PartResult
 from warpspace.parts.part import find_place, parse_part
-from warpspace.parts.program import Program, ProgramResult
 from warpspace.scene.model import Scene
 
 SETTINGS = ("part.place", "part.shown", "part.normal", "part.moved")
-MOST_LETTERS, MOST_SHARES = 200, 2  # of a line that is shown; errors that a block is split into
+MOST_LETTERS = 200  # of a line that is shown
 
 
 class InBoxPart(FilesPart):
@@ -47,26 +46,23 @@ class InBoxPart(FilesPart):
 
     at_once = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
-    endings: tuple[str, ...] = ()
+    holds = ("", "")  # fields of `PartLook`: what is there, if anything, and the name of its file
     invitation = ""
 
-    def __init__(self, context: Context, entry: Entry) -> None:
-        super().__init__(context, entry)
-        context.offers |= dict.fromkeys(self.endings, self.sent)
-
-    def held(self, state: AppState) -> tuple[object, str]:
-        """Give what is there, if anything, and the name of its file."""
-        raise NotImplementedError
+    def held(self, state: AppState) -> tuple[Any, str]:
+        what, name = (getattr(state.part, field) for field in self.holds)
+        return what, name
 
     def about(self, state: AppState) -> Markup:
         """Say what is to be known of it, and set."""
         raise NotImplementedError
 
     def question(self, state: AppState) -> Question:
-        return (*super().question(state), Identity(self.held(state)[0]), state.part.place)
+        made = replace(state.part, shown=True, normal=False, moved=False)
+        return (*super().question(state), made)
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().concerns(picture), Identity(picture.state.part))
+        return (*super().concerns(picture), picture.state.part)
 
     def is_ready(self, state: AppState) -> bool:
         return self.held(state)[0] is not None
@@ -75,7 +71,7 @@ class InBoxPart(FilesPart):
         held, name = self.held(state)
         upload = html.upload_button(
             f"Another {self.name} …" if held else f"{self.title} …", self.name, self.most_bytes,
-            ",".join(self.endings), kind="" if held else "main",
+            ",".join(IN_BOX[self.name]), kind="" if held else "main",
             hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
         missing = f"{name} is not here: links and saved scenes hold only its name."
@@ -85,44 +81,43 @@ class InBoxPart(FilesPart):
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
         return join((about, self.files_html(), actions(upload)))
 
-    def show(self, **held: Any) -> None:
+    def show(self, held: object, name: str, **more: Any) -> None:
         """Take something in, see it through the box, and unfold the section."""
 
         def shown(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
             page = replace(state.page, task=self.task, open=opened, window="")
-            found = replace(state, part=replace(state.part, shown=True, **held), page=page)
+            made = dict(zip(self.holds, (held, name), strict=True)) | more
+            found = replace(state, part=replace(state.part, shown=True, **made), page=page)
             return edits.with_sight(found, inside=True)
 
         self.context.post(shown)
 
-    def removed(self, state: AppState, part: PartLook) -> AppState:
-        """Take it out of the box."""
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word != "remove" or value:
+            return super().take(state, word, value)
         self._answer = None
-        found = replace(state, part=part)
-        return edits.with_sight(found, inside=not part.is_empty)
+        none = {field: getattr(PartLook(), field) for field in self.holds}
+        found = replace(state, part=replace(state.part, **none))
+        return edits.with_sight(found, inside=not found.part.is_empty)
 
 
 class PartPart(InBoxPart):
     """A part: clamped, and measured as it is cut."""
 
-    endings = PART_ENDINGS
+    holds = ("mesh", "name")
     invitation = "A mesh of your part (STL, OBJ, PLY, GLB), as this machine would cut it."
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
         return [one for one in super().options() if one.name != "place"]
 
-    def held(self, state: AppState) -> tuple[object, str]:
-        return state.part.mesh, state.part.name
-
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked = read_form(Part, self.options(), values, scenes[0])
-        if state.part.mesh is PartLook.of_scene(state.scene).mesh:
-            asked = replace(asked, features=state.scene.part.path("features"))
-        tolerances = next(((one.name, one.content) for one in self._files), None)
-        place, mesh = state.part.place, state.part.mesh
-        return replace(asked, place=place, mesh=mesh, tolerances=tolerances)
+        asked: Any = super().ask(state, values, scenes)
+        own, part = PartLook.of_scene(state.scene), state.part
+        beside = state.scene.part.path("features") if part.mesh is own.mesh else None
+        told = next(((one.name, one.content) for one in self._files), None)
+        return replace(asked, place=part.place, mesh=part.mesh, features=beside, tolerances=told)
 
     def about(self, state: AppState) -> Markup:
         turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
@@ -146,15 +141,13 @@ class PartPart(InBoxPart):
         return html.rows(judged) + super().result_html(found)
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "remove" and not value:
-            self._sent = None
-            return self.removed(state, PartLook(program=state.part.program))
-        if word == "turn" and value in ("x", "y", "z") and (part := clamped_part(state)):
-            place = turned_place(part, value, 90.0)
-            return replace(state, part=replace(state.part, place=place))
+        if word == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
+            turn = transforms.placed(middle_mm(part), 90.0 * np.eye(3)["xyz".index(value)])
+            return replace(state, part=replace(state.part, place=moved_place(part, turn)))
+        found = super().take(state, word, value)
         if word == "set.unit" and self._sent is not None:
             self.attempt(partial(self.received, *self._sent))
-        return super().take(state, word, value)
+        return found
 
     def received(self, name: str, content: bytes) -> None:
         """Take in tolerances, or a mesh: of another name it is clamped in the middle."""
@@ -166,51 +159,34 @@ class PartPart(InBoxPart):
         place = state.part.place if name == state.part.name else None
         if place is None:
             place = tuple(round(at, 3) for at in find_place(mesh, clamped_scene(state), None))
-        self.show(mesh=mesh, name=name, place=place)
+        self.show(mesh, name, place=place)
 
 
 class ProgramPart(InBoxPart):
     """A program: a line and its place in the drawing find each other."""
 
     most_bytes = MOST_BYTES  # longer ones would hold up other tabs
-    endings = PROGRAM_ENDINGS
+    holds = ("program", "program_name")
     invitation = "A program (G-code): its path over the workpiece, and its worst blocks."
 
-    def held(self, state: AppState) -> tuple[object, str]:
-        return state.part.program, (state.part.program or ("",))[0]
-
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        name, text = state.part.program or ("", "")
-        asked = read_form(Program, self.options(), values, scenes[0])
-        return replace(asked, file=name, text=text)
-
-    def defaults(self, state: AppState) -> Mapping[str, str]:
-        return {**super().defaults(state), **program_defaults(state)}
+        asked: Any = super().ask(state, values, scenes)
+        return replace(asked, file=state.part.program_name, text=state.part.program)
 
     def about(self, state: AppState) -> Markup:
-        line, text = state.forms.get(AT_LINE, ""), (state.part.program or ("", ""))[1].splitlines()
+        line, text = state.forms.get(AT_LINE, ""), self.held(state)[0].splitlines()
         if not (at := index_of(line, len(text) + 1)):
             return EMPTY
         return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
 
     def result_html(self, found: Result) -> Markup:
-        assert isinstance(found, ProgramResult)  # noqa: S101 - of this analysis
-        worst: list[tuple[Markup, str]] = []
-        for one in found.worst:
-            line = button(f"line {one.line}", f"{self.name}:set.at_line", one.line, kind="link",
-                          hint="Show it in the drawing")  # fmt: skip
-            most = sorted(one.budget.items(), key=lambda share: -share[1])[:MOST_SHARES]
-            shares = ", ".join(f"{key} {html.signed(um)}" for key, um in most)
-            worst.append((line, f"{number(one.um)} µm: {shares}"))
-        words = tag("p", "Click a line, or the path in the drawing.", class_="ws-tiny")
-        rest = details_html(one for one in found.blocks() if not isinstance(one, str))
-        return join((tag("h4", "Worst blocks"), words, html.rows(worst), rest))
+        def link(line: int) -> Markup:
+            words = "Show it in the drawing; a click on the path finds its line"
+            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=words)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "remove":
-            return self.removed(state, replace(state.part, program=None))
-        return super().take(state, word, value)
+        *rest, worst = (one for one in found.blocks() if isinstance(one, Table))
+        columns = replace(worst.columns[0], form=link), *worst.columns[1:]
+        return block_html(replace(worst, columns=columns)) + details_html(rest)
 
     def received(self, name: str, content: bytes) -> None:
-        """Take in a program, and run it."""
-        self.show(program=(name, content.decode("utf-8-sig", "replace")))
+        self.show(content.decode("utf-8-sig", "replace"), name)
