@@ -12,7 +12,7 @@ from timing import best
 from warpspace import load_scene
 from warpspace.analysis.description import silent
 from warpspace.parts.as_cut import Part
-from warpspace.parts.part import make_points, parse_part, point_basis
+from warpspace.parts.part import load_part, make_points, point_basis
 
 AROUND = 1000  # vertices of a million
 GROWING = (400, 566, 800, 1000)  # above what features are looked for in
@@ -54,7 +54,7 @@ def measure() -> Section:
         most = tracemalloc.get_traced_memory()[1] / MEGABYTE
         tracemalloc.stop()
     own = (found.part.vertices_mm.nbytes + found.part.triangles.nbytes) / MEGABYTE
-    small = parse_part(ball(316).export(file_type="ply"), "ball.ply")
+    small = load_part("ball.ply", data=ball(316).export(file_type="ply"))
     basis = point_basis(scene, make_points(scene, small.vertices_mm))
     values = np.array([scene.errors.amplitude(key) for key in basis.keys])
     moved = best(lambda: basis.evaluate(values))

@@ -110,7 +110,7 @@ class ConvertResult(Result):
     changed: Mapping[str, tuple[float, float]]
     notes: tuple[str, ...]  # what could not be taken along
 
-    def texts(self) -> Mapping[str, str]:
+    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
         wishes = "; ".join(self.wishes)
         head = f"# Converted from {self.before.name} by warpspace convert: {wishes}\n"
         return {"": head + self.text}

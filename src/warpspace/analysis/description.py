@@ -61,7 +61,7 @@ class Result(ABC):
         """Say what a reader should doubt of its numbers."""
         return ()
 
-    def texts(self) -> Mapping[str, str]:
+    def texts(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
         """Give the files that -o writes, by what is added to its name: "", "_X.COM"."""
         return {}
 

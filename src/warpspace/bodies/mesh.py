@@ -29,30 +29,11 @@ _PLY_BYTES = {
 }
 _DAE_REFERENCES = 20
 """Nodes of a DAE file by reference: each may hold others, so that they multiply."""
+LISTED, WORDS, BYTES = 12, 40, 200
+"""Of a triangle in a file: numbers in lists or lines; words of a text, 21 in STL; bytes."""
 
 
-@dataclass(frozen=True, slots=True)
-class Most:
-    """What a mesh file may hold at most."""
-
-    triangles: int = limits.MAX_TRIANGLES
-    megabytes: int = limits.MAX_MESH_MB
-
-    @property
-    def listed(self) -> int:
-        """Numbers in lists, points and indices, lines of text: three corners, each with more."""
-        return 12 * self.triangles
-
-    @property
-    def words(self) -> int:
-        """Words of a text: a triangle of an STL file has 21."""
-        return 40 * self.triangles
-
-
-OF_BODY, OF_PART = Most(), Most(limits.MAX_PART_TRIANGLES, limits.MAX_PART_MB)
-
-
-def count_mesh(data: bytes, ending: str, most: Most = OF_BODY) -> bytes:
+def count_mesh(data: bytes, ending: str, most: int = limits.MAX_TRIANGLES) -> bytes:
     """Refuse a mesh file that holds more than can be built in a moment."""
     if ending == ".obj":
         text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", "")
@@ -68,14 +49,14 @@ def _limit(count: int, limit: int, what: str) -> None:
         raise OptionError(f"it holds {count:,} {what}; expected at most {limit:,}")
 
 
-def _count_stl(data: bytes, most: Most) -> None:
+def _count_stl(data: bytes, most: int) -> None:
     if _is_binary(data):
-        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, most.triangles, "triangles")
+        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, most, "triangles")
         return
     _count_text(data, most)
     text = data.lower()
     _limit(text.count(b"endsolid"), limits.MAX_SOLIDS, "solids")
-    _limit(text.count(b"vertex") // 3, most.triangles, "triangles")
+    _limit(text.count(b"vertex") // 3, most, "triangles")
 
 
 def _is_binary(data: bytes) -> bool:
@@ -83,22 +64,22 @@ def _is_binary(data: bytes) -> bool:
     return len(data) == _STL_HEAD + _STL_TRIANGLE * stated
 
 
-def _count_text(data: bytes, most: Most) -> int:
-    _limit(data.count(b"\n"), most.listed, "lines")
+def _count_text(data: bytes, most: int) -> int:
+    _limit(data.count(b"\n"), LISTED * most, "lines")
     blank = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
     words = int(np.count_nonzero(blank[:-1] & ~blank[1:]))
-    _limit(words, most.words, "words")
+    _limit(words, WORDS * most, "words")
     return words
 
 
-def _count_obj(data: bytes, most: Most) -> None:
+def _count_obj(data: bytes, most: int) -> None:
     _count_text(data, most)
     faces = _FACE.finditer(data.decode())
     triangles = sum(max(len(face[1].split()) - 2, 0) for face in faces)
-    _limit(triangles, most.triangles, "triangles")
+    _limit(triangles, most, "triangles")
 
 
-def _count_ply(data: bytes, most: Most) -> None:
+def _count_ply(data: bytes, most: int) -> None:
     rows, total, scalars, smallest, at = 0, 0, 0, 4, 0
     is_text = b"ascii" in data[:100].lower()
     while at < len(data):
@@ -111,7 +92,7 @@ def _count_ply(data: bytes, most: Most) -> None:
         if len(words) == 3 and "element" in words[0]:
             rows = max(int(words[2]), 0)
             total += rows
-            _limit(rows, 3 * most.triangles, f"rows of {words[1][:40]!r}")
+            _limit(rows, 3 * most, f"rows of {words[1][:40]!r}")
         elif len(words) == 3 and "property" in words[0]:
             scalars += rows * (1 if is_text else _PLY_BYTES.get(words[1], 4))
         elif len(words) == 5 and "property" in words[0]:
@@ -120,10 +101,10 @@ def _count_ply(data: bytes, most: Most) -> None:
         _limit(data.count(b"\n", at), total + 100, "lines")
     held = _count_text(data[at:], most) if is_text else (len(data) - at) // smallest
     scalars //= 1 if is_text else smallest
-    _limit(held - scalars, most.listed, "numbers in lists")
+    _limit(held - scalars, LISTED * most, "numbers in lists")
 
 
-def _count_glb(data: bytes, most: Most) -> None:
+def _count_glb(data: bytes, most: int) -> None:
     size = int.from_bytes(data[12:16], "little")
     if data[:4] != b"glTF" or size > len(data):
         return  # whoever reads it says what it is not
@@ -140,16 +121,16 @@ def _count_glb(data: bytes, most: Most) -> None:
     primitives = [mesh["primitives"] for mesh in held.get("meshes", [])]
     _limit(sum(map(len, primitives)), limits.MAX_MESH_PARTS, "primitives")
     accessors = [max(int(accessor["count"]), 0) for accessor in held.get("accessors", [])]
-    _limit(sum(accessors), most.listed, "points and indices")
+    _limit(sum(accessors), LISTED * most, "points and indices")
     stored = sum(max(int(view["byteLength"]), 0) for view in held.get("bufferViews", []))
-    _limit(stored, most.megabytes * 1_000_000, "bytes in views of its data")
+    _limit(stored, BYTES * most, "bytes in views of its data")
     placed = [primitive for mesh in _placed(held) for primitive in primitives[mesh]]
     _limit(len(placed), limits.MAX_MESH_PARTS, "primitives, each placing counted")
     corners = sum(
         accessors[part["indices"] if "indices" in part else part["attributes"]["POSITION"]]
         for part in placed
     )
-    _limit(corners // 3, most.triangles, "triangles, each placing counted")
+    _limit(corners // 3, most, "triangles, each placing counted")
 
 
 def _placed(held: Any) -> Iterator[int]:
@@ -170,13 +151,13 @@ def _placed(held: Any) -> Iterator[int]:
             yield nodes[node]["mesh"]
 
 
-def _count_dae(data: bytes, most: Most) -> None:
+def _count_dae(data: bytes, most: int) -> None:
     _limit(data.count(b"<"), 2 * limits.MAX_MESH_PARTS, "XML tags")
     _limit(data.count(b"<instance_node"), _DAE_REFERENCES, "nodes by reference")
     _count_text(data, most)
 
 
-_COUNTERS: dict[str, Callable[[bytes, Most], object]] = {
+_COUNTERS: dict[str, Callable[[bytes, int], object]] = {
     ".stl": _count_stl,
     ".obj": _count_obj,
     ".ply": _count_ply,
@@ -221,39 +202,34 @@ def crease_edges(mesh: Any) -> Array:
     return np.asarray(mesh.vertices[mesh.face_adjacency_edges[sharp]], dtype=float)
 
 
-def _check_geometry(scene: Any, most: Most) -> None:
+def _check_geometry(scene: Any, most: int) -> None:
     """Refuse what trimesh takes as it comes: points in a plane, vertices that are not there."""
     for mesh in scene.geometry.values():
+        mesh.metadata.clear()  # of a PLY file it holds all again
         if np.shape(getattr(mesh, "vertices", ()))[1:] != (3,):
             raise ValueError("it has points without three coordinates")
         faces = np.asarray(getattr(mesh, "faces", ()))
         if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(mesh.vertices)):
             raise ValueError("a triangle names a vertex that is not there")
-        if len(faces) > most.triangles:
-            raise ValueError(f"{len(faces):,} triangles; expected at most {most.triangles:,}")
+        if len(faces) > most:
+            raise ValueError(f"{len(faces):,} triangles; expected at most {most:,}")
 
 
-def open_meshes(path: Path, what: str, most: Most = OF_BODY) -> Any:
+def open_meshes(
+    path: Path, what: str, most: int = limits.MAX_TRIANGLES, data: bytes | None = None
+) -> Any:
     try:
-        check_size(path, path.stat().st_size, what, most)
-        data = path.read_bytes()
+        size = path.stat().st_size if data is None else len(data)
+        if size > BYTES * most:
+            raise OptionError(
+                f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {BYTES * most / 1e6:.0f} MB."
+                " Reduce its triangles before"
+            )
+        data = path.read_bytes() if data is None else data
     except FileNotFoundError:
         raise OptionError(f"{path}: there is no such file") from None
     except OSError as error:
         raise OptionError(f"{path}: cannot be read ({error.strerror})") from None
-    return parse_meshes(data, path, what, most)
-
-
-def check_size(path: Path, size: int, what: str, most: Most) -> None:
-    if size > most.megabytes * 1_000_000:
-        raise OptionError(
-            f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {most.megabytes} MB. "
-            "Reduce its triangles before"
-        )
-
-
-def parse_meshes(data: bytes, path: Path, what: str, most: Most = OF_BODY) -> Any:
-    check_size(path, len(data), what, most)
     if not data:
         raise OptionError(f"{path}: the file is empty; expected a {what}")
     import trimesh

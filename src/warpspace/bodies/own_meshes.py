@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpspace.bodies.mesh import MIDDLE, Body, build_body, count_mesh, open_meshes
+from warpspace.bodies.mesh import BYTES, MIDDLE, Body, build_body, count_mesh, open_meshes
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.transforms import apply, placed
 from warpspace.machine.description import BodySource, Machine
-from warpspace.machine.limits import MAX_MESH_MB, MAX_URDF_TRIANGLES
+from warpspace.machine.limits import MAX_TRIANGLES, MAX_URDF_TRIANGLES
 from warpspace.units import Array
 
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -36,47 +37,11 @@ def load_mesh(
     path: str | Path, frame: str, *, unit: str | None = None, up: str | None = None
 ) -> LoadedMesh:
     path = Path(path)
-    check_format(path, unit, up)
     try:
         changed = path.stat().st_mtime_ns
     except OSError:
         changed = 0
     return _read_mesh(path, changed, frame, unit, up)
-
-
-def check_format(path: Path, unit: str | None, up: str | None = None) -> str:
-    """Refuse what is not read; give what a message calls the file."""
-    if path.suffix.lower() not in FORMATS:
-        raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
-    for given, known in ((unit, tuple(UNITS_MM)), (up, UP_AXES)):
-        if given is not None and given not in known:
-            raise OptionError(f"{path}: {given!r}; expected one of {', '.join(known)}")
-    return f"{path.suffix[1:].upper()} file"
-
-
-def _joined(found: Any) -> Any:
-    nodes = found.graph.nodes_geometry
-    pose, name = found.graph[nodes[0]] if len(nodes) == 1 else (None, None)
-    if not hasattr(found.geometry.get(name), "faces"):
-        return found.to_mesh()
-    return found.geometry[name].apply_transform(pose)  # not copied
-
-
-def join_meshes(found: Any, path: Path, unit: str | None, up: str | None = None) -> Any:
-    """Give what a file holds as one mesh of trimesh, in mm with z upwards."""
-    standard_unit, standard_up = FORMATS[path.suffix.lower()]
-    mesh = _joined(found)
-    if not len(mesh.faces):
-        raise OptionError(f"{path}: there are no triangles in it")
-    is_finite = np.isfinite(mesh.vertices).all(axis=1)
-    if not is_finite[mesh.faces].all():
-        raise OptionError(f"{path}: a vertex is not finite")
-    mesh.apply_scale(UNITS_MM[unit or standard_unit])
-    if (up or standard_up) == "y":
-        mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-    if unit is None:
-        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), standard_unit)
-    return mesh
 
 
 @lru_cache(maxsize=16)
@@ -87,18 +52,73 @@ def _read_mesh(
     unit: str | None,
     up: str | None,
 ) -> LoadedMesh:
-    what = check_format(path, unit, up)
-    mesh = join_meshes(open_meshes(path, what), path, unit, up)
+    mesh, said = read_mesh(path, unit, up)
     mesh.update_faces(mesh.nondegenerate_faces())
     if not len(mesh.faces):
         raise OptionError(f"{path}: all of its triangles are points or lines")
-    with np.errstate(all="ignore"):  # a flat surface has no volume, and no centre of it
-        open_edges = _clean(mesh)
-        body = build_body(mesh, path.stem, frame, MIDDLE)
-    if not open_edges:
-        return LoadedMesh(body)
-    warning = f"{path}: the surface is not closed ({open_edges} open edges); it is drawn as it is"
-    return LoadedMesh(body, (warning,))
+    return LoadedMesh(build_body(mesh, path.stem, frame, MIDDLE), said)
+
+
+def read_mesh(
+    path: Path,
+    unit: str | None,
+    up: str | None = None,
+    *,
+    most: int = MAX_TRIANGLES,
+    data: bytes | None = None,
+) -> tuple[Any, tuple[str, ...]]:
+    """Give a file as one mesh of trimesh, in mm with z upwards, and what is wrong with it.
+
+    Vertices are merged, triangles without three of them left out, closed surfaces face outwards.
+    """
+    from trimesh import grouping
+
+    if path.suffix.lower() not in FORMATS:
+        raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
+    for given, known in ((unit, tuple(UNITS_MM)), (up, UP_AXES)):
+        if given is not None and given not in known:
+            raise OptionError(f"{path}: {given!r}; expected one of {', '.join(known)}")
+    standard_unit, standard_up = FORMATS[path.suffix.lower()]
+    found = open_meshes(path, f"{path.suffix[1:].upper()} file", most, data)
+    nodes = found.graph.nodes_geometry
+    pose, name = found.graph[nodes[0]] if len(nodes) == 1 else (None, None)
+    is_one = hasattr(found.geometry.get(name), "faces")  # a large one is not copied
+    mesh = found.geometry[name].apply_transform(pose) if is_one else found.to_mesh()
+    if not np.isfinite(mesh.vertices).all():
+        raise OptionError(f"{path}: a vertex is not finite")
+    if len(mesh.vertices) > len(mesh.faces) or not _is_closed(mesh.faces):
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    mesh.update_faces((mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1))
+    if not len(mesh.faces):
+        raise OptionError(f"{path}: there are no triangles in it")
+    mesh.apply_scale(UNITS_MM[unit or standard_unit])
+    if (up or standard_up) == "y":
+        mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+    if unit is None:
+        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), standard_unit)
+    if not _is_closed(mesh.faces):
+        said = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
+        count = len(grouping.group_rows(mesh.edges_sorted, require_count=1))
+        return mesh, (f"{said} ({count:,} open edges); it is taken as it is",)
+    x, y, z = np.ascontiguousarray((mesh.vertices - mesh.vertices[0]).T)
+    one, two, three = mesh.faces.T
+    across = (y[two] - y[one]) * (z[three] - z[one]) - (z[two] - z[one]) * (y[three] - y[one])
+    if (x[one] + x[two] + x[three]) @ across >= 0.0:  # six times the volume
+        return mesh, ()
+    mesh.invert()
+    return mesh, (f"{path}: its triangles face inwards; they are turned outwards",)
+
+
+def _is_closed(faces: NDArray[np.int64]) -> bool:
+    """Tell whether each edge is passed as often in one direction as in the other."""
+    count = faces.max(initial=0) + 1
+    one, other = np.random.default_rng(0).integers(2**64, size=(2, count), dtype=np.uint64)
+    # each direction adds its own random number; only opposite ones cancel
+    sums = [
+        int(np.sum(one[begin] * other[end] - other[begin] * one[end]))
+        for begin, end in zip(faces.T, np.roll(faces, 1, axis=1).T, strict=True)
+    ]
+    return sum(sums) % 2**64 == 0
 
 
 def _check_size(path: Path, longest_mm: float, unit: str) -> None:
@@ -111,19 +131,6 @@ def _check_size(path: Path, longest_mm: float, unit: str) -> None:
                 f"{path}: taken as {unit}, its longest edge is {longest_mm:.4g} mm. It is probably "
                 f"in {other}; give its unit ({', '.join(UNITS_MM)})"
             )
-
-
-def _clean(mesh: Any) -> int:
-    from trimesh.grouping import group_rows
-
-    if not mesh.is_watertight:
-        mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    if mesh.is_watertight:
-        if mesh.volume < 0.0:
-            mesh.invert()
-        return 0
-    joined = len(group_rows(mesh.edges_sorted, require_count=2))
-    return len(mesh.edges_unique) - joined
 
 
 def own_meshes(machine: Machine) -> dict[str, LoadedMesh]:
@@ -263,8 +270,8 @@ def _load(path: Path) -> Any:
     ending = path.suffix.lower()
     if ending not in ENDINGS:
         return f"has no ending of {', '.join(ENDINGS)}"
-    if path.stat().st_size > MAX_MESH_MB * 1_000_000:
-        return f"is larger than {MAX_MESH_MB} MB"
+    if path.stat().st_size > (most := BYTES * MAX_TRIANGLES):
+        return f"is larger than {most / 1e6:.0f} MB"
     try:
         data = io.BytesIO(count_mesh(path.read_bytes(), ending))
         mesh = trimesh.load(data, file_type=ending[1:], force="mesh", skip_materials=True)

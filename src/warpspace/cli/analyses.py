@@ -159,7 +159,7 @@ def write_result(
     from warpspace.scene.files import spell_row
 
     wrote = [output] if output else []
-    if output is not None and (texts := found.texts()):
+    if output is not None and (texts := found.texts(Path(output).suffix.lower())):
         wrote = write_texts(texts, Path(output), force=force)
     elif output is not None:
         from warpspace.scene.save import scene_to_toml
@@ -180,7 +180,7 @@ def write_result(
     return wrote
 
 
-def write_texts(texts: Mapping[str, str], path: Path, *, force: bool) -> list[str]:
+def write_texts(texts: Mapping[str, str | bytes], path: Path, *, force: bool) -> list[str]:
     targets = {add: path.with_name(f"{path.stem}{add}") if add else path for add in texts}
     check_files(click.get_current_context(), [target for add, target in targets.items() if add])
     for add, target in targets.items():

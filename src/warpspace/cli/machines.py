@@ -1,9 +1,8 @@
-"""What `concepts`, `montecarlo` and `part` have on the command line only."""
+"""What `concepts` and `montecarlo` have on the command line only."""
 
 import os
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import click
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from warpspace.analysis.description import Watch
     from warpspace.analysis.machines import Machines, MachinesResult
     from warpspace.analysis.montecarlo import Take
-    from warpspace.parts.as_cut import Part, PartResult
     from warpspace.scene.model import Scene
     from warpspace.units import Array
 
@@ -181,28 +179,6 @@ def _machine_table(
         yield take
 
 
-def write_part(
-    asked: "Part",
-    scenes: "Sequence[Scene]",
-    watch: "Watch",
-    *,
-    output: str | None,
-    predistorted: bool,
-    force: bool,
-    **_others: object,
-) -> "PartResult":
-    from warpspace.outputs.files import write_atomically
-    from warpspace.parts.as_cut import bent_file
-
-    found = asked.run(scenes[0], watch)
-    if output is not None:
-        ending = Path(output).suffix.lower()
-        data = bent_file(scenes[0], found, ending, predistorted=predistorted)
-        with write_atomically(output, overwrite=force) as temporary:
-            temporary.write_bytes(data)
-    return found
-
-
 MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
     "concepts": (
         (plot_option("machines side by side"), size_option("1600x1200", "Of the picture, px.")),
@@ -230,24 +206,5 @@ MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
             ),
         ),
         sample,
-    ),
-    "part": (
-        (
-            output_option(
-                "Part as cut: .stl, .obj, .ply or .glb.",
-                ".stl",
-                ".obj",
-                ".ply",
-                ".glb",
-                required=False,
-            ),
-            click.option(
-                "--predistorted",
-                is_flag=True,
-                help="Write with -o the part to be asked for instead, so that the nominal one is"
-                " cut.",
-            ),
-        ),
-        write_part,
     ),
 }

@@ -215,11 +215,11 @@ def plot_option(what: str) -> Decorator:
     return click.option("--plot", type=OutputFile(*FIGURES), help=help_text)
 
 
-def write_text(path: str | Path, text: str, *, force: bool) -> None:
+def write_text(path: str | Path, text: str | bytes, *, force: bool) -> None:
     from warpspace.outputs.files import write_atomically
 
     with write_atomically(path, overwrite=force) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="")
+        temporary.write_bytes(text.encode() if isinstance(text, str) else text)
 
 
 def size_text(path: str) -> str:

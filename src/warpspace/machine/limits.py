@@ -58,16 +58,14 @@ MAX_FEATURE_TRIANGLES = 300_000  # of a mesh that features are looked for in: a 
 
 # --- meshes and robots: what is counted before anything is built ----------------------------------
 
-MAX_MESH_MB = 50
 # of one mesh file, each placing of a mesh counted: 2 s to read and to find the edges of
 MAX_TRIANGLES = 250_000
 MAX_MESH_PARTS = 5_000  # entries of any one list of a GLB file, and primitives, as often as placed
 MAX_SOLIDS = 1_000  # of an STL file, those between which there is text
 MAX_MESH_DEPTH = 50  # nodes of a GLB file below each other
 MAX_MESH_HEADER = {".glb": 12_000_000, ".ply": 65_536}  # bytes before the numbers
-MAX_PART_MB = 200  # of a part that is to be cut
 MAX_UPLOAD_BYTES = 11 * 2**20  # of one that a page sends, which is a third longer on its way
-MAX_PART_TRIANGLES = 2_000_000
+MAX_PART_TRIANGLES = 2_000_000  # of a part that is to be cut
 MAX_LINKS = 2_000  # links of a URDF file
 MAX_SHAPES = 500  # shapes of its links
 MAX_URDF_ELEMENTS = 50_000

@@ -6,16 +6,17 @@ Geometry only: no forces, heat, wear or servo.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.options import File, option
+from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.bodies.gltf import to_gltf
 from warpspace.bodies.own_meshes import FORMATS, MM_PER_M, UNITS_MM
-from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import ErrorField
 from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
@@ -23,14 +24,11 @@ from warpspace.parts.inspection import FeatureResult, features_table, inspect
 from warpspace.parts.part import (
     PLACE_HELP,
     PLACE_UNSET,
-    Deviation,
     Made,
     PartMesh,
     Place,
-    deviation_of,
-    find_place,
+    find_part,
     fit_out,
-    load_part,
     make_points,
     place_part,
 )
@@ -38,12 +36,14 @@ from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MM_PER_UM, Array
 
+TRIANGLES_AT_ONCE = 200_000  # what lies between needs memory, too
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, kw_only=True)
 class Off:
     """How far the vertices of a part are from where they should be."""
 
-    deviation: Deviation
+    deviation: Statistics
     normal: Mapping[str, float]  # min_um and max_um along normals of triangles, at their corners
 
 
@@ -61,6 +61,8 @@ class Part(Analysis):
     name = "part"
     task = "measure"
     has_table = True
+    file_help = "Part as cut: .stl, .obj, .ply or .glb."
+    file_endings = tuple(FORMATS)
     file: File = option(
         None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
     )
@@ -71,77 +73,70 @@ class Part(Analysis):
     features: File = option(
         None, "Names and tolerances of its features, .toml", unset="all that are found"
     )
+    predistorted: bool = option(
+        False, "Write with -o the part to be asked for, so that the nominal one is cut"
+    )
     mesh: PartMesh | None = None  # one that is read already
     tolerances: tuple[str, str] | None = None  # name and text of features that are read already
 
     def run(self, scene: Scene, watch: Watch, /) -> "PartResult":
-        own = scene.part
-        if self.mesh is None and self.file is None:
-            if (path := own.path("file")) is None:
-                raise OptionError(
-                    "{file} is missing; expected a mesh, or a scene whose [part] has one"
-                )
-            beside = self.features or own.path("features")
-            unit: Any = self.unit or own.unit or None
-            return replace(self, file=path, features=beside, unit=unit).run(scene, watch)
-        mesh = self.mesh or load_part(str(self.file), self.unit)
+        mesh = self.mesh or find_part(scene, self.file, self.unit)
+        is_own = not (self.mesh or self.file)
+        features = self.features or (scene.part.path("features") if is_own else None)
         tolerances = self.tolerances
-        if self.features and not tolerances:
-            tolerances = self.features, read_text(Path(self.features), MAX_SCENE_BYTES)
+        if features and not tolerances:
+            tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
         watch(0.2)
-        place = find_place(mesh, scene, self.place)
-        part = place_part(mesh, scene, place)
+        part = place_part(mesh, scene, self.place)
         made = make_points(scene, part.vertices_mm)
         watch(0.5)
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        found = () if is_large else inspect(scene, mesh, made, tolerances)
-        cut, placed = _off(part, made.error_um, fit_out(made.point_mm, made.error_um))
+        placed_um = fit_out(made.point_mm, made.error_um)
+        cut, placed = _off(part, made, made.error_um, placed_um)
         return PartResult(
             vertices=len(mesh.vertices_mm),
             outside=int(made.outside.sum()),
-            deviation=cut.deviation,
-            normal=cut.normal,
+            **vars(cut),
             placed=placed,
-            features=found,
-            title=scene.title,
-            place=place,
-            unit=self.unit,
+            features=() if is_large else inspect(scene, mesh, made, tolerances),
             part=part,
             made=made,
+            scene=scene,
+            asked=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
 
 
-def _off(part: PartMesh, *errors_um: Array) -> list[Off]:
+def _off(part: PartMesh, made: Made, *errors_um: Array) -> Iterator[Off]:
     """Sum errors of the vertices up, [V, 3] each."""
+    from trimesh import triangles
+
     spans = np.array([[np.inf, -np.inf]] * len(errors_um))
-    for some in part.pieces():
+    for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
+        some = part.triangles[first : first + TRIANGLES_AT_ONCE]
+        normals, is_valid = triangles.normals(part.vertices_mm[some])
         for span, error in zip(spans, errors_um, strict=True):
-            away = np.einsum("tcx,tx->tc", error[some.triangles], some.normals)
-            span[:] = min(span[0], away.min()), max(span[1], away.max())
-    both = zip(errors_um, spans.tolist(), strict=True)
-    return [
-        Off(deviation_of(part.vertices_mm, error), {"min_um": low, "max_um": high})
-        for error, (low, high) in both
-    ]
+            away = np.einsum("tcx,tx->tc", error[some[is_valid]], normals)
+            span[:] = away.min(initial=span[0]), away.max(initial=span[1])
+    for (low, high), error in zip(spans.tolist(), errors_um, strict=True):
+        field = ErrorField(made.point_mm, error, np.broadcast_to(np.nan, error.shape))
+        normal = {"min_um": low, "max_um": high}
+        yield Off(deviation=statistics(field, made.coordinates), normal=normal)
 
 
 @dataclass(frozen=True, kw_only=True)
-class PartResult(Result):
+class PartResult(Off, Result):
     """A part as it is cut."""
 
     keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
     vertices: int
     outside: int  # vertices beyond the travel
-    deviation: Deviation
-    normal: Mapping[str, float]
     placed: Off
     features: Sequence[FeatureResult]
-    title: str
-    place: tuple[float, ...]  # (6,), mm and degrees
-    unit: str | None  # of the numbers in its file; None for that of the format
     part: PartMesh  # nominal, in the workpiece frame
     made: Made  # its vertices
+    scene: Scene
+    asked: Part
 
     def doubts(self) -> Iterator[str]:
         yield from self.part.warnings
@@ -158,35 +153,26 @@ class PartResult(Result):
 
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.deviation.max_at_mm
-        yield f"{self.title} · {self.part.name}, {self.vertices:,} vertices"
-        yield f"  clamped at {', '.join(f'{value:.6g}' for value in self.place)} mm and degrees"
+        at = ", ".join(f"{value:.6g}" for value in self.part.place)
+        yield f"{self.scene.title} · {self.part.name}, {self.vertices:,} vertices"
+        yield f"  clamped at {at} mm and degrees"
         yield f"  largest |E| {self.deviation.max_um:.2f} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
         yield "  Geometry only: no forces, heat, wear or servo"
-        both = ("as cut", Off(self.deviation, self.normal)), ("placed", self.placed)
+        both = ("as cut", self), ("placed", self.placed)
         rows = [(word, *astuple(one.deviation)[:4], *one.normal.values()) for word, one in both]
         heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
         yield features_table(self.features)
 
-
-def bent_file(scene: Scene, found: PartResult, ending: str, *, predistorted: bool = False) -> bytes:
-    """Spell a part as it is cut, in its own frame and unit, as a file of this ending.
-
-    Predistorted it is the part to be asked for, so that the nominal one is cut.
-    """
-    import trimesh
-
-    nominal, moved = found.made.point_mm, found.made.error_um * MM_PER_UM
-    if predistorted:
-        for _ in range(2):
-            moved = -make_points(scene, nominal + moved).error_um * MM_PER_UM
-    own = transforms.inverse(transforms.placed(found.place[:3], found.place[3:]))
-    point = transforms.apply(own, nominal + moved)
-    unit, up = FORMATS[ending]
-    if up == "y":
-        point = to_gltf(point) * MM_PER_M
-    mesh = trimesh.Trimesh(
-        point / UNITS_MM[found.unit or unit], found.part.triangles, process=False
-    )
-    spelled: Any = mesh.export(file_type=ending[1:])
-    return spelled.encode() if isinstance(spelled, str) else spelled
+    def texts(self, ending: str = "", /) -> Mapping[str, bytes | str]:
+        """Spell the part in its own frame and unit: as it is cut, or so that it is cut nominal."""
+        nominal, moved = self.made.point_mm, self.made.error_um * MM_PER_UM
+        for _ in range(2 * self.asked.predistorted):
+            moved = -make_points(self.scene, nominal + moved).error_um * MM_PER_UM
+        place, (unit, up) = self.part.place, FORMATS[ending]
+        own = transforms.inverse(transforms.placed(place[:3], place[3:]))
+        point = transforms.apply(own, nominal + moved)
+        if up == "y":
+            point = to_gltf(point) * MM_PER_M
+        cut = replace(self.part, vertices_mm=point / UNITS_MM[self.part.unit or unit])
+        return {"": cut.surface.export(file_type=ending[1:])}

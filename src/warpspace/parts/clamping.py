@@ -4,8 +4,9 @@ Fixtures and collisions are not looked at. Geometry only: no forces, heat, wear 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
+from operator import attrgetter
 from typing import Literal
 
 import numpy as np
@@ -13,21 +14,20 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.options import File, option
-from warpspace.bench.placing import following_axes
+from warpspace.bench.placing import ball_point, following_axes
 from warpspace.exceptions import OptionError
-from warpspace.kinematics import transforms
-from warpspace.kinematics.model import Loop
+from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.parts.part import (
     PLACE_HELP,
     PLACE_UNSET,
+    PartMesh,
     Place,
-    find_place,
+    find_part,
     fit_out,
-    load_part,
     make_points,
+    place_part,
 )
 from warpspace.scene.model import Scene, second_order
-from warpspace.units import Array
 
 SEARCHED = 800  # vertices that tell where a part deviates least; all do at the best places
 RIVALS = 3  # best places of the search that are judged by all vertices
@@ -43,6 +43,10 @@ class Clamping:
     max_um: float
     placed_um: float  # after the best rigid fit
     outside: int  # vertices beyond the travel
+
+
+JUDGED = attrgetter("max_um"), attrgetter("placed_um")
+"""What is judged: as the part lies, and placed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,78 +71,55 @@ class Clamp(Analysis):
     turns: Literal["none", "C", "all"] = option(
         "none", "Orientations allowed: this one, 90° steps about z, or all 24"
     )
-    grid: int = option(7, "Places along each axis of the plane", low=1, high=31)
-    heights: int = option(1, "Places along the third; 1 for that of its lower side", low=1, high=31)
+    grid: int = option(7, "Places along x and along y", low=2, high=31)
     placed: bool = option(False, "Judge what is left after the best rigid fit of the part")
 
     def run(self, scene: Scene, watch: Watch, /) -> "ClampResult":
-        if (path := self.file or scene.part.path("file")) is None:
-            raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
-        mesh = load_part(path, self.unit or ("" if self.file else scene.part.unit) or None)
-        own, present = mesh.vertices_mm, find_place(mesh, scene, self.place)
-        a, b, c = present[3:]
-        turns = [(a, b, c + 90.0 * quarter) for quarter in range(1 if self.turns == "none" else 4)]
-        if self.turns == "all":
-            turns = [(*tilt, c) for tilt, (_, _, c) in product(TILTS, turns)]
-        level = _turned(own, present)[:, 2].min() + present[2]
+        mesh = find_part(scene, self.file, self.unit)
+        part = place_part(mesh, scene, self.place)
+        a, b, c = part.place[3:]
+        tilts = TILTS if self.turns == "all" else [(a, b)]
+        quarters = range(1 if self.turns == "none" else 4)
+        names = following_axes(scene.model)
+        ends = np.array([*product(*(scene.machine.axes[name].travel for name in names))])
+        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+        reach = ball_point(scene.model, {**stand, **dict(zip(names, ends.T, strict=True))})
+        level, places = part.vertices_mm[:, 2].min(), list[tuple[float, ...]]()
+        for tilt, quarter in product(tilts, quarters):
+            turn = (*tilt, c + 90.0 * quarter)
+            turned = place_part(mesh, scene, (0.0, 0.0, 0.0, *turn)).vertices_mm
+            low, high = (end(reach, axis=0) - end(turned, axis=0) for end in (np.min, np.max))
+            z = float(np.clip(level - turned[:, 2].min(), low[2], high[2]))
+            grid = np.linspace(low[:2], high[:2], self.grid).T.tolist()
+            places += [(x, y, z, *turn) for x, y in product(*grid)]
+        own, found = mesh.vertices_mm, list[Clamping]()
         outermost = np.random.default_rng(0).standard_normal((3, SEARCHED // 4))
         every = range(0, len(own), -(-len(own) // SEARCHED))
-        some = own[np.unique([*np.argmax(own @ outermost, axis=0), *every])]
-        places = [
-            (*shift, *map(float, turn))
-            for turn in turns
-            for shift in self.shifts(scene, _turned(own, (0, 0, 0, *turn)), [*present[:2], level])
-        ]
-        found: list[Clamping] = []
+        some = replace(mesh, vertices_mm=own[[*np.argmax(own @ outermost, axis=0), *every]])
         for number, place in enumerate(places):
-            found.append(_judge(scene, some, place))
+            found.append(_judge(scene, place_part(some, scene, place)))
             watch((number + 1) / len(places))
+        judged = JUDGED[self.placed]
+        found = sorted((one for one in found if not one.outside), key=judged)
         if not found:
             raise OptionError(f"{mesh.name} fits nowhere into the travel of {scene.machine.chain}")
-
-        def worst(one: Clamping) -> float:
-            return one.placed_um if self.placed else one.max_um
-
-        found.sort(key=worst)
         now, *best = (
-            _judge(scene, own, at) for at in (present, *(one.place for one in found[:RIVALS]))
+            _judge(scene, place_part(mesh, scene, at))
+            for at in (part.place, *(one.place for one in found[:RIVALS]))
         )
-        first = min(best if now.outside else [now, *best], key=worst)
+        first = min(now, *best, key=lambda one: (one.outside > 0, judged(one)))
         return ClampResult(
-            places=found, best=first, present=now, gain_um=worst(now) - worst(first),
+            places=found, best=first, present=now, gain_um=judged(now) - judged(first),
             title=f"{scene.title} · {mesh.name}", placed=self.placed,
             second_order=second_order(scene, Loop.RELATIVE),
         )  # fmt: skip
 
-    def shifts(self, scene: Scene, turned_mm: Array, lowest_mm: list[float]) -> list[list[float]]:
-        """Give the shifts of a grid that keep a turned part within the travel, mm."""
-        names = following_axes(scene.model)
-        at = make_points(scene, np.vstack([np.zeros(3), np.eye(3)])).coordinates
-        zero, *rows = np.stack([at[name] for name in names], axis=-1)
-        rows = (np.array(rows) - zero).T  # positions of the axes at p of w are zero + rows · p
-        reached = zero + turned_mm @ rows.T
-        low, high = np.array([scene.machine.axes[name].travel for name in names]).T
-        low, high = low - reached.min(axis=0), high - reached.max(axis=0)
-        up = int(np.argmax(np.abs(rows[:, 2])))
-        counts = [self.heights if axis == up else self.grid for axis in range(3)]
-        shares = [np.linspace(0.0, 1.0, n) if n > 1 else np.array([0.5]) for n in counts]
-        moves = [low[axis] + share * (high - low)[axis] for axis, share in enumerate(shares)]
-        if self.heights == 1:
-            kept = rows[up] @ (lowest_mm - np.array([0.0, 0.0, turned_mm[:, 2].min()]))
-            moves[up] = np.clip([kept], low[up], high[up])
-        fits = bool((low <= high).all())
-        return (np.array([*product(*moves)]) @ np.linalg.inv(rows).T).tolist() if fits else []
 
-
-def _turned(own_mm: Array, place: tuple[float, ...]) -> Array:
-    return transforms.apply(transforms.placed(np.zeros(3), place[3:]), own_mm)
-
-
-def _judge(scene: Scene, own_mm: Array, place: tuple[float, ...]) -> Clamping:
-    made = make_points(scene, _turned(own_mm, place) + place[:3])
+def _judge(scene: Scene, part: PartMesh) -> Clamping:
+    made = make_points(scene, part.vertices_mm)
     both = made.error_um, fit_out(made.point_mm, made.error_um)
     most, placed = (float(np.linalg.norm(error, axis=1).max()) for error in both)
-    return Clamping(place, most, placed, int(made.outside.sum()))
+    return Clamping(part.place, most, placed, int(made.outside.sum()))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,9 +148,8 @@ class ClampResult(Result):
         told = [("present", self.present), ("best", self.best), *(("", x) for x in self.places)]
         rows = [(word, *one.place, one.max_um, one.placed_um) for word, one in told]
         yield Table(columns, rows[:SHOWN], file_rows=rows)
-        first = self.places[0].place
-        here = [one for one in self.places if np.allclose(one.place[2:], first[2:], atol=1e-6)]
-        um = np.array([one.placed_um if self.placed else one.max_um for one in here])
+        here = [one for one in self.places if one.place[2:] == self.places[0].place[2:]]
+        um = np.array([*map(JUDGED[self.placed], here)])
         where = np.array([one.place[:2] for one in here])
         edges = np.linspace(um.min(), um.max(), CLASSES + 1)
         which = np.clip(np.searchsorted(edges, um) - 1, 0, CLASSES - 1)

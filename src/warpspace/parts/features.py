@@ -151,10 +151,10 @@ class _Surfaces:
 
     def __init__(self, mesh: PartMesh) -> None:
         self.mesh = mesh
-        self.area = np.linalg.norm(mesh.areas_mm2, axis=1)
+        self.area, self.normals = mesh.surface.area_faces, mesh.surface.face_normals
         self.rounding_mm = FINE * float(np.abs(mesh.vertices_mm).max())
-        one, other = (edge // 3 for edge in mesh.neighbours)
-        cosine = np.einsum("ec,ec->e", mesh.normals[one], mesh.normals[other])
+        one, other = mesh.surface.face_adjacency.T
+        cosine = np.einsum("ec,ec->e", self.normals[one], self.normals[other])
         is_smooth = cosine > np.cos(np.deg2rad(SMOOTH_DEG))
         self.pairs = np.stack([one[is_smooth], other[is_smooth]], axis=-1)
         self.facet_of = self._joined(self.pairs[cosine[is_smooth] > np.cos(FLAT_RAD)])
@@ -199,7 +199,7 @@ class _Surfaces:
 
     def _start(self, kind: str, part: Indices) -> Shape:
         """Guess a shape from its triangles: their normals meet in its axis or its centre."""
-        normal, weight = self.mesh.normals[part], self.area[part] / self.area[part].sum()
+        normal, weight = self.normals[part], self.area[part] / self.area[part].sum()
         place = self.mesh.vertices_mm[self.mesh.triangles[part]].mean(axis=1)
         centre, mean = weight @ place, weight @ normal
         # normals are square to the axis of a cylinder, and on a circle about that of a cone
@@ -228,7 +228,7 @@ class _Surfaces:
         """Fit a shape; None where normals of the triangles or vertices are off it."""
         triangles, area = self.mesh.triangles[part], self.area[part]
         below = start.respond(self.mesh.vertices_mm[triangles].mean(axis=1)).normal
-        turned = np.sum(below * self.mesh.normals[part], axis=1)
+        turned = np.sum(below * self.normals[part], axis=1)
         odd = turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))
         if area @ odd > ODD * area.sum():
             return None

@@ -5,7 +5,7 @@ linear axes bring the tool to the point and the rotary axes stand as they do in 
 as cut is the nominal one plus that error. Geometry only: no forces, heat, wear or servo.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,19 +16,19 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.options import Grammar
 from warpspace.bench.placing import ball_point, follow, within_travel
-from warpspace.bodies.mesh import CREASE_DEG, OF_PART, open_meshes, parse_meshes
-from warpspace.bodies.own_meshes import check_format, join_meshes
+from warpspace.bodies.mesh import CREASE_DEG
+from warpspace.bodies.own_meshes import read_mesh
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, build_basis
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.machine.limits import MAX_LENGTH_MM
+from warpspace.machine.limits import MAX_LENGTH_MM, MAX_PART_TRIANGLES
 from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene, evaluate
 from warpspace.units import Array
 
-POINTS_AT_ONCE, TRIANGLES_AT_ONCE = 50_000, 200_000  # what lies between needs memory, too
+POINTS_AT_ONCE = 50_000  # what lies between needs memory, too
 
 
 class Corners(NamedTuple):
@@ -47,133 +47,52 @@ class PartMesh:
     name: str
     vertices_mm: Array  # [V, 3]
     triangles: NDArray[np.int32]  # [T, 3]
+    unit: str | None = None  # of the numbers in its file; None for that of the format
     warnings: tuple[str, ...] = ()  # open, inverted, crooked: shown and said
-
-    def pieces(self) -> "Iterator[PartMesh]":
-        """Give some triangles at a time: what is computed of them needs memory, too."""
-        for first in range(0, len(self.triangles), TRIANGLES_AT_ONCE):
-            some = self.triangles[first : first + TRIANGLES_AT_ONCE]
-            yield PartMesh(self.name, self.vertices_mm, some)
+    place: tuple[float, ...] = (0.0,) * 6  # where it is clamped, mm and degrees
 
     @cached_property
-    def areas_mm2(self) -> Array:
-        """Area times unit normal of the triangles, [T, 3], outwards."""
-        first, second, third = (
-            np.take(self.vertices_mm, self.triangles[:, at], axis=0) for at in range(3)
-        )
-        return np.cross(second - first, third - first) / 2.0
+    def surface(self) -> Any:
+        """The same as a mesh of trimesh, which knows its normals and neighbours."""
+        from trimesh import Trimesh
 
-    @cached_property
-    def normals(self) -> Array:
-        """Unit normals of the triangles, [T, 3], outwards; zero for slivers without area."""
-        length = np.linalg.norm(self.areas_mm2, axis=1, keepdims=True)
-        return self.areas_mm2 / np.where(length > 0.0, length, 1.0)
-
-    @cached_property
-    def neighbours(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Edges where two triangles meet, [e] each: 3 × triangle + corner they begin at."""
-        edge = np.stack([self.triangles, np.roll(self.triangles, -1, axis=1)], -1).reshape(-1, 2)
-        low, high = edge.min(axis=1).astype(np.int64), edge.max(axis=1)
-        order = np.argsort(low * len(self.vertices_mm) + high, kind="stable")
-        one, other = order[:-1], order[1:]
-        is_same = (low[one] == low[other]) & (high[one] == high[other])
-        return one[is_same], other[is_same]
+        return Trimesh(self.vertices_mm, self.triangles, process=False)
 
     @cached_property
     def corners(self) -> Corners:
         """Vertices split at creases above `CREASE_DEG`."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
+        from trimesh import Trimesh, graph
 
-        count = len(self.triangles)
-        one, other = self.neighbours
-        cosine = np.sum(self.normals[one // 3] * self.normals[other // 3], axis=1)
-        joined = cosine > np.cos(np.deg2rad(CREASE_DEG))
-        sharp, one, other = one[~joined], one[joined], other[joined]
-        # an edge begins at its corner of the triangle and ends at the following one
-        begin, end = other, other // 3 * 3 + (other % 3 + 1) % 3
-        turned = self.triangles.reshape(-1)[one] != self.triangles.reshape(-1)[other]
-        rows = np.concatenate([one, one // 3 * 3 + (one % 3 + 1) % 3])
-        columns = [np.where(turned, end, begin), np.where(turned, begin, end)]
-        columns = np.concatenate(columns)
-        links = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(3 * count, 3 * count))
-        found, label = connected_components(links, directed=False)
-        vertex = np.empty(found, dtype=np.int32)
-        vertex[label] = self.triangles.reshape(-1)
-        area = np.repeat(self.areas_mm2, 3, axis=0)
-        normals = np.stack([np.bincount(label, area[:, at], found) for at in range(3)], -1)
-        length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return Corners(
-            vertex,
-            label.reshape(-1, 3).astype(np.int32),
-            normals / np.where(length > 0.0, length, 1.0),
-            label[np.stack([sharp, sharp // 3 * 3 + (sharp % 3 + 1) % 3], -1)].astype(np.int32),
-        )
+        surface, vertex = self.surface, self.triangles.reshape(-1)
+        faces, ends = surface.face_adjacency, surface.face_adjacency_edges
+        # which corner of each of its two triangles is at each end of an edge, [e, 2 ends, 2]
+        is_there = self.triangles[faces][:, None] == ends[:, :, None, None]
+        corner = 3 * faces[:, None] + is_there.argmax(axis=-1)
+        is_sharp = surface.face_adjacency_angles > np.deg2rad(CREASE_DEG)
+        joined = corner[~is_sharp].reshape(-1, 2)
+        label = graph.connected_component_labels(joined, node_count=len(vertex))
+        corner_of = np.empty(label.max() + 1, np.int32)
+        corner_of[label] = vertex
+        split = Trimesh(self.vertices_mm[corner_of], label.reshape(-1, 3), process=False)
+        triangles = label.reshape(-1, 3).astype(np.int32)
+        creases = label[corner[is_sharp][..., 0]].astype(np.int32)
+        return Corners(corner_of, triangles, split.vertex_normals, creases)
 
 
-def load_part(path: str | Path, unit: str | None = None) -> PartMesh:
-    """Read a mesh from a file: .stl, .obj, .ply in mm, .glb in m unless a unit is given."""
+def load_part(path: str | Path, unit: str | None = None, data: bytes | None = None) -> PartMesh:
+    """Read a mesh from a file, or from its bytes: in mm, .glb in m, unless a unit is given."""
     path = Path(path)
-    found = open_meshes(path, check_format(path, unit), OF_PART)
-    return _build(join_meshes(found, path, unit), path)
+    mesh, said = read_mesh(path, unit, most=MAX_PART_TRIANGLES, data=data)
+    vertices, triangles = np.asarray(mesh.vertices), mesh.faces.astype(np.int32)
+    return PartMesh(path.stem, vertices, triangles, unit, said)
 
 
-def parse_part(data: bytes, name: str, unit: str | None = None) -> PartMesh:
-    """Read a mesh from the bytes of a file of this name."""
-    path = Path(name)
-    found = parse_meshes(data, path, check_format(path, unit), OF_PART)
-    return _build(join_meshes(found, path, unit), path)
-
-
-def _build(mesh: Any, path: Path) -> PartMesh:
-    vertices, triangles = np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int32)
-    if len(vertices) > len(triangles) or len(loose := _loose_edges(triangles)):
-        vertices, numbers = _merge(vertices)
-        triangles = numbers[triangles]
-        loose = _loose_edges(triangles)
-    is_flat = (triangles == np.roll(triangles, 1, axis=1)).any(axis=1)
-    if is_flat.all():
-        raise OptionError(f"{path}: all of its triangles are points or lines")
-    if is_flat.any():
-        triangles = triangles[~is_flat]
-    part = PartMesh(path.stem, vertices, triangles)
-    if len(loose):
-        said = (
-            f"{path}: the surface is not closed, or its triangles do not agree on the outside"
-            f" ({len(loose):,} edges); it is taken as it is"
-        )
-        return replace(part, warnings=(said,))
-    volume = 0.0
-    for some in part.pieces():
-        lever = np.take(vertices, some.triangles[:, 0], axis=0) - vertices[0]
-        volume += float(np.einsum("ij,ij", lever, some.areas_mm2))
-    if volume >= 0.0:
-        return part
-    said = f"{path}: its triangles face inwards; they are turned outwards"
-    return PartMesh(path.stem, vertices, triangles[:, ::-1].copy(), (said,))
-
-
-def _loose_edges(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
-    """List edges that are not passed as often in one direction as in the other."""
-    end = np.roll(triangles, 1, axis=1)
-    edge = np.minimum(triangles, end) * (np.int64(triangles.max()) + 1)
-    edge += np.maximum(triangles, end)
-    mixed = edge.astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
-    if mixed[triangles < end].sum() == mixed[triangles > end].sum():  # sums of hashes
-        return edge[:0, 0]
-    found, numbers = np.unique(edge, return_inverse=True)
-    balance = np.bincount(numbers.reshape(-1), np.sign(end - triangles).reshape(-1))
-    return found[balance != 0.0]
-
-
-def _merge(vertices: Array) -> tuple[Array, NDArray[np.int32]]:
-    """Give each place once, and its number for each vertex."""
-    order = np.lexsort(vertices.T)
-    is_first = np.append(True, np.diff(vertices[order], axis=0).any(axis=1))
-    numbers = np.empty(len(order), np.int32)
-    numbers[order] = np.cumsum(is_first) - 1
-    return vertices[order[is_first]], numbers
+def find_part(scene: Scene, file: str | None, unit: str | None) -> PartMesh:
+    """Read the mesh of a file, or that of a scene where none is named."""
+    own = scene.part
+    if (path := file or own.path("file")) is None:
+        raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
+    return load_part(path, unit or (None if file else own.unit or None))
 
 
 PLACE_HELP = (
@@ -197,30 +116,15 @@ def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
 Place: TypeAlias = Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)]
 
 
-def find_place(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> tuple[float, ...]:
-    """Give all six numbers of a place, mm and degrees; see `place_part`."""
-    place = scene.part.place if place is None else place
-    if place is not None:
-        return (*place, 0.0, 0.0, 0.0)[:6]
-    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-    box = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
-    return (*(ball_point(scene.model, stand) - box).tolist(), 0.0, 0.0, 0.0)
-
-
-def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None) -> PartMesh:
-    """Put a part into the workpiece frame.
-
-    Parameters
-    ----------
-    mesh : PartMesh
-    scene : Scene
-    place : sequence of float, (3,) or (6,), or None
-        Shift in mm and turns in degrees about the fixed x, y, z in that order; None puts it
-        where the scene says, or the middle of its box into the middle of the working volume.
-    """
-    at = find_place(mesh, scene, place)
+def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = None) -> PartMesh:
+    """Put a part into the workpiece frame: where told, else as the scene says, or in its middle."""
+    at = scene.part.place if place is None else (*place, 0.0, 0.0, 0.0)[:6]
+    if at is None:
+        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+        box = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
+        at = (*(ball_point(scene.model, stand) - box).tolist(), 0.0, 0.0, 0.0)
     pose = transforms.placed(at[:3], at[3:])
-    return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm))
+    return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm), place=at)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,27 +172,3 @@ def fit_out(point_mm: Array, error_um: Array) -> Array:
     # points on a line do not tell the turn about it: the smallest one counts
     turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)
     return error_um - shift - np.cross(turn[..., None, :], arm)
-
-
-@dataclass(frozen=True)
-class Deviation:
-    """How long errors are, each point counting once."""
-
-    mean_um: float
-    rms_um: float
-    p95_um: float
-    max_um: float
-    max_at_mm: tuple[float, float, float]  # nominal, w
-
-
-def deviation_of(point_mm: Array, error_um: Array) -> Deviation:
-    length = np.sqrt(np.einsum("ij,ij->i", error_um, error_um))
-    worst = int(np.argmax(length))
-    x, y, z = point_mm[worst].tolist()
-    return Deviation(
-        mean_um=float(length.mean()),
-        rms_um=float(np.sqrt(np.mean(length * length))),
-        p95_um=float(np.percentile(length, 95.0)),
-        max_um=float(length[worst]),
-        max_at_mm=(x, y, z),
-    )

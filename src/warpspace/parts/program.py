@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch, plain
 from warpspace.analysis.options import File, option, place_words
-from warpspace.analysis.statistics import P95, Summary
+from warpspace.analysis.statistics import P95, Statistics, Summary
 from warpspace.bench.placing import ball_point, follow, within_travel
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import amplitudes_of, build_basis, evaluate_first_order
@@ -27,7 +27,6 @@ from warpspace.machine.axes import is_linear
 from warpspace.machine.description import Axis
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
 from warpspace.parts.control import ReadProgram, Setup, read_program, upright, with_length
-from warpspace.parts.part import Deviation
 from warpspace.parts.words import program_lines
 from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.units import Array
@@ -242,12 +241,12 @@ class Program(Setup, Analysis):
         norm, across = (np.linalg.norm(one, axis=1) for one in (path.error_um, path.across_um))
         order = np.lexsort((-norm, path.line))
         block = order[np.unique(path.line[order], return_index=True)[1]]
-        mean, rms, p95, largest = astuple(path.summary(norm))
-        x, y, z = path.tip_mm[int(np.argmax(norm))].tolist()
+        at, (mean, rms, p95, largest) = int(np.argmax(norm)), astuple(path.summary(norm))
+        x, y, z = path.tip_mm[at].tolist()
         return ProgramResult(
             read=read,
             path=path,
-            deviation=Deviation(mean, rms, p95, largest, (x, y, z)),
+            deviation=Statistics(mean, rms, p95, largest, (x, y, z), path.axes_at(at)),
             along=path.summary(np.sqrt(np.maximum(norm**2 - across**2, 0.0))),
             across=path.summary(across),
             worst=_split(scene, path, block[np.argsort(-norm[block], kind="stable")][:WORST]),
@@ -299,7 +298,7 @@ class ProgramResult(Result):
 
     read: ReadProgram
     path: ToolPath
-    deviation: Deviation
+    deviation: Statistics
     along: Summary
     across: Summary
     worst: tuple[WorstBlock, ...]
@@ -308,7 +307,7 @@ class ProgramResult(Result):
     scene: Scene
     asked: Program
 
-    def texts(self) -> Mapping[str, str]:
+    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
         from warpspace.parts.correction import correct_program
 
         lines = [*self.asked.lines()]

@@ -146,7 +146,8 @@ def test_an_open_surface_is_a_warning(tmp_path):
     found = load_mesh(written(tmp_path / "open.stl", mesh), "R")
     assert len(found.body.triangles) == 11
     (warning,) = found.warnings
-    assert "open.stl: the surface is not closed (3 open edges)" in warning
+    assert "open.stl: the surface is not closed" in warning
+    assert "(3 open edges)" in warning
 
 
 def test_a_surface_turned_inside_out_is_turned_back(tmp_path):

@@ -52,7 +52,7 @@ def test_all_places_are_within_the_travel_in_all_orientations(tmp_path):
     path = tmp_path / "part.stl"
     path.write_text(build_piece("contour").texts()[".stl"])
     scene = warpspace.load_scene("dvf5000_first")
-    found = warpspace.clamp(scene, file=str(path), turns="all", grid=2, heights=2)
+    found = warpspace.clamp(scene, file=str(path), turns="all", grid=2)
     assert len({one.place[3:] for one in found.places}) == 24
     mesh = load_part(path)
     for one in found.places[::17]:

@@ -16,7 +16,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.parts.control import read_program
-from warpspace.parts.part import Made, PartMesh, find_place, make_points, place_part, point_basis
+from warpspace.parts.part import Made, PartMesh, make_points, place_part, point_basis
 from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
@@ -38,7 +38,6 @@ class InBox(Generic[T]):
     made: Made  # its points there
     pose: Array  # [4, 4]; of that frame
     at: NDArray[Any]  # points of the corners of a part, [W], or of both ends of pieces of path
-    place: tuple[float, ...]  # (6,), of a part
     nominal_mm: Floats  # [n, 3]
     response: Floats  # [K, n * 3], µm per µm or µrad
     error_um: Floats  # [n, 3]; of the tool against the workpiece
@@ -84,10 +83,9 @@ def part_in_box(state: AppState) -> InBox[PartMesh] | None:
         return None
 
     def clamp(scene: Scene) -> InBox[PartMesh]:
-        place = find_place(mesh, scene, wanted)
-        part = place_part(mesh, scene, place)
+        part = place_part(mesh, scene, wanted)
         made = make_points(scene, part.vertices_mm)
-        return _respond(scene, part, made, part.corners.corner_of, place)
+        return _respond(scene, part, made, part.corners.corner_of)
 
     return _with_errors(state, (Identity(mesh), wanted), clamp)
 
@@ -122,9 +120,7 @@ def _with_errors(
         return None
 
 
-def _respond(
-    scene: Scene, of: T, made: Made, at: NDArray[Any], place: tuple[float, ...] = ()
-) -> InBox[T]:
+def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> InBox[T]:
     """Work out what does not depend on errors."""
     count, keys = len(made.point_mm), scene.parameter_keys
     if count > MOST_POINTS:
@@ -137,7 +133,7 @@ def _respond(
         response[:, rows] = point_basis(scene, made, rows=rows).position @ pose[:3, :3].T
     nominal = transforms.apply(pose, made.point_mm).astype(np.float32)
     flat = response.reshape(len(keys), -1)
-    return InBox(of, made, pose, at, place, nominal, flat, nominal)
+    return InBox(of, made, pose, at, nominal, flat, nominal)
 
 
 # --- Where it is clamped --------------------------------------------------------------------------
@@ -150,7 +146,7 @@ def middle_mm(part: InBox[PartMesh]) -> Array:
 
 def moved_place(part: InBox[PartMesh], stand: Array) -> tuple[float, ...]:
     """Give the place of a part whose middle is moved and turned in the workpiece frame, [4, 4]."""
-    own = transforms.placed(part.place[:3], part.place[3:])
+    own = transforms.placed(part.of.place[:3], part.of.place[3:])
     pose = stand @ transforms.translation(-middle_mm(part)) @ own
     angles = transforms.roll_pitch_yaw_deg(pose[:3, :3])
     return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())

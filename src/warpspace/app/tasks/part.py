@@ -34,7 +34,7 @@ from warpspace.app.tasks.parts import actions
 from warpspace.kinematics import transforms
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
 from warpspace.parts.as_cut import PartResult
-from warpspace.parts.part import find_place, parse_part
+from warpspace.parts.part import load_part, place_part
 from warpspace.scene.model import Scene
 
 SETTINGS = ("part.place", "part.shown", "part.normal", "part.moved")
@@ -110,7 +110,7 @@ class PartPart(InBoxPart):
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name != "place"]
+        return [one for one in super().options() if one.name not in ("place", "predistorted")]
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked: Any = super().ask(state, values, scenes)
@@ -155,10 +155,11 @@ class PartPart(InBoxPart):
             self._files = (Held(name, upload_text(content, name, "file of tolerances")),)
             return
         self._sent, state = (name, content), self.context.state
-        mesh = parse_part(content, name, option_values(state, self.name).get("unit") or None)
+        mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
         place = state.part.place if name == state.part.name else None
         if place is None:
-            place = tuple(round(at, 3) for at in find_place(mesh, clamped_scene(state), None))
+            place = place_part(mesh, clamped_scene(state)).place
+            place = tuple(round(at, 3) for at in place)
         self.show(mesh, name, place=place)
 
 

@@ -209,7 +209,7 @@ class Compensation(BeforeAfter, Result):
     def bytes(self) -> int:
         return sum(len(text.encode()) for text in self.files.values())
 
-    def texts(self) -> Mapping[str, str]:
+    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
         return self.files
 
     def as_json(self) -> dict[str, Any]:
