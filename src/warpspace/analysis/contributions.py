@@ -26,8 +26,9 @@ from warpspace.kinematics.model import Coordinates, Model
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import Array, spell_signed
 
+LEAST_SHOWN = 0.005  # µm or µrad of a budget that is named
 CHECK_MACHINES = 20_000
 CHECK_NODES = 512
 SOBOL_NODES = 5
@@ -310,3 +311,9 @@ def explain(
         tuple(parts),
         exact.error_um - total,
     )
+
+
+def budget_words(budget: Mapping[str, float], most: int = 3) -> str:
+    """Name the parameters that add most to a number, the largest first, µm or µrad."""
+    shown = [(key, part) for key, part in budget.items() if abs(part) >= LEAST_SHOWN]
+    return ", ".join(f"{key} {spell_signed(part)}" for key, part in shown[:most])

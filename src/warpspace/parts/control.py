@@ -1,4 +1,4 @@
-"""A program as a control runs it: modal words, and the moves that they come to.
+"""A program as a control runs it: words of G-code, and the moves that they come to.
 
 **Words** are axis positions plus the active offset; after G53 they are axis positions. A tool of
 length L reaches L beyond the scene's tool point, against the tool axis: tip = tool point − L · tool
@@ -17,63 +17,71 @@ G28 goes to axis positions zero, or to the end of the travel that is nearest.
 import re
 from array import array
 from cmath import phase
-from collections.abc import Generator, Iterable, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from math import ceil, sqrt, tau
-from typing import Annotated, Literal
+from math import ceil, copysign, sqrt, tau
+from pathlib import Path
+from typing import Annotated, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.options import Grammar, option, read_numbers
 from warpspace.bench.placing import ball_point, follow, following_axes
+from warpspace.exceptions import SceneError
+from warpspace.formats.source import MAX_LINE, MAX_LINES
 from warpspace.kinematics.model import Model, complete_coordinates
-from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM, MAX_PATH_POINTS
-from warpspace.parts.words import Block, Reader, Refused
+from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM, MAX_PATH_POINTS, MAX_PROGRAM_BYTES
+from warpspace.scene.files import check_file
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 MM_PER_INCH = 25.4
-RADIUS_SLACK = 0.5, 0.005, 1e-3  # mm, and mm with share of the radius: both ends of an arc differ
+SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
 FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
 STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in other words
-PLANES = "YZ", "ZX", "XY"  # of arcs, by the direction across
+PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
 SYSTEMS = tuple(f"G{number}" for number in range(54, 60))
-_AXIS_LETTERS = frozenset("XYZUVWABC")
+CYCLES = "G81", "G82", "G83"
+MOST_SAID = 1000  # words that are listed as not understood
+MOST = 1e9  # largest number that is no position
+SHOWN = 40  # characters of a word that a message shows
+WORD = re.compile(
+    r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=])"  # a letter and its number
+    r"|\([^()]*\)|;.*"  # comments
+    r"|(\S[^\s(;]*)",  # anything else
+    re.IGNORECASE,
+)
+_TITLE = re.compile(r"%?\s*O\s*\d+\s*(\([^()]*\)\s*)*", re.IGNORECASE)  # number of a program
+_CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
+_AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _MODAL: Mapping[str, tuple[str, object]] = {
-    **{code: ("motion", code) for code in ("G0", "G1", "G2", "G3", "G81", "G82", "G83")},
+    **{code: ("motion", code) for code in ("G0", "G1", "G2", "G3", *CYCLES)},
     "G80": ("motion", "G0"),
     "G17": ("across", 2), "G18": ("across", 1), "G19": ("across", 0),
     "G20": ("unit_mm", MM_PER_INCH), "G21": ("unit_mm", 1.0),
     "G90": ("absolute", True), "G91": ("absolute", False),
-    "G90.1": ("absolute_centre", True), "G91.1": ("absolute_centre", False),
+    "G93": ("inverse_time", True), "G94": ("inverse_time", False), "G95": ("inverse_time", False),
     "G98": ("to_initial", True), "G99": ("to_initial", False),
     **{code: ("system", code) for code in SYSTEMS},
 }  # fmt: skip
+_OTHER = "4 9 15 28 40 43 43.4 49 50 53 61 61.1 64 67 69 91.1 96 97"
+_UNDERSTOOD = _MODAL.keys() | {f"G{number}" for number in _OTHER.split()}
+_BENDING = (
+    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 30 33 33.1 38.2 38.3 38.4 38.5"
+    " 41 41.1 42 42.1 43.1 43.2 43.5 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65 66 68 68.2 68.3 72"
+    " 73 74 76 84 85 86 87 88 89 90.1 92"
+)
+REFUSED = {"M96", "M97", "M98", "M99"} | {f"G{number}" for number in _BENDING.split()}
+"""Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
 
 
-def _offsets(text: str, scene: Scene) -> tuple[tuple[str, str, float], ...]:
-    found: list[tuple[str, str, float]] = []
-    system = ""
-    for part in filter(None, text.upper().replace(" ", "").split(",")):
-        given, _, word = part.rpartition("=")
-        system = given or system
-        read = re.fullmatch(r"([A-Z])([+-]?(?:\d+\.?\d*|\.\d+))", word)
-        if system not in SYSTEMS or not read or read[1] not in scene.machine.axes:
-            known = f"G54 to G59 and axes of {', '.join(scene.machine.axes)}"
-            raise ValueError(f"{part!r}; expected {known}, for instance G54=X10,Y-5.5")
-        found.append((system, read[1], float(read[2])))
-    return tuple(found)
-
-
-def _lengths(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
-    return tuple(read_numbers(text, "H=length", "H1=120,H2=85.5").items())
-
-
-Lengths = Annotated[tuple[tuple[str, float], ...], Grammar("H1=..,H2=..", _lengths, many=True)]
-Offsets = Annotated[tuple[tuple[str, str, float], ...], Grammar("G54=X..", _offsets, many=True)]
-"""Work offset, axis, and its position where the word is zero, mm or degrees."""
+def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
+    found = read_numbers(text, "G54X=position and H1=length", "G54X=10,H1=85.5")
+    for name in found:
+        if not re.fullmatch(rf"G5[4-9]({'|'.join(scene.machine.axes)})|H\d+", name):
+            raise ValueError(f"{name}; expected G54 to G59 with an axis of the machine, or H1")
+    return tuple(found.items())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +94,12 @@ class Setup:
     length_mm: float = option(
         0.0, "Length of the tool beyond the tool point of the scene", unit="mm", low=-1e4, high=1e4
     )
-    lengths: Lengths = option((), "Lengths of tools by their H", unset="--length for all")
-    offset: Offsets = option(
-        (), "Where the zero of the program is: axis positions by work offset", unset="at axes zero"
-    )
+    offset: Annotated[
+        tuple[tuple[str, float], ...], Grammar("G54X=..,H1=..", _offsets, many=True)
+    ] = option(
+        (), "Positions of axes where words of a work offset are zero, and lengths of tools by H",
+        unset="at axes zero; --length for all tools",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,45 +110,35 @@ class ReadProgram:
     line: NDArray[np.int64]  # [m], of the file, from 1; 0 for where the axes stand at first
     kind: NDArray[np.int64]  # [m]; STAND, RAPID, FEED or ARC
     tcp: NDArray[np.bool_]  # [m]
+    across: NDArray[np.int64]  # [m]; direction 0 to 2 about which an arc turns
     length_mm: Array  # [m], of the tool
+    turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
+    centre_mm: NDArray[np.complex128]  # [m]; of an arc, along the two axes of its `PLANES`
     # [m, a], mm and degrees; axis positions. With TCP those of the linear axes bring the scene's
     # tool point to where the tip is while rotary axes are at zero: see `upright`
     end: Array
-    across: NDArray[np.int64]  # [m]; direction 0 to 2 about which an arc turns
-    turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
-    centre_mm: Array  # [m, 2]; of an arc, along the two axes of its `PLANES`
-    refused: tuple[Refused, ...]  # the path ends before the first of them
+    refused: Mapping[int, str]  # words by their line; the path ends before the first of them
     unknown: Mapping[str, int]  # words that are not understood, to their first line
-
-    @property
-    def moves(self) -> NDArray[np.bool_]:
-        return self.kind != STAND
 
     @property
     def blocks(self) -> int:
         """How many lines move an axis."""
-        return len(np.unique(self.line[self.moves]))
+        return len(np.unique(self.line[self.kind != STAND]))
 
     def positions(self, move: NDArray[np.int64], share: Array) -> Array:
         """Give the positions of axes, as `end` has them, at shares of moves, [n, a]."""
         start, end = self.end[np.maximum(move - 1, 0)], self.end[move]
         at = start + share[:, None] * (end - start)
         (arc,) = np.nonzero(self.turn_rad[move])
+        move, share = move[arc], share[arc]
         columns = [[self.axes.index(x) if x in self.axes else 0 for x in names] for names in PLANES]
-        rows, plane = arc[:, None], np.array(columns)[self.across[move[arc]]]
-        first, last = (places[rows, plane] - self.centre_mm[move[arc]] for places in (start, end))
-        radius, further = np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1)
-        radius = radius + share[arc] * (further - radius)
-        angle = np.arctan2(first[:, 1], first[:, 0]) + share[arc] * self.turn_rad[move[arc]]
-        around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        at[rows, plane] = self.centre_mm[move[arc]] + radius[:, None] * around
+        rows, plane = arc[:, None], np.array(columns)[self.across[move]]
+        centre = self.centre_mm[move]
+        first, last = (places[rows, plane] @ [1.0, 1j] - centre for places in (start, end))
+        grown = 1.0 + share * (np.abs(last / first) - 1.0)
+        place = centre + first * grown * np.exp(1j * share * self.turn_rad[move])
+        at[rows, plane] = np.stack([place.real, place.imag], axis=-1)
         return at
-
-
-def upright(model: Model, words: Mapping[str, Array]) -> dict[str, Array]:
-    """Give where the axes stand at words of a program with TCP, were its rotary axes at zero."""
-    axes = model.machine.axes
-    return {name: at if axes[name].is_linear else np.zeros(()) for name, at in words.items()}
 
 
 def with_length(model: Model, length_mm: float) -> Model:
@@ -147,86 +147,167 @@ def with_length(model: Model, length_mm: float) -> Model:
     return replace(model, tool_point_mm=(x, y, z - length_mm))
 
 
+def upright(model: Model, words: Mapping[str, Array]) -> dict[str, Array]:
+    """Give where the axes stand at words of a program with TCP, were its rotary axes at zero."""
+    axes = model.machine.axes
+    return {name: at if axes[name].is_linear else np.zeros(()) for name, at in words.items()}
+
+
+def axes_at(model: Model, length_mm: float, words: Mapping[str, Array]) -> dict[str, Array]:
+    """Give where the axes stand at words of a program with TCP."""
+    return follow(with_length(model, length_mm), words, ball_point(model, upright(model, words)))
+
+
+def words_at(model: Model, tip_mm: Array, axes: Mapping[str, Array]) -> dict[str, Array]:
+    """Give the words of a program with TCP that lead the tip to a place, rotary axes to theirs."""
+    words = follow(model, upright(model, axes), tip_mm)
+    return {**axes, **{name: words[name] for name in following_axes(model)}}
+
+
+def program_lines(path: str | Path) -> Iterator[str]:
+    """Read the lines of a program one by one; bytes that are no UTF-8 stand in comments."""
+    check_file(Path(path), MAX_PROGRAM_BYTES, str(path))
+    try:
+        with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
+            yield from iter(lambda: file.readline(MAX_LINE + 1), "")
+    except OSError as error:
+        raise SceneError(str(path), [f"cannot be read: {error.strerror or error}"]) from None
+
+
 def read_program(
     scene: Scene, lines: Iterable[str], setup: Setup | None = None, name: str = "program"
 ) -> ReadProgram:
     """Run the lines of a program on the control of a machine; a `SceneError` names its line."""
-    reader = Reader(name)
-    control = Control(scene, setup or Setup(), reader)
-    for block in reader.blocks(lines):
-        control.run(block)
-    rows = np.frombuffer(control.rows).reshape(-1, 8 + len(control.names))
+    control = Control(scene, setup or Setup(), name)
+    for _ in control.run(lines):
+        pass
+    rows = np.frombuffer(control.rows).reshape(-1, control.width)
     line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
     return ReadProgram(
-        axes=control.names, line=line, kind=kind, tcp=tcp > 0, across=across, length_mm=rows[:, 4],
-        turn_rad=rows[:, 5], centre_mm=rows[:, 6:8], end=rows[:, 8:],
-        refused=tuple(reader.refused), unknown=reader.unknown,
+        control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
+        rows[:, 6] + 1j * rows[:, 7], rows[:, 8:], control.refused, control.unknown,
     )  # fmt: skip
 
 
 class Control:
-    """Modal words of a control, and where its axes stand."""
+    """Modal words of a control, where its axes stand, and the words of the line that it is at."""
 
-    def __init__(self, scene: Scene, setup: Setup, reader: Reader) -> None:
-        self.scene, self.setup, self.reader = scene, setup, reader
-        self.offset = {(system, axis): at for system, axis, at in setup.offset}
+    def __init__(self, scene: Scene, setup: Setup, name: str) -> None:
+        self.scene, self.setup, self.name = scene, setup, name
+        self.line, self.codes, self.words = 0, list[str](), dict[str, float]()
+        # spelled words and comments of a line by code or letter, and what skips it: "/"
+        self.tokens, self.skip = list[tuple[str, str]](), ""
+        self.refused, self.unknown = dict[int, str](), dict[str, int]()
+        self.offset = dict(setup.offset)
         self.names = tuple(scene.machine.axes)
         first = [axis[0] for axis in self.names]
         self.index = {x: first.index(x) for x in first if first.count(x) == 1}
         self.motion, self.system, self.across, self.unit_mm = "G0", "G54", 2, 1.0
-        self.absolute, self.absolute_centre, self.to_initial = True, False, True
-        self.is_compensated, self.tcp, self.length_mm = False, False, setup.length_mm
-        self.cycle: dict[str, float] = {}
-        self.rows, self.begun, self.block = array("d"), False, Block(reader.program, 0)
+        self.absolute, self.to_initial, self.inverse_time = True, True, False
+        self.is_compensated, self.has_blocks, self.begun = False, False, False
+        self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
+        self.rows, self.width = array("d"), 8 + len(self.names)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
         self.at = [float(stand[axis]) for axis in self.names]
-        self.switch(tcp=setup.tcp == "always", length_mm=self.length_mm)
-        if not self.rows:
-            self.record(STAND)
+        self.tcp, self.length_mm = False, setup.length_mm
+        self.record(STAND)
+        self.switch(tcp=setup.tcp == "always", length_mm=setup.length_mm)
 
-    def run(self, block: Block) -> None:
-        self.block, words, once = block, block.numbers, ""
-        if len(self.rows) > MAX_PATH_POINTS * (8 + len(self.names)):
-            block.refuse(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
-        for code in block.codes:
+    def run(self, lines: Iterable[str]) -> Iterator[str]:
+        """Do what lines say, and give them one by one, up to the first word that is refused."""
+        for line, raw in enumerate(lines, start=1):
+            self.line, self.codes, self.words, self.tokens = line, [], {}, []
+            text = raw.strip()
+            if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MOST_SAID:
+                most = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MOST_SAID:,} other words"
+                self.fail(f"is no program in G-code; expected at most {most}")
+            if text.startswith("%") and self.has_blocks:
+                return
+            if text.startswith("/"):
+                self.unknown.setdefault("/", line)
+                text = text.lstrip("/0123456789")
+            self.skip = raw.strip().removesuffix(text)
+            if self.has_blocks or not _TITLE.fullmatch(text):
+                for found in WORD.finditer(text.lstrip("%")):
+                    self.take(found)
+            if {"G5", "G5.1"} & {*self.codes} and {"X", "Y", "Z"} & self.words.keys():
+                self.refused[line] = "G5"  # a spline; without a place a look-ahead
+            self.has_blocks = self.has_blocks or bool(self.codes or self.words)
+            if not self.refused:
+                self.move()
+                yield raw
+            if {"M2", "M30"} & {*self.codes} or len(self.refused) > MOST_SAID:
+                return
+
+    def take(self, found: re.Match[str]) -> None:
+        """Take in a word or comment; where one is refused only others that are count."""
+        letter, number, other = ((group or "").upper() for group in found.groups())
+        value, is_code = float(number or 0.0), letter in {"G", "M"}
+        word = f"{letter}{value:g}" if is_code else (letter + number + other)[:SHOWN]
+        self.tokens.append((word if is_code else letter, found[0]))
+        if letter == "O" or word in REFUSED or (other and _CONTROL_FLOW.match(other)):
+            self.refused.setdefault(self.line, word)
+        elif is_code:
+            self.codes.append(word)
+            if letter == "G" and word not in _UNDERSTOOD:
+                self.unknown.setdefault(word, self.line)
+        elif letter in {"E", "L"} or (word[:2].isalpha() and len(word) > 1):
+            self.unknown.setdefault(word, self.line)
+        elif other and not self.refused:  # behind one may be a language that is not read
+            end = "the end of the comment" if word.startswith("(") else "a letter and a number"
+            self.fail(f"{word!r}; expected {end}")
+        elif letter in self.words and not self.refused:
+            self.fail(f"{word}; expected {letter} once in a line")
+        elif abs(value) > (most := MAX_LENGTH_MM if letter in _POSITIONS else MOST):
+            self.fail(f"{word}; expected at most ±{most:g}, mm or degrees")
+        elif letter:
+            self.words[letter] = value
+
+    def fail(self, problem: str) -> NoReturn:
+        raise SceneError(self.name, [f"line {self.line}: {problem}"])
+
+    def move(self) -> None:
+        """Do what the words of a line say."""
+        words, once = self.words, ""
+        if len(self.rows) > MAX_PATH_POINTS * self.width:
+            self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
+        for code in self.codes:
             if code in _MODAL:
                 setattr(self, *_MODAL[code])
             elif code in {"G43", "G43.4", "G49"}:
                 self.compensate(code)
             elif code in {"G4", "G28", "G53"}:
                 once = code
-        drills = self.motion in {"G81", "G82", "G83"}
-        self.cycle = self.cycle if drills else {}
-        letters = words.keys() & _AXIS_LETTERS
+        self.cycle = self.cycle if self.motion in CYCLES else {}
+        letters = words.keys() & _AXES
         if once == "G4":  # X is a time there
             return
         for letter in letters - self.index.keys():
-            self.refuse(letter, f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}")
+            known = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
+            self.fail(f"{letter}{words[letter]:g}; expected {known}")
         if once == "G28":
-            self.go_home(letters)
+            if letters and any(self.at[index] != at for index, at in self.target().items()):
+                self.line_to(self.target(), RAPID)
+            axes = {self.index[x]: self.names[self.index[x]] for x in letters or self.index}
+            travel = {index: self.scene.machine.axes[name].travel for index, name in axes.items()}
+            home = {index: min(max(0.0, low), high) for index, (low, high) in travel.items()}
+            self.line_to(home, RAPID, bare=True)
         elif once == "G53" and letters:
-            with self.bare_axes():
-                self.line_to(self.target(bare=True))
+            self.line_to({self.index[letter]: self.value(letter) for letter in letters}, bare=True)
         elif self.motion in {"G2", "G3"}:
             if letters or words.keys() & set("IJKR"):
                 self.arc_to(self.target())
-        elif letters and drills:
+        elif letters and self.motion in CYCLES:
             self.drill()
         elif letters:
             self.line_to(self.target())
 
-    def refuse(self, letter: str, expected: str) -> None:
-        value = self.block.numbers.get(letter)
-        word = letter if value is None else f"{letter}{value:g}"
-        self.block.refuse(f"{word}; expected {expected}")
-
     def compensate(self, code: str) -> None:
-        length, lengths = self.length_mm, dict(self.setup.lengths)
-        if code != "G49":
-            number = f"H{self.block.numbers.get('H', 0.0):g}"
-            if not (length := lengths.get(number, self.setup.length_mm)):
-                self.reader.unknown.setdefault(f"{number} without a length", self.block.line)
-        self.is_compensated = code != "G49"
+        length, self.is_compensated = self.length_mm, code != "G49"
+        if self.is_compensated:
+            number = f"H{self.words.get('H', 0.0):g}"
+            if not (length := self.offset.get(number, self.setup.length_mm)):
+                self.unknown.setdefault(f"{number} without a length", self.line)
         by_word = code == "G43.4" and self.setup.tcp == "program"
         self.switch(tcp=by_word or self.setup.tcp == "always", length_mm=length)
 
@@ -236,134 +317,98 @@ class Control:
             at = {axis: np.asarray(q) for axis, q in zip(self.names, self.at, strict=True)}
             model = self.scene.model
             if self.tcp:
-                tip = ball_point(model, upright(model, at))
-                at = follow(with_length(model, self.length_mm), at, tip)
+                at = axes_at(model, self.length_mm, at)
             if tcp:
-                tip = ball_point(with_length(model, length_mm), at)
-                words = follow(model, upright(model, at), tip)
-                at |= {name: words[name] for name in following_axes(model)}
+                at = words_at(model, ball_point(with_length(model, length_mm), at), at)
             self.at, self.tcp, self.length_mm = [*map(float, at.values())], tcp, length_mm
             self.record(STAND)
         self.length_mm = length_mm
 
-    @contextmanager
-    def bare_axes(self) -> Generator[None]:
-        """Count positions of axes while the block lasts, not places of the tip."""
-        tcp = self.tcp
-        self.switch(tcp=False, length_mm=self.length_mm)
-        yield
-        self.switch(tcp=tcp, length_mm=self.length_mm)
-
     def record(self, kind: int, turn: float = 0.0, centre: complex = 0j) -> None:
-        mode = self.block.line, kind, self.tcp, self.across, self.length_mm
+        mode = self.line, kind, self.tcp, self.across, self.length_mm
         self.rows.extend((*mode, turn, centre.real, centre.imag, *self.at))
 
+    def value(self, letter: str) -> float:
+        """Give the number of a word in mm, degrees or seconds."""
+        return self.words[letter] * (1.0 if letter in "ABCP" else self.unit_mm)
+
     def place(self, letter: str, value: float) -> float:
-        """Give the position of an axis of an absolute word."""
+        """Give the position of an axis of an absolute word, mm or degrees."""
         is_longer = letter == "Z" and self.is_compensated and not self.tcp
-        shift = self.offset.get((self.system, letter), 0.0)
+        shift = self.offset.get(self.system + letter, 0.0)
         return value + shift + (self.length_mm if is_longer else 0.0)
 
-    def word(self, letter: str, position: float) -> float:
-        """Give the absolute word that leads an axis to a position."""
-        value = position - self.place(letter, 0.0)
-        return value if letter in "ABC" else value / self.unit_mm
-
-    def target(self, without: str = "", *, bare: bool = False) -> list[float]:
-        """Give where the words of the block lead; after G53 they are axis positions."""
-        to = self.at.copy()
-        for letter, value in self.block.numbers.items():
-            if letter == without or (index := self.index.get(letter)) is None:
-                continue
-            place = value if letter in "ABC" else value * self.unit_mm
-            if not bare:
-                place = self.place(letter, place) if self.absolute else to[index] + place
-            if not abs(place) <= MAX_LENGTH_MM:
-                self.refuse(letter, f"at most ±{MAX_LENGTH_MM:g} mm or degrees")
-            to[index] = place
+    def target(self) -> dict[int, float]:
+        """Give where the words of the line lead, by number of the axis."""
+        to: dict[int, float] = {}
+        for letter in self.words.keys() & self.index.keys():
+            value, index = self.value(letter), self.index[letter]
+            to[index] = self.place(letter, value) if self.absolute else self.at[index] + value
         return to
 
-    def line_to(self, to: list[float], kind: int | None = None) -> None:
-        if kind is None:
-            kind = RAPID if self.motion == "G0" else FEED
-        moves, self.at = not self.begun or to != self.at, to
+    def line_to(self, to: Mapping[int, float], kind: int = STAND, *, bare: bool = False) -> None:
+        """Go to positions of some axes: bare ones, or places of the tip with TCP."""
+        tcp = self.tcp
+        self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
+        before, self.at = self.at, [to.get(index, at) for index, at in enumerate(self.at)]
         if not self.begun:
             self.record(STAND)
-        self.record(kind if moves else STAND)
+        kind = kind or (RAPID if self.motion == "G0" else FEED)
+        self.record(STAND if self.begun and before == self.at else kind)
         self.begun = True
+        self.switch(tcp=tcp, length_mm=self.length_mm)
 
-    def go_home(self, letters: Iterable[str]) -> None:
-        if letters and (over := self.target()) != self.at:
-            self.line_to(over, RAPID)
-        with self.bare_axes():
-            to = self.at.copy()
-            for letter in letters or self.index:
-                low, high = self.scene.machine.axes[self.names[self.index[letter]]].travel
-                to[self.index[letter]] = min(max(0.0, low), high)
-            self.line_to(to, RAPID)
-
-    def arc_to(self, to: list[float]) -> None:
-        words, names = self.block.numbers, PLANES[self.across]
+    def arc_to(self, to: Mapping[int, float]) -> None:
+        names, centres, words = PLANES[self.across], CENTRES[self.across], self.words
         if not set(names) <= self.index.keys():
-            self.block.refuse(f"an arc in {names}; expected axes of {self.scene.machine.chain}")
-        (x, y), (u, v) = ([place[self.index[name]] for name in names] for place in (self.at, to))
-        start, end, sense = complex(x, y), complex(u, v), 1.0 if self.motion == "G3" else -1.0
-        offsets = [words.get("IJK"["XYZ".index(name)]) for name in names]
-        if "R" in words:
-            centre = self.centre_of_radius(start, end, sense)
-        elif offsets == [None, None]:
-            self.block.refuse(f"{self.motion} without I, J, K or R")
+            self.fail(f"an arc in {names}; expected axes of {self.scene.machine.chain}")
+        start = complex(*(self.at[self.index[x]] for x in names))
+        self.at = [to.get(index, at) for index, at in enumerate(self.at)]
+        end = complex(*(self.at[self.index[x]] for x in names))
+        sense = 1.0 if self.motion == "G3" else -1.0
+        if "R" in words:  # of the longer arc where it is negative
+            radius, half = self.value("R"), (end - start) / 2.0
+            if not half or abs(half) - abs(radius) > max(SLACK_MM, SLACK * abs(half)):
+                chord = f"a chord of {2.0 * abs(half):.4f} mm, above 0"
+                self.fail(f"R{words['R']:g}; expected a radius for an arc of {chord}")
+            height = sqrt(max(0.0, radius * radius - abs(half) ** 2))
+            centre = start + half + copysign(sense, sense * radius) * height * 1j * half / abs(half)
+        elif words.keys() & {*centres}:
+            centre = start + self.unit_mm * complex(*(words.get(x, 0.0) for x in centres))
         else:
-            begin = (x, y) if not self.absolute_centre else (self.place(n, 0.0) for n in names)
-            centre = complex(
-                *(at + (by or 0.0) * self.unit_mm for at, by in zip(begin, offsets, strict=True))
-            )
+            self.fail(f"{self.motion} without I, J, K or R")
         radius, other = abs(start - centre), abs(end - centre)
-        most, least, share = RADIUS_SLACK
-        if not radius or abs(radius - other) > min(most, max(least, share * radius)):
-            self.block.refuse(
+        if not radius or abs(radius - other) > max(SLACK_MM, SLACK * radius):
+            self.fail(
                 f"{self.motion}: its ends are {radius:.4f} and {other:.4f} mm from its centre;"
                 " expected one radius above 0"
             )
         turn = sense * phase((end - centre) / (start - centre))
-        turn += 0.0 if turn > FULL_TURN_RAD else tau
-        self.at, self.begun = to, True
-        self.record(ARC, sense * turn, centre)
-
-    def centre_of_radius(self, start: complex, end: complex, sense: float) -> complex:
-        """Find the centre of an arc of a given radius: of the longer one where it is negative."""
-        radius, chord = self.block.numbers["R"] * self.unit_mm, abs(end - start)
-        if not chord or chord / 2.0 - abs(radius) > max(RADIUS_SLACK[1], RADIUS_SLACK[2] * chord):
-            self.refuse("R", f"a radius for an arc of a chord of {chord:.4f} mm, above 0")
-        height = sqrt(max(0.0, radius * radius - chord * chord / 4.0))
-        side = sense if radius > 0.0 else -sense
-        return (start + end) / 2.0 + side * height * 1j * (end - start) / chord
+        self.begun = True
+        self.record(ARC, sense * (turn if turn > FULL_TURN_RAD else turn + tau), centre)
 
     def drill(self) -> None:
-        """Drill a hole at the place of the block: R plane, depth, in pecks of Q with G83."""
-        words, deep = self.block.numbers, "XYZ"[self.across]
-        self.cycle |= {x: words[x] * self.unit_mm for x in {deep, "R", "Q"} & words.keys()}
+        """Drill a hole at the place of the line: R plane, depth, in pecks of Q with G83."""
+        deep = "XYZ"[self.across]
+        self.cycle |= {x: self.value(x) for x in {deep, "R", "Q", "P"} & self.words.keys()}
         if deep not in self.index or not {deep, "R"} <= self.cycle.keys():
-            self.block.refuse(f"{self.motion} without {deep} and R")
-        index = self.index[deep]
+            self.fail(f"{self.motion} without {deep} and R")
+        index, place = self.index[deep], self.target()
         initial = self.cycle.setdefault("initial", self.at[index])
         clear = initial + self.cycle["R"]
         bottom = clear + self.cycle[deep]
         if self.absolute:
             clear, bottom = (self.place(deep, self.cycle[letter]) for letter in ("R", deep))
-        if bottom > clear:
-            self.refuse(deep, f"a depth below R at {clear:g} mm")
         peck = self.cycle.get("Q", 0.0) if self.motion == "G83" else clear - bottom or 1.0
-        if peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
-            self.refuse("Q", f"a depth of a peck above 0, at most {MAX_CYCLE:,} pecks")
-
-        def go(level: float, kind: int = RAPID) -> None:
-            self.line_to([level if i == index else q for i, q in enumerate(self.at)], kind)
-
-        go(max(clear, self.at[index]))
-        self.line_to(self.target(deep), RAPID)
+        if bottom > clear or peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
+            most = f"and at most {MAX_CYCLE:,} pecks of Q, above 0"
+            self.fail(
+                f"{self.motion} from R {clear:g} to {bottom:g} mm; expected a depth below R, {most}"
+            )
+        self.line_to({index: max(clear, self.at[index])}, RAPID)
+        self.line_to({**place, index: self.at[index]}, RAPID)
         for number in range(ceil((clear - bottom) / peck)):
-            go(clear)
-            go(clear - number * peck)
-            go(max(bottom, clear - (number + 1) * peck), FEED)
-        go(max(initial, clear) if self.to_initial else clear)
+            self.line_to({index: clear}, RAPID)
+            self.line_to({index: clear - number * peck}, RAPID)
+            self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)
+        self.line_to({index: max(initial, clear) if self.to_initial else clear}, RAPID)

@@ -1,9 +1,16 @@
-"""The path that a program takes over the workpiece, nominal and with the errors of a machine.
+"""The path of a program over the workpiece, nominal and with errors; and the program mended.
 
 Lengths of errors are weighed by the way: mean, RMS and P95 do not depend on where samples lie.
 Geometry only: no forces, heat, wear or servo.
+
+In the program mended the tip is sent to where it belongs less the error that the machine has there:
+linear axes follow, rotary words stay. Words come out absolute (G90), arcs as lines, cycles as the
+moves they stand for. The other words, comments and the lines of G28 and G53 are kept. An axis is
+written from the line on that names it: where it stands before, nobody knows. The same holds behind
+G28 and G53, another work offset or mode, and for Z behind another tool or length.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
@@ -13,24 +20,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.contributions import budget_words, explain
 from warpspace.analysis.description import Analysis, Result, Watch, plain
 from warpspace.analysis.options import File, option, place_words
-from warpspace.analysis.statistics import P95, Statistics, Summary
-from warpspace.bench.placing import ball_point, follow, within_travel
+from warpspace.analysis.statistics import P95, Statistics
+from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import amplitudes_of, build_basis, evaluate_first_order
-from warpspace.formats.source import MAX_LINES
-from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose
+from warpspace.field.evaluate import evaluate_first_order
+from warpspace.formats.source import MAX_LINES, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
-from warpspace.machine.description import Axis
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
-from warpspace.parts.control import ReadProgram, Setup, read_program, upright, with_length
-from warpspace.parts.words import program_lines
+from warpspace.parts.control import (
+    CYCLES,
+    RAPID,
+    STAND,
+    Control,
+    ReadProgram,
+    Setup,
+    axes_at,
+    program_lines,
+    read_program,
+    with_length,
+    words_at,
+)
 from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.units import Array
 
+TURN_DEG, STEP_MM = 2.0, 10.0  # most that axes, and arcs, move between samples
+LEFT_UM, ROUNDS = 1e-3, 20  # of an error that is taken back; how often
+DECIMALS = 4  # of words in mm; in inches one more, in degrees two
+_MODES = {"G2", "G3", *CYCLES, "G90", "G91"}  # not of a corrected program
+_LAST = {"M0", "M1", "M2", "M5", "M9", "M30", "M60"}  # take effect when the axes have moved
+CHORD_MM = 0.01  # most that a bent path leaves the line between samples
 MOST_AT_ONCE = 50_000  # samples
 WORST = 10  # blocks that are split by parameter
 SAID = 20  # words that a remark lists
@@ -42,100 +64,78 @@ class ToolPath:
 
     line: NDArray[np.int64]  # [n], of the file, from 1
     move: NDArray[np.int64]  # [n], row of the program
-    is_end: NDArray[np.bool_]  # [n], whether a block ends there
     coordinates: dict[str, Array]  # [n] each, mm or degrees; full turns of a rotary axis left out
     tip_mm: Array  # [n, 3], nominal, w
     error_um: Array  # [n, 3], relative, actual − nominal, w
     outside: NDArray[np.bool_]  # [n], beyond the travel; errors are continued
     step_mm: Array  # [n, 3], from the sample before; zero where the path begins or a tool changes
 
-    def axes_at(self, sample: int) -> dict[str, float]:
-        return {name: float(at[sample]) for name, at in self.coordinates.items()}
-
     @cached_property
     def way_mm(self) -> Array:
-        """Length of the nominal path up to each sample, [n]."""
-        return np.cumsum(np.linalg.norm(self.step_mm, axis=1))
+        """Length of the nominal path from the sample before, [n]."""
+        return np.linalg.norm(self.step_mm, axis=1)
 
     @cached_property
-    def across_um(self) -> Array:
-        """What of the errors is across the path, [n, 3]; all of them where nothing moves."""
+    def norm_um(self) -> Array:
+        return np.linalg.norm(self.error_um, axis=1)
+
+    @cached_property
+    def along_um(self) -> Array:
+        """How much of the errors is along the path, [n]; nothing where nothing moves."""
         back, ahead = self.step_mm, np.roll(self.step_mm, -1, axis=0)
         follows = (self.move == np.roll(self.move, 1))[:, None]
         bend = np.where(follows, back - np.roll(back, 1, axis=0), 0.0)
-        bend = np.where(np.roll(follows, -1, axis=0), ahead - back, bend)
-        along = 2.0 * back + bend
-        along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-        return self.error_um - np.sum(self.error_um * along, axis=1, keepdims=True) * along
+        along = 2.0 * back + np.where(np.roll(follows, -1, axis=0), ahead - back, bend)
+        length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+        return np.abs(np.sum(self.error_um * along, axis=1)) / length
 
-    def summary(self, length_um: Array) -> Summary:
+    @cached_property
+    def across_um(self) -> Array:
+        """How much of them is across it, [n]."""
+        return np.sqrt(np.maximum(self.norm_um**2 - self.along_um**2, 0.0))
+
+    def deviation(self, length_um: Array) -> Statistics:
         """Sum lengths of errors up over the way; each sample counts once where there is none."""
-        way = np.diff(self.way_mm, prepend=0.0)
-        weight = way + np.append(way[1:], 0.0)
-        weight = weight / weight.sum() if weight.any() else np.full(len(way), 1.0 / len(way))
-        order = np.argsort(length_um)
-        place = np.cumsum(weight[order]) - weight[order] / 2.0
-        rms = float(np.sqrt(weight @ length_um**2))
-        p95 = float(np.interp(P95, place, length_um[order]))
-        return Summary(float(weight @ length_um), rms, p95, float(length_um.max()))
+        weights = self.way_mm + np.append(self.way_mm[1:], 0.0)
+        weights = weights if weights.any() else np.ones(len(weights))
+        mean, square = np.average([length_um, length_um**2], axis=1, weights=weights).tolist()
+        p95 = np.quantile(length_um, P95, weights=weights, method="inverted_cdf")
+        worst = int(np.argmax(length_um))
+        x, y, z = self.tip_mm[worst].tolist()
+        axes = {name: float(at[worst]) for name, at in self.coordinates.items()}
+        return Statistics(mean, square**0.5, float(p95), float(length_um[worst]), (x, y, z), axes)
 
 
-def trace_program(
-    scene: Scene,
-    read: ReadProgram,
-    *,
-    chord_mm: float = 0.01,
-    turn_deg: float = 2.0,
-    step_mm: float = 10.0,
-) -> ToolPath:
-    """Follow the tip of the tool over the workpiece.
-
-    Between samples a bent path leaves its chord by `chord_mm` at most, rotary axes and arcs turn by
-    `turn_deg` at most, and linear axes move by `step_mm` at most.
-    """
-    count = samples_of_moves(scene, read, chord_mm, turn_deg, step_mm)
-    if count.sum() > MAX_PATH_POINTS:
-        raise OptionError(
-            f"the path has {count.sum():,} points; expected at most {MAX_PATH_POINTS:,}"
-        )
+def trace_program(scene: Scene, read: ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
+    """Follow the tip of the tool over the workpiece."""
+    count = count_samples(scene, read, chord_mm)
     move = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(move)) - (np.cumsum(count) - count)[move] + 1.0) / count[move]
-    coordinates, tip, error = along_moves(scene, read, move, share)
-    line = read.line[move]
+    at, tip, error = along_moves(scene, read, move, share)
     same_tool = np.diff(read.length_mm[move], prepend=read.length_mm[move[:1]]) == 0.0
-    return ToolPath(
-        line=line,
-        move=move,
-        is_end=(share == 1.0) & (np.append(line[1:], -1) != line),
-        coordinates=coordinates,
-        tip_mm=tip,
-        error_um=error,
-        outside=~within_travel(scene.machine, coordinates),
-        step_mm=np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None],
-    )
+    step = np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None]
+    return ToolPath(read.line[move], move, at, tip, error, ~within_travel(scene.machine, at), step)
 
 
-def samples_of_moves(
-    scene: Scene, read: ReadProgram, chord_mm: float, turn_deg: float, step_mm: float
-) -> NDArray[np.int64]:
+def count_samples(scene: Scene, read: ReadProgram, chord_mm: float) -> NDArray[np.int64]:
     """Count the samples of each move, [m]; 0 where nothing moves."""
-    is_rotary = np.array([not scene.machine.axes[name].is_linear for name in read.axes])
-    change = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1]))
+    is_rotary = np.array([not is_linear(name) for name in read.axes])
+    change, moves = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1])), read.kind != STAND
     way, turn = np.linalg.norm(change[:, ~is_rotary], axis=1), change[:, is_rotary]
     is_bent = (read.turn_rad != 0.0) | (~read.tcp & turn.any(axis=1))
     turn = np.maximum(turn.max(axis=1, initial=0.0), np.rad2deg(np.abs(read.turn_rad)))
-    count = np.ceil(np.maximum(turn / turn_deg, way / step_mm))
-    count = np.where(read.moves, np.maximum(count, 1.0), 0.0)
-    if not read.moves.any():
+    count = np.maximum(np.ceil(np.maximum(turn / TURN_DEG, way / STEP_MM)), 1.0) * moves
+    if not moves.any():
         count[-1] = 1.0
-    (bent,) = np.nonzero(is_bent & read.moves)
+    (bent,) = np.nonzero(is_bent & moves)
     if len(bent):  # how far the middle of a piece is from the line between its ends
-        half = 0.5 / count[bent]
-        start, middle, end = (
-            along_moves(scene, read, bent, 0.5 + at)[1] for at in (-half, 0, half)
-        )
-        away = np.linalg.norm(middle - (start + end) / 2.0, axis=1)
+        share = 0.5 + np.array([-0.5, 0.0, 0.5]) / count[bent, None]
+        tip = along_moves(scene, read, np.repeat(bent, 3), share.reshape(-1))[1].reshape(-1, 3, 3)
+        away = np.linalg.norm(np.diff(tip, 2, axis=1)[:, 0] / 2.0, axis=1)
         count[bent] = np.ceil(count[bent] * np.maximum(1.0, np.sqrt(away / chord_mm)))
+    if count.sum() > MAX_PATH_POINTS:
+        most = f"{count.sum():,.0f} points; expected at most {MAX_PATH_POINTS:,}"
+        raise OptionError(f"the path has {most}")
     return count.astype(np.int64)
 
 
@@ -143,15 +143,14 @@ def along_moves(
     scene: Scene,
     read: ReadProgram,
     move: NDArray[np.int64],
-    share: Array | float,
+    share: Array,
     shift_mm: Array | None = None,
 ) -> tuple[dict[str, Array], Array, Array]:
     """Give positions of axes, tip and error at shares of moves, [n].
 
     A shift of the tip, [n, 3] in w, is made by the linear axes.
     """
-    at = read.positions(move, np.broadcast_to(share, move.shape))
-    found = dict(zip(read.axes, at.T, strict=True))
+    found = dict(zip(read.axes, read.positions(move, share).T, strict=True))
     tip, error = np.empty((len(move), 3)), np.empty((len(move), 3))
     modes = np.stack([read.tcp, read.length_mm], axis=-1)[move]
     view = scene.view(Loop.RELATIVE, "workpiece")
@@ -160,38 +159,31 @@ def along_moves(
         model = with_length(scene.model, length)
         for part in np.array_split(same, -(-len(same) // MOST_AT_ONCE)):
             here = {name: values[part] for name, values in found.items()}
-            if tcp:
-                target = ball_point(scene.model, upright(scene.model, here))
-                here = follow(model, here, target)
-            for name, axis in scene.machine.axes.items():
-                found[name][part] = here[name] = _unwound(axis, here[name])
+            here = axes_at(scene.model, length, here) if tcp else here
             if shift_mm is not None:
                 here = follow(model, here, ball_point(model, here) + shift_mm[part])
-                for name in here:
-                    found[name][part] = here[name]
+            for name, axis in scene.machine.axes.items():
+                low, high = axis.travel
+                if not axis.is_linear and high - low >= FULL_TURN_DEG:  # leave full turns out
+                    is_out = (here[name] < low) | (here[name] > high)
+                    turned = low + (here[name] - low) % FULL_TURN_DEG
+                    here[name] = np.where(is_out, turned, here[name])
+                found[name][part] = here[name]
             check_magnitude(scene, here)
             tip[part] = ball_point(model, here)
             error[part] = evaluate_first_order(model, scene.errors, here, view).error_um
     return found, tip, error
 
 
-def _unwound(axis: Axis, at: Array) -> Array:
-    """Leave full turns out beyond the travel of a rotary axis that can turn once round."""
-    low, high = axis.travel
-    if axis.is_linear or high - low < FULL_TURN_DEG:
-        return at
-    return np.where((at < low) | (at > high), low + (at - low) % FULL_TURN_DEG, at)
-
-
 @dataclass(frozen=True)
-class WorstBlock:
-    """The worst place of a block."""
+class PathPoint:
+    """The error at a place of a path, split by parameter."""
 
     line: int
     um: float  # |E|
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
-    budget: Mapping[str, float]  # µm of |E| by parameter, which add up to it
+    budget: Mapping[str, float]  # µm of |E| by parameter, which add up to it, the largest first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,9 +201,6 @@ class Program(Setup, Analysis):
     has_table = True
     file_help = "Corrected program to write: this machine cuts the nominal path with it."
     file: File = option(None, "Program, G-code", positional=True, unset="that of the scene")
-    chord_mm: float = option(
-        0.01, "How far the path may bend between samples", unit="mm", low=1e-5, high=10.0
-    )
     at_line: int | None = option(
         None, "Line whose end is told", low=1, high=MAX_LINES, unset="none"
     )
@@ -219,9 +208,6 @@ class Program(Setup, Analysis):
         1.0, "How far a corrected program may be from the nominal path between its points",
         unit="µm", low=0.01, high=1000.0,
     )  # fmt: skip
-    decimals: int = option(
-        4, "Decimals of corrected words in mm; in inches one more, in degrees two", low=1, high=9
-    )
     text: str | None = None  # of one that is read already; `file` is then its name
 
     def lines(self) -> Iterable[str]:
@@ -236,141 +222,221 @@ class Program(Setup, Analysis):
             return replace(self, file=path, tcp=tcp).run(scene, watch)
         read = read_program(scene, self.lines(), self, self.file)
         watch(0.3)
-        path = trace_program(scene, read, chord_mm=self.chord_mm)
+        path = trace_program(scene, read)
         watch(0.9)
-        norm, across = (np.linalg.norm(one, axis=1) for one in (path.error_um, path.across_um))
-        order = np.lexsort((-norm, path.line))
-        block = order[np.unique(path.line[order], return_index=True)[1]]
-        at, (mean, rms, p95, largest) = int(np.argmax(norm)), astuple(path.summary(norm))
-        x, y, z = path.tip_mm[at].tolist()
+        order = np.argsort(-path.norm_um, kind="stable")
+        worst = order[np.sort(np.unique(path.line[order], return_index=True)[1])[:WORST]]
+
+        def explained(sample: int) -> PathPoint:
+            at = {name: values[sample] for name, values in path.coordinates.items()}
+            model = with_length(scene.model, float(read.length_mm[path.move[sample]]))
+            found = explain(model, scene.errors, at, scene.view(Loop.RELATIVE, "workpiece"))
+            ranked = sorted(found.contributions, key=lambda part: -part.along_um)
+            return PathPoint(
+                line=int(path.line[sample]),
+                um=float(path.norm_um[sample]),
+                axes={name: float(value) for name, value in at.items()},
+                error_um=path.error_um[sample],
+                budget={part.key: part.along_um for part in ranked},
+            )
+
         return ProgramResult(
+            length_mm=float(path.way_mm.sum()),
+            outside=int(path.outside.sum()),
+            deviation=path.deviation(path.norm_um),
+            along=path.deviation(path.along_um),
+            across=path.deviation(path.across_um),
+            worst=[explained(sample) for sample in worst],
+            line=None if self.at_line is None else explained(_end_of(path, self.at_line)),
             read=read,
             path=path,
-            deviation=Statistics(mean, rms, p95, largest, (x, y, z), path.axes_at(at)),
-            along=path.summary(np.sqrt(np.maximum(norm**2 - across**2, 0.0))),
-            across=path.summary(across),
-            worst=_split(scene, path, block[np.argsort(-norm[block], kind="stable")][:WORST]),
-            line=None if self.at_line is None else _end_of(path, self.at_line),
-            of_lines=block,
             scene=scene,
             asked=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
 
 
-def _end_of(path: ToolPath, line: int) -> dict[str, Any]:
-    (found,) = np.nonzero(path.is_end & (path.line == line))
-    if not len(found):
-        lines = np.unique(path.line[path.is_end])
-        near = ", ".join(map(str, lines[np.argsort(np.abs(lines - line))][:3])) or "none"
+def _end_of(path: ToolPath, line: int) -> int:
+    if line not in path.line:
+        lines = np.unique(path.line)
+        near = ", ".join(map(str, lines[np.argsort(np.abs(lines - line))][:3]))
         raise OptionError(f"{{at_line}} {line} moves no axis; expected a line that does: {near}")
-    at = int(found[-1])
-    return {"axes": path.axes_at(at), "error_um": path.error_um[at]}
-
-
-def _split(scene: Scene, path: ToolPath, chosen: NDArray[np.int64]) -> tuple[WorstBlock, ...]:
-    """Split the errors of some samples by parameter."""
-    at = {name: values[chosen] for name, values in path.coordinates.items()}
-    keys = [key for key in scene.parameter_keys if scene.errors.amplitude(key)]
-    point = transforms.apply(branch_pose(scene.model, "workpiece", at), path.tip_mm[chosen])
-    view = scene.view(Loop.RELATIVE, "workpiece")
-    basis = build_basis(scene.model, scene.errors, keys, at, view, point)
-    error = path.error_um[chosen]
-    norm = np.linalg.norm(error, axis=1)
-    along = error / np.where(norm > 0.0, norm, 1.0)[:, None]
-    share = amplitudes_of(scene.errors, keys)[:, None] * np.sum(basis.position * along, axis=-1)
-    budgets = (dict(zip(keys, parts, strict=True)) for parts in share.T.tolist())
-    rows = zip(chosen, norm.tolist(), error, budgets, strict=True)
-    return tuple(
-        WorstBlock(int(path.line[at]), um, path.axes_at(at), errors, parts)
-        for at, um, errors, parts in rows
-    )
-
-
-def _most(budget: Mapping[str, float]) -> str:
-    first = sorted(budget.items(), key=lambda share: -share[1])[:3]
-    return "  ".join(f"{key} {um:.1f}" for key, um in first)
+    return int(np.flatnonzero(path.line == line)[-1])
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProgramResult(Result):
     """The path of a program, and its worst blocks."""
 
+    keys = ("length_mm", "outside", "deviation", "along", "across", "worst")
+    length_mm: float  # of the nominal path
+    outside: int  # samples beyond the travel
+    deviation: Statistics
+    along: Statistics
+    across: Statistics
+    worst: Sequence[PathPoint]
+    line: PathPoint | None  # the end of the line asked for
     read: ReadProgram
     path: ToolPath
-    deviation: Statistics
-    along: Summary
-    across: Summary
-    worst: tuple[WorstBlock, ...]
-    line: Mapping[str, Any] | None  # axes and error at the end of the line asked for
-    of_lines: NDArray[np.int64]  # the worst sample of each line
     scene: Scene
     asked: Program
 
     def texts(self, _ending: str = "", /) -> Mapping[str, str]:
-        from warpspace.parts.correction import correct_program
-
-        lines = [*self.asked.lines()]
-        return {"": "\n".join([*correct_program(self.scene, lines, self.read, self.asked), ""])}
+        return {"": "\n".join([*correct_program(self.scene, self.asked, self.read), ""])}
 
     def as_plain(self) -> dict[str, Any]:
-        said = {
-            "blocks": self.read.blocks,
-            "length_mm": self.path.way_mm[-1],
-            "outside": self.path.outside.sum(),
-            "refused": self.read.refused,
-            "deviation": self.deviation,
-            "along": self.along,
-            "across": self.across,
-            "worst": self.worst,
-        }
-        return plain(said | ({"line": self.line} if self.line else {}))
+        refused = [{"line": line, "word": word} for line, word in self.read.refused.items()]
+        said = {"blocks": self.read.blocks, "refused": refused, **plain(self)}
+        return said | ({"line": plain(self.line)} if self.line else {})
 
     def doubts(self) -> Iterator[str]:
-        if refused := [f"line {one.line} {one.word}" for one in self.read.refused[:SAID]]:
-            yield f"refused: {', '.join(refused)}; the path ends before the first of them"
+        if refused := [f"line {line} {word}" for line, word in self.read.refused.items()]:
+            yield f"refused: {', '.join(refused[:SAID])}; the path ends before the first of them"
         if unknown := [f"{word} (line {line})" for word, line in self.read.unknown.items()]:
             yield f"not followed: {', '.join(unknown[:SAID])}"
-        if outside := self.path.outside.sum():
-            yield f"{outside} of {len(self.path.line)} points are beyond the travel"
+        if self.outside:
+            yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
         if not self.read.blocks:
             yield "no block moves an axis: the errors are those where the axes stand"
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.scene.title} · {self.read.blocks} blocks, {self.path.way_mm[-1]:.1f} mm"
+        yield f"{self.scene.title} · {self.read.blocks} blocks, {self.length_mm:.1f} mm"
         yield "  relative error in the workpiece frame"
         yield "  Geometry only: no forces, heat, wear or servo"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
         names = {"error": self.deviation, "along the path": self.along, "across it": self.across}
         rows = [(name, *astuple(one)[:4]) for name, one in names.items()]
         yield Table((Column("", leads=True), *heads), rows)
-        if self.line:
-            said = ", ".join(f"{value:.2f}" for value in self.line["error_um"])
-            yield f"{place_words(self.line['axes'])}: x, y, z {said} µm"
-        lines = self.path.line[self.of_lines]
-        samples = self.of_lines[np.searchsorted(lines, [one.line for one in self.worst])]
-        yield self.table(samples, [one.budget for one in self.worst])
-
-    def file_table(self) -> Table:
-        return self.table(self.of_lines, [None] * len(self.of_lines))
-
-    def table(
-        self, samples: NDArray[np.int64], budgets: Sequence[Mapping[str, float] | None]
-    ) -> Table:
-        """Give the places of samples, their errors and, unless it is for a file, whose they are."""
-        path = self.path
-        both = (np.linalg.norm(error, axis=1) for error in (path.error_um, path.across_um))
-        places = *path.coordinates.values(), *path.tip_mm.T, *path.error_um.T
-        hidden = [f"{name}_{'mm' if is_linear(name) else 'deg'}" for name in path.coordinates]
-        hidden += ["x_mm", "y_mm", "z_mm", "error_x_um", "error_y_um", "error_z_um"]
         columns = (
             Column("line", "d", key="line", leads=True),
-            *number_columns(("|E|", "across"), ".2f", "µm", ("norm_um", "across_um")),
-            *(Column(key=key, shows=False) for key in hidden),
-            Column(key="outside", shows=False),
-            Column("most of it", _most, "µm"),
+            *number_columns(
+                ("|E|", "x", "y", "z"), ".2f", "µm", ("norm_um", "x_um", "y_um", "z_um")
+            ),
+            Column("where", place_words, wraps=True),
+            Column("most of it", budget_words, "µm", wraps=True),
         )
-        numbers = np.column_stack([values[samples] for values in (*both, *places)]).tolist()
-        told = (path.line[samples].tolist(), numbers, path.outside[samples].tolist(), budgets)
-        rows = [(line, *row, outside, of) for line, row, outside, of in zip(*told, strict=True)]
-        return Table(columns, rows, "Worst blocks")
+        told = [*self.worst, *([self.line] if self.line else [])]
+        rows = [(one.line, one.um, *one.error_um, one.axes, one.budget) for one in told]
+        yield Table(
+            columns, rows, "Worst blocks, and the line asked for" if self.line else "Worst blocks"
+        )
+
+
+def corrected_places(
+    scene: Scene, read: ReadProgram, within_mm: float
+) -> tuple[NDArray[np.int64], Array]:
+    """Give rows of a program, [n], and corrected places, [n, a], that its lines lead to in turn.
+
+    A row comes as often as its move has pieces, all of one length. Between two places the linear
+    axes stay within a distance of where they have to be. Places are those of `ReadProgram.end`.
+    """
+    count = np.maximum(count_samples(scene, read, within_mm / 4.0), 1)
+    count[read.kind == RAPID] = 1
+    row, _, places = _corrected(scene, read, count)
+    linear = [read.axes.index(name) for name in following_axes(scene.model)]
+    bend = np.linalg.norm(np.diff(places[:, linear], 2, axis=0), axis=1) / within_mm
+    most = np.zeros(len(count))
+    np.maximum.at(most, row[1:-1], np.where(row[2:] == row[:-2], bend, 0.0))
+    # an arc leaves its chord by an eighth of its second difference, a kink by a quarter at most
+    count = np.ceil(count * np.maximum(np.sqrt(most / 8.0), most / 4.0)).astype(np.int64)
+    row, share, places = _corrected(scene, read, np.maximum(count, 1))
+    return row[share > 0.0], places[share > 0.0]
+
+
+def _corrected(
+    scene: Scene, read: ReadProgram, count: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Give row and share of the ends of equal pieces of moves, and corrected places, [n, a]."""
+    row = np.repeat(np.arange(len(count)), count + 1)
+    share = (np.arange(len(row)) - np.searchsorted(row, row)) / count[row]
+    shift = np.zeros((len(row), 3))
+    for _ in range(ROUNDS):
+        found, tip, error_um = along_moves(scene, read, row, share, shift)
+        if np.abs(1e3 * shift + error_um).max() <= LEFT_UM:
+            break
+        shift = -error_um / 1e3
+    else:
+        raise OptionError("the errors change too much from place to place to be corrected")
+    places, words = read.positions(row, share), words_at(scene.model, tip, found)
+    for name in following_axes(scene.model):
+        places[:, read.axes.index(name)] = np.where(read.tcp[row], words[name], found[name])
+    return row, share, places
+
+
+def correct_program(scene: Scene, asked: Program, read: ReadProgram) -> Iterator[str]:
+    """Give the lines of a program that leaves the nominal path of another one on this machine."""
+    for line, word in read.refused.items():
+        raise OptionError(
+            f"line {line}: {word} is not followed; expected a program that is, to mend it"
+        )
+    row, places = corrected_places(scene, read, asked.within_um / 1e3)
+    lines, control = [*asked.lines()], Control(scene, asked, asked.file or "")
+    linear = {name[0] for name in following_axes(scene.model)}
+    if missing := ", ".join(linear - control.index.keys()):
+        raise OptionError(f"no word moves axis {missing}; expected one axis of each letter")
+    known, mode, header, number = set[str](), ("", False), _header(scene, asked), 0
+    for number, line in enumerate(control.run(lines), start=1):
+        codes, letters = {*control.codes}, control.words.keys() & control.index.keys()
+        if codes or control.words:
+            yield from header  # once
+        if mode != (control.system, control.tcp):
+            mode, known = (control.system, control.tcp), set()
+        if codes & {"G28", "G53"}:
+            known -= letters or known
+        elif codes & {"M6", "G43", "G43.4", "G49"}:
+            known -= {"Z"}
+        here = np.arange(*np.searchsorted(read.line[row], [number, number + 1]))
+        moving = here[read.kind[row[here]] != STAND]
+        if codes & {"G4", "G28", "G53"} or not (letters or len(moving)):
+            kept = [word for key, word in control.tokens if key not in _MODES]
+            is_step = "G28" in codes and not control.absolute
+            yield control.skip + " ".join(["G91"] * is_step + kept) if kept else line.rstrip()
+            yield from ["G90"] * is_step
+            continue
+        missing = ", ".join(sorted((linear | letters) - known))
+        if missing and not (control.absolute and control.motion in {"G0", "G1"}):
+            control.fail(f"moves from a place not known; expected G90 and {missing} before")
+        known |= letters
+        chosen = moving if len(moving) else here[-1:]
+        written = [letter for letter in control.index if letter in letters | (known & linear)]
+        yield from _blocks(control, written, read.kind[row[chosen]], places[chosen])
+    yield from (line.rstrip() for line in lines[number:])
+
+
+def _header(scene: Scene, asked: Program) -> Iterator[str]:
+    from hashlib import sha256
+
+    from warpspace.scene.save import scene_to_toml
+
+    digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
+    said = f"for {scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
+    yield f"(corrected {re.sub('[()]', ' ', said).encode('ascii', 'replace').decode()})"
+    setup = "".join(f", {name}={value:g}" for name, value in asked.offset)
+    yield f"(TCP {asked.tcp}, length {asked.length_mm:g} mm{setup})"
+    yield f"(within {asked.within_um:g} um between points; geometry only)"
+    yield "G90"
+
+
+def _blocks(
+    control: Control, letters: Sequence[str], kinds: NDArray[np.int64], places: Array
+) -> Iterator[str]:
+    """Write the line that a control is at as straight blocks to places, [n, a]."""
+    number = [word for key, word in control.tokens if key == "N"]
+    said = _MODES | _LAST | {"N", "G0", "G1", *"IJKR", *control.index}
+    said |= {*("PQ" if control.cycle else ""), *("F" if control.inverse_time else "")}
+    rest = [word for key, word in control.tokens if key not in said]
+    last = [code for code in control.codes if code in _LAST]
+    for left, kind, place in zip(range(len(kinds))[::-1], kinds, places, strict=True):
+        is_rapid = kind == RAPID or (kind == STAND and control.motion == "G0")
+        words = ["G0" if is_rapid else "G1"]
+        for letter in letters:
+            value = float(place[control.index[letter]]) - control.place(letter, 0.0)
+            digits = DECIMALS + (2 if letter in "ABC" else control.unit_mm != 1.0)
+            unit = 1.0 if letter in "ABC" else control.unit_mm
+            words.append(letter + spell(value / unit, digits))
+        if control.inverse_time and not is_rapid and "F" in control.words:
+            words.append("F" + spell(control.words["F"] * len(kinds), DECIMALS))
+        yield control.skip + " ".join([*number, *words, *(() if left else last), *rest])
+        number, rest = [], []
+        if control.motion == "G82" and not is_rapid:
+            yield f"{control.skip}G4 P{control.cycle.get('P', 0.0):g}"

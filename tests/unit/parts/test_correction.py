@@ -12,8 +12,7 @@ import warpspace
 from warpspace.cli.main import cli
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.parts.control import read_program
-from warpspace.parts.correction import correct_program
-from warpspace.parts.program import Program, ToolPath, trace_program
+from warpspace.parts.program import Program, ToolPath, correct_program, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
@@ -26,16 +25,20 @@ def dvf() -> Scene:
 
 
 def correct(scene: Scene, lines: Sequence[str], **asked) -> list[str]:
-    program = Program(**asked)
-    return [*correct_program(scene, lines, read_program(scene, lines, program), program)]
+    program = Program(text="\n".join(lines), **asked)
+    return [*correct_program(scene, program, read_program(scene, lines, program))]
 
 
 def trace(scene: Scene, lines: Sequence[str], chord_mm=0.1, **asked) -> ToolPath:
-    return trace_program(scene, read_program(scene, lines, Program(**asked)), chord_mm=chord_mm)
+    return trace_program(scene, read_program(scene, lines, Program(**asked)), chord_mm)
 
 
 def actual(path: ToolPath) -> np.ndarray:
     return path.tip_mm + path.error_um / 1e3
+
+
+def is_end(path: ToolPath) -> np.ndarray:
+    return np.append(path.line[1:], -1) != path.line
 
 
 def random_scene(seed: int) -> Scene:
@@ -65,12 +68,12 @@ def test_a_hundred_machines_cut_the_nominal_points(tcp: str):
             f"G91 X30.5 Z-20 {turn}12.5", f"G90 G20 X.5 Y-1 Z2 {turn}-70",
             "N5 G21 G54 X-80 Y40 Z-50 M9", "G2 X-70 Y50 I10", "G1 X-70 Y50", "G49 X-80 Y40 Z9",
         ]  # fmt: skip
-        offset = ("G54", "X", 3.0), ("G55", "Y", -7.25), ("G55", turn, 20.0)
-        asked = {"tcp": tcp, "length_mm": 60.0, "offset": offset, "within_um": 100.0, "decimals": 5}
+        offset = ("G54X", 3.0), ("G55Y", -7.25), (f"G55{turn}", 20.0)
+        asked = {"tcp": tcp, "length_mm": 60.0, "offset": offset, "within_um": 100.0}
         wanted, found = (
             trace(scene, some, **asked) for some in (lines, correct(scene, lines, **asked))
         )
-        left = actual(found)[found.is_end] - wanted.tip_mm[wanted.is_end][:, None]
+        left = actual(found)[is_end(found)] - wanted.tip_mm[is_end(wanted)][:, None]
         left_um = 1e3 * np.linalg.norm(left, axis=-1).min(axis=1)
         assert left_um.max() <= 0.1 + np.sqrt(3.0) * 0.127, seed  # the word in inches, 1e-5
 
@@ -104,30 +107,30 @@ def test_words_that_do_not_lead_are_kept(dvf: Scene):
     G94 X50 M30
     %
     rest""".splitlines()
-    found = [line.strip() for line in correct(dvf, [line.strip() for line in text], decimals=1)]
+    lines = correct(dvf, [line.strip() for line in text])
+    found = [re.sub(r"-?\d+\.\d{2,}", lambda x: f"{float(x[0]):.0f}", line) for line in lines]
     assert found[:2] == ["%", "O0012 (a part)"]
     assert found[2].startswith("(corrected for DVF5000, first machine measured, chain wCBFXYZt")
     assert found[5:10] == [
-        "G90", "G91 N10 (kept) g28 z0", "G90", "N20 G0 X10. Y20. G54 S900 M3 ; fast",
-        "N30 G43 H1 G0 X10. Y20. Z-100. M8",
+        "G90", "G91 N10 (kept) g28 z0", "G90", "N20 G0 X10 Y20 G54 S900 M3 ; fast",
+        "N30 G0 X10 Y20 Z-100 G43 H1 M8",
     ]  # fmt: skip
-    assert found[10] == "/N40 G99 G0 X10. Y20. Z-102."
-    assert found[11:16] == [
-        "/G1 X10. Y20. Z-120.", "/G4 P2", "/G0 X10. Y20. Z-102.", "G0 X30. Y20. Z-102.",
-        "G1 X30. Y20. Z-120.",
+    assert found[10:16] == [
+        "/N40 G0 X10 Y20 Z-102 G99", "/G1 X10 Y20 Z-120", "/G4 P2", "/G0 X10 Y20 Z-102",
+        "G0 X30 Y20 Z-102", "G1 X30 Y20 Z-120",
     ]  # fmt: skip
-    assert found[18:20] == ["N50 G80 (done)", "G93 G1 X40. Y20. Z-102. F2. M5"]
-    arc = [line for line in found if "F" in line and line.startswith("G1")]
+    assert found[18:20] == ["N50 G80 (done)", "G1 X40 Y20 Z-102 F2.0 M5 G93"]
+    arc = [line for line in found[20:] if "F" in line]
     assert len(arc) > 2
-    assert {re.findall(r"F(.*)", line)[0] for line in arc} == {f"{3 * len(arc)}."}
-    assert found[-4:] == ["G53 G0 Z-80", "G94 G0 X50. Y40. M30", "%", "rest"]
+    assert {line.split("F")[1] for line in arc} == {f"{3 * len(arc)}.0"}
+    assert found[-4:] == ["G53 G0 Z-80", "G0 X50 Y40 M30 G94", "%", "rest"]
 
 
 @pytest.mark.parametrize(
     ("lines", "said"),
-    [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G91 G1 X1"], "moves X from a place"),
-     (["G0 X1 Z1", "G2 X1 I5"], "moves Y from a place"),
-     (["G90 X1 Y1 Z1", "G55 G91 Z1"], "line 2: moves Z")],
+    [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G91 G1 X1"], "expected G90 and X, Y, Z before"),
+     (["G0 X1 Z1", "G2 X1 I5"], "expected G90 and Y before"),
+     (["G90 X1 Y1 Z1", "G55 G91 Z1"], "line 2: moves from a place not known")],
 )  # fmt: skip
 def test_what_cannot_be_corrected_is_said(dvf: Scene, lines: list[str], said: str):
     with pytest.raises((OptionError, SceneError), match=said):

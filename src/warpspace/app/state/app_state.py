@@ -30,8 +30,8 @@ from warpspace.machine.description import Vector
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBABILITY
+from warpspace.parts.control import program_lines
 from warpspace.parts.part import PartMesh, load_part
-from warpspace.parts.words import program_lines
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import KINDS, Mark, Note
 
