@@ -102,9 +102,7 @@ def test_figure_and_path_follow_the_errors(name):
     moved = LIVE.evaluate(column.state.with_amplitude("EC0Y", 150.0)).bench
     assert moved.nominal_mm is found.nominal_mm
     assert np.abs(moved.error_um - found.error_um).max() > 1.0
-    ((nominal, actual), *_) = moved.lines_mm(1000.0)
-    rows = moved.path[0]
-    np.testing.assert_allclose(actual - nominal, moved.error_um[rows], atol=1e-9)
+    np.testing.assert_allclose(moved.drawn_mm(1e3) - moved.nominal_mm, moved.error_um, atol=1e-9)
     column.do("path", "0")
     assert LIVE.evaluate(column.state).bench is None
 

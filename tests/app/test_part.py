@@ -15,7 +15,7 @@ from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.evaluation.budget import pick_line
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.part import clamped_scene, middle_mm, moved_place, part_in_box
+from warpspace.app.evaluation.in_box import clamped_scene, moved_place, part_in_box
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
@@ -84,12 +84,12 @@ def test_turns_keep_the_middle_and_add_up() -> None:
         for _ in range(4):
             again = part_in_box(state)
             assert again is not None
-            np.testing.assert_allclose(middle_mm(again), middle_mm(placed), atol=5e-3)
-            place = moved_place(again, transforms.placed(middle_mm(again), turn))
+            np.testing.assert_allclose(again.of.middle_mm, placed.of.middle_mm, atol=5e-3)
+            place = moved_place(again.of, transforms.placed(again.of.middle_mm, turn))
             state = replace(state, part=replace(state.part, place=place))
         again = part_in_box(state)
         assert again is not None
-        np.testing.assert_allclose(again.made.point_mm, placed.made.point_mm, atol=5e-3)
+        np.testing.assert_allclose(again.of.vertices_mm, placed.of.vertices_mm, atol=5e-3)
 
 
 def test_a_place_is_typed_linked_and_undone() -> None:

@@ -52,6 +52,11 @@ class PartMesh:
     place: tuple[float, ...] = (0.0,) * 6  # where it is clamped, mm and degrees
 
     @cached_property
+    def middle_mm(self) -> Array:
+        """Middle of the box around it, [3]."""
+        return (self.vertices_mm.min(axis=0) + self.vertices_mm.max(axis=0)) / 2.0
+
+    @cached_property
     def surface(self) -> Any:
         """The same as a mesh of trimesh, which knows its normals and neighbours."""
         from trimesh import Trimesh
@@ -121,8 +126,7 @@ def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = Non
     at = scene.part.place if place is None else (*place, 0.0, 0.0, 0.0)[:6]
     if at is None:
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-        box = (mesh.vertices_mm.min(axis=0) + mesh.vertices_mm.max(axis=0)) / 2.0
-        at = (*(ball_point(scene.model, stand) - box).tolist(), 0.0, 0.0, 0.0)
+        at = (*(ball_point(scene.model, stand) - mesh.middle_mm).tolist(), 0.0, 0.0, 0.0)
     pose = transforms.placed(at[:3], at[3:])
     return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm), place=at)
 

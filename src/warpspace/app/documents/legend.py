@@ -116,16 +116,16 @@ def part_html(picture: LivePicture) -> Markup:
     named = (f"Part {look.name}", part), (f"Program {look.program_name}", picture.path)
     for what, found in named:
         if found is not None:
-            most = float(component_values(found.error_um, "norm").max(initial=0.0))
-            out = int(found.made.outside.sum())
+            most = number(float(component_values(found.error_um, "norm").max()))
+            out = int(found.outside.sum())
             more = f", {spell_count(out)} points beyond the travel" if out else ""
-            said.append(join([f"{what} {change}up to {number(most)} µm{more}"]))
+            said.append(join([f"{what} {change}up to {most} µm{more}"]))
     if part is not None and look.normal:
         scale = picture.coloured(part)[1]
-        bar = tag("i", "", class_="ws-strip",
-                  style=f"background:linear-gradient(to right,{_stops(scale)})")  # fmt: skip
-        ends = (f"{spell_short(end)} " for end in (scale.low, scale.high))
-        said.append(join(("Along its normal ", next(ends), bar, " ", next(ends), "µm")))
+        shades = f"background:linear-gradient(to right,{_stops(scale)})"
+        low, high = map(spell_short, (scale.low, scale.high))
+        bar = tag("i", "", class_="ws-strip", style=shades)
+        said.append(join((f"Along its normal {low} ", bar, f" {high} µm")))
     words = Markup("<br>").join((*said, GEOMETRY_ONLY))
     return tag("p", words, class_="ws-part") if said else EMPTY
 

@@ -4,7 +4,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from warpspace.app.drawing.colours import Rgb, colour
+from warpspace.app.browser.incoming import index_of
+from warpspace.app.drawing.box import coloured_shape
+from warpspace.app.drawing.colours import Rgb, colour, colour_levels, level_colours
 from warpspace.app.drawing.labels import TICK, Axis, axes, axis_labels, point_labels
 from warpspace.app.drawing.shapes import (
     SCENE_PER_MM,
@@ -17,8 +19,10 @@ from warpspace.app.drawing.shapes import (
     polylines,
 )
 from warpspace.app.evaluation.budget import answer, measured
+from warpspace.app.evaluation.in_box import AT_LINE
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
+from warpspace.formats.source import MAX_LINES
 from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.mesh import outline_pieces
 from warpspace.units import Array
@@ -31,6 +35,8 @@ TURNED = 0.014  # diameter of a traced point while the table turns
 ASKED, AXIS_HALF, DASH = 0.011, 0.32, 0.02
 """Marker of the point that was asked about, half the axis that turns it, dash of its lever."""
 RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
+MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # points beyond the travel that are marked, and their size
+GIZMO = "/part/gizmo"  # what moves the part
 
 ACCENT = (194, 24, 91)  # colour of everything that answers "why?"; it is in no colour map
 RESIDUALS = {True: (138, 143, 152), False: (47, 116, 192)}
@@ -42,7 +48,7 @@ STROKES, SLANT = 12, 0.3  # lines of a head, and how far they slant, as a part o
 
 def around(picture: LivePicture) -> Shapes:
     """Draw all that follows the picture beside the box and the machine."""
-    draws = (_axes, _traces, _path, _other_side, _asked, _measured, _marks)
+    draws = (_axes, _traces, _path, _part, _program, _other_side, _asked, _measured, _marks)
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
 
 
@@ -83,8 +89,8 @@ def _path(picture: LivePicture) -> Shapes:
     found = picture.bench
     if found is None:
         return {}
-    nominal, actual = zip(*found.lines_mm(picture.exaggeration), strict=True)
-    return _pair(picture, "/test", polylines(nominal), polylines(actual))
+    actual = found.drawn_mm(picture.exaggeration)[found.at]
+    return _pair(picture, "/test", found.nominal_mm[found.at], actual)
 
 
 def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Shapes:
@@ -92,6 +98,39 @@ def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Sha
         f"{root}/nominal": lines(nominal, colour(picture, "trace_nominal"), 1.5),
         f"{root}/actual": lines(actual, colour(picture, "trace_actual"), 3.0),
     }
+
+
+def _part(picture: LivePicture) -> Shapes:
+    """Draw the part as cut, its creases, those of the nominal one, and what is out of reach."""
+    part, ghost, state = picture.part, colour(picture, "ghost"), picture.state
+    if part is None:
+        return {}
+    corners, drawn = part.of.corners, part.drawn_mm(picture.exaggeration)
+    ends, away = part.at[corners.creases], part.nominal_mm[part.outside]
+    away = away[:: 1 + len(away) // MOST_OUTSIDE]
+    return {
+        "/part/surface": coloured_shape(drawn[part.at], corners.triangles, *picture.coloured(part)),
+        "/part/edges": lines(drawn[ends], colour(picture, "edge"), 1.4),
+        "/part/outside": dots(away, OUTSIDE * picture.size_mm, ACCENT),
+        "/part/nominal": lines(part.nominal_mm[ends], ghost, 1.2) if state.shown.ghost else None,
+        f"{GIZMO}/nominal": lines((part.of.vertices_mm - part.of.middle_mm)[ends], ghost, 1.2)
+        if state.part.moved
+        else None,
+    }
+
+
+def _program(picture: LivePicture) -> Shapes:
+    """Draw the path of a program, nominal and actual, and the end of the line that is asked for."""
+    path = picture.path
+    if path is None:
+        return {}
+    drawn, (values, scale) = path.drawn_mm(picture.exaggeration), picture.coloured(path)
+    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # viser wants lines so
+    colours = (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
+    asked = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
+    marker = dots(drawn[path.of.line == asked][-1:], ASKED * picture.size_mm, ACCENT)
+    pair = _pair(picture, "/program", path.nominal_mm[path.at], drawn[path.at])
+    return {**pair, "/program/actual": lines(drawn[path.at], colours, 3.0), "/program/line": marker}
 
 
 def _other_side(picture: LivePicture) -> Shapes:

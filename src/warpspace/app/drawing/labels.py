@@ -180,8 +180,9 @@ def _measured(picture: LivePicture) -> Iterator[Label]:
 def _names(picture: LivePicture) -> Iterator[Label]:
     state, found = picture.state, picture.bench
     if found is not None:
-        ends = np.concatenate([other for _, other in found.lines_mm(picture.exaggeration)])
-        words = f"{found.title}: max {_spell(found.largest_um)}"
+        ends = found.drawn_mm(picture.exaggeration)[np.unique(found.at)]
+        largest = np.linalg.norm(found.error_um[np.unique(found.at)], axis=-1).max()
+        words = f"{found.of.title}: max {_spell(float(largest))}"
         factor = spell_factor(picture.exaggeration)
         yield Label(f"{words}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = picture.moved_traces

@@ -2,18 +2,22 @@
 
 import time
 from collections.abc import Callable, Mapping
+from typing import Any
 
+import numpy as np
 from viser import ClientHandle
+from viser.transforms import SO3
 
 from warpspace.app.browser.page import Page
-from warpspace.app.drawing.around import around, turned_points
+from warpspace.app.drawing.around import GIZMO, around, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
-from warpspace.app.drawing.part import part_shapes, path_shapes
-from warpspace.app.drawing.shapes import Nodes, Shape, Shapes, ball, lines, mesh
+from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, Shape, Shapes, ball, lines, mesh
+from warpspace.app.evaluation.in_box import moved_place
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import drawn_bodies, played_position, tool_point
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.placed import PlacedBody
+from warpspace.kinematics import transforms
 
 STEP_S = 0.125  # between two pictures of a turning table: modest, since each is sent to the page
 LONGEST_STEP_S = 0.5  # time lost is skipped, not made up for
@@ -21,6 +25,7 @@ SPEED_DEG_S = 30.0
 
 BALL = 0.010  # marker of the tool point, as a part of the longest edge
 OPACITY = 0.045
+GIZMO_SIZE = 0.3  # of what moves the part, as a part of the longest edge
 
 
 def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
@@ -60,8 +65,11 @@ def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **more: object) -> S
 class MovingLayer:
     """Everything around the box, which may also move by itself: the session turns it on."""
 
-    def __init__(self, client: ClientHandle, page: Page, picture: LivePicture) -> None:
+    def __init__(
+        self, client: ClientHandle, page: Page, picture: LivePicture, clamp: Callable[[str], None]
+    ) -> None:
         self._client = client
+        self._clamp = clamp  # takes the place that the part is moved to
         self._picture = picture
         self._around = Nodes(client.scene, page)
         self._ghost, self._turning = Nodes(client.scene), Nodes(client.scene)
@@ -80,9 +88,27 @@ class MovingLayer:
         if not same or before.positions != now.positions:
             self._turned_at, self._turned_deg = None, 0.0
             self._stand({})
-        self._around.draw({**around(picture), **part_shapes(picture), **path_shapes(picture)})
+        self._around.draw({**self._gizmo(picture), **around(picture)})
         self._draw_ghost(picture)
         self._draw_turning()
+
+    def _gizmo(self, picture: LivePicture) -> Shapes:
+        """Draw arrows and arcs that move the part; lines of the nominal one go with them."""
+        if picture.part is None or not picture.state.part.moved:
+            return {}
+        part, size = picture.part, GIZMO_SIZE * picture.size_mm * SCENE_PER_MM
+        stays = {"scale": size, "depth_test": False, "disable_sliders": True}
+        at = transforms.apply(part.pose, part.of.middle_mm) * SCENE_PER_MM
+        follows = {"position": at, "wxyz": SO3.from_matrix(part.pose[:3, :3]).wxyz}
+        return {GIZMO: Shape("add_transform_controls", stays, follows, self._drag)}
+
+    def _drag(self, event: Any) -> None:
+        """Clamp the part where it is let go; viser calls it in a thread of its own."""
+        if event.phase == "end" and self._picture.part is not None:
+            part, turn = self._picture.part, np.asarray(SO3(event.target.wxyz).as_matrix(), float)
+            at = transforms.rigid(turn, event.target.position / SCENE_PER_MM)
+            place = moved_place(part.of, transforms.inverse(part.pose) @ at)
+            self._clamp(",".join(map(repr, place)))
 
     def _draw_ghost(self, picture: LivePicture) -> None:
         """Errors do not move the ghost; it is not drawn beside the machine itself."""

@@ -4,7 +4,7 @@ All points are in mm and all nodes have a scale of `SCENE_PER_MM`: one scene uni
 viser clips beyond 1000 units.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -35,6 +35,7 @@ class Shape:
     add: str  # method of viser's scene that adds it
     stays: Mapping[str, Any]  # another value adds it anew
     follows: Mapping[str, Any]  # assigned in place; arrays are not changed afterwards
+    on_update: Callable[[Any], None] | None = None  # told what a user does with it
 
 
 Shapes = Mapping[str, Shape | None]
@@ -59,7 +60,10 @@ class Nodes:
     def _handle(self, name: str, shape: Shape) -> Any:
         known = self._drawn.get(name)
         if known is None or not _same(known[1].stays, shape.stays):
-            return getattr(self._scene, shape.add)(name, **shape.stays, **shape.follows)
+            handle = getattr(self._scene, shape.add)(name, **shape.stays, **shape.follows)
+            if shape.on_update is not None:
+                handle.on_update(shape.on_update)
+            return handle
         handle, held = known
         for word, value in shape.follows.items():
             if word == "position" and self._page is not None:  # viser takes ten times as long
@@ -78,10 +82,11 @@ def _same(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
     )
 
 
-def lines(pieces: Array | Pieces, rgb: Rgb, width_px: float) -> Shape | None:
-    """Give pieces of line, [S, 2, 3], in one colour, as thick on screen from near and far."""
+def lines(pieces: Array | Pieces, rgb: Rgb | NDArray[np.uint8], width_px: float) -> Shape | None:
+    """Give pieces of line, [S, 2, 3], in one colour or many, as thick from near and far."""
     stays = {"thickness": width_px, "thickness_units": "screen", "scale": SCENE_PER_MM}
-    follows = {"points": pieces.astype(np.float32), "colors": line_colour(rgb)}
+    colours = line_colour(rgb) if isinstance(rgb, tuple) else rgb
+    follows = {"points": pieces.astype(np.float32), "colors": colours}
     return Shape("add_line_segments", stays, follows) if len(pieces) else None
 
 

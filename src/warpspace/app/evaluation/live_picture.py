@@ -8,9 +8,15 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics
-from warpspace.app.evaluation.bench import BenchPicture, bench_picture
-from warpspace.app.evaluation.part import InBox, T, normal_um, part_in_box, path_in_box
+from warpspace.app.evaluation.in_box import (
+    InBox,
+    T,
+    bench_in_box,
+    part_in_box,
+    path_in_box,
+)
 from warpspace.app.state.app_state import AppState
+from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.parts.part import PartMesh
 from warpspace.parts.program import ToolPath
@@ -58,9 +64,9 @@ class LivePicture(Picture):
         return picture_size_mm(self.state.scene, self.grid)
 
     @cached_property
-    def bench(self) -> BenchPicture | None:
+    def bench(self) -> InBox[type[BenchTest]] | None:
         """The path of the standard test that is run; None where none is, or cannot be."""
-        return None if self.is_difference else bench_picture(self.drawn_state)
+        return None if self.is_difference else bench_in_box(self.drawn_state)
 
     @cached_property
     def part(self) -> InBox[PartMesh] | None:
@@ -83,7 +89,8 @@ class LivePicture(Picture):
     def coloured(self, found: InBox[Any]) -> tuple[Array, ColourScale]:
         """Give what is coloured of it, in the colours of the map; along normals in its own."""
         if self.state.part.normal and isinstance(found.of, PartMesh):
-            values = normal_um(found)
+            normals = found.of.corners.normals @ found.pose[:3, :3].T
+            values = np.einsum("ij,ij->i", found.error_um[found.at], normals)
             return values, choose_scale([values], "x")
         values = component_values(found.error_um, self.component)[found.at]
         return values, choose_scale([values], self.component) if self.tilts else self.scale

@@ -29,17 +29,13 @@ from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
-from warpspace.app.drawing.part import PartGizmo
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Layer
 from warpspace.app.evaluation.budget import pick, pick_line, with_clicked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.part import AT_LINE
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.forms import with_form
 from warpspace.app.state.store import StateStore
-from warpspace.app.state.tree import put
 from warpspace.app.tasks.catalogue import build_parts
 from warpspace.app.tasks.context import PAUSE_S, Context
 from warpspace.app.tasks.parts import Part, Window
@@ -314,9 +310,9 @@ class Session:
         self._around_at = None
         context = self.context
         with context.page.as_one():
-            gizmo = PartGizmo(self._client.scene, picture, self._clamp)  # it carries what is drawn
-            context.stage = MovingLayer(self._client, context.page, picture)
-            self.display.add(picture, [gizmo, context.stage])
+            clamp = partial(context.send, "state:set.part.place")
+            context.stage = MovingLayer(self._client, context.page, picture, clamp)
+            self.display.add(picture, [context.stage])
             context.page.call("stage", "open")
 
         @self._client.scene.on_click()
@@ -330,15 +326,11 @@ class Session:
             return
         ray = np.array([origin, direction], dtype=float)
         if line := pick_line(picture, ray[0] / SCENE_PER_MM, ray[1]):
-            context.post(partial(with_form, name=AT_LINE, text=str(line)))
+            context.send("program:set.at_line", str(line))
             return
         found = pick(picture, ray[0] / SCENE_PER_MM, ray[1])
         if found is not None:
             context.post(lambda state: with_clicked(state, found[0]))
-
-    def _clamp(self, place: str) -> None:
-        """Take where the part has been moved to in the drawing."""
-        self.context.post(partial(put, path="part.place", text=place))
 
     def _hear(self, event: Event) -> None:
         """Take note of what a page says of itself."""

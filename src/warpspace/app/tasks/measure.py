@@ -30,7 +30,7 @@ from warpspace.app.browser.page import error_words
 from warpspace.app.documents.files import read_upload, upload_text
 from warpspace.app.drawing.around import residuals
 from warpspace.app.drawing.shapes import Nodes, Shapes
-from warpspace.app.evaluation.bench import chosen_test, plan_test
+from warpspace.app.evaluation.in_box import chosen_test, plan_test
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState

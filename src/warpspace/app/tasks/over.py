@@ -39,15 +39,15 @@ class HeadPart(Part):
     follows = "at once"
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        words, place, part = subject_words(picture), place_words(picture), part_html(picture)
+        words, place = subject_words(picture), place_words(picture)
         head = fill(
             '<div data-piece="reopened"></div><h1>{numbers}</h1>'
             '<div>{place}<span data-piece="head.kept"></span>'
-            '<span data-piece="head.allowed"></span></div>{words}{part}'
+            '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
             numbers=numbers_words(picture), place=place,
-            words=tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY,
-            part=part,
+            words=(tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY)
+            + part_html(picture),
         )  # fmt: skip
         return {"head": head}
 

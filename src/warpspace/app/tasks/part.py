@@ -15,14 +15,8 @@ from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.files import IN_BOX, upload_text
+from warpspace.app.evaluation.in_box import AT_LINE, clamped_scene, moved_place, part_in_box
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.part import (
-    AT_LINE,
-    clamped_scene,
-    middle_mm,
-    moved_place,
-    part_in_box,
-)
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.forms import option_values
@@ -33,7 +27,6 @@ from warpspace.app.tasks.measure import MOST_BYTES, FilesPart, Held
 from warpspace.app.tasks.parts import actions
 from warpspace.kinematics import transforms
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
-from warpspace.parts.as_cut import PartResult
 from warpspace.parts.part import load_part, place_part
 from warpspace.scene.model import Scene
 
@@ -47,7 +40,6 @@ class InBoxPart(FilesPart):
     at_once = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
     holds = ("", "")  # fields of `PartLook`: what is there, if anything, and the name of its file
-    invitation = ""
 
     def held(self, state: AppState) -> tuple[Any, str]:
         what, name = (getattr(state.part, field) for field in self.holds)
@@ -75,38 +67,37 @@ class InBoxPart(FilesPart):
             hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
         missing = f"{name} is not here: links and saved scenes hold only its name."
-        about = tag("p", missing if name else self.invitation, class_="ws-quiet")
+        about = tag("p", missing, class_="ws-quiet") if name else EMPTY
         if held:
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
         return join((about, self.files_html(), actions(upload)))
 
     def show(self, held: object, name: str, **more: Any) -> None:
-        """Take something in, see it through the box, and unfold the section."""
+        """Take something in, and unfold the section."""
 
         def shown(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
             page = replace(state.page, task=self.task, open=opened, window="")
-            made = dict(zip(self.holds, (held, name), strict=True)) | more
-            found = replace(state, part=replace(state.part, shown=True, **made), page=page)
-            return edits.with_sight(found, inside=True)
+            return self.hold(replace(state, page=page), held, name, shown=True, **more)
 
         self.context.post(shown)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word != "remove" or value:
-            return super().take(state, word, value)
+    def hold(self, state: AppState, held: object, name: str, **more: Any) -> AppState:
+        """Put something into the box, or nothing, and see it through the box."""
         self._answer = None
-        none = {field: getattr(PartLook(), field) for field in self.holds}
-        found = replace(state, part=replace(state.part, **none))
-        return edits.with_sight(found, inside=not found.part.is_empty)
+        part = replace(state.part, **dict(zip(self.holds, (held, name), strict=True)), **more)
+        return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        is_removed = word == "remove" and not value
+        return self.hold(state, None, "") if is_removed else super().take(state, word, value)
 
 
 class PartPart(InBoxPart):
     """A part: clamped, and measured as it is cut."""
 
     holds = ("mesh", "name")
-    invitation = "A mesh of your part (STL, OBJ, PLY, GLB), as this machine would cut it."
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
@@ -131,21 +122,16 @@ class PartPart(InBoxPart):
         ))  # fmt: skip
 
     def result_html(self, found: Result) -> Markup:
-        assert isinstance(found, PartResult)  # noqa: S101 - of this analysis
-        judged = [
-            (f"{one.name} · {name.replace('_', ' ')}", measure["verdict"])
-            for one in found.features
-            for name, measure in one.measures.items()
-            if "verdict" in measure
-        ]
+        *_, features = (one for one in found.blocks() if isinstance(one, Table))
+        judged = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
         return html.rows(judged) + super().result_html(found)
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
-            turn = transforms.placed(middle_mm(part), 90.0 * np.eye(3)["xyz".index(value)])
-            return replace(state, part=replace(state.part, place=moved_place(part, turn)))
+            turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
+            return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
         found = super().take(state, word, value)
-        if word == "set.unit" and self._sent is not None:
+        if word == "set.unit" and state.part.mesh and self._sent:
             self.attempt(partial(self.received, *self._sent))
         return found
 
@@ -156,11 +142,9 @@ class PartPart(InBoxPart):
             return
         self._sent, state = (name, content), self.context.state
         mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
-        place = state.part.place if name == state.part.name else None
-        if place is None:
-            place = place_part(mesh, clamped_scene(state)).place
-            place = tuple(round(at, 3) for at in place)
-        self.show(mesh, name, place=place)
+        kept = state.part.place if name == state.part.name else None
+        place = np.round(place_part(mesh, clamped_scene(state), kept).place, 3)
+        self.show(mesh, name, place=tuple(place.tolist()))
 
 
 class ProgramPart(InBoxPart):
@@ -168,7 +152,6 @@ class ProgramPart(InBoxPart):
 
     most_bytes = MOST_BYTES  # longer ones would hold up other tabs
     holds = ("program", "program_name")
-    invitation = "A program (G-code): its path over the workpiece, and its worst blocks."
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked: Any = super().ask(state, values, scenes)
