@@ -1,106 +1,254 @@
 """What an inspector measures on a part as cut: features, their measures, tolerances and causes.
 
-A measure is taken on the part as it lies in the machine, and `placed`, after the best rigid fit of
-all its vertices. The placed difference is split by error parameter: what each of them moves the
-measure by where all errors are half as large, so that the parts add up.
+A shape is a surface of revolution about an axis: from a point at the height h along it and the
+distance ρ from it, (ρ − radius) · cos φ − h · sin φ is the way to the surface. φ is 0 for a
+cylinder and the half angle of a cone; −90° makes it a plane whose axis is its normal; without an
+axis it is a sphere. Shapes are fitted to vertices by least squares of these distances, and follow
+small moves of them in first order. A measure is taken on the part as it lies in the machine, and
+`placed`, after the best rigid fit of all vertices; each parameter adds to it what it does where all
+errors are half as large, so that the parts add up.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.exceptions import SceneError, near_miss
-from warpspace.field.evaluate import amplitudes_of
 from warpspace.kinematics.model import Loop
-from warpspace.parts.features import FREE, Feature, Shape, find_features, fit_shape
+from warpspace.kinematics.transforms import skew, vector_rotation
 from warpspace.parts.part import Made, PartMesh, fit_out, point_basis
 from warpspace.scene import schema
 from warpspace.scene.files import parse_toml
 from warpspace.scene.model import Scene, evaluate
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array, spell_signed
 
+SMOOTH_DEG = 30.5  # triangles meeting at less may belong to one curved surface: 12 around a hole
+FLAT_RAD = 1e-3  # triangles meeting at less lie in one facet
+FINE = 5e-6  # share of the largest coordinate that vertices are rounded by: files of six digits
+CLOSE = 2e-5  # share of its extent that a feature's vertices may be off its shape, beside rounding
+NEAR_DEG = 12.0  # angle between triangles and the first guess of the shape, at most
+FACETS = 4  # of a curved surface, at least: fewer lie on many shapes
+ALIKE = 4.0  # facets within this ratio may belong to one surface that runs into others
+ODD = 0.01  # share of its area that may lean otherwise: slivers
+MIDST_MM = 1e-3  # from an axis; closer points, as the tip of a cone, are on no side of it
+WEAK = 3e-7  # share of the strongest response below which a freedom of a shape counts as none
+STEPS, STILL_MM, FAR_MM = 40, 1e-11, 1e6  # of a fit; changes of a distance that end it
+MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
 RIGHT_RAD = 1e-4  # a nominal angle this close to 90° or to 0 has a squareness or a parallelism
 NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
-KEYS_AT_ONCE = 8  # parameters whose responses of all points are in memory
 SHOWN = 0.005  # µm or µrad that a table names a parameter for
-Shapes = Sequence[Shape]
+SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circles lie on the last
 
 
-def _distance(actual: Shapes, _nominal: Shapes) -> float:
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A plane, sphere, cylinder or cone."""
+
+    kind: str
+    centre_mm: Array  # [3]; on the plane or axis, amid the triangles that it was found in
+    axis: Array  # [3], unit vector; outward normal of a plane, zero of a sphere
+    radius_mm: float = 0.0  # at the centre
+    angle_rad: float = 0.0  # half angle of a cone, along whose axis the radius grows
+
+    @property
+    def across(self) -> Array:
+        """Projection on the directions in which it has a place, [3, 3]."""
+        along = np.outer(self.axis, self.axis)
+        return along if self.kind == "plane" else np.eye(3) - along
+
+    def respond(self, point_mm: Array) -> tuple[Array, Array, Array]:
+        """Give distances of points, [n], outwards, and what they grow with.
+
+        That is unit vectors, [n, 3]; and shifts, turns, and radius or, of a cone, angle, [n, 8].
+        """
+        arm = point_mm - self.centre_mm
+        sine, cosine = np.sin(self.angle_rad), np.cos(self.angle_rad)
+        height = arm @ self.axis
+        radial = arm - np.outer(height, self.axis)
+        length = np.linalg.norm(radial, axis=1)
+        beyond = length - self.radius_mm
+        normal = radial * (cosine / np.maximum(length, MIDST_MM))[:, None] - sine * self.axis
+        opening, widening = beyond * sine + height * cosine, np.full_like(beyond, cosine)
+        sizes = [0.0 * widening, opening] if self.kind == "cone" else [widening, 0.0 * opening]
+        design: Any = -np.column_stack([normal, np.cross(arm, normal), *sizes])
+        return beyond * cosine - height * sine, normal, design
+
+
+class Motion(NamedTuple):
+    """How a shape follows F fields of small moves."""
+
+    shape: Shape
+    shift_mm: Array  # [F, 3], of its centre
+    turn_rad: Array  # [F, 3]
+    radius_mm: Array  # [F]
+    angle_rad: Array  # [F]
+    form_mm: Array  # [F], span of the distances of its points
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """One surface of a part."""
+
+    shape: Shape  # in the frame of the mesh
+    vertices: NDArray[np.int32]  # [n], of the mesh
+    area_mm2: float
+    normal: Array  # [n, 3]; see `Shape.respond`
+    design: Array  # [n, 8]
+
+    def follow(self, move_um: Array) -> Motion:
+        """Fit how the shape follows moves of all vertices of the mesh, [F, V, 3]."""
+        move = move_um[:, self.vertices] * MM_PER_UM
+        mean = move.mean(axis=1)  # what no distance tells follows this
+        away = np.einsum("fnc,nc->fn", move - mean[:, None], self.normal)
+        step = -np.linalg.lstsq(self.design, away.T, WEAK)[0].T
+        radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
+        form = np.ptp(away + step @ self.design.T, axis=1)
+        return Motion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
+
+
+def fit_shape(start: Shape, point_mm: Array) -> Shape:
+    """Fit a shape to points, [n, 3], by least squares of their distances, from a near one."""
+    shape = start
+    for _ in range(STEPS):
+        distance, _, design = shape.respond(point_mm)
+        step = -np.linalg.lstsq(design, distance, WEAK)[0]
+        centre, axis = shape.centre_mm + step[:3], vector_rotation(step[3:6]) @ shape.axis
+        radius, angle = shape.radius_mm + step[6], shape.angle_rad + step[7]
+        shape = Shape(shape.kind, centre, axis, radius, angle)
+        if not STILL_MM < np.abs(design @ step).max() < FAR_MM:
+            break
+    return shape
+
+
+def find_features(mesh: PartMesh) -> dict[str, Feature]:
+    """Find the shapes that the surface of a part consists of: by kind, size, and place.
+
+    First what lies between creases is looked at; then what is left of it, parted by the size of its
+    facets. A surface that is none of them, within `CLOSE` of its extent, is no feature.
+    """
+    from trimesh.graph import connected_component_labels, connected_components
+
+    area, pairs = np.linalg.norm(mesh.areas_mm2, axis=1), np.stack(mesh.neighbours, axis=-1) // 3
+    cosine = np.einsum("ec,ec->e", *mesh.normals[pairs.T])
+    facet_of = connected_component_labels(pairs[cosine > np.cos(FLAT_RAD)], len(area))
+    pairs = pairs[cosine > np.cos(np.deg2rad(SMOOTH_DEG))]
+    facet = np.bincount(facet_of, area)[facet_of][pairs]
+    is_alike = facet.max(axis=1) < ALIKE * facet.min(axis=1)
+    is_left, found = np.ones(len(area), dtype=bool), list[Feature]()
+    for chosen in (True, is_alike):
+        links = pairs[chosen & is_left[pairs].all(axis=1)]
+        # a single triangle is flat whatever the machine does
+        parts: Any = connected_components(links, min_len=2, engine="scipy")
+        for part in sorted(parts, key=lambda one: -area[one].sum())[:MAX_FEATURES]:
+            is_curved = len(np.unique(facet_of[part])) >= FACETS
+            tried = (_fitted(mesh, kind, part) for kind in SHAPES[: None if is_curved else 1])
+            if feature := next(filter(None, tried), None):
+                is_left[part] = False
+                found.append(feature)
+    found.sort(key=lambda one: (float(f"{-one.area_mm2:.5g}"), *one.shape.centre_mm.round(3)))
+    return {
+        f"{kind} {number}": feature
+        for kind in SHAPES
+        for number, feature in enumerate((one for one in found if one.shape.kind == kind), 1)
+    }
+
+
+def _fitted(mesh: PartMesh, kind: str, part: NDArray[np.intp]) -> Feature | None:
+    """Fit a shape to triangles; None where their normals or vertices are off it."""
+    normal, area = mesh.normals[part], np.linalg.norm(mesh.areas_mm2[part], axis=1)
+    place, weight = mesh.vertices_mm[mesh.triangles[part]].mean(axis=1), area / area.sum()
+    centre, mean = weight @ place, weight @ normal
+    bent, is_flat = normal - mean, kind == "plane"
+    same, spread = np.outer(mean, mean), (weight * bent.T) @ bent
+    # normals are square to the axis of a cylinder, and on a circle about that of a cone
+    apart = {"plane": same, "cylinder": -same - spread}.get(kind, -spread)
+    axis = np.linalg.eigh(apart)[1][:, 2] * (kind != "sphere")
+    lean = mean @ axis
+    angle = {"plane": -np.pi / 2.0, "cone": np.arcsin(min(abs(lean), 1.0))}.get(kind, 0.0)
+    # what places go apart by with their normals; a hole has less than none
+    reach = 0.0 if is_flat else weight @ np.sum((place - centre) * bent, 1) / np.trace(spread)
+    axis = axis * np.copysign(1.0, lean if is_flat else -lean * reach)
+    centre = centre - reach * (mean - (mean @ axis) * axis)
+    start = Shape(kind, centre, axis, abs(reach) * np.cos(angle), angle)
+    turned = np.sum(start.respond(place)[1] * normal, axis=1)
+    if area @ (turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))) > ODD * area.sum():
+        return None
+    vertices = np.unique(mesh.triangles[part])
+    points = mesh.vertices_mm[vertices]
+    shape = fit_shape(start, points)
+    distance, *response = shape.respond(points)
+    most = CLOSE * np.linalg.norm(np.ptp(points, axis=0)) + FINE * np.abs(mesh.vertices_mm).max()
+    is_close = np.abs(distance).max() <= most
+    return Feature(shape, vertices, float(area.sum()), *response) if is_close else None
+
+
+def _distance(one: Motion, other: Motion) -> Array:
     """Distance square to a plane; else square to an axis; else between centres."""
-    away = actual[0].centre_mm - actual[1].centre_mm
-    shape = min(reversed(actual), key=lambda one: one.across.shape[1])
-    return float(np.linalg.norm(away @ shape.across))
+    fixing = min(other, one, key=lambda motion: SHAPES.index(motion.shape.kind))
+    away = one.shape.centre_mm - other.shape.centre_mm
+    moved = one.shift_mm - other.shift_mm - np.cross(fixing.turn_rad, away)
+    return np.linalg.norm((away + moved) @ fixing.shape.across, axis=1)
 
 
-def _angle(actual: Shapes, nominal: Shapes) -> float:
+def _angle(one: Motion, other: Motion) -> Array:
     """Angle through the material between planes, else up to 90° between axes, or to a plane."""
-    one, other = actual
-    across = np.linalg.norm(np.cross(one.axis, other.axis))
-    turn = float(np.arctan2(across, one.axis @ other.axis))
-    planes = [one.kind, other.kind].count("plane")
-    if planes == 1:
-        return abs(np.pi / 2.0 - turn)
-    return np.pi - turn if planes or nominal[0].axis @ nominal[1].axis < -RIGHT_RAD else turn
+    axis, planes = one.shape.axis, [one.shape.kind, other.shape.kind].count("plane")
+    same = -1.0 if axis @ other.shape.axis < -RIGHT_RAD else 1.0
+    sine = np.linalg.norm(about := np.cross(axis, same * other.shape.axis))
+    start = about * np.arctan2(sine, same * axis @ other.shape.axis) / (sine or 1.0)
+    turned = other.turn_rad - one.turn_rad
+    offset = np.pi / 2.0 if planes == 1 else np.pi if planes and same > 0.0 else 0.0
+    return np.abs(offset - np.linalg.norm(start + turned - np.outer(turned @ axis, axis), axis=1))
 
 
-def _position(actual: Shapes, nominal: Shapes) -> float:
+def _position(own: Motion, *datums: Motion) -> Array:
     """How far a feature is from where it should be against datums, along what it fixes.
 
     Each datum fixes what those before it have left; what none does stays as the best fit has it.
     """
-    place, found, left = nominal[0].centre_mm, np.zeros(6), np.eye(6)
-    for shape, before in zip(actual[1:], nominal[1:], strict=True):
-        arm = (before.centre_mm - place) / LEVER_MM
-        moved = shape.centre_mm - before.centre_mm, np.cross(before.axis, shape.axis) * LEVER_MM
-        ways = [(at // 3, before.frame[:, at % 3]) for at in FREE[before.kind] if at < 6]
-        seen = np.array([way @ moved[turns] for turns, way in ways])
-        rows = np.array([[*way * (1 - turns), *(way if turns else np.cross(arm, way))]
-                         for turns, way in ways])  # fmt: skip
-        fixing = rows @ left
-        inverse = np.linalg.pinv(fixing, rcond=1e-6)
-        found = found + left @ inverse @ (seen - rows @ found)
-        left = left @ (np.eye(6) - inverse @ fixing)
-    away = actual[0].centre_mm - place - found[:3]
-    return float(np.linalg.norm(away @ nominal[0].across))
+    from scipy.linalg import block_diag, pinv
+
+    found, left, rigid = np.zeros(6), np.eye(6), np.eye(6)
+    for shape, shifted, turned, *_ in datums:
+        rigid[3:, :3] = skew((shape.centre_mm - own.shape.centre_mm) / LEVER_MM)
+        turns = np.eye(3) * (shape.axis @ shape.axis) - np.outer(shape.axis, shape.axis)
+        ways: Any = block_diag(shape.across, turns)
+        rest = np.hstack([shifted, turned * LEVER_MM]) @ ways - found @ rigid @ ways
+        fixing = left @ rigid @ ways
+        inverse = pinv(fixing, atol=RIGHT_RAD) @ left
+        found, left = found + rest @ inverse, left - fixing @ inverse
+    return np.linalg.norm((own.shift_mm - found[..., :3]) @ own.shape.across, axis=1)
 
 
 class Kind(NamedTuple):
-    """A kind of measure: how it is taken, mm or rad, of what, to how many others."""
+    """A kind of measure: how it is taken, of what, to how many others."""
 
-    take: Callable[[Shapes, Shapes], float] | None  # None of the form
+    take: Callable[..., Array]  # mm or rad, [F], of the motions of these
     features: Sequence[str]
     others: tuple[int, int] = (0, 0)
     is_angle: bool = False
 
 
-_LEANING = ("plane", "cylinder", "cone")
 KINDS: Mapping[str, Kind] = {
-    "flatness": Kind(None, ["plane"]),
-    "cylindricity": Kind(None, ["cylinder"]),
-    "conicity": Kind(None, ["cone"]),
-    "sphericity": Kind(None, ["sphere"]),
-    "diameter": Kind(lambda actual, _: 2.0 * actual[0].radius_mm, ["cylinder", "sphere"]),
-    "half_angle": Kind(lambda actual, _: actual[0].angle_rad, ["cone"], is_angle=True),
-    "position": Kind(_position, [*FREE], (0, 6)),
-    "distance": Kind(_distance, [*FREE], (1, 1)),
-    "angle": Kind(_angle, _LEANING, (1, 1), is_angle=True),
-    "squareness": Kind(_angle, _LEANING, (1, 1), is_angle=True),
-    "parallelism": Kind(_angle, _LEANING, (1, 1), is_angle=True),
+    "flatness": Kind(lambda one: one.form_mm, ["plane"]),
+    "cylindricity": Kind(lambda one: one.form_mm, ["cylinder"]),
+    "conicity": Kind(lambda one: one.form_mm, ["cone"]),
+    "sphericity": Kind(lambda one: one.form_mm, ["sphere"]),
+    "diameter": Kind(lambda one: 2.0 * one.radius_mm, ["cylinder", "sphere"]),
+    "half_angle": Kind(lambda one: one.angle_rad, ["cone"], is_angle=True),
+    "position": Kind(_position, SHAPES, (0, 6)),
+    "distance": Kind(_distance, SHAPES, (1, 1)),
+    "angle": Kind(_angle, SHAPES[:3], (1, 1), is_angle=True),
+    "squareness": Kind(_angle, SHAPES[:3], (1, 1), is_angle=True),
+    "parallelism": Kind(_angle, SHAPES[:3], (1, 1), is_angle=True),
 }
-
-
-class Wanted(NamedTuple):
-    """One measure of a feature, by the numbers of the features."""
-
-    kind: str
-    of: tuple[int, ...]  # the feature, and what it is measured to
-    name: str
-    tolerance: tuple[float, float] | None = None  # of the difference, µm or µrad
+Band: TypeAlias = tuple[float, float] | None  # a tolerance, µm or µrad
+Wanted = dict[tuple[str, tuple[int, ...]], Band]  # by kind of measure and numbers of features
 
 
 @dataclass(frozen=True)
@@ -122,136 +270,118 @@ def inspect(
     Tolerances are the name and the text of a TOML file that names features and says what they have
     to keep; SceneError says all that is wrong with it.
     """
-    features, points = find_features(mesh), mesh.vertices_mm
-    names = [one.name for one in features]
-    asked = _read(*tolerances, features, names) if tolerances else {}
-    wanted = [
-        asked.pop((kind, (at,)), Wanted(kind, (at,), kind))
-        for at, feature in enumerate(features)
+    from scipy.spatial.transform import Rotation
+
+    known, points = find_features(mesh), mesh.vertices_mm
+    names, features, shapes = [*known], known.values(), [one.shape for one in known.values()]
+    wanted: Wanted = {
+        (kind, (at,)): None
+        for at, shape in enumerate(shapes)
         for kind, row in KINDS.items()
-        if feature.shape.kind in row.features and not row.others[0]
-    ]
-    wanted += asked.values()
-    turns = np.linalg.svd(
-        (made.point_mm - made.point_mm.mean(axis=0)).T @ (points - points.mean(0))
-    )
-    sides = [1.0, 1.0, np.sign(np.linalg.det(turns[0] @ turns[2]))]
-    turn = turns[0] * sides @ turns[2]  # from the frame of the part to that of the workpiece
+        if shape.kind in row.features and not row.others[0]
+    }
+    if tolerances:
+        wanted |= _read(*tolerances, shapes, names)
+    arms = (at - at.mean(axis=0) for at in (made.point_mm, points))
+    turn = Rotation.align_vectors(*arms)[0].as_matrix()  # from the part to the workpiece
 
-    def measure(moved_um: Array) -> Array:
-        return _measure(features, wanted, points + moved_um * MM_PER_UM)
+    def take(move_um: Array) -> Array:  # [F, V, 3] → [F, m], µm or µrad
+        motions = [one.follow(move_um) for one in features]
+        found = np.empty((len(move_um), len(wanted)))
+        for index, (kind, of) in enumerate(wanted):
+            taken = KINDS[kind].take(*(motions[at] for at in of))
+            found[:, index] = taken * (URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM)
+        return found
 
-    rest = fit_out(points, made.error_um @ turn)
-    values = [measure(moved) for moved in (0.0 * rest, made.error_um @ turn, rest)]
-    if any(one.tolerance for one in wanted):
+    errors = [made.error_um]
+    if any(wanted.values()):
         at = made.coordinates
         exact = evaluate(scene, at=at, loop=Loop.RELATIVE, frame="workpiece", exact=True)
-        values.append(measure(fit_out(points, exact.error_um @ turn)))
-    keys = [key for key in scene.parameter_keys if scene.errors.amplitude(key) != 0.0]
-    parts: list[Array] = []
-    for some in (keys[first : first + KEYS_AT_ONCE] for first in range(0, len(keys), KEYS_AT_ONCE)):
-        moved = point_basis(scene, made, some).position @ turn
-        for amplitude, one in zip(amplitudes_of(scene.errors, some), moved, strict=True):
-            step = NUDGE * amplitude * fit_out(points, one)
-            parts.append((measure(rest / 2.0 + step) - measure(rest / 2.0 - step)) / (2.0 * NUDGE))
-    measures: list[dict[str, Mapping[str, Any]]] = [{} for _ in features]
-    for index, one in enumerate(wanted):
-        split = {key: float(part[index]) for key, part in zip(keys, parts, strict=True)}
-        measures[one.of[0]][one.name] = _numbers(one, [float(row[index]) for row in values], split)
+        errors.append(exact.error_um)
+    placed = fit_out(points, np.array(errors) @ turn)
+    values = take(np.stack([0.0 * placed[0], made.error_um @ turn, *placed]))
+    budget: dict[str, Array] = {}
+    for key in scene.parameter_keys:
+        if amplitude := scene.errors.amplitude(key):
+            alone = fit_out(points, amplitude * point_basis(scene, made, [key]).position @ turn)
+            low, high = take(placed[0] / 2.0 + NUDGE * np.concatenate([-alone, alone]))
+            budget[key] = (high - low) / (2.0 * NUDGE)
+    measures = [dict[str, Mapping[str, Any]]() for _ in features]
+    for index, ((kind, of), band) in enumerate(wanted.items()):
+        to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
+        split = {key: float(part[index]) for key, part in budget.items()}
+        measures[of[0]][kind + to] = _numbers(KINDS[kind], values[:, index], band, split)
     results: list[FeatureResult] = []
-    for name, feature, found in zip(names, features, measures, strict=True):
-        of = next((key for key, one in found.items() if "tolerance_um" in one), "position")
-        results.append(FeatureResult(name, feature.shape.kind, found, of, found[of]["budget"]))
+    for name, shape, row in zip(names, shapes, measures, strict=True):
+        of = next((key for key, one in row.items() if "tolerance_um" in one), "position")
+        results.append(FeatureResult(name, shape.kind, row, of, row[of]["budget"]))
     return tuple(results)
 
 
-def _measure(features: Sequence[Feature], wanted: Sequence[Wanted], point_mm: Array) -> Array:
-    """Take all measures, [m], µm or µrad, where the vertices of a part are, [V, 3]."""
-    points = [point_mm[one.vertices] for one in features]
-    shapes = [fit_shape(one.shape, seen) for one, seen in zip(features, points, strict=True)]
-    found = np.empty(len(wanted))
-    for index, (name, of, *_) in enumerate(wanted):
-        kind, at = KINDS[name], of[0]
-        if kind.take:
-            value = kind.take([shapes[at] for at in of], [features[at].shape for at in of])
-        else:  # what the file itself has rounded is no error of the machine
-            value = np.ptp(shapes[at].respond(points[at]).distance_mm - features[at].away_mm)
-        found[index] = value * (URAD_PER_RAD if kind.is_angle else UM_PER_MM)
-    return found
-
-
-def _numbers(wanted: Wanted, values: Sequence[float], split: Mapping[str, float]) -> dict[str, Any]:
+def _numbers(kind: Kind, values: Array, band: Band, budget: dict[str, float]) -> dict[str, Any]:
     """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad."""
-    is_angle = KINDS[wanted.kind].is_angle
-    large, small = ("deg", "urad") if is_angle else ("mm", "um")
-    per = np.rad2deg(RAD_PER_URAD) if is_angle else MM_PER_UM
-    difference, placed, *exact = (value - values[0] for value in values[1:])
-    names = ("nominal", "actual", "placed")
-    found: dict[str, Any] = {f"{a}_{large}": v * per for a, v in zip(names, values, strict=False)}
+    large, small = ("deg", "urad") if kind.is_angle else ("mm", "um")
+    per = np.rad2deg(RAD_PER_URAD) if kind.is_angle else MM_PER_UM
+    difference, placed, *exact = (values[1:] - values[0]).tolist()
+    names = (f"{word}_{large}" for word in ("nominal", "actual", "placed"))
+    found: dict[str, Any] = dict(zip(names, (values * per).tolist(), strict=False))
     found |= {f"difference_{small}": difference, f"placed_difference_{small}": placed}
-    if wanted.tolerance is not None:
-        low, high = wanted.tolerance
-        doubt, beyond = abs(exact[0] - placed), max(low - placed, placed - high)
+    if band is not None:
+        doubt, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
         verdict = "in doubt" if abs(beyond) < doubt else "missed" if beyond > 0.0 else "kept"
-        found |= {f"tolerance_{small}": wanted.tolerance, f"doubt_{small}": doubt}
-        found["verdict"] = verdict
-    return found | {"budget": dict(sorted(split.items(), key=lambda pair: -abs(pair[1])))}
+        found |= {f"tolerance_{small}": band, f"doubt_{small}": doubt, "verdict": verdict}
+    return found | {"budget": dict(sorted(budget.items(), key=lambda pair: -abs(pair[1])))}
 
 
-def _read(
-    source: str, text: str, features: Sequence[Feature], names: list[str]
-) -> dict[tuple[str, tuple[int, ...]], Wanted]:
+def _read(source: str, text: str, shapes: Sequence[Shape], names: list[str]) -> Wanted:
     """Read tolerances, and names of features into the list of them; refuse what does not fit."""
     problems, raw = schema.Problems(), parse_toml(text, source)
     entries: Sequence[Any] = (problems.read(schema.FEATURES, "", raw) or {}).get("features", ())
-    known = {one.name: at for at, one in enumerate(features)}
-    wanted: list[Wanted] = []
+    known, wanted = {name: at for at, name in enumerate(names)}, Wanted()
     for index, entry in enumerate(entries):
-        where, name, chosen = f"features[{index}]", entry["name"], [entry["is"], *entry["to"]]
+        where, chosen = f"features[{index}]", [entry["is"], *entry["to"]]
         if entry["near"] is not None:
             away = {
-                float(np.linalg.norm(one.shape.centre_mm - entry["near"])): one.name
-                for one in features
-                if one.shape.kind == entry["is"]
+                float(np.linalg.norm(shape.centre_mm - entry["near"])): name
+                for name, shape in zip(names, shapes, strict=True)
+                if shape.kind == entry["is"]
             }
-            chosen[0] = away[min(away)] if away else entry["is"]
+            chosen[0] = away.get(min(away, default=0.0), entry["is"])
         problems.only(where, chosen, known, "feature")
         of = tuple(known[one] for one in chosen if one in known)
         if len(of) < len(chosen):
             continue
-        if known.setdefault(name or names[of[0]], of[0]) != of[0]:
+        names[of[0]] = name = entry["name"] or names[of[0]]
+        if known.setdefault(name, of[0]) != of[0]:
             problems.add(f"{where}.name", "another feature has it", name)
-        names[of[0]] = name or names[of[0]]
-        if wrong := _wrong(entry, [features[at].shape for at in of]):
+        if wrong := _wrong(entry, [shapes[at] for at in of]):
             problems.add(where, wrong)
-        elif kind := entry["measure"]:
-            to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
-            band = entry["tolerance_um"] or entry["tolerance_urad"]
-            wanted.append(Wanted(kind, of, kind + to, band))
+        elif entry["measure"]:
+            wanted[entry["measure"], of] = entry["tolerance_um"] or entry["tolerance_urad"]
     if problems.lines:
         raise SceneError(source, problems.lines)
-    return {(one.kind, one.of): one for one in wanted}
+    return wanted
 
 
-def _wrong(entry: Mapping[str, Any], shapes: Shapes) -> str:
+def _wrong(entry: Mapping[str, Any], shapes: Sequence[Shape]) -> str:
     """Say why features do not have the measure of an entry; nothing where they do."""
     name, count = entry["measure"], len(shapes) - 1
+    bands = entry["tolerance_um"], entry["tolerance_urad"]
     if not name:
-        has_more = count or entry["tolerance_um"] or entry["tolerance_urad"]
-        return "expected a measure" if has_more else ""
+        return "expected a measure" if count or any(bands) else ""
     if name not in KINDS:
         return f"unknown measure {name!r}{near_miss(name, KINDS)}"
     kind = KINDS[name]
     unit, other = ("urad", "um") if kind.is_angle else ("um", "urad")
-    if entry[f"tolerance_{other}"] is not None:
+    if bands[not kind.is_angle]:
         return f"tolerance_{other} of {name}; expected tolerance_{unit}"
     if not kind.others[0] <= count <= kind.others[1]:
         return f"{name} to {count} features; expected {kind.others[1]}"
-    for one in shapes if kind.others[0] else shapes[:1]:
+    for one in shapes:
         if one.kind not in kind.features:
             return f"{name} of a {one.kind}; expected a {' or a '.join(kind.features)}"
     if name in ("squareness", "parallelism"):
-        angle = _angle(shapes, shapes)
+        (angle,) = _angle(*(Motion(shape, *np.zeros((5, 1, 3))) for shape in shapes))
         if abs((np.cos if name == "squareness" else np.sin)(angle)) > RIGHT_RAD:
             return f"{name} at a nominal angle of {np.rad2deg(angle):.4g}°; expected angle"
     return ""
@@ -262,14 +392,12 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
     rows: list[tuple[Any, ...]] = []
     for result in results:
         for name, one in result.measures.items():
-            large, small = ("deg", "urad") if "nominal_deg" in one else ("mm", "um")
+            nominal, _, placed, *differences = [*one.values()][:5]
+            tolerance = one.get("tolerance_um") or one.get("tolerance_urad") or ()
             most = [pair for pair in one["budget"].items() if abs(pair[1]) >= SHOWN][:3]
             rows.append((
-                f"{result.name} · {name.replace('_', ' ')}",
-                *(one[f"{key}_{large}"] for key in ("nominal", "placed")),
-                *(one[f"{key}_{small}"] for key in ("difference", "placed_difference")),
-                " … ".join(map(spell_signed, one.get(f"tolerance_{small}", ()))),
-                one.get("verdict", ""),
+                f"{result.name} · {name.replace('_', ' ')}", nominal, placed, *differences,
+                " … ".join(map(spell_signed, tolerance)), one.get("verdict", ""),
                 ", ".join(f"{key} {spell_signed(part)}" for key, part in most),
             ))  # fmt: skip
     columns = (
@@ -280,4 +408,4 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
         Column("verdict", key="verdict"),
         Column("most of it", key="most_of_it", wraps=True),
     )
-    return Table(columns, rows, empty=f"no {', '.join(FREE)} was found")
+    return Table(columns, rows, empty=f"no {', '.join(SHAPES)} was found")
