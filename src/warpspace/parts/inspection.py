@@ -133,10 +133,10 @@ def find_features(mesh: PartMesh) -> dict[str, Feature]:
     """
     from trimesh.graph import connected_component_labels, connected_components
 
-    area, pairs = np.linalg.norm(mesh.areas_mm2, axis=1), np.stack(mesh.neighbours, axis=-1) // 3
-    cosine = np.einsum("ec,ec->e", *mesh.normals[pairs.T])
-    facet_of = connected_component_labels(pairs[cosine > np.cos(FLAT_RAD)], len(area))
-    pairs = pairs[cosine > np.cos(np.deg2rad(SMOOTH_DEG))]
+    area, pairs = mesh.surface.area_faces, mesh.surface.face_adjacency
+    leaning = mesh.surface.face_adjacency_angles
+    facet_of = connected_component_labels(pairs[leaning < FLAT_RAD], len(area))
+    pairs = pairs[leaning < np.deg2rad(SMOOTH_DEG)]
     facet = np.bincount(facet_of, area)[facet_of][pairs]
     is_alike = facet.max(axis=1) < ALIKE * facet.min(axis=1)
     is_left, found = np.ones(len(area), dtype=bool), list[Feature]()
@@ -160,8 +160,8 @@ def find_features(mesh: PartMesh) -> dict[str, Feature]:
 
 def _fitted(mesh: PartMesh, kind: str, part: NDArray[np.intp]) -> Feature | None:
     """Fit a shape to triangles; None where their normals or vertices are off it."""
-    normal, area = mesh.normals[part], np.linalg.norm(mesh.areas_mm2[part], axis=1)
-    place, weight = mesh.vertices_mm[mesh.triangles[part]].mean(axis=1), area / area.sum()
+    normal, area = mesh.surface.face_normals[part], mesh.surface.area_faces[part]
+    place, weight = mesh.surface.triangles_center[part], area / area.sum()
     centre, mean = weight @ place, weight @ normal
     bent, is_flat = normal - mean, kind == "plane"
     same, spread = np.outer(mean, mean), (weight * bent.T) @ bent
