@@ -65,17 +65,15 @@ def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **more: object) -> S
 class MovingLayer:
     """Everything around the box, which may also move by itself: the session turns it on."""
 
-    def __init__(
-        self, client: ClientHandle, page: Page, picture: LivePicture, clamp: Callable[[str], None]
-    ) -> None:
+    def __init__(self, client: ClientHandle, page: Page, picture: LivePicture) -> None:
         self._client = client
-        self._clamp = clamp  # takes the place that the part is moved to
         self._picture = picture
         self._around = Nodes(client.scene, page)
         self._ghost, self._turning = Nodes(client.scene), Nodes(client.scene)
         self._ghost_of: object = None
         self.position: dict[str, float] = {}  # of the played axis, degrees; none where it stands
         self.moved: Callable[[], None] = lambda: None
+        self.clamp: Callable[[str], None] = lambda _place: None  # takes where the part is let go
         self._turned_deg = 0.0
         self._turned_at: float | None = None  # None while it stands still
         self.show(picture)
@@ -108,7 +106,7 @@ class MovingLayer:
             part, turn = self._picture.part, np.asarray(SO3(event.target.wxyz).as_matrix(), float)
             at = transforms.rigid(turn, event.target.position / SCENE_PER_MM)
             place = moved_place(part.of, transforms.inverse(part.pose) @ at)
-            self._clamp(",".join(map(repr, place)))
+            self.clamp(",".join(map(repr, place)))
 
     def _draw_ghost(self, picture: LivePicture) -> None:
         """Errors do not move the ghost; it is not drawn beside the machine itself."""

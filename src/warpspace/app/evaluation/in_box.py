@@ -97,8 +97,7 @@ def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> InBox[T]:
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
     pose = np.asarray(branch_pose(scene.model, "workpiece", stand))
     response = np.empty((len(keys), count, 3), np.float32)
-    for start in range(0, count, PIECE):
-        rows = slice(start, start + PIECE)
+    for rows in np.array_split(np.arange(count), -(-count // PIECE) or 1):
         response[:, rows] = point_basis(scene, made, rows=rows).position @ pose[:3, :3].T
     nominal = transforms.apply(pose, made.point_mm).astype(np.float32)
     here = branch_pose(scene.model, "workpiece", made.coordinates)

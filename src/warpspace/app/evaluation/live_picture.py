@@ -70,15 +70,14 @@ class LivePicture(Picture):
 
     @cached_property
     def part(self) -> InBox[PartMesh] | None:
-        """The part in the box; None where none is, or cannot be. Of a difference its change."""
         return self._in_box(part_in_box)
 
     @cached_property
     def path(self) -> InBox[ToolPath] | None:
-        """The path of the program, likewise."""
         return self._in_box(path_in_box)
 
     def _in_box(self, find: Callable[[AppState], InBox[T] | None]) -> InBox[T] | None:
+        """Find a part or a path; of a difference its change; None where none is, or cannot be."""
         if not self.is_difference or self.compared is None:
             return find(self.drawn_state)
         a, b = map(find, self.compared.sides)

@@ -310,8 +310,8 @@ class Session:
         self._around_at = None
         context = self.context
         with context.page.as_one():
-            clamp = partial(context.send, "state:set.part.place")
-            context.stage = MovingLayer(self._client, context.page, picture, clamp)
+            context.stage = MovingLayer(self._client, context.page, picture)
+            context.stage.clamp = partial(context.send, "state:set.part.place")
             self.display.add(picture, [context.stage])
             context.page.call("stage", "open")
 

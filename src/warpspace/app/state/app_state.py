@@ -172,7 +172,7 @@ class Picked:
 class PartLook:
     """The part that stands in the box, in place of the scene's own."""
 
-    # never saved or linked, but for its name
+    # mesh and text of the program are never saved or linked
     mesh: PartMesh | None = field(default=None, metadata=said("Mesh of the part"))
     name: str = described("", "Part", linked="part")
     place: tuple[float, ...] | None = described(
@@ -184,7 +184,6 @@ class PartLook:
         hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
         " degrees about the fixed x, y and z, in that order; empty for the usual place.",
     )
-    # likewise
     program: str | None = field(default=None, metadata=said("Program"))
     program_name: str = field(default="", metadata=said("Program"))
     shown: bool = described(

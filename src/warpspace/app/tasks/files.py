@@ -130,10 +130,9 @@ class FilesWindow(JobWindow):
     def _open(self, value: str) -> None:
         """Open a scene or a machine, or show what a file of measured data would bring."""
         told = value.partition("\n")[2].partition("\n")[0].lower()
-        for part, endings in files.IN_BOX.items():
-            if told.endswith(endings):
-                self.context.send(f"{part}:file", value)
-                return
+        if part := next((part for part, ends in files.IN_BOX.items() if told.endswith(ends)), ""):
+            self.context.send(f"{part}:file", value)
+            return
         name, content = files.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:

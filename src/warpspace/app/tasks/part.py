@@ -30,7 +30,6 @@ from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
 from warpspace.parts.part import load_part, place_part
 from warpspace.scene.model import Scene
 
-SETTINGS = ("part.place", "part.shown", "part.normal", "part.moved")
 MOST_LETTERS = 200  # of a line that is shown
 
 
@@ -40,10 +39,6 @@ class InBoxPart(FilesPart):
     at_once = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
     holds = ("", "")  # fields of `PartLook`: what is there, if anything, and the name of its file
-
-    def held(self, state: AppState) -> tuple[Any, str]:
-        what, name = (getattr(state.part, field) for field in self.holds)
-        return what, name
 
     def about(self, state: AppState) -> Markup:
         """Say what is to be known of it, and set."""
@@ -57,10 +52,10 @@ class InBoxPart(FilesPart):
         return (*super().concerns(picture), picture.state.part)
 
     def is_ready(self, state: AppState) -> bool:
-        return self.held(state)[0] is not None
+        return getattr(state.part, self.holds[0]) is not None
 
     def before_result(self, state: AppState) -> Markup:
-        held, name = self.held(state)
+        held, name = (getattr(state.part, field) for field in self.holds)
         upload = html.upload_button(
             f"Another {self.name} …" if held else f"{self.title} …", self.name, self.most_bytes,
             ",".join(IN_BOX[self.name]), kind="" if held else "main",
@@ -116,7 +111,7 @@ class PartPart(InBoxPart):
                  for axis in "xyz")  # fmt: skip
         return join((
             actions(tag("span", "Turn about"), *turns),
-            *(setting(state, path) for path in SETTINGS),
+            *(setting(state, f"part.{one}") for one in ("place", "shown", "normal", "moved")),
             html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
                                hint="Names and tolerances of its features"),
         ))  # fmt: skip
@@ -158,7 +153,7 @@ class ProgramPart(InBoxPart):
         return replace(asked, file=state.part.program_name, text=state.part.program)
 
     def about(self, state: AppState) -> Markup:
-        line, text = state.forms.get(AT_LINE, ""), self.held(state)[0].splitlines()
+        line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
         if not (at := index_of(line, len(text) + 1)):
             return EMPTY
         return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
