@@ -38,11 +38,11 @@ MIDST_MM = 1e-3  # from an axis; closer points, as the tip of a cone, are on no 
 WEAK = 3e-7  # share of the strongest response below which a freedom of a shape counts as none
 STEPS, STILL_MM, FAR_MM = 40, 1e-11, 1e6  # of a fit; changes of a distance that end it
 MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
-RIGHT_RAD = 1e-4  # a nominal angle this close to 90° or to 0 has a squareness or a parallelism
+RIGHT_RAD = 1e-4  # nominal angles this close to 90° or 0 are right or none; datums fix no less
 NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
 SHOWN = 0.005  # µm or µrad that a table names a parameter for
-SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circles lie on the last
+SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: a sphere fits two circles, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +145,8 @@ def find_features(mesh: PartMesh) -> dict[str, Feature]:
         # a single triangle is flat whatever the machine does
         parts: Any = connected_components(links, min_len=2, engine="scipy")
         for part in sorted(parts, key=lambda one: -area[one].sum())[:MAX_FEATURES]:
-            is_curved = len(np.unique(facet_of[part])) >= FACETS
-            tried = (_fitted(mesh, kind, part) for kind in SHAPES[: None if is_curved else 1])
-            if feature := next(filter(None, tried), None):
+            kinds = SHAPES if len(np.unique(facet_of[part])) >= FACETS else SHAPES[:1]
+            if feature := next(filter(None, (_fitted(mesh, kind, part) for kind in kinds)), None):
                 is_left[part] = False
                 found.append(feature)
     found.sort(key=lambda one: (float(f"{-one.area_mm2:.5g}"), *one.shape.centre_mm.round(3)))
