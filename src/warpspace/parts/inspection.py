@@ -42,7 +42,7 @@ RIGHT_RAD = 1e-4  # nominal angles this close to 90° or 0 are right or none; da
 NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
 SHOWN = 0.005  # µm or µrad that a table names a parameter for
-SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: a sphere fits two circles, too
+SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circles fit a sphere, too
 
 
 @dataclass(frozen=True, eq=False)
