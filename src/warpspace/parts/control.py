@@ -21,7 +21,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, copysign, sqrt, tau
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Literal, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +36,12 @@ from warpspace.scene.files import check_file
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
+Rows: TypeAlias = NDArray[np.int64]
 MM_PER_INCH = 25.4
 SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
 FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
 STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in other words
 PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
-SYSTEMS = tuple(f"G{number}" for number in range(54, 60))
 CYCLES = "G81", "G82", "G83"
 MOST_SAID = 1000  # words that are listed as not understood
 MOST = 1e9  # largest number that is no position
@@ -63,7 +63,7 @@ _MODAL: Mapping[str, tuple[str, object]] = {
     "G90": ("absolute", True), "G91": ("absolute", False),
     "G93": ("inverse_time", True), "G94": ("inverse_time", False), "G95": ("inverse_time", False),
     "G98": ("to_initial", True), "G99": ("to_initial", False),
-    **{code: ("system", code) for code in SYSTEMS},
+    **{code: ("system", code) for code in ("G54", "G55", "G56", "G57", "G58", "G59")},
 }  # fmt: skip
 _OTHER = "4 9 15 28 40 43 43.4 49 50 53 61 61.1 64 67 69 91.1 96 97"
 _UNDERSTOOD = _MODAL.keys() | {f"G{number}" for number in _OTHER.split()}
@@ -107,10 +107,10 @@ class ReadProgram:
     """Moves of a program, one a row; each begins where the one before it ends."""
 
     axes: tuple[str, ...]  # of the machine, [a]
-    line: NDArray[np.int64]  # [m], of the file, from 1; 0 for where the axes stand at first
-    kind: NDArray[np.int64]  # [m]; STAND, RAPID, FEED or ARC
+    line: Rows  # [m], of the file, from 1; 0 for where the axes stand at first
+    kind: Rows  # [m]; STAND, RAPID, FEED or ARC
     tcp: NDArray[np.bool_]  # [m]
-    across: NDArray[np.int64]  # [m]; direction 0 to 2 about which an arc turns
+    across: Rows  # [m]; direction 0 to 2 about which an arc turns
     length_mm: Array  # [m], of the tool
     turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
     centre_mm: NDArray[np.complex128]  # [m]; of an arc, along the two axes of its `PLANES`
@@ -125,7 +125,7 @@ class ReadProgram:
         """How many lines move an axis."""
         return len(np.unique(self.line[self.kind != STAND]))
 
-    def positions(self, move: NDArray[np.int64], share: Array) -> Array:
+    def positions(self, move: Rows, share: Array) -> Array:
         """Give the positions of axes, as `end` has them, at shares of moves, [n, a]."""
         start, end = self.end[np.maximum(move - 1, 0)], self.end[move]
         at = start + share[:, None] * (end - start)

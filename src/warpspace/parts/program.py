@@ -14,6 +14,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ from warpspace.parts.control import (
     STAND,
     Control,
     ReadProgram,
+    Rows,
     Setup,
     axes_at,
     program_lines,
@@ -45,6 +47,7 @@ from warpspace.parts.control import (
     words_at,
 )
 from warpspace.scene.model import Scene, check_magnitude, second_order
+from warpspace.scene.save import scene_to_toml
 from warpspace.units import Array
 
 TURN_DEG, STEP_MM = 2.0, 10.0  # most that axes, and arcs, move between samples
@@ -62,8 +65,8 @@ SAID = 20  # words that a remark lists
 class ToolPath:
     """Samples along a path: where it begins, the end of each move, and what lies between."""
 
-    line: NDArray[np.int64]  # [n], of the file, from 1
-    move: NDArray[np.int64]  # [n], row of the program
+    line: Rows  # [n], of the file, from 1
+    move: Rows  # [n], row of the program
     coordinates: dict[str, Array]  # [n] each, mm or degrees; full turns of a rotary axis left out
     tip_mm: Array  # [n, 3], nominal, w
     error_um: Array  # [n, 3], relative, actual − nominal, w
@@ -71,39 +74,32 @@ class ToolPath:
     step_mm: Array  # [n, 3], from the sample before; zero where the path begins or a tool changes
 
     @cached_property
-    def way_mm(self) -> Array:
-        """Length of the nominal path from the sample before, [n]."""
-        return np.linalg.norm(self.step_mm, axis=1)
-
-    @cached_property
     def norm_um(self) -> Array:
         return np.linalg.norm(self.error_um, axis=1)
 
-    @cached_property
-    def along_um(self) -> Array:
-        """How much of the errors is along the path, [n]; nothing where nothing moves."""
+    def axes_at(self, sample: int) -> dict[str, float]:
+        return {name: float(at[sample]) for name, at in self.coordinates.items()}
+
+    def deviations(self) -> Iterator[Statistics]:
+        """Sum errors up over the way: their length, and how much is along the path, and across it.
+
+        Where nothing moves each sample counts once, and is across.
+        """
         back, ahead = self.step_mm, np.roll(self.step_mm, -1, axis=0)
         follows = (self.move == np.roll(self.move, 1))[:, None]
         bend = np.where(follows, back - np.roll(back, 1, axis=0), 0.0)
-        along = 2.0 * back + np.where(np.roll(follows, -1, axis=0), ahead - back, bend)
-        length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
-        return np.abs(np.sum(self.error_um * along, axis=1)) / length
-
-    @cached_property
-    def across_um(self) -> Array:
-        """How much of them is across it, [n]."""
-        return np.sqrt(np.maximum(self.norm_um**2 - self.along_um**2, 0.0))
-
-    def deviation(self, length_um: Array) -> Statistics:
-        """Sum lengths of errors up over the way; each sample counts once where there is none."""
-        weights = self.way_mm + np.append(self.way_mm[1:], 0.0)
+        tangent = 2.0 * back + np.where(np.roll(follows, -1, axis=0), ahead - back, bend)
+        tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
+        along_um = np.abs(np.sum(self.error_um * tangent, axis=1))
+        across_um = np.sqrt(np.maximum(self.norm_um**2 - along_um**2, 0.0))
+        weights = np.linalg.norm(back, axis=1) + np.append(np.linalg.norm(ahead[:-1], axis=1), 0.0)
         weights = weights if weights.any() else np.ones(len(weights))
-        mean, square = np.average([length_um, length_um**2], axis=1, weights=weights).tolist()
-        p95 = np.quantile(length_um, P95, weights=weights, method="inverted_cdf")
-        worst = int(np.argmax(length_um))
-        x, y, z = self.tip_mm[worst].tolist()
-        axes = {name: float(at[worst]) for name, at in self.coordinates.items()}
-        return Statistics(mean, square**0.5, float(p95), float(length_um[worst]), (x, y, z), axes)
+        for um in (self.norm_um, along_um, across_um):
+            mean, square = np.average([um, um**2], axis=1, weights=weights).tolist()
+            p95 = float(np.quantile(um, P95, weights=weights, method="inverted_cdf"))
+            at = int(np.argmax(um))
+            x, y, z = self.tip_mm[at].tolist()
+            yield Statistics(mean, square**0.5, p95, float(um[at]), (x, y, z), self.axes_at(at))
 
 
 def trace_program(scene: Scene, read: ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
@@ -117,7 +113,7 @@ def trace_program(scene: Scene, read: ReadProgram, chord_mm: float = CHORD_MM) -
     return ToolPath(read.line[move], move, at, tip, error, ~within_travel(scene.machine, at), step)
 
 
-def count_samples(scene: Scene, read: ReadProgram, chord_mm: float) -> NDArray[np.int64]:
+def count_samples(scene: Scene, read: ReadProgram, chord_mm: float) -> Rows:
     """Count the samples of each move, [m]; 0 where nothing moves."""
     is_rotary = np.array([not is_linear(name) for name in read.axes])
     change, moves = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1])), read.kind != STAND
@@ -140,11 +136,7 @@ def count_samples(scene: Scene, read: ReadProgram, chord_mm: float) -> NDArray[n
 
 
 def along_moves(
-    scene: Scene,
-    read: ReadProgram,
-    move: NDArray[np.int64],
-    share: Array,
-    shift_mm: Array | None = None,
+    scene: Scene, read: ReadProgram, move: Rows, share: Array, shift_mm: Array | None = None
 ) -> tuple[dict[str, Array], Array, Array]:
     """Give positions of axes, tip and error at shares of moves, [n].
 
@@ -198,7 +190,6 @@ class Program(Setup, Analysis):
 
     name = "program"
     task = "measure"
-    has_table = True
     file_help = "Corrected program to write: this machine cuts the nominal path with it."
     file: File = option(None, "Program, G-code", positional=True, unset="that of the scene")
     at_line: int | None = option(
@@ -228,40 +219,35 @@ class Program(Setup, Analysis):
         worst = order[np.sort(np.unique(path.line[order], return_index=True)[1])[:WORST]]
 
         def explained(sample: int) -> PathPoint:
-            at = {name: values[sample] for name, values in path.coordinates.items()}
-            model = with_length(scene.model, float(read.length_mm[path.move[sample]]))
-            found = explain(model, scene.errors, at, scene.view(Loop.RELATIVE, "workpiece"))
-            ranked = sorted(found.contributions, key=lambda part: -part.along_um)
-            return PathPoint(
-                line=int(path.line[sample]),
-                um=float(path.norm_um[sample]),
-                axes={name: float(value) for name, value in at.items()},
-                error_um=path.error_um[sample],
-                budget={part.key: part.along_um for part in ranked},
-            )
+            axes, length = path.axes_at(sample), float(read.length_mm[path.move[sample]])
+            at = {name: np.asarray(value) for name, value in axes.items()}
+            view = scene.view(Loop.RELATIVE, "workpiece")
+            parts = explain(with_length(scene.model, length), scene.errors, at, view).contributions
+            ranked = sorted(parts, key=lambda part: -part.along_um)
+            budget, um = {part.key: part.along_um for part in ranked}, float(path.norm_um[sample])
+            return PathPoint(int(path.line[sample]), um, axes, path.error_um[sample], budget)
 
+        ends = np.flatnonzero(path.line == self.at_line)
+        if self.at_line and not len(ends):
+            lines = np.unique(path.line)
+            near = ", ".join(map(str, lines[np.argsort(np.abs(lines - self.at_line))][:3]))
+            most = f"{self.at_line} moves no axis; expected a line that does: {near}"
+            raise OptionError(f"{{at_line}} {most}")
+        deviation, along, across = path.deviations()
         return ProgramResult(
-            length_mm=float(path.way_mm.sum()),
+            length_mm=float(np.linalg.norm(path.step_mm, axis=1).sum()),
             outside=int(path.outside.sum()),
-            deviation=path.deviation(path.norm_um),
-            along=path.deviation(path.along_um),
-            across=path.deviation(path.across_um),
+            deviation=deviation,
+            along=along,
+            across=across,
             worst=[explained(sample) for sample in worst],
-            line=None if self.at_line is None else explained(_end_of(path, self.at_line)),
+            line=explained(ends[-1]) if len(ends) else None,
             read=read,
             path=path,
             scene=scene,
             asked=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
-
-
-def _end_of(path: ToolPath, line: int) -> int:
-    if line not in path.line:
-        lines = np.unique(path.line)
-        near = ", ".join(map(str, lines[np.argsort(np.abs(lines - line))][:3]))
-        raise OptionError(f"{{at_line}} {line} moves no axis; expected a line that does: {near}")
-    return int(np.flatnonzero(path.line == line)[-1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -296,8 +282,6 @@ class ProgramResult(Result):
             yield f"not followed: {', '.join(unknown[:SAID])}"
         if self.outside:
             yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
-        if not self.read.blocks:
-            yield "no block moves an axis: the errors are those where the axes stand"
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.scene.title} · {self.read.blocks} blocks, {self.length_mm:.1f} mm"
@@ -308,23 +292,17 @@ class ProgramResult(Result):
         rows = [(name, *astuple(one)[:4]) for name, one in names.items()]
         yield Table((Column("", leads=True), *heads), rows)
         columns = (
-            Column("line", "d", key="line", leads=True),
-            *number_columns(
-                ("|E|", "x", "y", "z"), ".2f", "µm", ("norm_um", "x_um", "y_um", "z_um")
-            ),
+            Column("line", "d", leads=True),
+            *number_columns(("|E|", "x", "y", "z"), ".2f", "µm"),
             Column("where", place_words, wraps=True),
             Column("most of it", budget_words, "µm", wraps=True),
         )
         told = [*self.worst, *([self.line] if self.line else [])]
         rows = [(one.line, one.um, *one.error_um, one.axes, one.budget) for one in told]
-        yield Table(
-            columns, rows, "Worst blocks, and the line asked for" if self.line else "Worst blocks"
-        )
+        yield Table(columns, rows, "Worst blocks")
 
 
-def corrected_places(
-    scene: Scene, read: ReadProgram, within_mm: float
-) -> tuple[NDArray[np.int64], Array]:
+def corrected_places(scene: Scene, read: ReadProgram, within_mm: float) -> tuple[Rows, Array]:
     """Give rows of a program, [n], and corrected places, [n, a], that its lines lead to in turn.
 
     A row comes as often as its move has pieces, all of one length. Between two places the linear
@@ -343,9 +321,7 @@ def corrected_places(
     return row[share > 0.0], places[share > 0.0]
 
 
-def _corrected(
-    scene: Scene, read: ReadProgram, count: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], Array, Array]:
+def _corrected(scene: Scene, read: ReadProgram, count: Rows) -> tuple[Rows, Array, Array]:
     """Give row and share of the ends of equal pieces of moves, and corrected places, [n, a]."""
     row = np.repeat(np.arange(len(count)), count + 1)
     share = (np.arange(len(row)) - np.searchsorted(row, row)) / count[row]
@@ -366,9 +342,7 @@ def _corrected(
 def correct_program(scene: Scene, asked: Program, read: ReadProgram) -> Iterator[str]:
     """Give the lines of a program that leaves the nominal path of another one on this machine."""
     for line, word in read.refused.items():
-        raise OptionError(
-            f"line {line}: {word} is not followed; expected a program that is, to mend it"
-        )
+        raise OptionError(f"line {line}: {word} is not followed; expected a program that is")
     row, places = corrected_places(scene, read, asked.within_um / 1e3)
     lines, control = [*asked.lines()], Control(scene, asked, asked.file or "")
     linear = {name[0] for name in following_axes(scene.model)}
@@ -390,7 +364,11 @@ def correct_program(scene: Scene, asked: Program, read: ReadProgram) -> Iterator
         if codes & {"G4", "G28", "G53"} or not (letters or len(moving)):
             kept = [word for key, word in control.tokens if key not in _MODES]
             is_step = "G28" in codes and not control.absolute
-            yield control.skip + " ".join(["G91"] * is_step + kept) if kept else line.rstrip()
+            yield (
+                control.skip + " ".join(["G91"] * is_step + kept)
+                if control.tokens
+                else line.rstrip()
+            )
             yield from ["G90"] * is_step
             continue
         missing = ", ".join(sorted((linear | letters) - known))
@@ -404,10 +382,6 @@ def correct_program(scene: Scene, asked: Program, read: ReadProgram) -> Iterator
 
 
 def _header(scene: Scene, asked: Program) -> Iterator[str]:
-    from hashlib import sha256
-
-    from warpspace.scene.save import scene_to_toml
-
     digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
     said = f"for {scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
     yield f"(corrected {re.sub('[()]', ' ', said).encode('ascii', 'replace').decode()})"
@@ -417,9 +391,7 @@ def _header(scene: Scene, asked: Program) -> Iterator[str]:
     yield "G90"
 
 
-def _blocks(
-    control: Control, letters: Sequence[str], kinds: NDArray[np.int64], places: Array
-) -> Iterator[str]:
+def _blocks(control: Control, letters: Sequence[str], kinds: Rows, places: Array) -> Iterator[str]:
     """Write the line that a control is at as straight blocks to places, [n, a]."""
     number = [word for key, word in control.tokens if key == "N"]
     said = _MODES | _LAST | {"N", "G0", "G1", *"IJKR", *control.index}

@@ -65,7 +65,7 @@ def test_a_hundred_machines_cut_the_nominal_points(tcp: str):
         turn = next(axis for axis in "ABC" if axis in scene.machine.axes)
         lines = [
             f"G55 G0 X1 Y2 Z-3 {turn}0", f"G43.4 H1 G1 X9 Y1 Z4 {turn}12.5 F500",
-            f"G91 X30.5 Z-20 {turn}12.5", f"G90 G20 X.5 Y-1 Z2 {turn}-70",
+            "G91", f"X30.5 Z-20 {turn}12.5", f"G90 G20 X.5 Y-1 Z2 {turn}-70",
             "N5 G21 G54 X-80 Y40 Z-50 M9", "G2 X-70 Y50 I10", "G1 X-70 Y50", "G49 X-80 Y40 Z9",
         ]  # fmt: skip
         offset = ("G54X", 3.0), ("G55Y", -7.25), (f"G55{turn}", 20.0)
