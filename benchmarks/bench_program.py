@@ -32,7 +32,7 @@ def measure() -> Section:
 
     def trace(text: str, tcp: str = "program") -> None:
         read = read_program(scene, text.splitlines(), Setup(tcp=tcp, length_mm=80.0))
-        trace_program(scene, read)
+        trace_program(read)
 
     text = program(BLOCKS)
     split = best(lambda: [line.split() for line in text.splitlines()])

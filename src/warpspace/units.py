@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]  # array of doubles; the shape is given in each docstring
+Integers: TypeAlias = NDArray[np.int64]
 
 UM_PER_MM = 1e3
 MM_PER_UM = 1e-3

@@ -21,22 +21,22 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, copysign, sqrt, tau
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn, TypeAlias
+from typing import Annotated, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.options import Grammar, option, read_numbers
-from warpspace.bench.placing import ball_point, follow, following_axes
+from warpspace.bench.placing import ball_point, follow
 from warpspace.exceptions import SceneError
 from warpspace.formats.source import MAX_LINE, MAX_LINES
 from warpspace.kinematics.model import Model, complete_coordinates
+from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM, MAX_PATH_POINTS, MAX_PROGRAM_BYTES
 from warpspace.scene.files import check_file
 from warpspace.scene.model import Scene
-from warpspace.units import Array
+from warpspace.units import Array, Integers
 
-Rows: TypeAlias = NDArray[np.int64]
 MM_PER_INCH = 25.4
 SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
 FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
@@ -44,7 +44,6 @@ STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in
 PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
 CYCLES = "G81", "G82", "G83"
 MOST_SAID = 1000  # words that are listed as not understood
-MOST = 1e9  # largest number that is no position
 SHOWN = 40  # characters of a word that a message shows
 WORD = re.compile(
     r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=])"  # a letter and its number
@@ -106,11 +105,12 @@ class Setup:
 class ReadProgram:
     """Moves of a program, one a row; each begins where the one before it ends."""
 
-    axes: tuple[str, ...]  # of the machine, [a]
-    line: Rows  # [m], of the file, from 1; 0 for where the axes stand at first
-    kind: Rows  # [m]; STAND, RAPID, FEED or ARC
+    scene: Scene
+    axes: tuple[str, ...]  # of its machine, [a]
+    line: Integers  # [m], of the file, from 1; 0 for where the axes stand at first
+    kind: Integers  # [m]; STAND, RAPID, FEED or ARC
     tcp: NDArray[np.bool_]  # [m]
-    across: Rows  # [m]; direction 0 to 2 about which an arc turns
+    across: Integers  # [m]; direction 0 to 2 about which an arc turns
     length_mm: Array  # [m], of the tool
     turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
     centre_mm: NDArray[np.complex128]  # [m]; of an arc, along the two axes of its `PLANES`
@@ -119,13 +119,9 @@ class ReadProgram:
     end: Array
     refused: Mapping[int, str]  # words by their line; the path ends before the first of them
     unknown: Mapping[str, int]  # words that are not understood, to their first line
+    blocks: int  # lines that move an axis
 
-    @property
-    def blocks(self) -> int:
-        """How many lines move an axis."""
-        return len(np.unique(self.line[self.kind != STAND]))
-
-    def positions(self, move: Rows, share: Array) -> Array:
+    def positions(self, move: Integers, share: Array) -> Array:
         """Give the positions of axes, as `end` has them, at shares of moves, [n, a]."""
         start, end = self.end[np.maximum(move - 1, 0)], self.end[move]
         at = start + share[:, None] * (end - start)
@@ -147,21 +143,20 @@ def with_length(model: Model, length_mm: float) -> Model:
     return replace(model, tool_point_mm=(x, y, z - length_mm))
 
 
-def upright(model: Model, words: Mapping[str, Array]) -> dict[str, Array]:
+def upright(words: Mapping[str, Array]) -> dict[str, Array]:
     """Give where the axes stand at words of a program with TCP, were its rotary axes at zero."""
-    axes = model.machine.axes
-    return {name: at if axes[name].is_linear else np.zeros(()) for name, at in words.items()}
+    return {name: at if is_linear(name) else np.zeros(()) for name, at in words.items()}
 
 
 def axes_at(model: Model, length_mm: float, words: Mapping[str, Array]) -> dict[str, Array]:
     """Give where the axes stand at words of a program with TCP."""
-    return follow(with_length(model, length_mm), words, ball_point(model, upright(model, words)))
+    return follow(with_length(model, length_mm), words, ball_point(model, upright(words)))
 
 
 def words_at(model: Model, tip_mm: Array, axes: Mapping[str, Array]) -> dict[str, Array]:
     """Give the words of a program with TCP that lead the tip to a place, rotary axes to theirs."""
-    words = follow(model, upright(model, axes), tip_mm)
-    return {**axes, **{name: words[name] for name in following_axes(model)}}
+    words = follow(model, upright(axes), tip_mm)
+    return {name: words[name] if is_linear(name) else at for name, at in axes.items()}
 
 
 def program_lines(path: str | Path) -> Iterator[str]:
@@ -184,8 +179,9 @@ def read_program(
     rows = np.frombuffer(control.rows).reshape(-1, control.width)
     line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
     return ReadProgram(
-        control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
+        scene, control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
         rows[:, 6] + 1j * rows[:, 7], rows[:, 8:], control.refused, control.unknown,
+        len(np.unique(line[kind != STAND])),
     )  # fmt: skip
 
 
@@ -258,8 +254,8 @@ class Control:
             self.fail(f"{word!r}; expected {end}")
         elif letter in self.words and not self.refused:
             self.fail(f"{word}; expected {letter} once in a line")
-        elif abs(value) > (most := MAX_LENGTH_MM if letter in _POSITIONS else MOST):
-            self.fail(f"{word}; expected at most ±{most:g}, mm or degrees")
+        elif abs(value) > MAX_LENGTH_MM and letter in _POSITIONS:
+            self.fail(f"{word}; expected at most ±{MAX_LENGTH_MM:g} mm or degrees")
         elif letter:
             self.words[letter] = value
 
@@ -279,18 +275,15 @@ class Control:
             elif code in {"G4", "G28", "G53"}:
                 once = code
         self.cycle = self.cycle if self.motion in CYCLES else {}
-        letters = words.keys() & _AXES
-        if once == "G4":  # X is a time there
-            return
+        letters = set[str]() if once == "G4" else words.keys() & _AXES  # X is a time there
         for letter in letters - self.index.keys():
             known = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
             self.fail(f"{letter}{words[letter]:g}; expected {known}")
         if once == "G28":
             if letters and any(self.at[index] != at for index, at in self.target().items()):
                 self.line_to(self.target(), RAPID)
-            axes = {self.index[x]: self.names[self.index[x]] for x in letters or self.index}
-            travel = {index: self.scene.machine.axes[name].travel for index, name in axes.items()}
-            home = {index: min(max(0.0, low), high) for index, (low, high) in travel.items()}
+            axes, indices = self.scene.machine.axes, [self.index[x] for x in letters or self.index]
+            home = {i: float(np.clip(0.0, *axes[self.names[i]].travel)) for i in indices}
             self.line_to(home, RAPID, bare=True)
         elif once == "G53" and letters:
             self.line_to({self.index[letter]: self.value(letter) for letter in letters}, bare=True)
@@ -379,10 +372,7 @@ class Control:
             self.fail(f"{self.motion} without I, J, K or R")
         radius, other = abs(start - centre), abs(end - centre)
         if not radius or abs(radius - other) > max(SLACK_MM, SLACK * radius):
-            self.fail(
-                f"{self.motion}: its ends are {radius:.4f} and {other:.4f} mm from its centre;"
-                " expected one radius above 0"
-            )
+            self.fail(f"{self.motion}: radii {radius:.4f} and {other:.4f} mm; expected one radius")
         turn = sense * phase((end - centre) / (start - centre))
         self.begun = True
         self.record(ARC, sense * (turn if turn > FULL_TURN_RAD else turn + tau), centre)
@@ -401,10 +391,8 @@ class Control:
             clear, bottom = (self.place(deep, self.cycle[letter]) for letter in ("R", deep))
         peck = self.cycle.get("Q", 0.0) if self.motion == "G83" else clear - bottom or 1.0
         if bottom > clear or peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
-            most = f"and at most {MAX_CYCLE:,} pecks of Q, above 0"
-            self.fail(
-                f"{self.motion} from R {clear:g} to {bottom:g} mm; expected a depth below R, {most}"
-            )
+            wanted = f"a depth below R, in up to {MAX_CYCLE:,} pecks of Q above 0"
+            self.fail(f"{self.motion} from {clear:g} to {bottom:g} mm; expected {wanted}")
         self.line_to({index: max(clear, self.at[index])}, RAPID)
         self.line_to({**place, index: self.at[index]}, RAPID)
         for number in range(ceil((clear - bottom) / peck)):

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Column, Table, number_columns
+from warpspace.analysis.contributions import budget_words
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
@@ -41,7 +42,6 @@ MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
 RIGHT_RAD = 1e-4  # nominal angles this close to 90° or 0 are right or none; datums fix no less
 NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
-SHOWN = 0.005  # µm or µrad that a table names a parameter for
 SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circles fit a sphere, too
 
 
@@ -393,11 +393,10 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
         for name, one in result.measures.items():
             nominal, _, placed, *differences = [*one.values()][:5]
             tolerance = one.get("tolerance_um") or one.get("tolerance_urad") or ()
-            most = [pair for pair in one["budget"].items() if abs(pair[1]) >= SHOWN][:3]
             rows.append((
                 f"{result.name} · {name.replace('_', ' ')}", nominal, placed, *differences,
                 " … ".join(map(spell_signed, tolerance)), one.get("verdict", ""),
-                ", ".join(f"{key} {spell_signed(part)}" for key, part in most),
+                budget_words(one["budget"]),
             ))  # fmt: skip
     columns = (
         Column("measure", key="measure", leads=True, wraps=True),

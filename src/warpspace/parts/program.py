@@ -32,28 +32,15 @@ from warpspace.formats.source import MAX_LINES, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
-from warpspace.parts.control import (
-    CYCLES,
-    RAPID,
-    STAND,
-    Control,
-    ReadProgram,
-    Rows,
-    Setup,
-    axes_at,
-    program_lines,
-    read_program,
-    with_length,
-    words_at,
-)
+from warpspace.parts import control
 from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.scene.save import scene_to_toml
-from warpspace.units import Array
+from warpspace.units import Array, Integers
 
 TURN_DEG, STEP_MM = 2.0, 10.0  # most that axes, and arcs, move between samples
 LEFT_UM, ROUNDS = 1e-3, 20  # of an error that is taken back; how often
 DECIMALS = 4  # of words in mm; in inches one more, in degrees two
-_MODES = {"G2", "G3", *CYCLES, "G90", "G91"}  # not of a corrected program
+_MODES = {"G2", "G3", *control.CYCLES, "G90", "G91"}  # not of a corrected program
 _LAST = {"M0", "M1", "M2", "M5", "M9", "M30", "M60"}  # take effect when the axes have moved
 CHORD_MM = 0.01  # most that a bent path leaves the line between samples
 MOST_AT_ONCE = 50_000  # samples
@@ -65,8 +52,8 @@ SAID = 20  # words that a remark lists
 class ToolPath:
     """Samples along a path: where it begins, the end of each move, and what lies between."""
 
-    line: Rows  # [n], of the file, from 1
-    move: Rows  # [n], row of the program
+    line: Integers  # [n], of the file, from 1
+    move: Integers  # [n], row of the program
     coordinates: dict[str, Array]  # [n] each, mm or degrees; full turns of a rotary axis left out
     tip_mm: Array  # [n, 3], nominal, w
     error_um: Array  # [n, 3], relative, actual − nominal, w
@@ -77,8 +64,8 @@ class ToolPath:
     def norm_um(self) -> Array:
         return np.linalg.norm(self.error_um, axis=1)
 
-    def axes_at(self, sample: int) -> dict[str, float]:
-        return {name: float(at[sample]) for name, at in self.coordinates.items()}
+    def axes_at(self, sample: int) -> dict[str, Any]:
+        return {name: at[sample] for name, at in self.coordinates.items()}
 
     def deviations(self) -> Iterator[Statistics]:
         """Sum errors up over the way: their length, and how much is along the path, and across it.
@@ -102,56 +89,56 @@ class ToolPath:
             yield Statistics(mean, square**0.5, p95, float(um[at]), (x, y, z), self.axes_at(at))
 
 
-def trace_program(scene: Scene, read: ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
+def trace_program(read: control.ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
     """Follow the tip of the tool over the workpiece."""
-    count = count_samples(scene, read, chord_mm)
+    count = count_samples(read, chord_mm)
     move = np.repeat(np.arange(len(count)), count)
     share = (np.arange(len(move)) - (np.cumsum(count) - count)[move] + 1.0) / count[move]
-    at, tip, error = along_moves(scene, read, move, share)
+    at, tip, error = along_moves(read, move, share)
     same_tool = np.diff(read.length_mm[move], prepend=read.length_mm[move[:1]]) == 0.0
     step = np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None]
-    return ToolPath(read.line[move], move, at, tip, error, ~within_travel(scene.machine, at), step)
+    outside = ~within_travel(read.scene.machine, at)
+    return ToolPath(read.line[move], move, at, tip, error, outside, step)
 
 
-def count_samples(scene: Scene, read: ReadProgram, chord_mm: float) -> Rows:
+def count_samples(read: control.ReadProgram, chord_mm: float) -> Integers:
     """Count the samples of each move, [m]; 0 where nothing moves."""
     is_rotary = np.array([not is_linear(name) for name in read.axes])
-    change, moves = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1])), read.kind != STAND
+    moves = read.kind != control.STAND
+    change = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1]))
     way, turn = np.linalg.norm(change[:, ~is_rotary], axis=1), change[:, is_rotary]
     is_bent = (read.turn_rad != 0.0) | (~read.tcp & turn.any(axis=1))
     turn = np.maximum(turn.max(axis=1, initial=0.0), np.rad2deg(np.abs(read.turn_rad)))
     count = np.maximum(np.ceil(np.maximum(turn / TURN_DEG, way / STEP_MM)), 1.0) * moves
-    if not moves.any():
-        count[-1] = 1.0
+    count[-1] += not moves.any()  # where the axes stand
     (bent,) = np.nonzero(is_bent & moves)
     if len(bent):  # how far the middle of a piece is from the line between its ends
         share = 0.5 + np.array([-0.5, 0.0, 0.5]) / count[bent, None]
-        tip = along_moves(scene, read, np.repeat(bent, 3), share.reshape(-1))[1].reshape(-1, 3, 3)
+        tip = along_moves(read, np.repeat(bent, 3), share.reshape(-1))[1].reshape(-1, 3, 3)
         away = np.linalg.norm(np.diff(tip, 2, axis=1)[:, 0] / 2.0, axis=1)
         count[bent] = np.ceil(count[bent] * np.maximum(1.0, np.sqrt(away / chord_mm)))
     if count.sum() > MAX_PATH_POINTS:
-        most = f"{count.sum():,.0f} points; expected at most {MAX_PATH_POINTS:,}"
-        raise OptionError(f"the path has {most}")
+        raise OptionError(f"{count.sum():,.0f} points; expected at most {MAX_PATH_POINTS:,}")
     return count.astype(np.int64)
 
 
 def along_moves(
-    scene: Scene, read: ReadProgram, move: Rows, share: Array, shift_mm: Array | None = None
+    read: control.ReadProgram, move: Integers, share: Array, shift_mm: Array | None = None
 ) -> tuple[dict[str, Array], Array, Array]:
     """Give positions of axes, tip and error at shares of moves, [n].
 
     A shift of the tip, [n, 3] in w, is made by the linear axes.
     """
-    found = dict(zip(read.axes, read.positions(move, share).T, strict=True))
+    scene, found = read.scene, dict(zip(read.axes, read.positions(move, share).T, strict=True))
     tip, error = np.empty((len(move), 3)), np.empty((len(move), 3))
     modes = np.stack([read.tcp, read.length_mm], axis=-1)[move]
     view = scene.view(Loop.RELATIVE, "workpiece")
     for tcp, length in np.unique(modes, axis=0):
         (same,) = np.nonzero((modes == (tcp, length)).all(axis=1))
-        model = with_length(scene.model, length)
+        model = control.with_length(scene.model, length)
         for part in np.array_split(same, -(-len(same) // MOST_AT_ONCE)):
             here = {name: values[part] for name, values in found.items()}
-            here = axes_at(scene.model, length, here) if tcp else here
+            here = control.axes_at(scene.model, length, here) if tcp else here
             if shift_mm is not None:
                 here = follow(model, here, ball_point(model, here) + shift_mm[part])
             for name, axis in scene.machine.axes.items():
@@ -179,7 +166,7 @@ class PathPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Program(Setup, Analysis):
+class Program(control.Setup, Analysis):
     """Run a program on SCENE: the errors along its path.
 
     G-code: G0 to G3 in three planes, G17 to G21, G28, G43, G43.4, G49, G53 to G59, G80 to G83, G90,
@@ -203,7 +190,8 @@ class Program(Setup, Analysis):
 
     def lines(self) -> Iterable[str]:
         """Give the lines of the program."""
-        return program_lines(self.file or "") if self.text is None else self.text.splitlines()
+        file = self.file or ""
+        return control.program_lines(file) if self.text is None else self.text.splitlines()
 
     def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
         if self.file is None:
@@ -211,18 +199,18 @@ class Program(Setup, Analysis):
                 raise OptionError("{file} is missing; expected a program")
             tcp: Any = scene.part.tcp or self.tcp
             return replace(self, file=path, tcp=tcp).run(scene, watch)
-        read = read_program(scene, self.lines(), self, self.file)
+        read = control.read_program(scene, self.lines(), self, self.file)
         watch(0.3)
-        path = trace_program(scene, read)
+        path = trace_program(read)
         watch(0.9)
         order = np.argsort(-path.norm_um, kind="stable")
         worst = order[np.sort(np.unique(path.line[order], return_index=True)[1])[:WORST]]
 
         def explained(sample: int) -> PathPoint:
             axes, length = path.axes_at(sample), float(read.length_mm[path.move[sample]])
-            at = {name: np.asarray(value) for name, value in axes.items()}
             view = scene.view(Loop.RELATIVE, "workpiece")
-            parts = explain(with_length(scene.model, length), scene.errors, at, view).contributions
+            model = control.with_length(scene.model, length)
+            parts = explain(model, scene.errors, axes, view).contributions
             ranked = sorted(parts, key=lambda part: -part.along_um)
             budget, um = {part.key: part.along_um for part in ranked}, float(path.norm_um[sample])
             return PathPoint(int(path.line[sample]), um, axes, path.error_um[sample], budget)
@@ -231,8 +219,7 @@ class Program(Setup, Analysis):
         if self.at_line and not len(ends):
             lines = np.unique(path.line)
             near = ", ".join(map(str, lines[np.argsort(np.abs(lines - self.at_line))][:3]))
-            most = f"{self.at_line} moves no axis; expected a line that does: {near}"
-            raise OptionError(f"{{at_line}} {most}")
+            raise OptionError(f"{{at_line}} {self.at_line} moves no axis; expected {near}")
         deviation, along, across = path.deviations()
         return ProgramResult(
             length_mm=float(np.linalg.norm(path.step_mm, axis=1).sum()),
@@ -244,7 +231,6 @@ class Program(Setup, Analysis):
             line=explained(ends[-1]) if len(ends) else None,
             read=read,
             path=path,
-            scene=scene,
             asked=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
@@ -262,13 +248,12 @@ class ProgramResult(Result):
     across: Statistics
     worst: Sequence[PathPoint]
     line: PathPoint | None  # the end of the line asked for
-    read: ReadProgram
+    read: control.ReadProgram
     path: ToolPath
-    scene: Scene
     asked: Program
 
     def texts(self, _ending: str = "", /) -> Mapping[str, str]:
-        return {"": "\n".join([*correct_program(self.scene, self.asked, self.read), ""])}
+        return {"": "\n".join([*correct_program(self.asked, self.read), ""])}
 
     def as_plain(self) -> dict[str, Any]:
         refused = [{"line": line, "word": word} for line, word in self.read.refused.items()]
@@ -284,9 +269,8 @@ class ProgramResult(Result):
             yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.scene.title} · {self.read.blocks} blocks, {self.length_mm:.1f} mm"
-        yield "  relative error in the workpiece frame"
-        yield "  Geometry only: no forces, heat, wear or servo"
+        yield f"{self.read.scene.title} · {self.read.blocks} blocks, {self.length_mm:.1f} mm"
+        yield "  Geometry only: no forces, heat, wear or servo; errors in the workpiece frame"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
         names = {"error": self.deviation, "along the path": self.along, "across it": self.across}
         rows = [(name, *astuple(one)[:4]) for name, one in names.items()]
@@ -302,82 +286,79 @@ class ProgramResult(Result):
         yield Table(columns, rows, "Worst blocks")
 
 
-def corrected_places(scene: Scene, read: ReadProgram, within_mm: float) -> tuple[Rows, Array]:
+def corrected_places(read: control.ReadProgram, within_mm: float) -> tuple[Integers, Array]:
     """Give rows of a program, [n], and corrected places, [n, a], that its lines lead to in turn.
 
     A row comes as often as its move has pieces, all of one length. Between two places the linear
     axes stay within a distance of where they have to be. Places are those of `ReadProgram.end`.
     """
-    count = np.maximum(count_samples(scene, read, within_mm / 4.0), 1)
-    count[read.kind == RAPID] = 1
-    row, _, places = _corrected(scene, read, count)
-    linear = [read.axes.index(name) for name in following_axes(scene.model)]
+    count = np.maximum(count_samples(read, within_mm / 4.0), 1)
+    count[read.kind == control.RAPID] = 1
+    row, _, places = _corrected(read, count)
+    linear = [read.axes.index(name) for name in following_axes(read.scene.model)]
     bend = np.linalg.norm(np.diff(places[:, linear], 2, axis=0), axis=1) / within_mm
     most = np.zeros(len(count))
     np.maximum.at(most, row[1:-1], np.where(row[2:] == row[:-2], bend, 0.0))
     # an arc leaves its chord by an eighth of its second difference, a kink by a quarter at most
     count = np.ceil(count * np.maximum(np.sqrt(most / 8.0), most / 4.0)).astype(np.int64)
-    row, share, places = _corrected(scene, read, np.maximum(count, 1))
+    row, share, places = _corrected(read, np.maximum(count, 1))
     return row[share > 0.0], places[share > 0.0]
 
 
-def _corrected(scene: Scene, read: ReadProgram, count: Rows) -> tuple[Rows, Array, Array]:
+def _corrected(read: control.ReadProgram, count: Integers) -> tuple[Integers, Array, Array]:
     """Give row and share of the ends of equal pieces of moves, and corrected places, [n, a]."""
     row = np.repeat(np.arange(len(count)), count + 1)
     share = (np.arange(len(row)) - np.searchsorted(row, row)) / count[row]
     shift = np.zeros((len(row), 3))
     for _ in range(ROUNDS):
-        found, tip, error_um = along_moves(scene, read, row, share, shift)
+        found, tip, error_um = along_moves(read, row, share, shift)
         if np.abs(1e3 * shift + error_um).max() <= LEFT_UM:
             break
         shift = -error_um / 1e3
     else:
         raise OptionError("the errors change too much from place to place to be corrected")
-    places, words = read.positions(row, share), words_at(scene.model, tip, found)
-    for name in following_axes(scene.model):
+    places, words = read.positions(row, share), control.words_at(read.scene.model, tip, found)
+    for name in following_axes(read.scene.model):
         places[:, read.axes.index(name)] = np.where(read.tcp[row], words[name], found[name])
     return row, share, places
 
 
-def correct_program(scene: Scene, asked: Program, read: ReadProgram) -> Iterator[str]:
+def correct_program(asked: Program, read: control.ReadProgram) -> Iterator[str]:
     """Give the lines of a program that leaves the nominal path of another one on this machine."""
     for line, word in read.refused.items():
         raise OptionError(f"line {line}: {word} is not followed; expected a program that is")
-    row, places = corrected_places(scene, read, asked.within_um / 1e3)
-    lines, control = [*asked.lines()], Control(scene, asked, asked.file or "")
+    row, places = corrected_places(read, asked.within_um / 1e3)
+    scene, lines = read.scene, [*asked.lines()]
+    state = control.Control(scene, asked, asked.file or "")
     linear = {name[0] for name in following_axes(scene.model)}
-    if missing := ", ".join(linear - control.index.keys()):
+    if missing := ", ".join(linear - state.index.keys()):
         raise OptionError(f"no word moves axis {missing}; expected one axis of each letter")
     known, mode, header, number = set[str](), ("", False), _header(scene, asked), 0
-    for number, line in enumerate(control.run(lines), start=1):
-        codes, letters = {*control.codes}, control.words.keys() & control.index.keys()
-        if codes or control.words:
+    for number, line in enumerate(state.run(lines), start=1):
+        codes, letters = {*state.codes}, state.words.keys() & state.index.keys()
+        if codes or state.words:
             yield from header  # once
-        if mode != (control.system, control.tcp):
-            mode, known = (control.system, control.tcp), set()
+        if mode != (state.system, state.tcp):
+            mode, known = (state.system, state.tcp), set()
         if codes & {"G28", "G53"}:
             known -= letters or known
         elif codes & {"M6", "G43", "G43.4", "G49"}:
             known -= {"Z"}
         here = np.arange(*np.searchsorted(read.line[row], [number, number + 1]))
-        moving = here[read.kind[row[here]] != STAND]
+        moving = here[read.kind[row[here]] != control.STAND]
         if codes & {"G4", "G28", "G53"} or not (letters or len(moving)):
-            kept = [word for key, word in control.tokens if key not in _MODES]
-            is_step = "G28" in codes and not control.absolute
-            yield (
-                control.skip + " ".join(["G91"] * is_step + kept)
-                if control.tokens
-                else line.rstrip()
-            )
-            yield from ["G90"] * is_step
+            kept = [word for key, word in state.tokens if key not in _MODES]
+            way = ["G91"] * ("G28" in codes and not state.absolute)
+            yield state.skip + " ".join(way + kept) if state.tokens else line.rstrip()
+            yield from ["G90"] * len(way)
             continue
         missing = ", ".join(sorted((linear | letters) - known))
-        if missing and not (control.absolute and control.motion in {"G0", "G1"}):
-            control.fail(f"moves from a place not known; expected G90 and {missing} before")
+        if missing and not (state.absolute and state.motion in {"G0", "G1"}):
+            state.fail(f"moves from a place not known; expected G90 and {missing} before")
         known |= letters
         chosen = moving if len(moving) else here[-1:]
-        written = [letter for letter in control.index if letter in letters | (known & linear)]
-        yield from _blocks(control, written, read.kind[row[chosen]], places[chosen])
+        written = [letter for letter in state.index if letter in letters | (known & linear)]
+        yield from _blocks(state, written, read.kind[row[chosen]], places[chosen])
     yield from (line.rstrip() for line in lines[number:])
 
 
@@ -391,24 +372,26 @@ def _header(scene: Scene, asked: Program) -> Iterator[str]:
     yield "G90"
 
 
-def _blocks(control: Control, letters: Sequence[str], kinds: Rows, places: Array) -> Iterator[str]:
+def _blocks(
+    state: control.Control, letters: Sequence[str], kinds: Integers, places: Array
+) -> Iterator[str]:
     """Write the line that a control is at as straight blocks to places, [n, a]."""
-    number = [word for key, word in control.tokens if key == "N"]
-    said = _MODES | _LAST | {"N", "G0", "G1", *"IJKR", *control.index}
-    said |= {*("PQ" if control.cycle else ""), *("F" if control.inverse_time else "")}
-    rest = [word for key, word in control.tokens if key not in said]
-    last = [code for code in control.codes if code in _LAST]
+    number = [word for key, word in state.tokens if key == "N"]
+    said = _MODES | _LAST | {"N", "G0", "G1", *"IJKR", *state.index}
+    said |= {*("PQ" if state.cycle else ""), *("F" if state.inverse_time else "")}
+    rest = [word for key, word in state.tokens if key not in said]
+    last = [code for code in state.codes if code in _LAST]
     for left, kind, place in zip(range(len(kinds))[::-1], kinds, places, strict=True):
-        is_rapid = kind == RAPID or (kind == STAND and control.motion == "G0")
+        is_rapid = kind == control.RAPID or (kind == control.STAND and state.motion == "G0")
         words = ["G0" if is_rapid else "G1"]
         for letter in letters:
-            value = float(place[control.index[letter]]) - control.place(letter, 0.0)
-            digits = DECIMALS + (2 if letter in "ABC" else control.unit_mm != 1.0)
-            unit = 1.0 if letter in "ABC" else control.unit_mm
+            value = float(place[state.index[letter]]) - state.place(letter, 0.0)
+            digits = DECIMALS + (2 if letter in "ABC" else state.unit_mm != 1.0)
+            unit = 1.0 if letter in "ABC" else state.unit_mm
             words.append(letter + spell(value / unit, digits))
-        if control.inverse_time and not is_rapid and "F" in control.words:
-            words.append("F" + spell(control.words["F"] * len(kinds), DECIMALS))
-        yield control.skip + " ".join([*number, *words, *(() if left else last), *rest])
+        if state.inverse_time and not is_rapid and "F" in state.words:
+            words.append("F" + spell(state.words["F"] * len(kinds), DECIMALS))
+        yield state.skip + " ".join([*number, *words, *(() if left else last), *rest])
         number, rest = [], []
-        if control.motion == "G82" and not is_rapid:
-            yield f"{control.skip}G4 P{control.cycle.get('P', 0.0):g}"
+        if state.motion == "G82" and not is_rapid:
+            yield f"{state.skip}G4 P{state.cycle.get('P', 0.0):g}"

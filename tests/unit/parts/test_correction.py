@@ -26,11 +26,11 @@ def dvf() -> Scene:
 
 def correct(scene: Scene, lines: Sequence[str], **asked) -> list[str]:
     program = Program(text="\n".join(lines), **asked)
-    return [*correct_program(scene, program, read_program(scene, lines, program))]
+    return [*correct_program(program, read_program(scene, lines, program))]
 
 
 def trace(scene: Scene, lines: Sequence[str], chord_mm=0.1, **asked) -> ToolPath:
-    return trace_program(scene, read_program(scene, lines, Program(**asked)), chord_mm)
+    return trace_program(read_program(scene, lines, Program(**asked)), chord_mm)
 
 
 def actual(path: ToolPath) -> np.ndarray:

@@ -43,7 +43,7 @@ def test_pieces_hold_together(name: str, tmp_path: Path):
     read = read_program(scene, (tmp_path / "a.ngc").read_text().splitlines(), Setup())
     assert not read.refused
     assert not read.unknown
-    path = trace_program(scene, read)
+    path = trace_program(read)
     low = path.tip_mm[path.tip_mm[:, 2] <= mesh.vertices_mm[:, 2].max()][:, :2]
     widest = np.abs(mesh.vertices_mm[:, :2]).max()
     assert np.abs(low).max() <= widest + 1e-6

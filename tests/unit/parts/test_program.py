@@ -49,7 +49,7 @@ def dvf() -> Scene:
 
 def run(scene: Scene, text: str, **setup: Any) -> tuple[ReadProgram, ToolPath]:
     read = read_program(scene, text.splitlines(), Setup(**setup))
-    return read, trace_program(scene, read)
+    return read, trace_program(read)
 
 
 def is_end(path: ToolPath) -> np.ndarray:
@@ -194,7 +194,7 @@ def test_json_holds_together(dvf: Scene, tmp_path: Path):
             assert sum(one["budget"].values()) == pytest.approx(one["um"], abs=1e-9)
     assert said["line"]["axes"]["Z"] == 75.0
     assert said["outside"] > 0
-    with pytest.raises(OptionError, match="line that does: 7"):
+    with pytest.raises(OptionError, match="moves no axis; expected 7"):
         Program(file=str(file), at_line=8).run(dvf, lambda _: None)
 
 

@@ -142,7 +142,7 @@ def path_in_box(state: AppState) -> InBox[ToolPath] | None:
     def trace(scene: Scene) -> InBox[ToolPath]:
         asked = read_form(Program, Program.options(), told, scene)
         read = read_program(scene, text.splitlines(), asked, state.part.program_name)
-        path = trace_program(scene, read)
+        path = trace_program(read)
         made = Made(path.tip_mm, path.coordinates, path.error_um, path.outside)
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return _respond(scene, path, made, np.stack([ends - 1, ends], axis=1))
