@@ -48,10 +48,9 @@ def ghost_dashes(picture: LivePicture) -> Array:
 
 def surface(picture: LivePicture) -> Shape:
     """Draw the coloured map of a picture, or its lines alone."""
-    if picture.state.look.surface == "grid":  # its lines would stand before the part
-        mesh = line_mesh(picture, grid=picture.state.part.is_empty)
-    else:
-        mesh = map_mesh(picture)
+    has_lines, alone = picture.state.look.surface == "grid", picture.state.part.is_empty
+    # lines of the grid would stand before a part
+    mesh = line_mesh(picture, grid=alone) if has_lines else map_mesh(picture)
     return coloured_shape(mesh.vertices_mm, mesh.triangles, mesh.values, picture.scale)
 
 
@@ -64,7 +63,7 @@ def coloured_shape(
     return Shape("add_glb", UNLIT, {"glb_data": filled})
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=8)  # of a large part 15 MB
 def _template(triangles: Identity, count: int) -> GltfTemplate:
     return GltfTemplate("surface", triangles.thing, count)
 

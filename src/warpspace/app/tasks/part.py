@@ -164,8 +164,10 @@ class ProgramPart(InBoxPart):
             return button(line, f"{self.name}:set.at_line", line, kind="link", hint=words)
 
         *rest, worst = (one for one in found.blocks() if isinstance(one, Table))
-        columns = replace(worst.columns[0], form=link), *worst.columns[1:]
-        return block_html(replace(worst, columns=columns)) + details_html(rest)
+        line, *others = worst.columns
+        others = (replace(one, shows=one.heading in ("|E|", "most of it")) for one in others)
+        narrow = replace(worst, columns=(replace(line, form=link), *others))
+        return block_html(narrow) + details_html((*rest, worst))
 
     def received(self, name: str, content: bytes) -> None:
         self.show(content.decode("utf-8-sig", "replace"), name)
