@@ -180,6 +180,7 @@ class Body:
     vertices_mm: Array  # [V, 3]
     triangles: NDArray[np.int32]  # [T, 3]; Counter-clockwise seen from outside
     edges_mm: Array  # [E, 2, 3]; ends of the edges worth drawing
+    warnings: tuple[str, ...] = ()  # what is wrong with its surface
 
 
 def build_body(

@@ -1,7 +1,6 @@
 """Meshes of a user: those a machine names, and what the links of a robot look like."""
 
-import io
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.bodies.mesh import BYTES, MIDDLE, Body, build_body, count_mesh, open_meshes
+from warpspace.bodies.mesh import MIDDLE, Body, build_body, open_meshes
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.transforms import apply, placed
 from warpspace.machine.description import BodySource, Machine
@@ -18,54 +17,24 @@ from warpspace.units import Array
 
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 """Units of length a mesh may be in, in mm."""
-UP_AXES = ("y", "z")
 FORMATS = {".stl": ("mm", "z"), ".obj": ("mm", "z"), ".ply": ("mm", "z"), ".glb": ("m", "y")}
 """Endings that are read, with the unit and the upward axis taken where none is given."""
 SMALL_MM, LARGE_MM = 10.0, 100_000.0
 """A body whose longest edge lies beyond is probably in another unit."""
 
 
-@dataclass(frozen=True, slots=True)
-class LoadedMesh:
-    """A body read from a user's file."""
-
-    body: Body
-    warnings: tuple[str, ...] = ()  # what the user should know; the body can be drawn all the same
-
-
-def load_mesh(
-    path: str | Path, frame: str, *, unit: str | None = None, up: str | None = None
-) -> LoadedMesh:
+def load_mesh(path: str | Path, frame: str, unit: str | None = None) -> Body:
+    """Read a body from a file of a user; it can be drawn whatever its warnings say."""
     path = Path(path)
-    try:
-        changed = path.stat().st_mtime_ns
-    except OSError:
-        changed = 0
-    return _read_mesh(path, changed, frame, unit, up)
-
-
-@lru_cache(maxsize=16)
-def _read_mesh(
-    path: Path,
-    changed: int,  # noqa: ARG001  # a file written anew is read anew
-    frame: str,
-    unit: str | None,
-    up: str | None,
-) -> LoadedMesh:
-    mesh, said = read_mesh(path, unit, up)
+    mesh, said = read_mesh(path, unit)
     mesh.update_faces(mesh.nondegenerate_faces())
     if not len(mesh.faces):
         raise OptionError(f"{path}: all of its triangles are points or lines")
-    return LoadedMesh(build_body(mesh, path.stem, frame, MIDDLE), said)
+    return replace(build_body(mesh, path.stem, frame, MIDDLE), warnings=said)
 
 
 def read_mesh(
-    path: Path,
-    unit: str | None,
-    up: str | None = None,
-    *,
-    most: int = MAX_TRIANGLES,
-    data: bytes | None = None,
+    path: Path, unit: str | None, most: int = MAX_TRIANGLES, data: bytes | None = None
 ) -> tuple[Any, tuple[str, ...]]:
     """Give a file as one mesh of trimesh, in mm with z upwards, and what is wrong with it.
 
@@ -75,10 +44,9 @@ def read_mesh(
 
     if path.suffix.lower() not in FORMATS:
         raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
-    for given, known in ((unit, tuple(UNITS_MM)), (up, UP_AXES)):
-        if given is not None and given not in known:
-            raise OptionError(f"{path}: {given!r}; expected one of {', '.join(known)}")
-    standard_unit, standard_up = FORMATS[path.suffix.lower()]
+    is_told, (standard, up) = unit is not None, FORMATS[path.suffix.lower()]
+    if (unit := unit or standard) not in UNITS_MM:
+        raise OptionError(f"{path}: {unit!r}; expected one of {', '.join(UNITS_MM)}")
     found = open_meshes(path, f"{path.suffix[1:].upper()} file", most, data)
     nodes = found.graph.nodes_geometry
     pose, name = found.graph[nodes[0]] if len(nodes) == 1 else (None, None)
@@ -91,11 +59,11 @@ def read_mesh(
     mesh.update_faces((mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1))
     if not len(mesh.faces):
         raise OptionError(f"{path}: there are no triangles in it")
-    mesh.apply_scale(UNITS_MM[unit or standard_unit])
-    if (up or standard_up) == "y":
+    mesh.apply_scale(UNITS_MM[unit])
+    if up == "y":
         mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-    if unit is None:
-        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), standard_unit)
+    if not is_told:
+        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), unit)
     if not _is_closed(mesh.faces):
         said = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
         count = len(grouping.group_rows(mesh.edges_sorted, require_count=1))
@@ -133,7 +101,7 @@ def _check_size(path: Path, longest_mm: float, unit: str) -> None:
             )
 
 
-def own_meshes(machine: Machine) -> dict[str, LoadedMesh]:
+def own_meshes(machine: Machine) -> dict[str, Body]:
     return {
         frame: _read(frame, source)
         for frame, source in machine.bodies.items()
@@ -142,28 +110,26 @@ def own_meshes(machine: Machine) -> dict[str, LoadedMesh]:
 
 
 @lru_cache(maxsize=64)
-def _read(frame: str, source: BodySource) -> LoadedMesh:
+def _read(frame: str, source: BodySource) -> Body:
     try:
-        loaded = load_mesh(source.path, frame, unit=source.unit or None)
+        body = load_mesh(source.path, frame, source.unit or None)
     except OptionError as error:
         raise OptionError(f"bodies.{frame}: {error}") from None
     pose = placed(source.offset_mm, source.rotation_deg)
-    body = loaded.body
     name = body.name if body.name.startswith(f"{frame}_") else f"{frame}_{body.name}"
-    moved = replace(
+    return replace(
         body,
         name=name,
         vertices_mm=np.ascontiguousarray(apply(pose, body.vertices_mm)),
         edges_mm=np.ascontiguousarray(apply(pose, body.edges_mm)),
+        warnings=tuple(f"bodies.{frame}: {warning}" for warning in body.warnings),
     )
-    return LoadedMesh(moved, tuple(f"bodies.{frame}: {warning}" for warning in loaded.warnings))
 
 
 def check_meshes(machine: Machine) -> tuple[str, ...]:
-    return tuple(text for loaded in own_meshes(machine).values() for text in loaded.warnings)
+    return tuple(text for body in own_meshes(machine).values() for text in body.warnings)
 
 
-ENDINGS = (".stl", ".obj", ".ply", ".glb", ".dae")
 MM_PER_M = 1000.0
 LARGEST_M = 1e6  # of a shape, its place and its scale; also keeps NaN out
 
@@ -251,10 +217,13 @@ def _mesh(given: Any, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
             f"mesh {name!r} leads out of {folders[1]}; left out (--mesh-root FOLDER)"
         )
     if path not in read:
-        read[path] = _load(path)
-    mesh = read[path]
-    if isinstance(mesh, str):
-        raise WarpspaceError(f"mesh {name!r} {mesh}; left out")
+        try:
+            found = open_meshes(path, "mesh").to_mesh()
+            read[path] = found if len(found.faces) else "it is empty"
+        except OptionError as error:
+            read[path] = str(error)
+    if isinstance(mesh := read[path], str):
+        raise WarpspaceError(f"mesh {name!r}: {mesh}; left out")
     bare = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
     if given.scale is not None:
         scale = np.asarray(given.scale, dtype=float)
@@ -262,25 +231,6 @@ def _mesh(given: Any, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
             raise WarpspaceError(f"mesh {name!r} has no scale that can be read; left out")
         bare.apply_transform(np.diag([*np.broadcast_to(scale, 3), 1.0]))
     return bare
-
-
-def _load(path: Path) -> Any:
-    import trimesh
-
-    ending = path.suffix.lower()
-    if ending not in ENDINGS:
-        return f"has no ending of {', '.join(ENDINGS)}"
-    if path.stat().st_size > (most := BYTES * MAX_TRIANGLES):
-        return f"is larger than {most / 1e6:.0f} MB"
-    try:
-        data = io.BytesIO(count_mesh(path.read_bytes(), ending))
-        mesh = trimesh.load(data, file_type=ending[1:], force="mesh", skip_materials=True)
-    except Exception as error:  # noqa: BLE001 - every format fails in ways of its own
-        reason = str(error).replace("\n", " ")[:100]
-        return f"cannot be read ({reason})"
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        return "is empty"
-    return mesh
 
 
 def _find(name: str, folder: Path, root: Path) -> Path | None:

@@ -25,7 +25,7 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
     frames = {BASE, "S", "t", "w", *machine.axes}
     kept = read_bodies(Path(machine.body_dir) / BODY_FILE) if machine.body_dir else ()
-    own = {frame: loaded.body for frame, loaded in own_meshes(machine).items()}
+    own = own_meshes(machine)
     bodies = [body for body in kept or generate_bodies(machine) if body.frame not in own]
     return tuple(body for body in (*bodies, *own.values()) if body.frame in frames)
 

@@ -6,12 +6,11 @@ Geometry only: no forces, heat, wear or servo.
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Result, Watch
 from warpspace.analysis.options import File, option
 from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.bodies.gltf import to_gltf
@@ -22,12 +21,9 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
 from warpspace.parts.part import (
-    PLACE_HELP,
-    PLACE_UNSET,
     Made,
+    OfPart,
     PartMesh,
-    Place,
-    find_part,
     fit_out,
     make_points,
     place_part,
@@ -48,7 +44,7 @@ class Off:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part(Analysis):
+class Part(OfPart):
     """Show a part, a mesh, as the machine of SCENE cuts it.
 
     The part stands where it is clamped; rotary axes stand as they do in the scene, linear axes
@@ -63,24 +59,16 @@ class Part(Analysis):
     has_table = True
     file_help = "Part as cut: .stl, .obj, .ply or .glb."
     file_endings = tuple(FORMATS)
-    file: File = option(
-        None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
-    )
-    place: Place = option(None, PLACE_HELP, unset=PLACE_UNSET)
-    unit: Literal["mm", "cm", "m", "in"] | None = option(
-        None, "Unit of its numbers", unset="mm, of .glb m"
-    )
     features: File = option(
         None, "Names and tolerances of its features, .toml", unset="all that are found"
     )
     predistorted: bool = option(
         False, "Write with -o the part to be asked for, so that the nominal one is cut"
     )
-    mesh: PartMesh | None = None  # one that is read already
     tolerances: tuple[str, str] | None = None  # name and text of features that are read already
 
     def run(self, scene: Scene, watch: Watch, /) -> "PartResult":
-        mesh = self.mesh or find_part(scene, self.file, self.unit)
+        mesh = self.find_mesh(scene)
         is_own = not (self.mesh or self.file)
         features = self.features or (scene.part.path("features") if is_own else None)
         tolerances = self.tolerances

@@ -12,17 +12,14 @@ from typing import Literal
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.options import File, option
+from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.options import option
 from warpspace.bench.placing import ball_point, following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.parts.part import (
-    PLACE_HELP,
-    PLACE_UNSET,
+    OfPart,
     PartMesh,
-    Place,
-    find_part,
     fit_out,
     make_points,
     place_part,
@@ -50,12 +47,12 @@ JUDGED = attrgetter("max_um"), attrgetter("placed_um")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clamp(Analysis):
+class Clamp(OfPart):
     """Find where to clamp a part on the machine of SCENE.
 
-    The part stands at places all over the travel, in the orientations that are allowed; where any
-    of it would be beyond the travel it does not stand. Fixtures and collisions are not looked at.
-    Geometry only: no forces, heat, wear or servo.
+    The part stands at places all over the travel, in the orientations that are allowed, and is
+    compared with where it is clamped; where any of it would be beyond the travel it does not
+    stand. Fixtures and collisions are not looked at. Geometry only: no forces, heat, wear or servo.
     """
 
     name = "clamp"
@@ -63,11 +60,6 @@ class Clamp(Analysis):
     has_chart = True
     chart_help = "map of the places"
     has_table = True
-    file: File = option(None, "Mesh of the part", positional=True, unset="that of the scene")
-    unit: Literal["mm", "cm", "m", "in"] | None = option(
-        None, "Unit of its numbers", unset="mm, of .glb m"
-    )
-    place: Place = option(None, f"{PLACE_HELP}: what others are compared with", unset=PLACE_UNSET)
     turns: Literal["none", "C", "all"] = option(
         "none", "Orientations allowed: this one, 90° steps about z, or all 24"
     )
@@ -75,7 +67,7 @@ class Clamp(Analysis):
     placed: bool = option(False, "Judge what is left after the best rigid fit of the part")
 
     def run(self, scene: Scene, watch: Watch, /) -> "ClampResult":
-        mesh = find_part(scene, self.file, self.unit)
+        mesh = self.find_mesh(scene)
         part = place_part(mesh, scene, self.place)
         a, b, c = part.place[3:]
         tilts = TILTS if self.turns == "all" else [(a, b)]
@@ -149,14 +141,11 @@ class ClampResult(Result):
         rows = [(word, *one.place, one.max_um, one.placed_um) for word, one in told]
         yield Table(columns, rows[:SHOWN], file_rows=rows)
         here = [one for one in self.places if one.place[2:] == self.places[0].place[2:]]
-        um = np.array([*map(JUDGED[self.placed], here)])
-        where = np.array([one.place[:2] for one in here])
-        edges = np.linspace(um.min(), um.max(), CLASSES + 1)
-        which = np.clip(np.searchsorted(edges, um) - 1, 0, CLASSES - 1)
-        words = [f"{one:.2f} to {other:.2f} µm" for one, other in pairwise(edges)]
+        um, where = [*map(JUDGED[self.placed], here)], np.array([one.place[:2] for one in here])
+        ends = np.linspace(0, len(here), min(CLASSES, len(here)) + 1).astype(int)
         dots = tuple(
-            Curve(words[at], where[which == at, 0], where[which == at, 1], at, "dots")
-            for at in np.unique(which).tolist()
+            Curve(f"{um[at]:.2f} to {um[end - 1]:.2f} µm", *where[at:end].T, number, "dots")
+            for number, (at, end) in enumerate(pairwise(ends))
         )
         note = f"{judged}. Geometry only: no forces, heat, wear or servo."
         yield Lines("plane", f"Where to clamp: {self.title}", "x [mm]", "y [mm]", dots, (), note)

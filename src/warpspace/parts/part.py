@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.options import Grammar
+from warpspace.analysis.description import Analysis
+from warpspace.analysis.options import File, Grammar, option
 from warpspace.bench.placing import ball_point, follow, within_travel
 from warpspace.bodies.mesh import CREASE_DEG
 from warpspace.bodies.own_meshes import read_mesh
@@ -92,21 +93,6 @@ def load_part(path: str | Path, unit: str | None = None, data: bytes | None = No
     return PartMesh(path.stem, vertices, triangles, unit, said)
 
 
-def find_part(scene: Scene, file: str | None, unit: str | None) -> PartMesh:
-    """Read the mesh of a file, or that of a scene where none is named."""
-    own = scene.part
-    if (path := file or own.path("file")) is None:
-        raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
-    return load_part(path, unit or (None if file else own.unit or None))
-
-
-PLACE_HELP = (
-    "Where the part is clamped, in the workpiece frame: shift in mm and turns in degrees about the"
-    " fixed x, y, z in that order"
-)
-PLACE_UNSET = "that of the scene, or the middle of the working volume"
-
-
 def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
     """Read a place as it is typed: ``X,Y,Z`` or ``X,Y,Z,A,B,C``."""
     try:
@@ -119,6 +105,34 @@ def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
 
 
 Place: TypeAlias = Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfPart(Analysis):
+    """A question about a part where it is clamped."""
+
+    file: File = option(
+        None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
+    )
+    place: Place = option(
+        None,
+        "Where the part is clamped, in the workpiece frame: shift in mm and turns in degrees about"
+        " the fixed x, y, z in that order",
+        unset="that of the scene, or the middle of the working volume",
+    )
+    unit: Literal["mm", "cm", "m", "in"] | None = option(
+        None, "Unit of its numbers", unset="mm, of .glb m"
+    )
+    mesh: PartMesh | None = None  # one that is read already
+
+    def find_mesh(self, scene: Scene) -> PartMesh:
+        """Read the mesh, or that of the scene where none is named."""
+        own = scene.part
+        if self.mesh is not None:
+            return self.mesh
+        if (path := self.file or own.path("file")) is None:
+            raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
+        return load_part(path, self.unit or (None if self.file else own.unit or None))
 
 
 def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = None) -> PartMesh:

@@ -114,7 +114,9 @@ def parse_scene(
     convention = problems.read(schema.CONVENTION, "convention", raw.get("convention", {}))
     points = problems.read(schema.POINTS, "points_mm", raw.get("points_mm", {}))
     view = problems.read(schema.VIEW, "view", raw.get("view", {}))
-    part = _part(problems.read(schema.PART, "part", raw.get("part", {})), folder, problems)
+    part = problems.read(schema.PART, "part", raw.get("part", {})) or {}
+    for named in filter(part.get, ("file", "features", "program")):
+        machines.path_beside(part[named], f"part.{named}", folder, problems)
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     fixed = (convention or {}).get("reference_axis") == "fixed"
     document = _Document(raw, machine, workspace, machine.reference_keys * fixed, folder, problems)
@@ -148,16 +150,8 @@ def parse_scene(
         uncertainty=uncertainty,
         measured=measured,
         review=review,
-        part=part,
+        part=PartSource(**part, folder=str(folder or "")),
     )
-
-
-def _part(found: Mapping[str, Any] | None, folder: Path | None, problems: Problems) -> PartSource:
-    found = found or {}
-    for name in ("file", "features", "program"):
-        if found.get(name):
-            machines.path_beside(found[name], f"part.{name}", folder, problems)
-    return PartSource(**found, folder=str(folder or ""))
 
 
 def _machine(

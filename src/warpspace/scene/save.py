@@ -117,44 +117,44 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     if scene.model.direction != TravelDirection.MEAN:
         convention["direction"] = str(scene.model.direction)
     convention |= notation.to_toml()
-    parts.append(_section("convention", convention))
+    parts.append(spell_section("convention", convention))
     ranges = {
         axis: low if low == high else [low, high]
         for axis, (low, high) in scene.workspace.ranges.items()
     }
-    parts.append(_section("workspace", ranges))
+    parts.append(spell_section("workspace", ranges))
     points = {
         "tool": scene.model.tool_point_mm,
         "workpiece": scene.model.workpiece_point_mm,
         "traces": scene.trace_points_mm,
     }
-    parts.append(_section("points_mm", points))
+    parts.append(spell_section("points_mm", points))
     functions = {
         key: function.for_span(scene.axis_span(PARAMETERS[key].axis)).to_toml()
         for key, function in scene.errors.functions.items()
     }
-    parts += [_section("errors", functions, PARAMETERS), _tolerances_section(scene)]
+    parts += [spell_section("errors", functions, PARAMETERS), _tolerances_section(scene)]
     uncertain = {key: function.to_toml() for key, function in scene.uncertainty.items()}
-    parts.append(_section("uncertainty", uncertain, PARAMETERS))
+    parts.append(spell_section("uncertainty", uncertain, PARAMETERS))
     for key, measurement in scene.measured.items():
         runs = [asdict(run) for run in measurement.runs]
-        parts.append(_section(f"measured.{key}", {"runs": runs}))
+        parts.append(spell_section(f"measured.{key}", {"runs": runs}))
     view = {
         "exaggeration": "auto" if scene.exaggeration is None else scene.exaggeration,
         "reference": "absolute" if scene.reference is None else scene.reference,
         **({"placed": True} if scene.placed else {}),
         **({} if scene.limit_um is None else {"limit_um": scene.limit_um}),
     }
-    parts.append(_section("view", view))
+    parts.append(spell_section("view", view))
     part = asdict(replace(scene.part, folder=""))
-    parts.append(_section("part", {name: value for name, value in part.items() if value}))
+    parts.append(spell_section("part", {name: value for name, value in part.items() if value}))
     parts += map(spell_note, scene.review)
     return "\n".join(part for part in parts if part)
 
 
 def spell_note(note: Note) -> str:
     """Spell a note as a table of a scene file, an entry a line."""
-    return _section("[notes]", note_to_toml(note))
+    return spell_section("[notes]", note_to_toml(note))
 
 
 def _bundled(machine: Machine) -> Machine | None:
@@ -176,7 +176,7 @@ def _bodies_section(machine: Machine, known: Machine | None) -> str:
         entries = asdict(source)
         del entries["path"]
         values[frame] = source.file if source == plain else {k: v for k, v in entries.items() if v}
-    return _section("bodies", values)
+    return spell_section("bodies", values)
 
 
 def _machine_sections(machine: Machine) -> list[str]:
@@ -199,12 +199,12 @@ def _machine_sections(machine: Machine) -> list[str]:
     }
     source = {"source": machine.source} if machine.source else {}
     return [
-        _section("machine", {"title": machine.title, "chain": str(machine.chain)} | source),
-        _section("machine.offset_mm", {k: v for k, v in offsets.items() if v != ORIGIN}),
-        _section("machine.rotation_deg", {k: v for k, v in turned.items() if v != ORIGIN}),
-        _section("machine.travel", travel),
-        _section("machine.direction", direction),
-        _section("machine.gantry", gantry),
+        spell_section("machine", {"title": machine.title, "chain": str(machine.chain)} | source),
+        spell_section("machine.offset_mm", {k: v for k, v in offsets.items() if v != ORIGIN}),
+        spell_section("machine.rotation_deg", {k: v for k, v in turned.items() if v != ORIGIN}),
+        spell_section("machine.travel", travel),
+        spell_section("machine.direction", direction),
+        spell_section("machine.gantry", gantry),
     ]
 
 
@@ -214,12 +214,13 @@ def _tolerances_section(scene: Scene) -> str:
         values["default"] = scene.tolerances.default
     for key, own in scene.tolerances.own.items():
         values[key] = asdict(own) if own.centre else own.half_width
-    return _section("tolerances", values, PARAMETERS)
+    return spell_section("tolerances", values, PARAMETERS)
 
 
-def _section(
+def spell_section(
     name: str, values: Mapping[str, object], remarks: Mapping[str, Parameter] | None = None
 ) -> str:
+    """Spell a table of a scene file; nothing where it holds nothing."""
     if not values:
         return ""
     lines = [f"[{name}]"]

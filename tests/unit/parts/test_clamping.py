@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 import warpspace
 from warpspace.analysis.description import silent
@@ -19,11 +20,8 @@ HEAD = (
 
 def clamp(tmp_path, name="cube", size=100.0, long=1.0, **asked) -> ClampResult:
     file = tmp_path / "part.stl"
-    rows = [line.split() for line in build_piece(name, size).texts()[".stl"].splitlines()]
-    for row in rows:
-        if row[0] == "vertex":
-            row[1] = str(float(row[1]) * long)
-    file.write_text("\n".join(map(" ".join, rows)))
+    file.write_text(build_piece(name, size)[".stl"])
+    trimesh.load_mesh(file).apply_scale([long, 1.0, 1.0]).export(file)
     scene = parse_scene(f"{HEAD}\n[errors]\nEXX = {{ poly = [0.0, 0.1] }}", "plain")
     return Clamp(file=str(file), **asked).run(scene, silent)
 
@@ -50,7 +48,7 @@ def test_a_turn_lays_the_short_side_along_a_growing_error(tmp_path):
 
 def test_all_places_are_within_the_travel_in_all_orientations(tmp_path):
     path = tmp_path / "part.stl"
-    path.write_text(build_piece("contour").texts()[".stl"])
+    path.write_text(build_piece("contour")[".stl"])
     scene = warpspace.load_scene("dvf5000_first")
     found = warpspace.clamp(scene, file=str(path), turns="all", grid=2)
     assert len({one.place[3:] for one in found.places}) == 24

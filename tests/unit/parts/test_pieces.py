@@ -29,7 +29,7 @@ VOLUMES = {
 
 @pytest.mark.parametrize("name", PIECES)
 def test_pieces_hold_together(name: str, tmp_path: Path):
-    for ending, text in build_piece(name).texts().items():
+    for ending, text in build_piece(name).items():
         (tmp_path / f"a{ending}").write_text(text)
     mesh = load_part(tmp_path / "a.stl")
     assert not mesh.warnings

@@ -403,26 +403,15 @@ def _list_formats(*, as_json: bool) -> None:
     type=click.FloatRange(1.0, MAX_LENGTH_MM),
     help="Its length or diameter across, mm.  [100 to 240, by piece]",
 )
-@click.option(
-    "--zero",
-    nargs=3,
-    type=click.FloatRange(-MAX_LENGTH_MM, MAX_LENGTH_MM),
-    default=(0.0, 0.0, 0.0),
-    metavar="X Y Z",
-    help="Words of the program at the zero of the piece, mm.  [0 0 0]",
-)
 @force_option
-def piece(
-    name: str, output: str, size: float | None, zero: tuple[float, float, float], *, force: bool
-) -> None:
+def piece(name: str, output: str, size: float | None, *, force: bool) -> None:
     """Write a piece to start with: mesh, program or features.
 
     contour is a circle on a diamond on a square (after ISO 10791-7), cone a frustum (after NAS
     979), plate one of nine holes. The frame of all files has its zero in the middle of the lower
-    side: --place of the mesh, and work offset or --zero of the program.
+    side: --place of the mesh, and work offset of the program.
     """
     from warpspace.parts.pieces import build_piece
 
-    made = build_piece(name, size)
-    write_text(output, made.texts(zero)[Path(output).suffix.lower()], force=force)
-    print_text(f"{output}: {made.words}")
+    write_text(output, build_piece(name, size)[Path(output).suffix.lower()], force=force)
+    echo(f"wrote {output}")
