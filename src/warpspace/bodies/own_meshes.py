@@ -54,7 +54,8 @@ def read_mesh(
     mesh = found.geometry[name].apply_transform(pose) if is_one else found.to_mesh()
     if not np.isfinite(mesh.vertices).all():
         raise OptionError(f"{path}: a vertex is not finite")
-    if len(mesh.vertices) > len(mesh.faces) or not _is_closed(mesh.faces):
+    is_closed = len(mesh.vertices) <= len(mesh.faces) and _is_closed(mesh.faces)
+    if not is_closed:
         mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces((mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1))
     if not len(mesh.faces):
@@ -64,7 +65,7 @@ def read_mesh(
         mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     if not is_told:
         _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), unit)
-    if not _is_closed(mesh.faces):
+    if not (is_closed or _is_closed(mesh.faces)):
         said = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
         count = len(grouping.group_rows(mesh.edges_sorted, require_count=1))
         return mesh, (f"{said} ({count:,} open edges); it is taken as it is",)

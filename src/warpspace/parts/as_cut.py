@@ -102,9 +102,10 @@ def _off(part: PartMesh, made: Made, *errors_um: Array) -> Iterator[Off]:
     spans = np.array([[np.inf, -np.inf]] * len(errors_um))
     for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
         some = part.triangles[first : first + TRIANGLES_AT_ONCE]
-        normals, is_valid = triangles.normals(part.vertices_mm[some])
+        normals, is_valid = triangles.normals(np.take(part.vertices_mm, some, axis=0))
         for span, error in zip(spans, errors_um, strict=True):
-            away = np.einsum("tcx,tx->tc", error[some[is_valid]], normals)
+            at_corners = np.take(error, some[is_valid], axis=0)
+            away = np.einsum("tcx,tx->tc", at_corners, normals)
             span[:] = away.min(initial=span[0]), away.max(initial=span[1])
     for (low, high), error in zip(spans.tolist(), errors_um, strict=True):
         field = ErrorField(made.point_mm, error, np.broadcast_to(np.nan, error.shape))

@@ -141,10 +141,10 @@ class ClampResult(Result):
         rows = [(word, *one.place, one.max_um, one.placed_um) for word, one in told]
         yield Table(columns, rows[:SHOWN], file_rows=rows)
         here = [one for one in self.places if one.place[2:] == self.places[0].place[2:]]
-        um, where = [*map(JUDGED[self.placed], here)], np.array([one.place[:2] for one in here])
+        um, (x, y, *_) = [*map(JUDGED[self.placed], here)], np.array([one.place for one in here]).T
         ends = np.linspace(0, len(here), min(CLASSES, len(here)) + 1).astype(int)
         dots = tuple(
-            Curve(f"{um[at]:.2f} to {um[end - 1]:.2f} µm", *where[at:end].T, number, "dots")
+            Curve(f"{um[at]:.2f} to {um[end - 1]:.2f} µm", x[at:end], y[at:end], number, "dots")
             for number, (at, end) in enumerate(pairwise(ends))
         )
         note = f"{judged}. Geometry only: no forces, heat, wear or servo."

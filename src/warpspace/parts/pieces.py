@@ -36,7 +36,8 @@ class Outline:
         angle = np.arange(ON_RING) * (2.0 * np.pi / ON_RING)
         ring = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1)
         ring *= self.half_mm / np.linalg.norm(ring, self.shape, axis=1, keepdims=True)
-        return np.round(np.add(ring, [*self.middle_mm, self.level_mm]), 9) + 0.0
+        ring += [*self.middle_mm, self.level_mm]
+        return np.round(ring, 9) + 0.0
 
     def blocks(self) -> list[str]:
         """Write the blocks that cut along it."""
