@@ -63,8 +63,14 @@ def read_mesh(
     mesh.apply_scale(UNITS_MM[unit])
     if up == "y":
         mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-    if not is_told:
-        _check_size(path, float(np.ptp(mesh.vertices, axis=0).max()), unit)
+    longest = float(np.ptp(mesh.vertices, axis=0).max())
+    if not (is_told or SMALL_MM <= longest <= LARGE_MM):
+        is_usual = (unit == "mm") == (longest < SMALL_MM)
+        other = {"mm": "m", "m": "mm"}[unit] if is_usual else "another unit"
+        raise OptionError(
+            f"{path}: taken as {unit}, its longest edge is {longest:.4g} mm. It is probably in"
+            f" {other}; give its unit ({', '.join(UNITS_MM)})"
+        )
     if not (is_closed or _is_closed(mesh.faces)):
         said = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
         count = len(grouping.group_rows(mesh.edges_sorted, require_count=1))
@@ -88,18 +94,6 @@ def _is_closed(faces: NDArray[np.int64]) -> bool:
         for begin, end in zip(faces.T, np.roll(faces, 1, axis=1).T, strict=True)
     ]
     return sum(sums) % 2**64 == 0
-
-
-def _check_size(path: Path, longest_mm: float, unit: str) -> None:
-    for far, other in (
-        (longest_mm < SMALL_MM, "m" if unit == "mm" else "another unit"),
-        (longest_mm > LARGE_MM, "mm" if unit == "m" else "another unit"),
-    ):
-        if far:
-            raise OptionError(
-                f"{path}: taken as {unit}, its longest edge is {longest_mm:.4g} mm. It is probably "
-                f"in {other}; give its unit ({', '.join(UNITS_MM)})"
-            )
 
 
 def own_meshes(machine: Machine) -> dict[str, Body]:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,9 +104,6 @@ def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
     return found
 
 
-Place: TypeAlias = Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)]
-
-
 @dataclass(frozen=True, kw_only=True)
 class OfPart(Analysis):
     """A question about a part where it is clamped."""
@@ -114,7 +111,7 @@ class OfPart(Analysis):
     file: File = option(
         None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
     )
-    place: Place = option(
+    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
         None,
         "Where the part is clamped, in the workpiece frame: shift in mm and turns in degrees about"
         " the fixed x, y, z in that order",
@@ -158,16 +155,13 @@ class Made:
 def make_points(scene: Scene, point_mm: Array) -> Made:
     """Find where the axes stand at points of w, [n, 3], mm, and what error they have there."""
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-    coordinates: dict[str, list[Array]] = {name: [] for name in scene.machine.axes}
-    error, inside = list[Array](), list[NDArray[np.bool_]]()
-    for some in np.array_split(point_mm, -(-len(point_mm) // POINTS_AT_ONCE) or 1):
-        here = follow(scene.model, stand, some)
-        error.append(evaluate(scene, at=here, loop=Loop.RELATIVE, frame="workpiece").error_um)
-        inside.append(np.broadcast_to(within_travel(scene.machine, here), len(some)))
-        for name, at in coordinates.items():
-            at.append(here[name])
-    joined = {name: np.concatenate(at) if at[0].ndim else at[0] for name, at in coordinates.items()}
-    return Made(point_mm, joined, np.concatenate(error), ~np.concatenate(inside))
+    at, error = follow(scene.model, stand, point_mm), np.empty(point_mm.shape)
+    for first in range(0, len(point_mm), POINTS_AT_ONCE):
+        rows = slice(first, first + POINTS_AT_ONCE)
+        here = {name: of[rows] if np.ndim(of) else of for name, of in at.items()}
+        error[rows] = evaluate(scene, at=here, loop=Loop.RELATIVE, frame="workpiece").error_um
+    outside = ~np.broadcast_to(within_travel(scene.machine, at), len(point_mm))
+    return Made(point_mm, at, error, outside)
 
 
 def point_basis(

@@ -37,18 +37,13 @@ def read_bodies(
             problems.add(f"{where}.shape", "only the tool t has one; expected a file", body.shape)
         elif body.shape:
             found[frame] = description.BodySource(shape=body.shape)
+        elif Path(body.file).suffix.lower() not in description.MESH_ENDINGS:
+            known = ", ".join(description.MESH_ENDINGS)
+            expected = f"unknown ending; expected a mesh that ends in {known}"
+            problems.add(where, expected, body.file)
         else:
-            found[frame] = replace(body, path=_mesh_path(body.file, where, folder, problems))
+            found[frame] = replace(body, path=path_beside(body.file, where, folder, problems))
     return found
-
-
-def _mesh_path(file: str, where: str, folder: Path | None, problems: Problems) -> str:
-    ending = Path(file).suffix.lower()
-    if ending not in description.MESH_ENDINGS:
-        known = ", ".join(description.MESH_ENDINGS)
-        problems.add(where, f"unknown ending; expected a mesh that ends in {known}", file)
-        return ""
-    return path_beside(file, where, folder, problems)
 
 
 def path_beside(file: str, where: str, folder: Path | None, problems: Problems) -> str:
