@@ -187,7 +187,8 @@ def build_body(
     mesh: Any, name: str, frame: str, colour: tuple[int, int, int], lines_mm: Array | None = None
 ) -> Body:
     """Turn a mesh of trimesh, vertices in mm, into a body; its edges are where it bends."""
-    edges = crease_edges(mesh)
+    is_sharp = mesh.face_adjacency_angles > np.deg2rad(CREASE_DEG)
+    edges = np.asarray(mesh.vertices[mesh.face_adjacency_edges[is_sharp]], dtype=float)
     return Body(
         name,
         frame,
@@ -196,11 +197,6 @@ def build_body(
         np.array(mesh.faces, dtype=np.int32),
         edges if lines_mm is None else np.concatenate([edges, lines_mm]),
     )
-
-
-def crease_edges(mesh: Any) -> Array:
-    sharp = mesh.face_adjacency_angles > np.deg2rad(CREASE_DEG)
-    return np.asarray(mesh.vertices[mesh.face_adjacency_edges[sharp]], dtype=float)
 
 
 def _check_geometry(scene: Any, most: int) -> None:

@@ -153,7 +153,7 @@ class PartResult(Off, Result):
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
         yield features_table(self.features)
 
-    def texts(self, ending: str = "", /) -> Mapping[str, bytes | str]:
+    def texts(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
         """Spell the part in its own frame and unit: as it is cut, or so that it is cut nominal."""
         nominal, moved = self.made.point_mm, self.made.error_um * MM_PER_UM
         for _ in range(2 * self.asked.predistorted):

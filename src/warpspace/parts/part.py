@@ -124,12 +124,11 @@ class OfPart(Analysis):
 
     def find_mesh(self, scene: Scene) -> PartMesh:
         """Read the mesh, or that of the scene where none is named."""
-        own = scene.part
         if self.mesh is not None:
             return self.mesh
-        if (path := self.file or own.path("file")) is None:
+        if (path := self.file or scene.part.path("file")) is None:
             raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
-        return load_part(path, self.unit or (None if self.file else own.unit or None))
+        return load_part(path, self.unit or (None if self.file else scene.part.unit or None))
 
 
 def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = None) -> PartMesh:
