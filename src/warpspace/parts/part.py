@@ -179,7 +179,10 @@ def fit_out(point_mm: Array, error_um: Array) -> Array:
     arm = point_mm - point_mm.mean(axis=0)
     shift = error_um.mean(axis=-2, keepdims=True)
     inertia = np.sum(arm * arm) * np.eye(3) - arm.T @ arm
-    moment = np.cross(arm, error_um).sum(axis=-2)
+    both = (
+        np.swapaxes(error_um, -1, -2) @ arm
+    )  # a cross product of each pair takes five times longer
+    moment = (both - np.swapaxes(both, -1, -2))[..., [2, 0, 1], [1, 2, 0]]
     # points on a line do not tell the turn about it: the smallest one counts
     turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)
-    return error_um - shift - np.cross(turn[..., None, :], arm)
+    return error_um - shift + arm @ transforms.skew(turn)
