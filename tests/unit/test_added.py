@@ -16,7 +16,6 @@ from cli.conftest import warpspace
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.app.documents.scene_file import open_text, state_to_toml
-from warpspace.app.evaluation.bench import BenchPicture
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
@@ -303,8 +302,8 @@ def test_a_test_is_a_command_and_in_the_app(warpspace, tmp_path):
     assert plot.stat().st_size > 1000
     state = replace(start_state(FIRST, nodes=3), forms={"test": "corner"})
     picture = LiveModel().evaluate(state).bench
-    assert isinstance(picture, BenchPicture)
-    assert picture.largest_um > 0.0
+    assert picture is not None
+    assert picture.error_um.any()
 
 
 def test_reports_and_figures_have_the_words_of_each(monkeypatch):
