@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from warpspace.analysis.cases import Case, Places, Plan
 from warpspace.analysis.distribution import SIGMAS, Distribution, Draws, loop_keys
 from warpspace.analysis.statistics import Statistics, statistics, volume_statistics
 from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import ErrorField, amplitudes_of, build_basis, evaluate_first_order
-from warpspace.field.grid import DEFAULT_NODES, build_grid
-from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import PARAMETERS, parameter
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.errors import ErrorSet, ToleranceSet
@@ -125,16 +124,6 @@ SIGMAS_OF = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: 3.0**0.5}
 
 
 @dataclass(frozen=True, slots=True)
-class FieldUncertainty:
-    """Standard uncertainty (k = 1) of a field."""
-
-    error_um: Array  # [..., 3]; of each component of the position error
-    # [...]; of its length: along the error, or of the vector as a whole where the error is zero
-    norm_um: Array
-    orientation_urad: Array  # [..., 3]
-
-
-@dataclass(frozen=True, slots=True)
 class UncertainCase(Case):
     """A measured machine whose errors are off by their standard uncertainties."""
 
@@ -182,36 +171,3 @@ def scene_uncertainty(scene: Scene, loop: Loop) -> Mapping[str, ErrorFunction]:
         raise SceneError(scene.name, [problem])
     keys = loop_keys(scene.model, loop, tuple(scene.uncertainty))
     return {key: scene.uncertainty[key] for key in keys}
-
-
-def evaluate_uncertainty(
-    scene: Scene,
-    *,
-    at: Mapping[str, ArrayLike] | None = None,
-    grid: int | Sequence[int] | None = None,
-    loop: Loop | str = Loop.TOOL,
-    frame: str = "machine",
-) -> FieldUncertainty:
-    """Propagate the standard uncertainties of a scene to its field, to first order."""
-    model, view = scene.model, choose_view(scene, loop, frame)
-    own = ErrorSet(scene_uncertainty(scene, view.loop))
-    if at is not None:
-        coordinates = complete_coordinates(scene.machine, at, scene.workspace.positions)
-        where = coordinates, view, None
-    else:
-        nodes = build_grid(model, scene.workspace, DEFAULT_NODES if grid is None else grid)
-        where = nodes.coordinates, view, nodes.point_mm
-    nominal = evaluate_first_order(model, scene.errors, *where)
-    length = nominal.norm_um[..., None]
-    along = np.where(length > 0.0, nominal.error_um / np.where(length > 0.0, length, 1.0), 0.0)
-    position, tilt = np.zeros(nominal.error_um.shape), np.zeros(nominal.error_um.shape)
-    norm = np.zeros(nominal.norm_um.shape)
-    for key in own:
-        one = build_basis(model, own, (key,), *where)
-        (amplitude,) = amplitudes_of(own, (key,))
-        part = amplitude * one.position[0]
-        position += part**2
-        tilt += (amplitude * one.orientation[0]) ** 2
-        norm += np.sum(part * along, axis=-1) ** 2
-    norm = np.where(length[..., 0] > 0.0, norm, np.sum(position, axis=-1))
-    return FieldUncertainty(np.sqrt(position), np.sqrt(norm), np.sqrt(tilt))

@@ -32,7 +32,8 @@ from warpspace.calibration.solve import (
     unwatched,
 )
 from warpspace.exceptions import OptionError
-from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
+from warpspace.machine.errors import Covariance
+from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_SPAN
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -251,7 +252,13 @@ def _fit(
                 " Are units, kind of readings and machine right?"
             )
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
-    fitted_scene = replace(scene, title=title, errors=errors)
+    fitted_scene = replace(
+        scene,
+        title=title,
+        errors=errors,
+        uncertainty={key: one for key, one in scene.uncertainty.items() if key not in part.keys},
+        covariance=_covariance(scene, part.keys, covariance, freedom, stack),
+    )
     outliers = _outliers(stack, after)
     held, held_notes = _predict(stack, terms, part, predict, begin, solved, robust=request.robust)
     return Calibration(
@@ -323,6 +330,30 @@ def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
     rows = [tolerance for key in keys if (tolerance := scene.tolerances.get(key)) is not None]
     widths = np.array([max(row.half_width, 1e-6) for row in rows])
     return np.array([row.centre for row in rows]), widths / np.sqrt(3.0)
+
+
+def _covariance(
+    scene: Scene, keys: tuple[str, ...], found: Array, freedom: int, stack: Stack
+) -> Covariance | None:
+    """Join what was found with what the scene knew of other errors."""
+    kept = [key for key in scene.covariance.keys if key not in keys] if scene.covariance else []
+    if not (keys or kept):
+        return None
+    matrix = np.zeros((len(keys) + len(kept),) * 2)
+    matrix[: len(keys), : len(keys)] = found
+    reach = dict.fromkeys(scene.machine.axes, (np.inf, -np.inf))
+    if scene.covariance:
+        places = [scene.covariance.keys.index(key) for key in kept]
+        matrix[len(keys) :, len(keys) :] = scene.covariance.matrix[np.ix_(places, places)]
+        reach |= scene.covariance.reach
+    for one in stack.sets:
+        for axis, at in one.coordinates.items():
+            low, high = reach[axis]
+            reach[axis] = min(low, float(np.min(at))), max(high, float(np.max(at)))
+    moved = {axis: ends for axis, ends in reach.items() if ends[1] - ends[0] >= MIN_SPAN}
+    rows = tuple(map(tuple, ((matrix + matrix.T) / 2.0).tolist()))
+    sure = np.inf if stack.has_uncertainties else float(max(freedom, 1))
+    return Covariance((*keys, *kept), rows, sure, moved)
 
 
 def _correlation(covariance: Array) -> Array:

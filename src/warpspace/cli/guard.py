@@ -213,5 +213,7 @@ def _named_files(value: object, key: str = "", table: str = "") -> Iterator[str]
     elif isinstance(value, list):
         for part in cast("list[object]", value):
             yield from _named_files(part, key, table)
-    elif isinstance(value, str) and (key in {"csv", "file"} or table in {"bodies", "part"}):
+    elif isinstance(value, str) and (
+        key in {"csv", "file", "covariance"} or table in {"bodies", "part"}
+    ):
         yield value

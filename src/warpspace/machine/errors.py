@@ -95,6 +95,21 @@ class ErrorSet:
         return ErrorSet({**self.functions, key: function.with_amplitude(amplitude)})
 
 
+@dataclass(frozen=True, slots=True)
+class Covariance:
+    """How sure the amplitudes of some errors are, together."""
+
+    keys: tuple[str, ...]  # (K,)
+    rows: tuple[tuple[float, ...], ...]  # (K, K); products of µm and µrad
+    freedom: float = np.inf  # degrees of freedom of what it was found from
+    # positions between which axes stood, mm or degrees; beyond them nothing was measured
+    reach: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+
+    @property
+    def matrix(self) -> Array:
+        return np.array(self.rows, dtype=float).reshape(len(self.keys), len(self.keys))
+
+
 TOLERANCE_CLASSES = ("translation", "rotation", "squareness")
 
 

@@ -26,6 +26,7 @@ MAX_TERMS = 64  # harmonics of one curve
 MAX_ORDER = 1000
 # points of a table, values of a table over two axes, rows of a CSV file, readings of an error
 MAX_POINTS = 100_000
+MAX_COVARIANCE = 200  # errors that one covariance is of
 MAX_RUNS = 1000  # runs of one measured error
 MAX_CURVE_ROWS = 2000  # rows of a curve that may be edited or pasted in the app
 MAX_CURVE_TEXT = 80_000  # their characters

@@ -1,9 +1,12 @@
 """Finding scenes and reading them: bundled by name, or any file by path, each in one pass."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.field.grid import Workspace, find_volume_axes
@@ -15,6 +18,7 @@ from warpspace.machine.curves.simple import Constant
 from warpspace.machine.curves.table import Table
 from warpspace.machine.description import BODY_FRAMES, Machine, Range, build_machine
 from warpspace.machine.errors import (
+    Covariance,
     ErrorSet,
     Measurement,
     Run,
@@ -24,7 +28,7 @@ from warpspace.machine.errors import (
 from warpspace.resources import scenes_dir
 from warpspace.scene import machines, schema
 from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
-from warpspace.scene.files import parse_toml, read_text
+from warpspace.scene.files import check_file, parse_toml, read_text
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.save import Notation, read_errors
@@ -98,6 +102,7 @@ SECTIONS = (
     "part",
     "notes",
 )
+ROUNDED = 1e-9  # of a covariance: by how much its two halves may differ, and what is zero of it
 OF_MACHINE = "axis of this machine"  # what a name is that is not known
 STAND_IN = build_machine("wFXYZABCt")
 """Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
@@ -122,6 +127,7 @@ def parse_scene(
     document = _Document(raw, machine, workspace, machine.reference_keys * fixed, folder, problems)
     errors, tolerances = document.errors(), document.tolerances()
     uncertainty, measured = document.uncertainties(), document.measurements()
+    covariance = document.covariance(uncertainty)
     reference = _reference(view, workspace, problems)
     review = _review(raw.get("notes", []), machine, problems)
     orders, lines = _conventions(convention or {}, machine, problems)
@@ -148,6 +154,7 @@ def parse_scene(
         description=description,
         notes=(*scene_notes(machine, workspace, errors), *machines.body_notes(machine)),
         uncertainty=uncertainty,
+        covariance=covariance,
         measured=measured,
         review=review,
         part=PartSource(**part, folder=str(folder or "")),
@@ -273,6 +280,23 @@ def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
     return found
 
 
+def read_npz(path: Path, where: str, problems: Problems) -> dict[str, object] | None:
+    """Read the arrays of a file of numpy as lists; note what is wrong with it."""
+    check_file(path, limits.MAX_SCENE_BYTES, str(path))
+    try:
+        with ZipFile(path) as packed:  # what it holds may be larger by far
+            size = sum(entry.file_size for entry in packed.infolist())
+        if size <= limits.MAX_SCENE_BYTES:
+            with np.load(path, allow_pickle=False) as arrays:
+                return {name: arrays[name].tolist() for name in arrays.files}
+    except (BadZipFile, OSError, ValueError, EOFError):
+        size = 0
+    most = f" of at most {limits.MAX_SCENE_BYTES:,} bytes" if size else ""
+    expected = f"expected a file of numpy{most} with the arrays keys and matrix"
+    problems.add(where, expected, path.name)
+    return None
+
+
 @dataclass(frozen=True)
 class _Document:
     """A document whose machine and working volume are known."""
@@ -288,7 +312,7 @@ class _Document:
         known: dict[str, object] = {}
         machine, problems = self.machine, self.problems
         for key, value in problems.table(section, self.raw.get(section)).items():
-            if section == "tolerances" and key == "default":
+            if (section, key) in {("tolerances", "default"), ("uncertainty", "covariance")}:
                 continue
             if key not in PARAMETERS:
                 problems.only(section, [key], machine.allowed_keys, "error parameter")
@@ -361,10 +385,51 @@ class _Document:
                 self.problems.add(where, expected, raw)
                 continue
             values = [curve.value] if isinstance(curve, Constant) else [v for _, v in curve.points]
-            if min(values) < 0.0:
-                self.problems.add(where, "a standard uncertainty is not negative", min(values))
+            if min(values) < 0.0 or not any(values):
+                expected = "expected a standard uncertainty above 0; leave out what is not known"
+                self.problems.add(where, expected, min(values))
             found[key] = curve
         return found
+
+    def covariance(self, alone: Collection[str]) -> Covariance | None:
+        """Read how sure errors are together, of others than those that stand alone."""
+        where, problems = "uncertainty.covariance", self.problems
+        given = self.raw.get("uncertainty")
+        raw = given.get("covariance") if isinstance(given, dict) else None
+        if isinstance(raw, str):
+            path = machines.path_beside(raw, where, self.folder, problems)
+            raw = read_npz(Path(path), where, problems) if path else None
+        if raw is None:
+            return None
+        before = len(problems.lines)
+        found: dict[str, Any] | None = problems.read(schema.COVARIANCE, where, raw)
+        if found is None:
+            return None
+        keys, rows = found["keys"], found["matrix"]
+        problems.only(f"{where}.keys", keys, self.machine.allowed_keys, "error parameter")
+        problems.only(f"{where}.reach", found["reach"], self.machine.axes, OF_MACHINE)
+        if twice := [key for at, key in enumerate(keys) if key in keys[:at] or key in alone]:
+            expected = "expected each error once, here or as uncertainty.KEY"
+            problems.add(f"{where}.keys", expected, twice[0])
+        lengths, count = [*map(len, rows)], len(keys)
+        if lengths not in ([count] * count, [*range(1, count + 1)]):
+            expected = f"expected {count} rows of {count} numbers, or of 1 to {count}"
+            problems.add(f"{where}.matrix", expected)
+            return None
+        half = np.zeros((count, count))
+        for at, row in enumerate(rows):
+            half[at, : len(row)] = row
+        matrix = np.tril(half) + np.tril(half, -1).T
+        width = np.sqrt(np.abs(np.diag(matrix)))
+        if len(rows[0]) == count and np.abs(half - matrix).max() > ROUNDED * np.abs(half).max():
+            problems.add(f"{where}.matrix", "is not symmetric; expected numbers mirrored")
+        if not width.all() or np.linalg.eigvalsh(matrix / np.outer(width, width))[0] < -ROUNDED:
+            expected = "is no covariance; expected a positive matrix, its diagonal above 0"
+            problems.add(f"{where}.matrix", expected)
+        if len(problems.lines) > before:
+            return None
+        spelled = tuple(map(tuple, matrix.tolist()))
+        return Covariance(keys, spelled, found["freedom"], found["reach"])
 
     def measurements(self) -> dict[str, Measurement]:
         found: dict[str, Measurement] = {}

@@ -24,7 +24,14 @@ from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
 from warpspace.machine import axes
 from warpspace.machine.description import Machine, Vector
-from warpspace.machine.errors import ErrorFunction, ErrorSet, Harmonics, Measurement, ToleranceSet
+from warpspace.machine.errors import (
+    Covariance,
+    ErrorFunction,
+    ErrorSet,
+    Harmonics,
+    Measurement,
+    ToleranceSet,
+)
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.notes import Note
 
@@ -74,7 +81,9 @@ class Scene:
     notes : tuple of str
         Remarks on the scene that are no errors.
     uncertainty : mapping of str to ErrorFunction
-        Standard uncertainty (k = 1) of errors along their axes by key, µm or µrad, never negative.
+        Standard uncertainty (k = 1) of errors along their axes by key, µm or µrad, above 0.
+    covariance : Covariance or None
+        How sure the amplitudes of other errors are, together.
     measured : mapping of str to Measurement
         Readings that errors were made from, by key.
     limit_um : float or None, µm
@@ -98,6 +107,7 @@ class Scene:
     description: str = ""
     notes: tuple[str, ...] = ()
     uncertainty: Mapping[str, ErrorFunction] = field(default_factory=dict[str, ErrorFunction])
+    covariance: Covariance | None = None
     measured: Mapping[str, Measurement] = field(default_factory=dict[str, Measurement])
     limit_um: float | None = None
     review: tuple[Note, ...] = ()

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
+from math import isinf
 from typing import cast
 
 import tomli_w
@@ -14,7 +15,7 @@ from warpspace.kinematics.model import Model
 from warpspace.machine.axes import PARAMETERS, Parameter, TravelDirection, parameter
 from warpspace.machine.curves.curve import Span
 from warpspace.machine.description import ORIGIN, BodySource, Machine, Vector, default_travel
-from warpspace.machine.errors import ErrorSet
+from warpspace.machine.errors import Covariance, ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.scene.files import spell_key
 from warpspace.scene.machines import load_machine, machine_names
@@ -135,7 +136,9 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     }
     parts += [spell_section("errors", functions, PARAMETERS), _tolerances_section(scene)]
     uncertain = {key: function.to_toml() for key, function in scene.uncertainty.items()}
-    parts.append(spell_section("uncertainty", uncertain, PARAMETERS))
+    parts.append(
+        spell_section("uncertainty", uncertain | _covariance(scene.covariance), PARAMETERS)
+    )
     for key, measurement in scene.measured.items():
         runs = [asdict(run) for run in measurement.runs]
         parts.append(spell_section(f"measured.{key}", {"runs": runs}))
@@ -150,6 +153,18 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     parts.append(spell_section("part", {name: value for name, value in part.items() if value}))
     parts += map(spell_note, scene.review)
     return "\n".join(part for part in parts if part)
+
+
+def _covariance(found: Covariance | None) -> dict[str, object]:
+    """Spell a covariance: of its rows what stands up to the diagonal."""
+    if found is None:
+        return {}
+    values: dict[str, object] = {
+        "keys": found.keys,
+        "matrix": [row[: at + 1] for at, row in enumerate(found.rows)],
+    }
+    values |= {} if isinf(found.freedom) else {"freedom": found.freedom}
+    return {"covariance": values | ({"reach": found.reach} if found.reach else {})}
 
 
 def spell_note(note: Note) -> str:

@@ -1,5 +1,6 @@
 """What each section of a scene or machine file may hold, and the list that its problems go to."""
 
+import math
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
@@ -282,6 +283,17 @@ RUNS = Section({"runs": (_list(_RUN, limits.MAX_RUNS, least=1), MISSING)})
 CSV_RUNS = Section(
     {"csv": (_text(MAX_FILE_NAME, 1), MISSING), "column": (_text(MAX_COLUMN_NAME, 1), MISSING)}
 )
+_PRODUCT = _number(-(limits.MAX_ERROR**2), limits.MAX_ERROR**2)
+COVARIANCE = Section(
+    {
+        "keys": (_list(_text(8, 1), limits.MAX_COVARIANCE, 1), MISSING),
+        "matrix": (
+            _list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE, 1), MISSING,
+        ),
+        "freedom": (_number(1.0, 1e9), math.inf),
+        "reach": (_by_name(_span), {}),
+    }
+)  # fmt: skip
 _MEASURED = _by_name(_number(0.0, limits.MAX_ERROR * 10.0), MEASURES)
 _VERSION = _text(16, 1, r"[a-z0-9]*", "small letters and digits")
 # what people write has lines and tabulators, but no other control characters

@@ -12,7 +12,7 @@ from warpspace.cli.tables import print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.measured import FieldUncertainty
+    from warpspace.analysis.doubt import FieldDoubt
     from warpspace.field.evaluate import ErrorField, View
     from warpspace.field.grid import Grid
     from warpspace.scene.model import Scene
@@ -36,7 +36,7 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
     "--uncertainty",
     "uncertain",
     is_flag=True,
-    help="Also what the standard uncertainties of SCENE's errors give (k = 1, first order).",
+    help="Also the standard uncertainty (k = 1) of each point of a grid, and in files.",
 )
 @click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
 @click.option(
@@ -77,6 +77,7 @@ def field(
     """
     from dataclasses import asdict
 
+    from warpspace.analysis.doubt import field_doubt, find_doubt, u95_words, volume_doubt, with_u95
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.field.evaluate import placed_words
     from warpspace.picture.words import direction_words, own_axes, spell_at, spell_point
@@ -91,14 +92,16 @@ def field(
         )
     loaded = options.load_placed(scene, direction, loop, placed=placed)
     view = choose_view(loaded, loop, frame)
-    spread = None
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
         places = axes if points else None
-        if uncertain:
-            from warpspace.analysis.measured import evaluate_uncertainty
-
-            spread = evaluate_uncertainty(loaded, at=places, grid=grid, loop=loop, frame=frame)
+        if uncertain and find_doubt(loaded, view.loop) is None:
+            raise OptionError(f"{loaded.name} has no [uncertainty], for instance EXX = 0.4")
+        shown = uncertain or bool(points)
+        where = None if nodes is None else nodes.point_mm
+        spread = field_doubt(loaded, result, axes, view, where) if shown else None
+        over = spread if points else volume_doubt(loaded, view, max(result.norm_um.shape))
+        u95 = {} if over is None else over.statistics()
         said = {} if exact else options.say_second_order(second_order(loaded, loop, at=places))
         plain = statistics(result, axes)
         summary = plain if nodes is None else volume_statistics(result, nodes)
@@ -112,7 +115,8 @@ def field(
             for path in files:
                 write_field(FieldRecord(axes, result, about, spread), path, overwrite=force)
     if as_json:
-        found: dict[str, object] = {"loop": loop, "frame": frame, "statistics": asdict(summary)}
+        found: dict[str, object] = {"loop": loop, "frame": frame}
+        found["statistics"] = with_u95(asdict(summary), u95)
         found |= {} if view.placed_over is None else {"placement": "fitted out"}
         found |= said if view.reference is None else {**said, "reference": dict(view.reference)}
         if nodes is not None:
@@ -121,24 +125,23 @@ def field(
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(options.spell_json({**size, **found}))
             return
-        _print_json(axes, result, found, spread)
+        _print_json(axes, result, found, spread, standard=uncertain)
         return
     told = (*direction_words(loaded), *placed_words(view))
     words = (f"{loop} loop", *told, "exact" if exact else "first order")
     print_text(" · ".join((loaded.title, *words)))
     if points:
         units = [loaded.machine.axes[name].unit for name in axes]
-        _list_points(axes, result, units, spread)
-    over = "" if nodes is None else ", over the volume"
+        _list_points(axes, result, units, spread if spread and spread.doubt.is_known else None)
+    volume = "" if nodes is None else ", over the volume"
     print_text(
-        f"  {result.norm_um.size} points{over}: mean {summary.mean_um:.2f},"
+        f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
-    if spread is not None:
-        print_text(
-            f"  standard uncertainty of |E|: mean {spread.norm_um.mean():.2f},"
-            f" max {spread.norm_um.max():.2f} µm"
-        )
+    if over is not None:
+        print_text(f"  {u95_words(over)}")
+        for remark in over.doubt.remarks():
+            print_text(f"  {remark}")
     if nodes is not None:
         print_text(f"  each node counted once: mean {plain.mean_um:.2f} µm")
     worst = own_axes(loaded, summary.max_at_axes)
@@ -176,7 +179,9 @@ def _print_json(
     axes: "Mapping[str, Array]",
     result: "ErrorField",
     found: "Mapping[str, object]",
-    spread: "FieldUncertainty | None",
+    spread: "FieldDoubt | None",
+    *,
+    standard: bool,
 ) -> None:
     """Print the JSON object piece by piece: a million points are never held as one text."""
     import numpy as np
@@ -189,11 +194,17 @@ def _print_json(
     }
     if not all(np.isfinite(values).all() for values in columns.values()):
         raise OptionError("the field has points whose error is no number; JSON cannot hold them")
-    if spread is not None:
+    if spread is not None and standard:
         columns |= {
-            "uncertainty_um": spread.error_um,
-            "uncertainty_norm_um": spread.norm_um,
-            "uncertainty_urad": spread.orientation_urad,
+            "uncertainty_um": spread.u_um,
+            "uncertainty_norm_um": spread.u_norm_um,
+            "uncertainty_urad": spread.u_urad,
+        }
+    if spread is not None and spread.doubt.is_known and result.norm_um.ndim == 1:
+        columns |= {
+            "u95_um": spread.doubt.factor * spread.u_um,
+            "u95_norm_um": spread.doubt.factor * spread.u_norm_um,
+            "covariance_um2": spread.covariance_um2,
         }
     shape, size = result.norm_um.shape, result.norm_um.size
     positions = [np.broadcast_to(values, shape).reshape(-1) for values in axes.values()]
@@ -219,7 +230,7 @@ def _list_points(
     axes: "Mapping[str, Array]",
     result: "ErrorField",
     units: "Sequence[str]",
-    spread: "FieldUncertainty | None",
+    spread: "FieldDoubt | None",
 ) -> None:
     columns = (
         Column("point", "d", leads=True),
@@ -238,7 +249,7 @@ def _list_points(
             *result.error_um[index],
             result.norm_um[index],
             *result.orientation_urad[index],
-            *(() if spread is None else (*spread.error_um[index], spread.norm_um[index])),
+            *(() if spread is None else (*spread.u_um[index], spread.u_norm_um[index])),
         )
         for index in range(min(result.norm_um.size, MAX_LISTED))
     ]

@@ -23,7 +23,7 @@ from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from warpspace.analysis.measured import FieldUncertainty
+    from warpspace.analysis.doubt import FieldDoubt
 
 ABOUT = "about_json"  # name under which NPZ and VTS files say what they hold
 DECIMALS = 9  # of numbers in text: a billionth of a micrometre
@@ -39,7 +39,7 @@ class FieldRecord:
     # scene, loop, reference, convention, program
     about: Mapping[str, str] = attribute(default_factory=dict[str, str])
     # standard uncertainty (k = 1) of each point, in columns of its own
-    uncertainty: "FieldUncertainty | None" = None
+    uncertainty: "FieldDoubt | None" = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -61,10 +61,10 @@ class FieldRecord:
         tilts = {f"orientation_{frame}_" + "{}_urad": self.field.orientation_urad}
         found |= _by_component(vectors) | {"norm_um": self.field.norm_um} | _by_component(tilts)
         if self.uncertainty is not None:
-            found |= _by_component({f"uncertainty_{frame}_" + "{}_um": self.uncertainty.error_um})
-            found["uncertainty_norm_um"] = self.uncertainty.norm_um
+            found |= _by_component({f"uncertainty_{frame}_" + "{}_um": self.uncertainty.u_um})
+            found["uncertainty_norm_um"] = self.uncertainty.u_norm_um
             name = f"uncertainty_orientation_{frame}_" + "{}_urad"
-            tilts = {name: self.uncertainty.orientation_urad}
+            tilts = {name: self.uncertainty.u_urad}
             found |= _by_component(tilts)
         return found
 
@@ -142,9 +142,9 @@ def _arrays(record: FieldRecord) -> dict[str, Array]:
         "orientation_urad": found.orientation_urad,
     }
     if spread is not None:
-        arrays["uncertainty_um"] = spread.error_um
-        arrays["uncertainty_norm_um"] = spread.norm_um
-        arrays["uncertainty_orientation_urad"] = spread.orientation_urad
+        arrays["uncertainty_um"] = spread.u_um
+        arrays["uncertainty_norm_um"] = spread.u_norm_um
+        arrays["uncertainty_orientation_urad"] = spread.u_urad
     return arrays
 
 

@@ -1,0 +1,193 @@
+"""How sure numbers are: the covariance of a machine's errors, carried to points and statistics.
+
+An error of a scene is sure by its standard uncertainty along its axis (``[uncertainty]``, errors
+independent of each other, one number for a whole curve), or by the covariance of amplitudes that a
+calibration found. To first order a result f moves by its gradient g per unit of the amplitudes, so
+that its variance is gᵀ C g (ISO/IEC Guide 98-3, 5.2). U95 = k · u, k being Student's t for 95.45 %:
+2 for infinite degrees of freedom (ibid., table G.2; ISO 230-9 takes k = 2).
+
+An error that a scene gives without saying how sure it is, is *unknown*: so is all that it moves.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from warpspace.analysis.distribution import loop_keys
+from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
+from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
+from warpspace.kinematics.model import Coordinates, Loop
+from warpspace.machine.errors import ErrorSet
+from warpspace.scene.model import Scene, evaluate_grid
+from warpspace.units import Array
+
+NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
+COVERED = 0.9545  # of a normal distribution, within two standard deviations
+NEAR = 0.01  # part of the points that tells how their 95th percentile moves
+
+
+@lru_cache(maxsize=256)
+def coverage_factor(freedom: float) -> float:
+    """Give k of U95 = k · u: 2 for infinite degrees of freedom."""
+    from scipy.stats import t
+
+    return 2.0 if np.isinf(freedom) else float(t.ppf(0.5 + COVERED / 2.0, max(freedom, 1.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """How sure the errors of a scene are, through one loop."""
+
+    keys: tuple[str, ...]  # (K,); errors that are not sure
+    errors: ErrorSet  # their curves; the amplitudes play no part
+    covariance: Array  # [K, K], µm and µrad; of their amplitudes
+    unknown: tuple[str, ...]  # errors of which nobody says how sure they are
+    freedom: float  # degrees of freedom
+
+    @property
+    def factor(self) -> float:
+        return coverage_factor(self.freedom)
+
+    @property
+    def is_known(self) -> bool:
+        return not self.unknown
+
+    def remarks(self) -> Iterator[str]:
+        """Say what is not stated."""
+        if self.unknown:
+            yield (
+                f"uncertainty not stated of {', '.join(self.unknown)}: it is unknown wherever they"
+                " act, not zero"
+            )
+
+
+def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
+    """Collect how sure the errors of a scene are; None where it says nothing of that."""
+    joint, alone = scene.covariance, scene.uncertainty
+    if joint is None and not alone:
+        return None
+    together = () if joint is None else joint.keys
+    keys = loop_keys(scene.model, loop, (*together, *alone))
+    curves = {key: scene.errors.functions[key] for key in together if key in scene.errors}
+    errors = ErrorSet({key: one for key, one in {**curves, **alone}.items() if key in keys})
+    covariance = np.diag([alone[key].amplitude ** 2 if key in alone else 0.0 for key in keys])
+    if joint is not None:
+        own = [key for key in keys if key in together]
+        rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
+        covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
+    acting = loop_keys(scene.model, loop, tuple(scene.errors))
+    unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
+    freedom = np.inf if joint is None else joint.freedom
+    return Doubt(keys, errors, covariance, unknown, freedom)
+
+
+def _root(variance: Array) -> Array:
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class FieldDoubt:
+    """How sure the errors of points are."""
+
+    doubt: Doubt
+    basis: ErrorBasis  # response of the points to what is not sure
+    field: ErrorField  # their errors
+    grid: Grid | None = None  # that they are the nodes of; statistics are then over its volume
+
+    @cached_property
+    def covariance_um2(self) -> Array:
+        """Covariance of the position errors, [..., 3, 3]."""
+        response = self.basis.position
+        turned = np.tensordot(self.doubt.covariance, response, 1)
+        return np.einsum("k...i,k...j->...ij", response, turned)
+
+    @cached_property
+    def u_um(self) -> Array:
+        """Standard uncertainty of the components of position errors, [..., 3]."""
+        return _root(np.diagonal(self.covariance_um2, axis1=-2, axis2=-1))
+
+    @cached_property
+    def u_urad(self) -> Array:
+        """Standard uncertainty of the components of orientation errors, [..., 3]."""
+        turned = np.tensordot(self.doubt.covariance, self.basis.orientation, 1)
+        return _root(np.sum(self.basis.orientation * turned, axis=0))
+
+    @cached_property
+    def along(self) -> Array:
+        """Growth of |E| per unit of each amplitude, [K, ...]; zero where there is no error."""
+        length = self.field.norm_um[..., None]
+        unit = self.field.error_um / np.where(length > 0.0, length, 1.0)
+        return np.einsum("k...i,...i->k...", self.basis.position, unit)
+
+    @cached_property
+    def u_norm_um(self) -> Array:
+        """Standard uncertainty of |E|, [...]; where that is zero, of the vector."""
+        along = self.along.reshape(len(self.doubt.keys), -1)
+        variance = np.sum(along * (self.doubt.covariance @ along), axis=0)
+        variance = variance.reshape(self.field.norm_um.shape)
+        if (none := self.field.norm_um == 0.0).any():
+            variance[none] = np.trace(self.covariance_um2[none], axis1=-2, axis2=-1)
+        return _root(variance)
+
+    def u95(self, gradient: Array) -> float:
+        """Give U95 of a number by its growth per unit of each amplitude, [K]."""
+        return self.doubt.factor * float(_root(gradient @ self.doubt.covariance @ gradient))
+
+    def statistics(self) -> dict[str, float | None]:
+        """Give U95 of mean, RMS, P95 and max of |E| by their keys; None where it is unknown."""
+        if not self.doubt.is_known:
+            return dict.fromkeys(NAMES)
+        norm = self.field.norm_um.reshape(-1)
+        along = self.along.reshape(len(self.doubt.keys), -1)
+        weights = (
+            np.full(norm.size, 1.0 / norm.size)
+            if self.grid is None
+            else self.grid.weights.reshape(-1)
+        )
+        order = np.argsort(norm)
+        place = np.cumsum(weights[order])
+        near = np.zeros(norm.size)
+        chosen = order[np.abs(place - 0.95) <= max(NEAR, 1.5 / norm.size)]
+        near[chosen] = weights[chosen] / max(weights[chosen].sum(), 1e-300)
+        rms = float(np.sqrt(weights @ norm**2))
+        largest = np.zeros(norm.size)
+        largest[int(np.argmax(norm))] = 1.0
+        shares = weights, weights * norm / (rms or 1.0), near, largest
+        return dict(zip(NAMES, map(self.u95, (along @ share for share in shares)), strict=True))
+
+
+def field_doubt(
+    scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
+) -> FieldDoubt | None:
+    """Say how sure a field of a scene is; None where the scene says nothing of that."""
+    if (doubt := find_doubt(scene, view.loop)) is None:
+        return None
+    basis = build_basis(scene.model, doubt.errors, doubt.keys, at, view, point_mm)
+    return FieldDoubt(doubt, basis, field)
+
+
+def volume_doubt(scene: Scene, view: View, nodes: int = DEFAULT_NODES) -> FieldDoubt | None:
+    """Say how sure the errors over the working volume are; None where a scene does not say."""
+    grid = build_grid(scene.model, scene.workspace, min(nodes, DEFAULT_NODES))
+    field = evaluate_grid(scene, grid, view)
+    found = field_doubt(scene, field, grid.coordinates, view, grid.point_mm)
+    return found and replace(found, grid=grid)
+
+
+def with_u95(found: Mapping[str, Any], u95: Mapping[str, float | None]) -> dict[str, Any]:
+    """Set U95 beside each number of a JSON object: u95_mean_um behind mean_um."""
+    pairs = (
+        ((key, value), *([(f"u95_{key}", u95[key])] if key in u95 else []))
+        for key, value in found.items()
+    )
+    return dict(pair for each in pairs for pair in each)
+
+
+def u95_words(found: FieldDoubt) -> str:
+    """Say U95 of mean, RMS, P95 and max."""
+    u95 = found.statistics().items()
+    each = (f"{NAMES[key]} ± {'?' if value is None else f'{value:.2f}'}" for key, value in u95)
+    return f"U95 (k = {found.doubt.factor:.3g}): {', '.join(each)} µm"

@@ -1,0 +1,189 @@
+"""How sure numbers are: covariances and uncertainties carried to points and statistics."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpspace import load_scene
+from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt, volume_doubt
+from warpspace.exceptions import SceneError
+from warpspace.kinematics.model import complete_coordinates
+from warpspace.machine.errors import Covariance
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import evaluate
+from warpspace.scene.save import scene_to_toml
+
+HEAD = """[machine]
+chain = "wFXYZt"
+[machine.offset_mm]
+t = [0, 0, -300]
+[workspace]
+X = [-100, 100]
+Y = [-100, 100]
+Z = 0
+"""
+
+SCENE = (
+    HEAD
+    + """[errors]
+EXX = 5
+[uncertainty]
+EXX = 0.4
+EYX = { table = [[-100, 0.1], [100, 0.3]] }
+EBX = 1
+"""
+)
+
+
+def sure(scene, at):
+    field = evaluate(scene, at=at)
+    axes = complete_coordinates(scene.machine, at, scene.workspace.positions)
+    return field_doubt(scene, field, axes, scene.view())
+
+
+def test_gains_times_uncertainties_add_up_in_squares():
+    found = sure(parse_scene(SCENE, "s"), at={"X": [-100.0, 0.0, 100.0]})
+    # along x: 0.4 µm, and 1 µrad on an arm of 300 mm; along y the table; along z nothing at X 0 …
+    x = math.hypot(0.4, 0.3)
+    np.testing.assert_allclose(found.u_um[:, 0], x)
+    np.testing.assert_allclose(found.u_um[:, 1], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose(found.u_um[:, 2], 0.0, atol=1e-12)
+    # … and |E| is along x
+    np.testing.assert_allclose(found.u_norm_um, x)
+    np.testing.assert_allclose(found.u_urad[:, 1], 1.0)
+
+
+def test_where_there_is_no_error_the_vector_counts_as_a_whole():
+    found = sure(parse_scene(SCENE.replace("EXX = 5\n", ""), "s"), at={"X": 0.0})
+    assert float(found.u_norm_um) == pytest.approx(math.sqrt(0.4**2 + 0.3**2 + 0.2**2))
+
+
+def test_with_a_reference_one_error_goes_the_same_way_at_both_points():
+    held = SCENE + "[view]\nreference = { X = -100, Y = 0, Z = 0 }\n"
+    found = sure(parse_scene(held, "s"), at={"X": [-100.0, 100.0]})
+    np.testing.assert_allclose(found.u_um, [[0, 0, 0], [0, 0.2, 0]], atol=1e-12)
+
+
+TWO = (
+    HEAD
+    + """[errors]
+EC0Y = 20
+EA0Z = -30
+[uncertainty.covariance]
+keys = ["EC0Y", "EA0Z"]
+matrix = [[4.0], [3.0, 9.0]]
+freedom = 12
+"""
+)
+
+
+def test_two_amplitudes_together_against_the_law_of_propagation():
+    # x grows by −y · γ, y by −z' · α …: numbers of the basis, differentiated by hand from errors
+    scene = parse_scene(TWO, "s")
+    at = {"X": 40.0, "Y": 70.0, "Z": -20.0}
+    found = sure(scene, at)
+    step = []
+    for key in ("EC0Y", "EA0Z"):
+        more = scene.errors.with_amplitude(key, scene.errors.amplitude(key) + 1.0, (0.0, 1.0))
+        step.append(evaluate(replace(scene, errors=more), at=at).error_um - found.field.error_um)
+    gain, matrix = np.array(step).T, np.array([[4.0, 3.0], [3.0, 9.0]])
+    np.testing.assert_allclose(found.covariance_um2, gain @ matrix @ gain.T, atol=1e-9)
+    along = found.field.error_um / found.field.norm_um
+    expected = math.sqrt(along @ gain @ matrix @ gain.T @ along)
+    assert float(found.u_norm_um) == pytest.approx(expected, rel=1e-9)
+    assert found.statistics()["max_um"] == pytest.approx(coverage_factor(12) * expected)
+
+
+def test_one_error_makes_all_statistics_as_unsure_as_itself():
+    # |E| is proportional to one amplitude everywhere: u(mean) / mean = u / amplitude
+    text = HEAD + "[errors]\nEC0Y = 20\n[uncertainty]\nEC0Y = 1.5\n"
+    scene = parse_scene(text, "s")
+    found = volume_doubt(scene, scene.view(), 11)
+    mean = evaluate(scene, grid=11)
+    u95 = found.statistics()
+    weights = found.grid.weights
+    assert u95["mean_um"] == pytest.approx(2.0 * 1.5 / 20.0 * float(np.sum(weights * mean.norm_um)))
+    assert u95["max_um"] == pytest.approx(2.0 * 1.5 / 20.0 * float(mean.norm_um.max()))
+
+
+def test_statistics_move_by_their_gradient():
+    scene = parse_scene(TWO, "s")
+    found, names = volume_doubt(scene, scene.view(), 21), ("mean_um", "rms_um", "max_um")
+    from warpspace.analysis.statistics import volume_statistics
+
+    def numbers(key, by):
+        more = scene.errors.with_amplitude(key, scene.errors.amplitude(key) + by, (0.0, 1.0))
+        field = evaluate(replace(scene, errors=more), grid=21)
+        of = volume_statistics(field, found.grid)
+        return np.array([getattr(of, name) for name in names])
+
+    slope = np.array([(numbers(k, 1e-3) - numbers(k, -1e-3)) / 2e-3 for k in found.doubt.keys])
+    matrix = np.array([[4.0, 3.0], [3.0, 9.0]])
+    expected = coverage_factor(12) * np.sqrt(np.einsum("kn,kl,ln->n", slope, matrix, slope))
+    np.testing.assert_allclose([found.statistics()[n] for n in names], expected, rtol=1e-4)
+
+
+def test_k_is_two_or_what_student_says():
+    # ISO/IEC Guide 98-3, table G.2, column 95.45 %
+    printed = {1: 13.97, 2: 4.53, 5: 2.65, 10: 2.28, 20: 2.13, 50: 2.05, math.inf: 2.00}
+    for freedom, factor in printed.items():
+        assert coverage_factor(freedom) == pytest.approx(factor, abs=0.005)
+
+
+def test_what_is_not_stated_is_unknown_and_not_zero():
+    scene = parse_scene(TWO.replace("EA0Z = -30", "EA0Z = -30\nEXX = 4"), "s")
+    found = volume_doubt(scene, scene.view(), 5)
+    assert found.doubt.unknown == ("EXX",)
+    assert set(found.statistics().values()) == {None}
+    assert "EXX" in " ".join(found.doubt.remarks())
+    assert find_doubt(load_scene("dvf5000_first")) is None
+
+
+def test_a_covariance_comes_back_from_its_text_and_from_a_file(tmp_path):
+    scene = parse_scene(TWO, "s")
+    assert parse_scene(scene_to_toml(scene), "s").covariance == scene.covariance
+    reach = replace(scene.covariance, reach={"X": (-10.0, 20.0)}, freedom=math.inf)
+    other = replace(scene, covariance=reach)
+    assert parse_scene(scene_to_toml(other), "s").covariance == reach
+    np.savez(tmp_path / "c.npz", keys=np.array(["EC0Y", "EA0Z"]), matrix=[[4.0, 3.0], [3.0, 9.0]])
+    text = TWO[: TWO.index("[uncertainty.")] + '[uncertainty]\ncovariance = "c.npz"\n'
+    (tmp_path / "s.toml").write_text(text)
+    read = load_scene(tmp_path / "s.toml").covariance
+    assert read == Covariance(("EC0Y", "EA0Z"), ((4.0, 3.0), (3.0, 9.0)))
+    (tmp_path / "c.npz").write_bytes(b"PK nothing")
+    with pytest.raises(SceneError, match="expected a file of numpy"):
+        load_scene(tmp_path / "s.toml")
+
+
+@pytest.mark.parametrize(
+    ("matrix", "said"),
+    [
+        ("[[4.0, 2.0], [3.0, 9.0]]", "is not symmetric"),
+        ("[[4.0], [7.0, 9.0]]", "expected a positive matrix"),
+        ("[[0.0], [0.0, 9.0]]", "its diagonal above 0"),
+        ("[[4.0]]", "expected 2 rows of 2 numbers, or of 1 to 2"),
+        ('"c.npz"', "expected a list"),
+        ("[[4.0], [nan, 9.0]]", "matrix"),
+    ],
+)
+def test_a_matrix_that_is_no_covariance_is_refused(matrix, said):
+    with pytest.raises(SceneError, match=said):
+        parse_scene(TWO.replace("[[4.0], [3.0, 9.0]]", matrix), "s")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('["EC0Y", "EA0Z"]', '["EC0Y", "EA0Q"]', "EA0Q"),
+        ('["EC0Y", "EA0Z"]', '["EC0Y", "EC0Y"]', "expected each error once"),
+        ("freedom = 12", "freedom = 0", "freedom"),
+        ("freedom = 12", "reach = { Q = [0, 1] }", "reach.Q"),
+        ("[uncertainty.", "[uncertainty]\nEXX = 0\n[uncertainty.", "above 0"),
+        ("[uncertainty.", "[uncertainty]\nEC0Y = 1\n[uncertainty.", "expected each error once"),
+    ],
+)
+def test_bad_statements_are_refused_by_name(old, new, said):
+    with pytest.raises(SceneError, match=said):
+        parse_scene(TWO.replace(old, new), "s")
