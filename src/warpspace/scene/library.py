@@ -385,9 +385,10 @@ class _Document:
                 self.problems.add(where, expected, raw)
                 continue
             values = [curve.value] if isinstance(curve, Constant) else [v for _, v in curve.points]
-            if min(values) < 0.0 or not any(values):
-                expected = "expected a standard uncertainty above 0; leave out what is not known"
-                self.problems.add(where, expected, min(values))
+            if min(values) < 0.0:
+                self.problems.add(where, "a standard uncertainty is not negative", min(values))
+            elif not any(values):
+                self.problems.add(where, "expected it above 0; leave out what is not known", 0.0)
             found[key] = curve
         return found
 
