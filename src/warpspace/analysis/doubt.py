@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.distribution import loop_keys
+from warpspace.analysis.statistics import P95
 from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
 from warpspace.kinematics.model import Coordinates, Loop
@@ -90,46 +91,40 @@ def _root(variance: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class FieldDoubt:
-    """How sure the errors of points are."""
+    """How sure the errors of points are; `replace(found, field=…)` where only the errors change."""
 
     doubt: Doubt
     basis: ErrorBasis  # response of the points to what is not sure
+    covariance_um2: Array  # [..., 3, 3], of the position errors
     field: ErrorField  # their errors
     grid: Grid | None = None  # that they are the nodes of; statistics are then over its volume
 
-    @cached_property
-    def covariance_um2(self) -> Array:
-        """Covariance of the position errors, [..., 3, 3]."""
-        response = self.basis.position
-        turned = np.tensordot(self.doubt.covariance, response, 1)
-        return np.einsum("k...i,k...j->...ij", response, turned)
-
-    @cached_property
+    @property
     def u_um(self) -> Array:
         """Standard uncertainty of the components of position errors, [..., 3]."""
         return _root(np.diagonal(self.covariance_um2, axis1=-2, axis2=-1))
 
-    @cached_property
+    @property
     def u_urad(self) -> Array:
         """Standard uncertainty of the components of orientation errors, [..., 3]."""
         turned = np.tensordot(self.doubt.covariance, self.basis.orientation, 1)
         return _root(np.sum(self.basis.orientation * turned, axis=0))
 
     @cached_property
-    def along(self) -> Array:
-        """Growth of |E| per unit of each amplitude, [K, ...]; zero where there is no error."""
+    def direction(self) -> Array:
+        """Unit vectors along the position errors, [..., 3]; zero where there is none."""
         length = self.field.norm_um[..., None]
-        unit = self.field.error_um / np.where(length > 0.0, length, 1.0)
-        return np.einsum("k...i,...i->k...", self.basis.position, unit)
+        return self.field.error_um / np.where(length > 0.0, length, 1.0)
 
     @cached_property
     def u_norm_um(self) -> Array:
         """Standard uncertainty of |E|, [...]; where that is zero, of the vector."""
-        along = self.along.reshape(len(self.doubt.keys), -1)
-        variance = np.sum(along * (self.doubt.covariance @ along), axis=0)
-        variance = variance.reshape(self.field.norm_um.shape)
+        way = self.direction
+        turned = np.einsum("...ij,...i->...j", self.covariance_um2, way)
+        variance = np.einsum("...j,...j->...", turned, way)
         if (none := self.field.norm_um == 0.0).any():
-            variance[none] = np.trace(self.covariance_um2[none], axis1=-2, axis2=-1)
+            traces = np.trace(self.covariance_um2, axis1=-2, axis2=-1)
+            variance = np.where(none, traces, variance)
         return _root(variance)
 
     def u95(self, gradient: Array) -> float:
@@ -141,22 +136,20 @@ class FieldDoubt:
         if not self.doubt.is_known:
             return dict.fromkeys(NAMES)
         norm = self.field.norm_um.reshape(-1)
-        along = self.along.reshape(len(self.doubt.keys), -1)
-        weights = (
-            np.full(norm.size, 1.0 / norm.size)
-            if self.grid is None
-            else self.grid.weights.reshape(-1)
-        )
+        weights = np.full(norm.size, 1.0 / norm.size)
+        if self.grid is not None:
+            weights = self.grid.weights.reshape(-1)
         order = np.argsort(norm)
         place = np.cumsum(weights[order])
-        near = np.zeros(norm.size)
-        chosen = order[np.abs(place - 0.95) <= max(NEAR, 1.5 / norm.size)]
+        near, largest = np.zeros((2, norm.size))
+        chosen = order[np.abs(place - P95) <= max(NEAR, 1.5 / norm.size)]
         near[chosen] = weights[chosen] / max(weights[chosen].sum(), 1e-300)
-        rms = float(np.sqrt(weights @ norm**2))
-        largest = np.zeros(norm.size)
         largest[int(np.argmax(norm))] = 1.0
-        shares = weights, weights * norm / (rms or 1.0), near, largest
-        return dict(zip(NAMES, map(self.u95, (along @ share for share in shares)), strict=True))
+        rms = float(np.sqrt(weights @ norm**2))
+        shares = np.stack([weights, weights * norm / (rms or 1.0), near, largest])
+        ways = shares[:, :, None] * self.direction.reshape(-1, 3)
+        gradients = ways.reshape(4, -1) @ self.basis.position.reshape(len(self.doubt.keys), -1).T
+        return dict(zip(NAMES, map(self.u95, gradients), strict=True))
 
 
 def field_doubt(
@@ -166,7 +159,10 @@ def field_doubt(
     if (doubt := find_doubt(scene, view.loop)) is None:
         return None
     basis = build_basis(scene.model, doubt.errors, doubt.keys, at, view, point_mm)
-    return FieldDoubt(doubt, basis, field)
+    flat = basis.position.reshape(len(doubt.keys), -1)
+    turned = (doubt.covariance @ flat).reshape(basis.position.shape)
+    covariance = np.einsum("k...i,k...j->...ij", basis.position, turned)
+    return FieldDoubt(doubt, basis, covariance, field)
 
 
 def volume_doubt(scene: Scene, view: View, nodes: int = DEFAULT_NODES) -> FieldDoubt | None:
