@@ -12,14 +12,7 @@ from numpy.typing import ArrayLike
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.distribution import loop_keys
-from warpspace.analysis.options import (
-    AT_HELP,
-    LOOP_HELP,
-    Place,
-    error_words,
-    option,
-    place_words,
-)
+from warpspace.analysis.options import AT_HELP, LOOP_HELP, Place, error_words, option, place_words
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import Column as Response

@@ -8,14 +8,7 @@ import numpy as np
 
 from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
-from warpspace.machine.curves.simple import (
-    NOTHING,
-    Constant,
-    Directional,
-    Harmonics,
-    Poly,
-    Ramp,
-)
+from warpspace.machine.curves.simple import NOTHING, Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.units import Array
 

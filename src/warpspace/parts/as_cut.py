@@ -20,14 +20,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
-from warpspace.parts.part import (
-    Made,
-    OfPart,
-    PartMesh,
-    fit_out,
-    make_points,
-    place_part,
-)
+from warpspace.parts.part import Made, OfPart, PartMesh, fit_out, make_points, place_part
 from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MM_PER_UM, Array
@@ -130,15 +123,11 @@ class PartResult(Off, Result):
     def doubts(self) -> Iterator[str]:
         yield from self.part.warnings
         if self.outside:
-            yield (
-                f"{self.outside:,} of {self.vertices:,} vertices are beyond the travel; their"
-                " errors are continued"
-            )
-        if len(self.part.triangles) > MAX_FEATURE_TRIANGLES:
-            yield (
-                f"{len(self.part.triangles):,} triangles: features are looked for in up to"
-                f" {MAX_FEATURE_TRIANGLES:,}"
-            )
+            far = f"{self.outside:,} of {self.vertices:,} vertices"
+            yield f"{far} are beyond the travel; their errors are continued"
+        if (count := len(self.part.triangles)) > MAX_FEATURE_TRIANGLES:
+            most = f"up to {MAX_FEATURE_TRIANGLES:,}"
+            yield f"{count:,} triangles: features are looked for in {most}"
 
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.deviation.max_at_mm

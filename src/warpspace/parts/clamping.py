@@ -17,13 +17,7 @@ from warpspace.analysis.options import option
 from warpspace.bench.placing import ball_point, following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.parts.part import (
-    OfPart,
-    PartMesh,
-    fit_out,
-    make_points,
-    place_part,
-)
+from warpspace.parts.part import OfPart, PartMesh, fit_out, make_points, place_part
 from warpspace.scene.model import Scene, second_order
 
 SEARCHED = 800  # vertices that tell where a part deviates least; all do at the best places

@@ -24,12 +24,14 @@ from warpspace.field.evaluate import ErrorBasis, build_basis
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.machine.limits import MAX_LENGTH_MM, MAX_PART_TRIANGLES
+from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_LENGTH_MM, MAX_PART_TRIANGLES
 from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene, evaluate
-from warpspace.units import Array
+from warpspace.units import Array, Integers
 
-POINTS_AT_ONCE = 50_000  # what lies between needs memory, too
+POINTS_AT_ONCE, PAIRS_AT_ONCE = 50_000, 500_000  # what lies between needs memory, too
+TOUCHING = 1e-5  # share of the largest coordinate up to which triangles only touch others
+TOGETHER, MOST_PAIRS = 100, 2e8  # triangles that are not parted any more; pairs that are looked at
 
 
 class Corners(NamedTuple):
@@ -89,8 +91,71 @@ def load_part(path: str | Path, unit: str | None = None, data: bytes | None = No
     """Read a mesh from a file, or from its bytes: in mm, .glb in m, unless a unit is given."""
     path = Path(path)
     mesh, said = read_mesh(path, unit, most=MAX_PART_TRIANGLES, data=data)
-    vertices, triangles = np.asarray(mesh.vertices), mesh.faces.astype(np.int32)
-    return PartMesh(path.stem, vertices, triangles, unit, said)
+    part = PartMesh(path.stem, np.asarray(mesh.vertices), mesh.faces.astype(np.int32), unit)
+    surface = "its surface passes through itself"
+    if (count := count_crossings(part)) is None:
+        said += (f"{path}: too many triangles, or too many in one place, to tell if {surface}",)
+    elif count:
+        said += (f"{path}: {surface} ({count:,} pairs of triangles); it is taken as it is",)
+    return replace(part, warnings=said)
+
+
+def count_crossings(part: PartMesh) -> int | None:
+    """Count pairs of triangles that pass through each other along a line.
+
+    Those with a common vertex do not count. None where there are too many to look at.
+    """
+    if len(triangles := part.triangles) > MAX_FEATURE_TRIANGLES:
+        return None
+    corner, normal = part.vertices_mm[triangles], part.surface.face_normals
+    slack = TOUCHING * np.abs(corner).max()
+    low, high = (np.ascontiguousarray(end(corner, axis=1).T) for end in (np.min, np.max))
+    waiting, found, looked_at = [np.arange(len(triangles))], list[Integers](), 0
+    while waiting:
+        some = waiting.pop()
+        first, last = low[:, some], high[:, some]  # [3, n]
+        if len(some) > TOGETHER:  # part them where it saves most pairs
+            cut = (first + last).mean(axis=1, keepdims=True) / 2.0
+            is_above = last > cut + slack / 2.0
+            is_below = (first < cut - slack / 2.0) | ~is_above  # what touches is on one side
+            pairs = is_above.sum(axis=1) ** 2 + is_below.sum(axis=1) ** 2
+            if pairs[along := pairs.argmin()] < 0.8 * len(some) ** 2:
+                waiting += [some[is_above[along]], some[is_below[along]]]
+                continue
+        for rows in np.array_split(np.arange(len(some)), 1 + len(some) ** 2 // PAIRS_AT_ONCE):
+            is_near = rows[:, None] > np.arange(len(some))
+            for begin, end in zip(first, last, strict=True):
+                is_near &= begin[rows, None] + slack < end
+                is_near &= begin + slack < end[rows, None]
+            row, column = np.nonzero(is_near)
+            pair = some[np.stack([rows[row], column])]
+            for _ in pair:  # each has corners on both sides of the other's plane
+                arm = corner[pair[0]] - corner[pair[1], :1]
+                away = np.einsum("nex,nx->ne", arm, normal[pair[1]])
+                is_across = (away.max(axis=1) > slack) & (away.min(axis=1) < -slack)
+                pair = pair[::-1, is_across]
+            found.append(pair[0] * len(triangles) + pair[1])
+            looked_at += is_near.size + 200 * pair.shape[1]
+            if looked_at > MOST_PAIRS:
+                return None
+    pair = np.stack(np.divmod(np.unique(np.concatenate(found)), len(triangles)))
+    one, other = triangles[pair]
+    pair = pair[:, (one[:, :, None] != other[:, None]).all(axis=(1, 2))]
+    line = np.cross(*normal[pair])
+    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    ways = pair, pair[::-1]
+    ends = [_ends(corner[one], corner[other], normal[other], line) for one, other in ways]
+    return int(np.sum(np.min(ends, axis=0)[1] - np.max(ends, axis=0)[0] > slack))
+
+
+def _ends(one: Array, other: Array, normal: Array, line: Array) -> tuple[Array, Array]:
+    """Give where a triangle begins and ends on the line where its plane meets another one's."""
+    away, at = (np.einsum("nex,nx->ne", one - other[:, :1], way) for way in (normal, line))
+    at += np.einsum("nx,nx->n", other[:, 0], line)[:, None]
+    ahead, to = np.roll(away, -1, axis=1), np.roll(at, -1, axis=1)
+    passes = (away < 0.0) != (ahead < 0.0)  # edges through the plane of the other, two of three
+    place = at + (to - at) * away / np.where(passes, away - ahead, 1.0)
+    return np.where(passes, place, np.inf).min(axis=1), np.where(passes, place, -np.inf).max(axis=1)
 
 
 def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
@@ -179,9 +244,8 @@ def fit_out(point_mm: Array, error_um: Array) -> Array:
     arm = point_mm - point_mm.mean(axis=0)
     shift = error_um.mean(axis=-2, keepdims=True)
     inertia = np.sum(arm * arm) * np.eye(3) - arm.T @ arm
-    both = (
-        np.swapaxes(error_um, -1, -2) @ arm
-    )  # a cross product of each pair takes five times longer
+    # a cross product of each pair takes five times longer
+    both = np.swapaxes(error_um, -1, -2) @ arm
     moment = (both - np.swapaxes(both, -1, -2))[..., [2, 0, 1], [1, 2, 0]]
     # points on a line do not tell the turn about it: the smallest one counts
     turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)

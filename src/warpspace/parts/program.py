@@ -189,7 +189,6 @@ class Program(control.Setup, Analysis):
     text: str | None = None  # of one that is read already; `file` is then its name
 
     def lines(self) -> Iterable[str]:
-        """Give the lines of the program."""
         file = self.file or ""
         return control.program_lines(file) if self.text is None else self.text.splitlines()
 

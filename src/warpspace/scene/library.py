@@ -17,14 +17,7 @@ from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Constant
 from warpspace.machine.curves.table import Table
 from warpspace.machine.description import BODY_FRAMES, Machine, Range, build_machine
-from warpspace.machine.errors import (
-    Covariance,
-    ErrorSet,
-    Measurement,
-    Run,
-    Tolerance,
-    ToleranceSet,
-)
+from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run, Tolerance, ToleranceSet
 from warpspace.resources import scenes_dir
 from warpspace.scene import machines, schema
 from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs

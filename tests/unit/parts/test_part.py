@@ -58,6 +58,49 @@ def test_what_is_wrong_with_a_surface_is_said(tmp_path):
         load_part(tmp_path / "none.stl")
 
 
+def prism(*corners):
+    """Stand a polygon up, 20 mm high, without a lid."""
+    low = np.array([[x, y, 0.0] for x, y in corners])
+    around = np.arange(len(low))
+    ahead, above = np.roll(around, -1), around + len(low)
+    walls = np.concatenate([np.stack(three, axis=-1) for three in
+                            ((around, ahead, above), (ahead, above[ahead], above))])  # fmt: skip
+    points = np.concatenate([low, np.add(low, [0.0, 0.0, 20.0])])
+    return trimesh.Trimesh(points, walls, process=False)
+
+
+def beside(mesh, *shift):
+    return mesh + mesh.copy().apply_translation(shift)
+
+
+FIN = trimesh.creation.cylinder(radius=50.0, height=300.0, sections=400)  # all sides long
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.3, 1.0, 2.5])
+def test_a_surface_that_passes_through_itself_is_said(turned):
+    turn = trimesh.transformations.rotation_matrix(turned, (1.0, 2.0, 3.0), (9.0, 0.0, 0.0))
+
+    def said(mesh):
+        warnings = mesh_of(mesh.copy().apply_transform(turn), "stl").warnings
+        return [text for text in warnings if "passes through itself" in text]
+
+    (text,) = said(beside(BOX, 30.0, 20.0, 10.0))
+    assert "(15 pairs of triangles); it is taken as it is" in text
+    assert said(prism((0, 0), (40, 0), (0, 40), (40, 40)))  # walls cross midway
+    assert said(prism((0, 0), (40, 0), (40, 30), (10, -10), (5, 20)))
+    assert said(beside(BALL, 40.0, 3.0, 5.0))
+    for good in (BOX, BALL, FIN, prism((0, 0), (40, 0), (40, 40), (20, 5))):
+        assert not said(good)
+    for shift in ((100.0, 0.0, 0.0), (30.0, 7.0, 40.0), (100.0, 60.0, 0.0), (100.0, 60.0, 40.0)):
+        assert not said(beside(BOX, *shift))
+
+
+def test_triangles_of_a_heap_are_not_all_looked_at():
+    points = 100.0 * np.random.default_rng(0).standard_normal((60_000, 3))
+    heap = trimesh.Trimesh(points, np.arange(60_000).reshape(-1, 3), process=False)
+    assert any("to tell if its surface passes" in text for text in mesh_of(heap).warnings)
+
+
 def test_a_part_stands_in_the_middle_or_where_it_is_put():
     scene = scene_with()
     part = place_part(mesh_of(BOX), scene, None)

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.page import Page
-from warpspace.app.drawing.colours import (
-    Rgb,
-    colour,
-    colour_levels,
-    level_colours,
-)
+from warpspace.app.drawing.colours import Rgb, colour, colour_levels, level_colours
 from warpspace.app.drawing.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.leaf import Identity

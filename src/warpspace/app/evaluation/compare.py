@@ -13,12 +13,7 @@ from warpspace.app.state.app_state import PRESENT, AppState, Comparison, Side, s
 from warpspace.app.state.look import RotaryLook
 from warpspace.app.state.table import table_words
 from warpspace.geometry.colour import ColourScale
-from warpspace.picture.model import (
-    choose_scale,
-    same_nodes,
-    subtract_pictures,
-    subtract_traces,
-)
+from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures, subtract_traces
 from warpspace.scene.model import Scene
 
 BEFORE, AFTER = "before", "after"

@@ -8,13 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics
-from warpspace.app.evaluation.in_box import (
-    InBox,
-    T,
-    bench_in_box,
-    part_in_box,
-    path_in_box,
-)
+from warpspace.app.evaluation.in_box import InBox, T, bench_in_box, part_in_box, path_in_box
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
