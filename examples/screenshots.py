@@ -27,7 +27,7 @@ from warpspace.scene.library import load_scene
 
 SCENES = (
     *("dvf5000_first", "dvf5000_second", "teach_wobbling_table", "fork_head_bc"),
-    "review_dvf5000",
+    *("review_dvf5000", "part_on_dvf5000"),
 )
 SIZE = (1440, 900)
 """Width and height of the page, CSS pixels."""
@@ -187,6 +187,26 @@ def measured(page: Page) -> None:
     press(page, "Stop")
 
 
+def clamped(page: Page) -> None:
+    """Colour the part along its normals, with the arrows that move it."""
+    open_task(page, "Measure")
+    unfold(page, "Import")
+    unfold(page, "Part")
+    page.get_by_label("Coloured along its normal", exact=True).check()
+    page.get_by_label("Move in the drawing", exact=True).check()
+
+
+def programmed(page: Page) -> None:
+    """Show the worst line of the program, without the part."""
+    open_task(page, "Measure")
+    unfold(page, "Import")
+    unfold(page, "Part")
+    page.get_by_label("Part in the box", exact=True).uncheck()
+    unfold(page, "Part")
+    unfold(page, "Program")
+    page.locator("[data-key=program]").get_by_role("button", name="28", exact=True).first.click()
+
+
 VISITS = {
     "app": Visit(as_opened),
     "app_dark": Visit(dark),
@@ -204,6 +224,8 @@ VISITS = {
     "review_notes": Visit(noted, "review_dvf5000"),
     "review_story": Visit(told, "review_dvf5000"),
     "review_distance": Visit(measured),
+    "part_box": Visit(clamped, "part_on_dvf5000"),
+    "part_program": Visit(programmed, "part_on_dvf5000"),
     "errors_row": Visit(opened_row, part="#ws-left"),
 }
 """File name to visit."""

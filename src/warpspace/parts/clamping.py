@@ -96,7 +96,7 @@ class Clamp(OfPart):
         first = min(now, *best, key=lambda one: (one.outside > 0, judged(one)))
         return ClampResult(
             places=found, best=first, present=now, gain_um=judged(now) - judged(first),
-            title=f"{scene.title} · {mesh.name}", placed=self.placed,
+            title=f"{scene.title} · {mesh.name}", placed=self.placed, warnings=mesh.warnings,
             second_order=second_order(scene, Loop.RELATIVE),
         )  # fmt: skip
 
@@ -119,6 +119,7 @@ class ClampResult(Result):
     gain_um: float
     title: str
     placed: bool
+    warnings: tuple[str, ...]  # of the mesh
 
     def blocks(self) -> Iterator[Block]:
         judged = "largest |E|" + " after the best rigid fit" * self.placed
@@ -145,5 +146,6 @@ class ClampResult(Result):
         yield Lines("plane", f"Where to clamp: {self.title}", "x [mm]", "y [mm]", dots, (), note)
 
     def doubts(self) -> Iterator[str]:
+        yield from self.warnings
         if self.present.outside:
             yield f"at present {self.present.outside:,} vertices are beyond the travel"

@@ -282,7 +282,8 @@ class ProgramResult(Result):
         )
         told = [*self.worst, *([self.line] if self.line else [])]
         rows = [(one.line, one.um, *one.error_um, one.axes, one.budget) for one in told]
-        yield Table(columns, rows, "Worst blocks")
+        title = "Worst blocks" + ", and the line asked for" * bool(self.line)
+        yield Table(columns, rows, title)
 
 
 def corrected_places(read: control.ReadProgram, within_mm: float) -> tuple[Integers, Array]:
