@@ -59,6 +59,8 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
      "Measure between points of SCENE: distance, angle."),
     ("reach", "understand", "analysis.reach:Reach",
      "Say which part of the volume of SCENE keeps a limit."),
+    ("trust", "understand", "analysis.trust:Trust",
+     "Say how sure the map of SCENE is."),
     ("certify", "understand", "analysis.certify:Certify",
      "Certify flatness, straightness, squareness of SCENE."),
     ("repair", "improve", "analysis.repair:Repair",

@@ -9,7 +9,7 @@ that its variance is gᵀ C g (ISO/IEC Guide 98-3, 5.2). U95 = k · u, k being S
 An error that a scene gives without saying how sure it is, is *unknown*: so is all that it moves.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -28,6 +28,7 @@ from warpspace.units import Array
 NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
 COVERED = 0.9545  # of a normal distribution, within two standard deviations
 NEAR = 0.01  # part of the points that tells how their 95th percentile moves
+MOST_DRAWN = 2_000_000  # |E| of machines that are held at a time
 
 
 @lru_cache(maxsize=256)
@@ -55,6 +56,35 @@ class Doubt:
     @property
     def is_known(self) -> bool:
         return not self.unknown
+
+    @cached_property
+    def root(self) -> Array:
+        """Independent changes of the amplitudes, [K, M], of one standard uncertainty each."""
+        width = np.sqrt(np.diagonal(self.covariance))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(width, width))
+        return width[:, None] * vectors * _root(values)
+
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of its freedom."""
+        found = rng.standard_normal((count, len(self.keys))) @ self.root.T
+        if np.isinf(self.freedom):
+            return found
+        return found * np.sqrt(self.freedom / rng.chisquare(self.freedom, (count, 1)))
+
+    def through(self, ask: Callable[[Array], Array]) -> list[float | None]:
+        """Give U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
+
+        Notes
+        -----
+        Half the difference of what one standard uncertainty up and down gives (ISO/IEC Guide 98-3,
+        5.1.3, note 2), or where both go the same way, as at the least of a width, their RMS.
+        """
+        present = ask(np.zeros(len(self.keys)))
+        if not self.is_known:
+            return [None] * len(present)
+        steps = np.array([(ask(way), ask(-way)) for way in self.root.T]) - present
+        variance = np.sum(steps**2, axis=(0, 1)) / 2.0 if steps.size else np.zeros(len(present))
+        return (self.factor * _root(variance)).tolist()
 
     def remarks(self) -> Iterator[str]:
         """Say what is not stated."""
@@ -135,6 +165,11 @@ class FieldDoubt:
         """Give U95 of mean, RMS, P95 and max of |E| by their keys; None where it is unknown."""
         if not self.doubt.is_known:
             return dict.fromkeys(NAMES)
+        return dict(zip(NAMES, map(self.u95, self.gradients), strict=True))
+
+    @cached_property
+    def gradients(self) -> Array:
+        """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
         norm = self.field.norm_um.reshape(-1)
         weights = np.full(norm.size, 1.0 / norm.size)
         if self.grid is not None:
@@ -148,8 +183,17 @@ class FieldDoubt:
         rms = float(np.sqrt(weights @ norm**2))
         shares = np.stack([weights, weights * norm / (rms or 1.0), near, largest])
         ways = shares[:, :, None] * self.direction.reshape(-1, 3)
-        gradients = ways.reshape(4, -1) @ self.basis.position.reshape(len(self.doubt.keys), -1).T
-        return dict(zip(NAMES, map(self.u95, gradients), strict=True))
+        return ways.reshape(4, -1) @ self.basis.position.reshape(len(self.doubt.keys), -1).T
+
+    def machines(self, count: int, seed: int) -> Iterator[Array]:
+        """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""
+        rng, points = np.random.default_rng(seed), self.field.norm_um.size
+        gains = np.moveaxis(self.basis.position.reshape(len(self.doubt.keys), points, 3), -1, 0)
+        present = self.field.error_um.reshape(points, 3).T
+        for start in range(0, count, step := max(1, MOST_DRAWN // points)):
+            change = self.doubt.draw(rng, min(step, count - start))
+            parts = (change @ gain + own for gain, own in zip(gains, present, strict=True))
+            yield np.sqrt(sum(part**2 for part in parts))
 
 
 def field_doubt(
@@ -185,5 +229,9 @@ def with_u95(found: Mapping[str, Any], u95: Mapping[str, float | None]) -> dict[
 def u95_words(found: FieldDoubt) -> str:
     """Say U95 of mean, RMS, P95 and max."""
     u95 = found.statistics().items()
-    each = (f"{NAMES[key]} ± {'?' if value is None else f'{value:.2f}'}" for key, value in u95)
+    each = (f"{NAMES[key]} {plus_minus(value)}" for key, value in u95)
     return f"U95 (k = {found.doubt.factor:.3g}): {', '.join(each)} µm"
+
+
+def plus_minus(u95: float | None, form: str = ".2f") -> str:
+    return f"± {'?' if u95 is None else format(u95, form)}"

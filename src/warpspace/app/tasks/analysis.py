@@ -42,6 +42,7 @@ from warpspace.scene.model import Scene
 TITLES = {
     "gains": "Error gains", "line": "Along a line",
     "distance": "Distance and angle", "reach": "Volume within a limit",
+    "trust": "Uncertainty of the map",
     "certify": "Flatness, straightness, squareness", "convert": "Another convention",
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
     "allocate": "Tolerances", "concepts": "Machines side by side",

@@ -37,7 +37,7 @@ HOOKS: dict[str, type[AnalysisPart]] = {
 FIRST = ("compensate", "concepts", "allocate")
 """Sections that stand first in their task, short ones before long ones."""
 RARE = frozenset(
-    {"volume", "gains", "line", "distance", "reach", "certify", "convert", "contributions"}
+    {"volume", "gains", "line", "distance", "reach", "trust", "certify", "convert", "contributions"}
 )
 """Sections that stand under "More analyses", so that a task is calm at first sight."""
 

@@ -1,0 +1,97 @@
+"""Uncertainty of points, means and the worst, and probabilities: known in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import ncx2, norm, t
+
+from warpspace.analysis.doubt import coverage_factor, find_doubt
+from warpspace.analysis.trust import Trust
+from warpspace.scene.library import parse_scene
+
+HEAD = """[machine]
+chain = "wFXYZt"
+[workspace]
+X = [-100, 100]
+Y = [-100, 100]
+Z = 0
+[errors]
+"""
+ONE = HEAD + "EC0Y = 20\n[uncertainty]\nEC0Y = 1.5\n"
+PAIR = "[uncertainty.covariance]\nkeys = ['EXX', 'EYX']\nmatrix = [[4.0], [{between}, {second}]]\n"
+TWO = HEAD + "EXX = 3\nEYX = 4\n" + PAIR
+
+
+def trust(text, **options):
+    return Trust(nodes=5, samples=100_000, **options).run(parse_scene(text, "s"), lambda _: None)
+
+
+@pytest.mark.parametrize("limit", [1.8, 2.0, 2.25])
+def test_one_squareness(limit):
+    # |E| = γ·|y|: 2 µm at the ends of Y and half of it in the mean; γ = 20 ± 1.5 µrad
+    found = trust(ONE, limit_um=limit)
+    said = found.statistics
+    assert said["mean_um"] == pytest.approx(1.0)
+    assert said["u95_mean_um"] == pytest.approx(2 * 1.5e-3 * 50.0)
+    assert said["u95_max_um"] == pytest.approx(2 * 1.5e-3 * 100.0)
+    assert said["u95_rms_um"] / said["rms_um"] == pytest.approx(2 * 1.5 / 20.0)
+    expected = norm.cdf((10 * limit - 20) / 1.5) - norm.cdf((-10 * limit - 20) / 1.5)
+    assert found.probability_worst == pytest.approx(expected, abs=0.005)
+    assert found.probability_everywhere == found.probability_worst
+    assert [one.percent_of_max for one in found.shares] == pytest.approx([100.0])
+
+
+def test_one_squareness_of_few_degrees_of_freedom():
+    covariance = "[uncertainty.covariance]\nkeys = ['EC0Y']\nmatrix = [[2.25]]\nfreedom = 4\n"
+    text = ONE.partition("[uncertainty]")[0] + covariance
+    found = trust(text, limit_um=2.25, verify=True)
+    assert found.statistics["u95_max_um"] == pytest.approx(coverage_factor(4) * 0.15)
+    assert found.probability_worst == pytest.approx(t.cdf(2.5 / 1.5, 4), abs=0.005)
+    # the spread of machines drawn is that of the interval which is stated
+    assert found.montecarlo["max_um"]["u95_um"] == pytest.approx(
+        coverage_factor(4) * 0.15, rel=0.02
+    )
+
+
+@pytest.mark.parametrize(("between", "second"), [(0.0, 4.0), (3.0, 9.0), (-6.0, 9.0)])
+def test_two_translations(between, second):
+    # E = (3, 4, 0) µm everywhere, so that |E| grows by 0.6 of the one and 0.8 of the other
+    found = trust(TWO.format(between=between, second=second), limit_um=7.0)
+    u = math.sqrt(0.36 * 4.0 + 2 * 0.48 * between + 0.64 * second)
+    for name in ("mean", "rms", "p95", "max"):
+        assert found.statistics[f"{name}_um"] == pytest.approx(5.0)
+        assert found.statistics[f"u95_{name}_um"] == pytest.approx(2 * u)
+    share = {one.key: one.percent_of_max for one in found.shares}
+    assert share["EXX"] == pytest.approx(100 * (0.36 * 4.0 + 0.48 * between) / u**2)
+    assert sum(share.values()) == pytest.approx(100.0)
+    assert found.significant_percent == (100.0 if 2 * u < 5.0 else 0.0)
+    if not between:  # |E|² over the common variance is noncentral χ² of two degrees of freedom
+        expected = ncx2.cdf(49.0 / 4.0, 2, 25.0 / 4.0)
+        assert found.probability_everywhere == pytest.approx(expected, abs=0.005)
+
+
+def test_beyond_the_data_nothing_was_measured():
+    text = TWO.format(between=0.0, second=4.0) + "reach = { X = [-100, 0], Y = [-50, 100] }\n"
+    found = trust(text)
+    # of five nodes an axis with weights 1 2 2 2 1: X 50 and 100 are beyond, and Y -100
+    assert found.never_measured_percent == pytest.approx(100 * (1 - 5 / 8 * 7 / 8))
+    assert found.probability_worst is None
+
+
+def test_numbers_move_by_one_standard_uncertainty_up_and_down():
+    doubt = find_doubt(parse_scene(TWO.format(between=3.0, second=9.0), "s"))
+    gain = np.array([[1.0, 2.0], [0.5, -1.0]])
+    matrix = np.array([[4.0, 3.0], [3.0, 9.0]])
+    expected = 2.0 * np.sqrt(np.diagonal(gain @ matrix @ gain.T))
+    assert doubt.through(lambda way: 7.0 + gain @ way) == pytest.approx(expected)
+    # a width at its least goes up on both sides: no gradient tells its uncertainty
+    assert doubt.through(lambda way: np.abs(way[:1])) == pytest.approx([4.0])
+
+
+def test_what_is_not_stated_leaves_all_of_it_unknown():
+    found = trust(ONE.replace("EC0Y = 20", "EC0Y = 20\nEXX = 1"), limit_um=2.0, verify=True)
+    assert found.unknown == ("EXX",)
+    assert found.statistics["u95_mean_um"] is None
+    assert (found.probability_everywhere, found.montecarlo, found.shares) == (None, {}, [])
+    assert "± ?" in str([*found.blocks()])
