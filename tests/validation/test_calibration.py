@@ -9,7 +9,7 @@ from warpspace.bench.base import find_test
 from warpspace.bench.plan import simulate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.kinds import VIEW
-from warpspace.calibration.next_best import Candidate, candidates, map_weights, next_best
+from warpspace.calibration.next_best import Candidate, candidates, next_best, u95_at
 from warpspace.calibration.readings import Readings, find_data, nominal_tip, parse_table
 from warpspace.calibration.solve import build_terms, spell_rank
 from warpspace.calibration.spheres import circles_of
@@ -330,7 +330,8 @@ def test_the_map_is_weighted_by_volume():
     scene = replace(load_scene("dvf5000_nominal"), tolerances=type(FORK.tolerances)({}, {}))
     terms = build_terms(scene, ("EXX:ramp",))
     nodes = np.linspace(0.0, 1.0, 5)
-    assert map_weights(scene, terms)[0, 0] == pytest.approx(np.trapezoid(nodes**2, nodes))
+    told = u95_at(scene, terms, "map")(np.eye(1))
+    assert told == pytest.approx(2.0 * np.sqrt(np.trapezoid(nodes**2, nodes)))
 
 
 def test_squareness_is_found_in_circles_of_two_planes(tmp_path):

@@ -4,16 +4,26 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 import numpy as np
 
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.description import Watch as Share
-from warpspace.analysis.options import Files, Grammar, option, typed_word
+from warpspace.analysis.options import PLACE, Files, Grammar, option, typed_word
+from warpspace.calibration.instruments import (
+    NO_INSTRUMENT,
+    Instrument,
+    common_mode,
+    effective_freedom,
+    instrument_names,
+    load_instrument,
+    share_out,
+)
 from warpspace.calibration.kinds import in_other_frame
+from warpspace.calibration.next_best import next_best, observability, separating, u95_at
 from warpspace.calibration.readings import Readings, read_readings
-from warpspace.calibration.results import Calibration, Combination, Found, Residuals
+from warpspace.calibration.results import Calibration, Combination, Found, Residuals, Target
 from warpspace.calibration.solve import (
     MAD,
     Rank,
@@ -35,11 +45,21 @@ from warpspace.exceptions import OptionError
 from warpspace.machine.errors import Covariance
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_SPAN
 from warpspace.scene.model import Scene
-from warpspace.units import UM_PER_MM, Array
+from warpspace.units import MM_PER_UM, UM_PER_MM, Array
 
+LEFT = "what a fit leaves"
 CALIBRATED = ", calibrated"  # behind the title of a calibrated scene
 OUTLIER = 4.0  # robust standard deviations beyond which a reading is named
 MOST_NEXT = 10
+Budget: TypeAlias = Annotated[Instrument, Grammar("NAME|FILE.toml", load_instrument, is_file=True)]
+
+
+def _target(text: str, scene: Scene) -> Target:
+    if text in ("map", "corner"):
+        return text
+    if "=" not in text:
+        raise ValueError("expected map, corner, or axis positions such as X=0,Y=-225")
+    return PLACE.read(text, scene)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,10 +109,21 @@ class Calibrate(Analysis):
     priors: bool = option(False, "Count the tolerances of SCENE as knowledge")
     next_count: int | None = option(
         None,
-        "Name the N measurements that would lower the uncertainty of the map most",
+        "Name the N measurements that would lower the uncertainty most, per minute of work",
         flag="--next",
         low=1,
         high=MOST_NEXT,
+    )
+    target: Annotated[Target, Grammar("map|corner|X=..,Y=..", _target)] = option(
+        "map",
+        "What they are to make sure: the map as a whole, its least sure node, or a point",
+        flag="--for",
+    )
+    instrument: Budget = option(
+        NO_INSTRUMENT,
+        f"Instrument, its uncertainties count: {', '.join(instrument_names())}, or a file. Readings"
+        " without u_um have its scatter; what all of them share widens what is found",
+        unset="none",
     )
 
     def run(self, scene: Scene, watch: Share, /) -> Calibration:
@@ -121,13 +152,14 @@ class Calibrate(Analysis):
         held: Sequence[Readings] = (),
         watch: Watch = unwatched,
     ) -> Calibration:
-        from warpspace.calibration.next_best import next_best, separating
-
         found = calibrate(scene, sets, self, held, watch)
-        if self.next_count is None and not found.rank.confounded:
+        count = self.next_count or int(self.target != "map")
+        if not count and not found.rank.confounded:
             return found
-        steps = next_best(scene, sets, found, self.next_count or 0, watch=watch)
-        return replace(found, apart=separating(scene, sets, found, watch=watch), steps=steps)
+        weighed = [one.readings for one in found.fitted]
+        steps = next_best(scene, weighed, found, count, watch=watch, target=self.target)
+        apart = separating(scene, sets, found, watch=watch)
+        return replace(found, apart=apart, steps=steps, target=self.target)
 
 
 def calibrate(
@@ -183,7 +215,8 @@ def calibrate(
     if not sets:
         raise OptionError("no readings; expected at least one file ({data} FILE)")
     found = _fit(scene, sets, request, predict, watch)
-    return replace(found, notes=(*found.notes, *_frame_notes(scene, sets, request, found, watch)))
+    notes = (*found.notes, *_frame_notes(scene, sets, request, found, watch))
+    return replace(found, notes=notes, merit=observability(scene, sets, watch))
 
 
 def _frame_notes(
@@ -221,6 +254,7 @@ def _fit(
     predict: Sequence[Readings],
     watch: Watch,
 ) -> Calibration:
+    instrument, is_assumed = request.instrument, any(one.sigma_mm is None for one in sets)
     sets, assumed = _weighed(scene, sets, request, watch)
     stack = Stack.of(scene, sets, watch)
     terms = build_terms(scene, automatic(scene, sets) if request.fit is None else request.fit)
@@ -240,9 +274,18 @@ def _fit(
     misses = np.concatenate([row.ravel() for row in after]) * np.concatenate(stack.weights())
     sigma = solved.scale or float(np.sqrt(np.sum(misses**2) / max(freedom, 1)))
     is_scaled = stack.has_uncertainties or solved.scale is not None
-    covariance = covariance_of(solved, len(free)) * (1.0 if is_scaled else sigma**2)
+    scattered = covariance_of(solved, len(free)) * (1.0 if is_scaled else sigma**2)
+    shared = _shared(instrument, stack, solved, len(free))
+    covariance = scattered + shared.sum(axis=0)
+    own = float(max(freedom, 1))
+    if stack.has_uncertainties:
+        own = instrument.scatter[1] if is_assumed else np.inf
+    variances = np.diagonal(np.stack([scattered, *shared]), axis1=1, axis2=2)
+    degrees = effective_freedom(variances, [own, *(one.freedom for one in instrument.shared)])
+    told = u95_at(scene, part, "map")
+    shares = [(told(one) / told(covariance)) ** 2 for one in (scattered * is_assumed, *shared)]
     parameters, combinations = _found(
-        terms, part, rank, solved, covariance, freedom, stack, has_prior=prior is not None
+        terms, part, rank, solved, covariance, degrees, has_prior=prior is not None
     )
     errors = part.errors_with(solved.amplitudes)
     for row, value in zip(part.parameters, solved.amplitudes, strict=True):
@@ -257,7 +300,7 @@ def _fit(
         title=title,
         errors=errors,
         uncertainty={key: one for key, one in scene.uncertainty.items() if key not in part.keys},
-        covariance=_covariance(scene, part.keys, covariance, freedom, stack),
+        covariance=_covariance(scene, part.keys, covariance, degrees.min(initial=np.inf), stack),
     )
     outliers = _outliers(stack, after)
     held, held_notes = _predict(stack, terms, part, predict, begin, solved, robust=request.robust)
@@ -282,6 +325,8 @@ def _fit(
         rms_predicted_after_mm=rms_mm([one.after_mm for one in held]) if held else None,
         sigma_mm=sigma,
         freedom=freedom,
+        lack_of_fit=sigma if stack.has_uncertainties else None,
+        instrument=share_out(instrument, stack, shares) if instrument.name else None,
         notes=(*assumed, *(note for one in (*sets, *predict) for note in one.notes), *held_notes),
     )
 
@@ -289,15 +334,27 @@ def _fit(
 def _weighed(
     scene: Scene, sets: Sequence[Readings], request: Calibrate, watch: Watch
 ) -> tuple[Sequence[Readings], tuple[str, ...]]:
-    if not request.priors or all(one.sigma_mm is not None for one in sets):
+    if all(one.sigma_mm is not None for one in sets):
         return sets, ()
-    width = _fit(scene, sets, replace(request, priors=False), (), watch).sigma_mm
+    width, why = MM_PER_UM * request.instrument.scatter[0], "scatter of the instrument"
+    if request.priors and not width:
+        width, why = _fit(scene, sets, replace(request, priors=False), (), watch).sigma_mm, LEFT
+    if not width:
+        return sets, ()
     weighed = [
         one if one.sigma_mm is not None else replace(one, sigma_mm=np.full(len(one), width))
         for one in sets
     ]
-    note = f"readings without u_um are taken as ± {UM_PER_MM * width:.3g} µm: what a fit leaves"
-    return weighed, (note,)
+    return weighed, (f"readings without u_um are taken as ± {UM_PER_MM * width:.3g} µm: {why}",)
+
+
+def _shared(instrument: Instrument, stack: Stack, solved: Solved, count: int) -> Array:
+    """Give the covariance that contributions bring which readings share, [c, K, K]."""
+    weights = np.sqrt(solved.trust) * np.concatenate(stack.weights())[:, None]
+    answer = covariance_of(solved, solved.weighted.shape[1])[:count] @ solved.weighted.T
+    answer = answer[:, : len(weights)]
+    moved = [answer @ (weights * common_mode(stack, one)) for one in instrument.shared]
+    return np.array([one @ one.T for one in moved]).reshape(-1, count, count)
 
 
 def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
@@ -333,7 +390,7 @@ def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _covariance(
-    scene: Scene, keys: tuple[str, ...], found: Array, freedom: int, stack: Stack
+    scene: Scene, keys: tuple[str, ...], found: Array, freedom: float, stack: Stack
 ) -> Covariance | None:
     """Join what was found with what the scene knew of other errors."""
     kept = [key for key in scene.covariance.keys if key not in keys] if scene.covariance else []
@@ -352,8 +409,7 @@ def _covariance(
             reach[axis] = min(low, float(np.min(at))), max(high, float(np.max(at)))
     moved = {axis: ends for axis, ends in reach.items() if ends[1] - ends[0] >= MIN_SPAN}
     rows = tuple(map(tuple, ((matrix + matrix.T) / 2.0).tolist()))
-    sure = np.inf if stack.has_uncertainties else float(max(freedom, 1))
-    return Covariance((*keys, *kept), rows, sure, moved)
+    return Covariance((*keys, *kept), rows, freedom, moved)
 
 
 def _correlation(covariance: Array) -> Array:
@@ -368,14 +424,13 @@ def _found(
     rank: Rank,
     solved: Solved,
     covariance: Array,
-    freedom: int,
-    stack: Stack,
+    degrees: Array,
     *,
     has_prior: bool,
 ) -> tuple[tuple[Found, ...], tuple[Combination, ...]]:
     from scipy.stats import t
 
-    factor = 1.959964 if stack.has_uncertainties else float(t.ppf(0.975, max(freedom, 1)))
+    factors = t.ppf(0.975, degrees)
     held = dict(zip(terms.keys, terms.start.tolist(), strict=True))
     rows: list[Found] = []
     sums: list[Combination] = []
@@ -386,15 +441,15 @@ def _found(
             continue
         own = part.keys.index(key)
         value, width = float(solved.amplitudes[own]), float(np.sqrt(covariance[own, own]))
-        half = factor * width
+        half = float(factors[own]) * width
         told = "yes" if rank.is_identifiable(key) else "in part"
         if told == "yes" or has_prior:
             rows.append(Found(key, before, value, width, (value - half, value + half), told))
             continue
         rows.append(Found(key, before, value, None, None, told))
-        factors = rank.told_with(key)
-        total = value + sum(factors[other] * held[other] for other in factors if other != key)
-        sums.append(Combination(factors, total, width, (total - half, total + half)))
+        shares = rank.told_with(key)
+        total = value + sum(shares[other] * held[other] for other in shares if other != key)
+        sums.append(Combination(shares, total, width, (total - half, total + half)))
     return tuple(rows), tuple(sums)
 
 

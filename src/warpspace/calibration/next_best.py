@@ -1,28 +1,35 @@
-"""The measurement to make next: the one that lowers the uncertainty of the error map most."""
+"""The measurement to make next: the one that lowers an uncertainty most per minute of work."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 
+from warpspace.analysis.doubt import coverage_factor
 from warpspace.bench.placing import PLANES
 from warpspace.calibration import solve
 from warpspace.calibration.readings import Readings, nominal_tip
 from warpspace.calibration.registry import TestReadings
-from warpspace.calibration.results import Calibration, Candidate, Step
+from warpspace.calibration.results import Calibration, Candidate, Step, Target
 from warpspace.calibration.spheres import solve_linear
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
+from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import complete_coordinates
+from warpspace.machine.axes import default_keys, is_linear, parameter
+from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene, grid_basis
-from warpspace.units import Array
+from warpspace.units import UM_PER_MM, Array
 
 # Poses and small tests on the machine of a scene.
 
 PLACES = (0.0, 0.5, 1.0)  # shares of the working volume, the ends at the ends
 TURNS_DEG = (-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 180.0, 270.0)
 ON_CIRCLE = 36
+POSES, REACH = 60, (-180.0, 180.0)  # poses, mm and degrees, that tell all that can be told
+ARM_MM = 250.0  # at which a rotation counts like a location
 SESSION = "next"  # the set-up of a measurement not made yet: a sphere put somewhere anew
 
 
@@ -134,6 +141,24 @@ def _reached(scene: Scene, at: Mapping[str, Array]) -> dict[str, Array]:
     return {name: values[inside] for name, values in at.items()}
 
 
+MINUTES = {
+    "tracker": (30.0, 0.5),
+    "positioning": (45.0, 0.2),
+    "diagonals": (90.0, 0.2),
+    "straightness": (20.0, 0.5),
+    "squareness": (20.0, 0.5),
+    "circular": (12.0, 0.05),
+    "sphere-tcp": (10.0, 1.0),
+}
+"""Minutes of work by kind: to set up, and for each reading. Typical, of somebody who does it often;
+what a shop needs differs, and the ranking with it."""
+
+
+def minutes(readings: Readings) -> float:
+    set_up, each = MINUTES.get(readings.kind.partition(":")[0], (30.0, 0.5))
+    return set_up + each * len(readings)
+
+
 NODES = 5  # nodes per axis of the map whose uncertainty counts
 WIDE = 1000.0  # standard uncertainty in µm or µrad of a parameter of which nothing is known
 LEAST_NOISE_MM = 1e-4
@@ -146,8 +171,9 @@ def next_best(
     count: int = 1,
     choice: Sequence[Candidate] | None = None,
     watch: solve.Watch = solve.unwatched,
+    target: Target = "map",
 ) -> tuple[Step, ...]:
-    """Choose measurements one after the other, each for the greatest gain.
+    """Choose measurements one after the other, each for the greatest gain per minute.
 
     Notes
     -----
@@ -164,20 +190,24 @@ def next_best(
     if len(stated) == len(sets):
         noise = float(np.median(np.concatenate(stated)))
     known = _information(solve.Stack.of(scene, sets, watch), terms, noise) + _prior(scene, keys)
-    weigh = map_weights(found.scene, terms)
+    over_map = u95_at(found.scene, terms, "map")
+    told = u95_at(found.scene, terms, target)
     rows = [
         (one, _information(solve.Stack.of(scene, [one.readings], watch), terms, noise))
         for one in choice or candidates(scene)
     ]
     steps: list[Step] = []
-    before = _map_um(weigh, _covariance(known))
+    covariance = _covariance(known)
     for _ in range(count):
         watch()
+        before, map_before = told(covariance), over_map(covariance)
         gains = [(one, _covariance(known + row), row) for one, row in rows]
-        best, covariance, row = min(gains, key=lambda gain: _map_um(weigh, gain[1]))
-        after = _map_um(weigh, covariance)
-        steps.append(Step(best, before, after, covariance))
-        known, before = known + row, after
+        best, covariance, row = max(
+            gains, key=lambda gain: (before - told(gain[1])) / minutes(gain[0].readings)
+        )
+        ends = before, told(covariance), map_before / FACTOR, over_map(covariance) / FACTOR
+        steps.append(Step(best, minutes(best.readings), *ends, covariance))
+        known = known + row
     return tuple(steps)
 
 
@@ -226,14 +256,65 @@ def _covariance(known: Array) -> Array:
     return inverse / np.outer(scale, scale)
 
 
-def map_weights(scene: Scene, terms: solve.Terms) -> Array:
-    """Give how the map weighs covariances, [K, K]: its mean square is the sum of the products."""
-    grid = build_grid(scene.model, scene.workspace, NODES)
-    basis = grid_basis(replace(scene, errors=terms.errors), grid, keys=terms.keys)
-    share = np.sqrt(grid.weights)[..., None]
-    flat = (basis.position * share).reshape(len(terms.keys), -1)
-    return flat @ flat.T
+FACTOR = coverage_factor(np.inf)
 
 
-def _map_um(weigh: Array, covariance: Array) -> float:
-    return float(np.sqrt(max(np.sum(weigh * covariance), 0.0)))
+def u95_at(scene: Scene, terms: solve.Terms, target: Target) -> Callable[[Array], float]:
+    """Give what tells U95 of a position error, µm, by the covariance of the parameters.
+
+    Of the map the root mean square over the volume, of its corners the largest at a node.
+    """
+    if isinstance(target, str):
+        grid = build_grid(scene.model, scene.workspace, NODES)
+        basis = grid_basis(replace(scene, errors=terms.errors), grid, keys=terms.keys)
+        weights = grid.weights.ravel() if target == "map" else None
+    else:
+        at = complete_coordinates(scene.machine, dict(target), scene.workspace.positions)
+        basis = build_basis(scene.model, terms.errors, terms.keys, at, scene.view())
+        weights = None
+    flat = basis.position.reshape(len(terms.keys), -1)
+
+    def told(covariance: Array) -> float:
+        variance = np.sum(flat * (covariance @ flat), axis=0).reshape(-1, 3).sum(axis=1)
+        whole = variance.max() if weights is None else weights @ variance
+        return FACTOR * float(np.sqrt(max(whole, 0.0)))
+
+    return told
+
+
+def observability(
+    scene: Scene, sets: Sequence[Readings], watch: solve.Watch = solve.unwatched
+) -> dict[str, float]:
+    """Say for each rotary axis how well poses tell its location and orientation errors.
+
+    The smallest singular value of the readings' Jacobian, set-ups eliminated, µm per µm: the
+    observability index O3 (Nahvi, Hollerbach and Hayward 1994; Sun and Hollerbach 2008). At the
+    nominal machine, each reading counting alike, so that deviations play no part. Combinations that
+    error vectors at no pose tell, since they look like a shift, are left out.
+    """
+    scene = replace(scene, errors=ErrorSet())
+    rows = [parameter(key) for key in default_keys(scene.machine.chain.axes)]
+    rows = [row for row in rows if row.is_constant and not is_linear(row.axis)]
+    if not rows:
+        return {}
+    terms = solve.build_terms(scene, [row.key for row in rows])
+    scale = np.array([UM_PER_MM * (UM_PER_MM / ARM_MM if row.is_rotation else 1.0) for row in rows])
+
+    def seen(readings: Sequence[Readings]) -> Array:
+        stack = solve.Stack.of(scene, readings, watch)
+        gains, own = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
+        return np.vstack(
+            [solve.without(gains * scale, solve.orthonormal(own)), 0.0 * np.diag(scale)]
+        )
+
+    draw, ends = np.random.default_rng(0), {n: a.travel for n, a in scene.machine.axes.items()}
+    anywhere = {name: draw.uniform(*np.clip(ends[name], *REACH), size=POSES) for name in ends}
+    found, most = seen(sets), seen([_nominal(scene, "points", anywhere, np.zeros((POSES, 3)))])
+    merit: dict[str, float] = {}
+    for axis in dict.fromkeys(row.axis for row in rows):
+        own = [at for at, row in enumerate(rows) if row.axis == axis]
+        _, values, told = np.linalg.svd(most[:, own])
+        told = told[values > solve.BLIND * max(values[0], 1e-300)]
+        if len(told):
+            merit[axis] = float(np.linalg.svd(found[:, own] @ told.T, compute_uv=False)[-1])
+    return merit

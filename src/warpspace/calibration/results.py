@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -20,12 +20,17 @@ from warpspace.analysis.blocks import (
     number_columns,
 )
 from warpspace.analysis.description import Change, Result, plain
+from warpspace.analysis.options import place_words
+from warpspace.calibration.instruments import budget_blocks
 from warpspace.calibration.readings import Circle, Readings
 from warpspace.calibration.solve import Rank, spell_rank
 from warpspace.machine.axes import parameter
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, UM_PER_MM, Array
 
+Target: TypeAlias = str | tuple[tuple[str, float], ...]
+"""What is to be made sure: the map, its least sure corner, or axis positions of a point."""
+LACK = 1.5  # scatter of residuals, of what is stated, beyond which a model lacks something
 MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their uncertainty
 
 
@@ -136,8 +141,13 @@ class Candidate:
 class Step:
     """One measurement to make."""
 
-    keys: ClassVar[tuple[str, ...]] = ("measurement", "kind", "map_before_um", "map_after_um")
+    keys: ClassVar[tuple[str, ...]] = (
+        "measurement", "kind", "minutes", "before_um", "after_um", "map_before_um", "map_after_um",
+    )  # fmt: skip
     candidate: Candidate
+    minutes: float  # that it takes, typically
+    before_um: float  # U95 of the position error at the target, likewise without and with it
+    after_um: float
     # standard uncertainty of the position error, root mean square over the volume (weighted by
     # volume): without and with this measurement, all those before it made
     map_before_um: float
@@ -177,10 +187,15 @@ class Calibration(Result):
     # weight of one where uncertainties are given
     sigma_mm: float
     freedom: int  # components less what was fitted
+    lack_of_fit: float | None  # scatter of the residuals in units of what is stated of readings
+    instrument: Mapping[str, Any] | None  # its contributions, and what they bring
     notes: tuple[str, ...] = ()
     # groups that cannot be told apart, and the measurement that would
     apart: Mapping[tuple[str, ...], str] = field(default_factory=dict[tuple[str, ...], str])
     steps: tuple[Step, ...] = ()  # next measurements
+    target: Target = "map"  # that they are to make sure
+    # by rotary axis: how well the poses tell its location and orientation errors
+    merit: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
     def circles(self) -> list[Circle]:
@@ -212,6 +227,9 @@ class Calibration(Result):
             "set_up_mm": dict(self.unknowns),
             "correlation": {"keys": list(self.fit), "matrix": self.correlation.tolist()},
             "circles": [asdict(circle) for circle in self.circles],
+            "lack_of_fit": self.lack_of_fit,
+            "instrument": self.instrument,
+            "merit": dict(self.merit),
             "next": plain(self.steps),
             "fitted": [group.as_json() for group in self.fitted],
             "predicted": [group.as_json() for group in self.predicted],
@@ -245,7 +263,18 @@ class Calibration(Result):
         yield from self._errors()
         wide = self.sigma_mm >= 1.0
         width = f"{self.sigma_mm:.2f} mm" if wide else f"{UM_PER_MM * self.sigma_mm:.2f} µm"
-        yield f"  standard deviation of one component {width}, {self.freedom} degrees of freedom"
+        width = f"standard deviation of one component {width}"
+        if self.lack_of_fit is not None:
+            width = f"residuals scatter {self.lack_of_fit:.2f} times as far as stated"
+            width += ": errors act that are not looked for" * (self.lack_of_fit > LACK)
+        yield f"  {width}, {self.freedom} degrees of freedom"
+        yield from budget_blocks(self.instrument) if self.instrument else ()
+        if self.merit:
+            each = ", of ".join(f"{axis} by {value:.2f}" for axis, value in self.merit.items())
+            yield (
+                f"  poses tell location and orientation of {each} µm per µm (all readings together,"
+                " of the combination that they tell least; rotations count at 250 mm)"
+            )
         for group in (*self.fitted, *self.predicted):
             for at in group.outliers:
                 yield f"  far off: {group.file} line {group.readings.lines[at]}"
@@ -255,11 +284,17 @@ class Calibration(Result):
         if self.steps:
             columns = (
                 Column("measurement", leads=True, wraps=True),
-                *number_columns(("map before", "map after"), unit="µm"),
+                Column("minutes", ".0f"),
+                *number_columns(("U95 before", "after"), unit="µm"),
             )
-            rows = [(one.measurement, one.map_before_um, one.map_after_um) for one in self.steps]
-            yield Table(columns, rows, "Next measurements, each for the greatest gain:")
-            yield "  map: standard uncertainty of the position error, RMS over the volume"
+            rows = [
+                (one.measurement, one.minutes, one.before_um, one.after_um) for one in self.steps
+            ]
+            words = "Next measurements, each for the greatest gain per minute (typical times):"
+            yield Table(columns, rows, words)
+            where = {"map": "RMS over the volume", "corner": "at the least sure node"}
+            place = place_words(dict(self.target)) if not isinstance(self.target, str) else ""
+            yield f"  U95 of the position error, {where.get(str(self.target), f'at {place}')}"
         yield from self._charts()
 
     def _errors(self) -> Iterator[Block]:

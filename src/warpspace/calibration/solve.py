@@ -309,6 +309,7 @@ class Solved:
     unknown: Array
     weighted: Array
     scale: float | None = None
+    trust: float = 1.0  # square of what multiplies the rows of `weighted`, beside their weights
 
 
 def solve(
@@ -379,7 +380,7 @@ def solve(
     if unit is not None:
         variance = unit**2 * _robust_variance(missed(start) / unit, freedom)
         trust = np.full(stack.size, 1.0 / max(variance, float(stack.has_uncertainties)))
-    return Solved(start[:count], start[count:], jacobian(start), unit)
+    return Solved(start[:count], start[count:], jacobian(start), unit, float(trust[0]))
 
 
 def _robust_variance(rows: Array, freedom: int) -> float:

@@ -294,6 +294,28 @@ COVARIANCE = Section(
         "reach": (_by_name(_span), {}),
     }
 )  # fmt: skip
+ACTS = "each", "all", "scale"  # what a contribution acts on
+DIVISORS = {"normal": 1.0, "rectangular": 3**0.5, "triangular": 6**0.5, "u-shaped": 2**0.5}
+_CONTRIBUTION = Section(
+    {
+        "name": (_text(100, 1), MISSING),
+        "type": (_choice(lambda: ("A", "B")), MISSING),
+        "distribution": (_one_of(DIVISORS), MISSING),
+        "value": (_number(1e-9, limits.MAX_ERROR), MISSING),
+        "unit": (_text(20, 1), MISSING),
+        "acts": (_one_of(ACTS), MISSING),
+        "sensitivity": (_number(1e-9, limits.MAX_ERROR), MISSING),
+        "freedom": (_number(1.0, 1e9), math.inf),
+        "source": (_text(limits.MAX_TEXT), ""),
+    }
+)
+INSTRUMENT = Section(
+    {
+        "title": (TEXT, ""),
+        "source": (TEXT, ""),
+        "contributions": (_list(_CONTRIBUTION, limits.MAX_TERMS, 1), MISSING),
+    }
+)
 _MEASURED = _by_name(_number(0.0, limits.MAX_ERROR * 10.0), MEASURES)
 _VERSION = _text(16, 1, r"[a-z0-9]*", "small letters and digits")
 # what people write has lines and tabulators, but no other control characters

@@ -299,7 +299,7 @@ class CalibratePart(FilesPart):
     def result_html(self, found: Result) -> Markup:
         blocks = list(found.blocks())
         shown = [next(one for one in blocks if isinstance(one, Lines))]
-        shown += [one for one in blocks if isinstance(one, Table) and len(one.columns) == 3]
+        shown += [one for one in blocks if isinstance(one, Table) and len(one.columns) == 4]
         arrows = labelled("Arrows in the box", choice("calibrate:arrows", self._arrows, ARROWS),
                           "calibrate:arrows",
                           hint="Observed − predicted at each reading, exaggerated")  # fmt: skip

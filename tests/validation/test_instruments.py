@@ -1,0 +1,234 @@
+"""Instruments, what to measure next and merit: against GTC, closed forms, and planted machines."""
+
+import math
+from dataclasses import replace
+
+import GTC
+import numpy as np
+import pytest
+
+from warpspace.analysis.doubt import field_doubt
+from warpspace.calibration import Calibrate, calibrate
+from warpspace.calibration.instruments import NO_INSTRUMENT, instrument_names, load_instrument
+from warpspace.calibration.next_best import candidates, observability
+from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.exceptions import SceneError, UnknownNameError
+from warpspace.kinematics.model import complete_coordinates
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import evaluate
+
+DIVISORS = {"normal": 1, "rectangular": math.sqrt(3), "triangular": math.sqrt(6),
+            "u-shaped": math.sqrt(2)}  # fmt: skip
+
+
+@pytest.mark.parametrize("length_mm", [100.0, 800.0])
+@pytest.mark.parametrize("name", ["ball_bar", "ball_plate", "laser", "probe_and_sphere", "tracker"])
+def test_a_budget_is_that_of_gtc(name, length_mm):
+    instrument = load_instrument(name)
+    assert name in instrument_names()
+    total = 0.0
+    for one in instrument.contributions:
+        factor = length_mm / 1000.0 if one.acts == "scale" else 1.0
+        u = one.value / DIVISORS[one.distribution]
+        total += one.sensitivity * factor * GTC.ureal(0.0, u, one.freedom)
+    u_um, freedom = instrument.budget(length_mm)
+    assert u_um == pytest.approx(GTC.uncertainty(total), rel=1e-9)
+    assert freedom == pytest.approx(GTC.dof(total), rel=1e-9)
+
+
+MACHINE = """[machine]
+chain = "wFXYZt"
+[machine.offset_mm]
+t = [0, 0, -300]
+[workspace]
+X = [-100, 300]
+Y = [-100, 100]
+Z = [-200, 0]
+"""
+
+
+def test_a_covariance_at_a_point_is_that_of_gtc():
+    text = """[errors]
+EC0Y = 20
+EA0Z = -30
+[uncertainty.covariance]
+keys = ["EC0Y", "EA0Z"]
+matrix = [[4.0], [3.0, 9.0]]
+"""
+    scene, at = parse_scene(MACHINE + text, "s"), {"X": 40.0, "Y": -70.0, "Z": -150.0}
+    axes = complete_coordinates(scene.machine, at, scene.workspace.positions)
+    found = field_doubt(scene, evaluate(scene, at=at), axes, scene.view())
+    turn, tilt = GTC.ureal(20.0, 2.0, independent=False), GTC.ureal(-30.0, 3.0, independent=False)
+    GTC.set_correlation(0.5, turn, tilt)
+    # a rotation about z at Y, about x at Z: lever times angle, mm times µrad is nm
+    error = (-turn * -70e-3, -tilt * (-150.0 - 300.0) * 1e-3)
+    wanted = [[GTC.get_covariance(a, b) for b in error] for a in error]
+    assert found.field.error_um[:2] == pytest.approx([GTC.value(one) for one in error])
+    np.testing.assert_allclose(found.covariance_um2[:2, :2], wanted, rtol=1e-9)
+    norm = GTC.sqrt(error[0] ** 2 + error[1] ** 2)
+    assert float(found.u_norm_um) == pytest.approx(GTC.uncertainty(norm), rel=1e-9)
+
+
+BODY = """title = "Own"
+[[contributions]]
+name = "scatter"
+type = "A"
+distribution = "normal"
+value = 2.0
+unit = "µm"
+sensitivity = 1.0
+freedom = 4
+acts = "each"
+[[contributions]]
+name = "zero"
+type = "B"
+distribution = "rectangular"
+value = 3.0
+unit = "µm"
+sensitivity = 1.0
+acts = "all"
+[[contributions]]
+name = "temperature"
+type = "B"
+distribution = "u-shaped"
+value = 0.5
+unit = "K"
+sensitivity = 11.5
+acts = "scale"
+"""
+
+
+@pytest.fixture
+def own(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text(BODY, encoding="utf-8")
+    return load_instrument(str(path))
+
+
+def vectors(scene, poses, error_um, session=""):
+    count = len(error_um)
+    at = {axis: np.asarray(poses.get(axis, np.zeros(count))) for axis in scene.machine.axes}
+    tip, lines = nominal_tip(scene, at), tuple(range(count))
+    return Readings("points", at, tip, 1e-3 * error_um, None, (session,) * count, lines, "r.csv")
+
+
+@pytest.mark.parametrize("session", ["", "one"])
+def test_a_scale_widens_a_slope_and_a_zero_only_what_no_set_up_takes_up(own, session):
+    """Straight line through five points: u² of slope and zero by hand."""
+    scene, x = parse_scene(MACHINE, "s"), np.linspace(-100.0, 300.0, 5)
+    readings = vectors(scene, {"X": x}, np.zeros((5, 3)), session)
+    keys = ("EXX:ramp", "EYX:constant")
+    found = calibrate(scene, [readings], Calibrate(fit=keys, instrument=own))
+    scale = 0.5 / math.sqrt(2.0) * 11.5 * 0.4  # µm over the 400 mm of the ramp
+    share = np.linspace(0.0, 1.0, 5)
+    scatter, zero = 4.0 / np.sum(share**2), 3.0 * (np.sum(share) / np.sum(share**2)) ** 2
+    if session:
+        scatter, zero = 4.0 / np.sum((share - 0.5) ** 2), 0.0
+    else:  # the mean point does not move
+        scale *= np.sum(share * (share - 0.5)) / np.sum(share**2)
+    u = {one.key: one.standard_uncertainty for one in found.parameters}
+    assert u["EXX"] == pytest.approx(math.sqrt(scatter + zero + scale**2), rel=1e-9)
+    # a constant is a shift of the session; without one the zero adds to the mean of five
+    assert u["EYX"] == (None if session else pytest.approx(math.sqrt(4.0 / 5.0 + 3.0), rel=1e-9))
+    # four degrees of freedom of the scatter; the least of what is found counts
+    rows = [(scatter, zero + scale**2)] if session else [(scatter, zero + scale**2), (0.8, 3.0)]
+    freedom = min((a + b) ** 2 / (a**2 / 4.0) for a, b in rows)
+    assert found.scene.covariance.freedom == pytest.approx(freedom)
+    told = found.as_json()["instrument"]
+    assert [round(one["share_of_map"], 9) >= 0.0 for one in told["contributions"]] == [True] * 3
+    assert sum(one["share_of_map"] for one in told["contributions"]) == pytest.approx(1.0)
+    assert sum(one["share"] for one in told["contributions"]) == pytest.approx(1.0)
+
+
+def test_a_scale_shows_along_the_line_a_laser_measures(own):
+    scene = parse_scene(MACHINE, "s")
+    line = next(one.readings for one in candidates(scene) if one.name.startswith("laser along X"))
+    found = calibrate(scene, [line], Calibrate(fit=("EXX:ramp",), instrument=own))
+    (u,) = [one.standard_uncertainty for one in found.parameters]
+    share = (line.coordinates["X"] + 100.0) / 400.0
+    scatter = 4.0 / np.sum((share - share.mean()) ** 2)
+    assert u == pytest.approx(math.hypot(math.sqrt(scatter), 0.5 / math.sqrt(2.0) * 11.5 * 0.4))
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "said"),
+    [
+        ('"A"', '"C"', 'contributions[0].type = "C": expected "A" or "B"'),
+        ("value = 2.0", "value = -2.0", "contributions[0].value = -2.0: expected at least 1e-09"),
+        ("sensitivity = 11.5\n", "", "contributions[2].sensitivity: is missing"),
+        ('"u-shaped"', '"arcsine"', "contributions[2].distribution"),
+        ("freedom", "freedoms", "contributions[0].freedoms: unknown key"),
+        ("[[contributions]]", "[[contribution]]", "contributions: is missing"),
+    ],
+)
+def test_a_bad_file_of_an_instrument_is_refused(tmp_path, was, now, said):
+    path = tmp_path / "bad.toml"
+    path.write_text(BODY.replace(was, now), encoding="utf-8")
+    with pytest.raises(SceneError) as error:
+        load_instrument(str(path))
+    assert said in str(error.value)
+
+
+def test_an_instrument_that_is_not_there_is_named():
+    with pytest.raises(UnknownNameError, match="did you mean 'tracker'"):
+        load_instrument("traker")
+
+
+TABLE = """[machine]
+chain = "wCFXYZt"
+[machine.travel]
+X = [-500, 500]
+Y = [-500, 500]
+Z = [-500, 500]
+[workspace]
+X = [-100, 100]
+Y = [-100, 100]
+Z = [-100, 100]
+C = 0
+"""
+
+
+@pytest.mark.parametrize("turned", [360.0, 30.0])
+def test_merit_of_a_table_with_a_sphere_in_its_plane(turned):
+    """All around, what is told least is a tilt: by z alone, r·sin of the angle at N poses."""
+    scene, count, r = parse_scene(TABLE, "s"), 12, 80.0
+    angle = np.deg2rad(np.arange(count) * turned / count)
+    poses = {"C": np.rad2deg(angle), "X": r * np.cos(angle), "Y": r * np.sin(angle)}
+    base = replace(vectors(scene, poses, np.zeros((count, 3))), kind="sphere-tcp")
+    np.testing.assert_allclose(base.nominal_mm, [[r, 0.0, 0.0]] * count, atol=1e-9)
+    found = observability(scene, [base])
+    noisy = replace(base, observed_mm=base.observed_mm + 0.1)
+    assert observability(scene, [noisy]) == found
+    if turned == 360.0:
+        assert found["C"] == pytest.approx(math.sqrt(count / 2.0) * r / 250.0, rel=1e-6)
+    else:
+        assert 0.0 < found["C"] < 0.1
+
+
+def test_what_makes_a_point_sure_is_what_acts_there():
+    scene = parse_scene(MACHINE, "s")
+    scene = replace(scene, tolerances=type(scene.tolerances)({}, {}))
+    x = np.array([-100.0, 0.0, 300.0])
+    readings = vectors(scene, {"X": x}, np.zeros((3, 3)))
+    request = Calibrate(fit=("EXX:ramp",), instrument=load_instrument("laser"), next_count=1)
+    step, far, zero = (
+        calibrate_next(scene, readings, replace(request, target=target))
+        for target in ("corner", (("X", 300.0),), (("X", -100.0),))
+    )
+    assert step.before_um == pytest.approx(far.before_um)  # a ramp is largest at its end
+    assert far.before_um > far.after_um > 0.0
+    assert zero.before_um == zero.after_um == 0.0
+    line = next(one for one in candidates(scene) if one.name == far.measurement)
+    both = calibrate(
+        scene,
+        [replace(one, sigma_mm=np.full(len(one), request.instrument.scatter[0] * 1e-3))
+         for one in (readings, line.readings)],
+        replace(request, instrument=NO_INSTRUMENT),
+    )  # fmt: skip
+    assert far.after_um == pytest.approx(2.0 * both.parameters[0].standard_uncertainty, rel=0.01)
+
+
+def calibrate_next(scene, readings, request):
+    (step,) = request.find(scene, [readings]).steps
+    assert step.minutes > 0.0
+    return step
