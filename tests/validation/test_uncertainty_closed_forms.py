@@ -1,13 +1,19 @@
 """Uncertainty of points, means and the worst, and probabilities: known in closed form."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import ncx2, norm, t
 
 from warpspace.analysis.doubt import coverage_factor, find_doubt
+from warpspace.analysis.machines import Machines
+from warpspace.analysis.repair import Repair
 from warpspace.analysis.trust import Trust
+from warpspace.bench.base import run_test
+from warpspace.bench.kinds.circular import Circular
+from warpspace.bench.kinds.straightness import Squareness
 from warpspace.scene.library import parse_scene
 
 HEAD = """[machine]
@@ -39,7 +45,7 @@ def test_one_squareness(limit):
     expected = norm.cdf((10 * limit - 20) / 1.5) - norm.cdf((-10 * limit - 20) / 1.5)
     assert found.probability_worst == pytest.approx(expected, abs=0.005)
     assert found.probability_everywhere == found.probability_worst
-    assert [one.percent_of_max for one in found.shares] == pytest.approx([100.0])
+    assert [one["percent_of_max"] for one in found.shares] == pytest.approx([100.0])
 
 
 def test_one_squareness_of_few_degrees_of_freedom():
@@ -62,7 +68,7 @@ def test_two_translations(between, second):
     for name in ("mean", "rms", "p95", "max"):
         assert found.statistics[f"{name}_um"] == pytest.approx(5.0)
         assert found.statistics[f"u95_{name}_um"] == pytest.approx(2 * u)
-    share = {one.key: one.percent_of_max for one in found.shares}
+    share = {one["key"]: one["percent_of_max"] for one in found.shares}
     assert share["EXX"] == pytest.approx(100 * (0.36 * 4.0 + 0.48 * between) / u**2)
     assert sum(share.values()) == pytest.approx(100.0)
     assert found.significant_percent == (100.0 if 2 * u < 5.0 else 0.0)
@@ -93,5 +99,37 @@ def test_what_is_not_stated_leaves_all_of_it_unknown():
     found = trust(ONE.replace("EC0Y = 20", "EC0Y = 20\nEXX = 1"), limit_um=2.0, verify=True)
     assert found.unknown == ("EXX",)
     assert found.statistics["u95_mean_um"] is None
-    assert (found.probability_everywhere, found.montecarlo, found.shares) == (None, {}, [])
+    assert (found.probability_everywhere, found.montecarlo, found.shares) == (None, {}, ())
     assert "± ?" in str([*found.blocks()])
+
+
+@pytest.mark.parametrize("objective", ["rms", "max"])
+def test_an_adjustment_helps_where_the_error_is_beyond_half_of_it(objective):
+    # by −20 from γ = 20 ± 15 µrad: |γ − 20| < |γ| wherever γ > 10, which is 10 / 15 of u away
+    scene = parse_scene(ONE.replace("1.5", "15"), "s")
+    found = Repair(grid=5, count=1, adjustable=("EC0Y",), objective=objective).run(scene)
+    expected = norm.cdf(10.0 / 15.0)
+    said = found.as_json()
+    assert said["errors"][0]["u95_present"] == pytest.approx(30.0)
+    assert said["errors"][0]["best"]["probability"] == pytest.approx(expected, abs=1e-4)
+    assert said["repairs"][0]["probability"] == pytest.approx(expected, abs=1e-4)
+    assert said["before"]["u95_max_um"] == pytest.approx(2 * 15e-3 * 100.0)
+    unsure = found.scene.errors.with_amplitude("EXX", 1.0, (0.0, 1.0))
+    found = Repair(grid=5, count=1).run(replace(scene, errors=unsure))
+    assert found.repairs[0].sure["probability"] is None
+    assert "± ?" in str([*found.blocks()])
+
+
+def test_a_test_is_as_sure_as_the_squareness_it_shows():
+    found = run_test(parse_scene(ONE, "s"), Squareness(plane="XY"))
+    assert found.as_json()["u95_end_points_urad"] == pytest.approx(2 * 1.5, rel=1e-3)
+    assert "± 3.000" in str([*found.blocks()])
+    found = run_test(parse_scene(ONE, "s"), Circular(plane="XY", radius_mm=50.0))
+    assert found.u95["circular_deviation_um"] == pytest.approx(2 * 1.5e-3 * 50.0, rel=1e-3)
+
+
+def test_machines_drawn_move_together():
+    # all of it is one number t: E = (3 + 2·t, 4 − 1.5·t) µm, so that |E|² = 25 + 6.25·t²
+    scene = parse_scene(TWO.format(between=-2.999999, second=2.25), "s")
+    found = Machines(source="uncertainty", samples=20_000, over="max").run(scene, lambda _: None)
+    assert found.p95_um == pytest.approx(math.sqrt(25 + 6.25 * norm.ppf(0.975) ** 2), rel=0.01)

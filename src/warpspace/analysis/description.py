@@ -177,7 +177,10 @@ def counting(watch: Watch, total: float) -> Watch:
 
 
 def plain(value: Any) -> Any:
-    """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class."""
+    """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class.
+
+    What a mapping `sure` of theirs holds stands beside their other keys.
+    """
     keys: Sequence[str] = getattr(type(value), "keys", ())
     if isinstance(value, Enum):
         return value.value
@@ -187,7 +190,8 @@ def plain(value: Any) -> Any:
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
         names = keys or [entry.name for entry in fields(value)]
-        return {name: plain(getattr(value, name)) for name in names}
+        found = {name: plain(getattr(value, name)) for name in names}
+        return found | dict(found.pop("sure", {}))
     if isinstance(value, (list, tuple, set, frozenset)):
         return [plain(one) for one in value]
     return value

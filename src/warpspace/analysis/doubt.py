@@ -64,6 +64,11 @@ class Doubt:
         values, vectors = np.linalg.eigh(self.covariance / np.outer(width, width))
         return width[:, None] * vectors * _root(values)
 
+    def u95_of(self, key: str) -> float | None:
+        """Give U95 of the amplitude of one error; None where it is not stated."""
+        width = dict(zip(self.keys, np.diagonal(self.covariance).tolist(), strict=True))
+        return self.factor * width[key] ** 0.5 if key in width else None
+
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Draw changes of the amplitudes, [count, K]: normal, or Student's t of its freedom."""
         found = rng.standard_normal((count, len(self.keys))) @ self.root.T
@@ -168,12 +173,15 @@ class FieldDoubt:
         return dict(zip(NAMES, map(self.u95, self.gradients), strict=True))
 
     @cached_property
+    def weights(self) -> Array:
+        norm = self.field.norm_um
+        even = np.full(norm.size, 1.0 / norm.size)
+        return even if self.grid is None else self.grid.weights.reshape(-1)
+
+    @cached_property
     def gradients(self) -> Array:
         """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
-        norm = self.field.norm_um.reshape(-1)
-        weights = np.full(norm.size, 1.0 / norm.size)
-        if self.grid is not None:
-            weights = self.grid.weights.reshape(-1)
+        norm, weights = self.field.norm_um.reshape(-1), self.weights
         order = np.argsort(norm)
         place = np.cumsum(weights[order])
         near, largest = np.zeros((2, norm.size))
@@ -184,6 +192,24 @@ class FieldDoubt:
         shares = np.stack([weights, weights * norm / (rms or 1.0), near, largest])
         ways = shares[:, :, None] * self.direction.reshape(-1, 3)
         return ways.reshape(4, -1) @ self.basis.position.reshape(len(self.doubt.keys), -1).T
+
+    def falls(self, after: "FieldDoubt", name: str) -> float | None:
+        """Give the probability that RMS or max of |E| is smaller with other errors of the points.
+
+        Squares are compared: that of the RMS is linear in what is not sure, however large that is.
+        """
+        if not self.doubt.is_known:
+            return None
+        from scipy.stats import t
+
+        squares, ways = np.zeros(2), list[Array]()
+        for index, one in enumerate((self, after)):
+            square = one.field.norm_um.reshape(-1) ** 2
+            squares[index] = square.max() if name == "max_um" else self.weights @ square
+            ways.append(2.0 * squares[index] ** 0.5 * one.gradients[[*NAMES].index(name)])
+        way, fall = ways[1] - ways[0], float(squares[0] - squares[1])
+        u = float(_root(way @ self.doubt.covariance @ way))
+        return float(t.cdf(fall / u, self.doubt.freedom)) if u else float(fall > 0.0)
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
         """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""

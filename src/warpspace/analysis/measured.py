@@ -1,25 +1,20 @@
-"""Measured machines: their errors against tolerances, what they predict, how far that is certain.
+"""Measured machines: errors against tolerances, what they predict, how far that is certain."""
 
-The uncertainties of different errors are taken as independent; that of one error as one number
-for its whole curve, which the errors of a calibration are: a reading that is too large at one
-position is so at the next one. At one point without a reference this makes no difference.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 
 import numpy as np
 
 from warpspace.analysis.cases import Case, Places, Plan
-from warpspace.analysis.distribution import SIGMAS, Distribution, Draws, loop_keys
+from warpspace.analysis.distribution import SIGMAS, Distribution, Draws
+from warpspace.analysis.doubt import Doubt, find_doubt
 from warpspace.analysis.statistics import Statistics, statistics, volume_statistics
 from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import ErrorField, amplitudes_of, build_basis, evaluate_first_order
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import PARAMETERS, parameter
-from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.errors import ErrorSet, ToleranceSet
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
 from warpspace.units import Array
@@ -123,13 +118,12 @@ SIGMAS_OF = {Distribution.NORMAL: SIGMAS, Distribution.UNIFORM: 3.0**0.5}
 """Half width in standard uncertainties."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class UncertainCase(Case):
     """A measured machine whose errors are off by their standard uncertainties."""
 
-    errors: ErrorSet = dataclass_field(default_factory=ErrorSet)  # as measured
-    # standard uncertainty along the axis of each error
-    uncertainty: ErrorSet = dataclass_field(default_factory=ErrorSet)
+    doubt: Doubt = dataclass_field(kw_only=True)
+    errors: ErrorSet = dataclass_field(kw_only=True)  # as measured
 
     def machines(self, rng: np.random.Generator, count: int) -> Array:
         """Draw how many standard uncertainties each error is off, and one last, [count, K + 1]."""
@@ -140,11 +134,10 @@ class UncertainCase(Case):
 
     def responses(self, places: Places) -> Array:
         """Give responses to a standard uncertainty each, the measured error last, [3, K + 1, N]."""
-        keys, model, view = self.draws.keys, self.model, self.view
+        model, view, doubt = self.model, self.view, self.doubt
         at, point = places.coordinates, places.point_mm
-        basis = build_basis(model, self.uncertainty, keys, at, view, point)
-        factors = amplitudes_of(self.uncertainty, keys)[:, None, None]
-        parts = factors * basis.position.reshape(len(keys), -1, 3)
+        basis = build_basis(model, doubt.errors, doubt.keys, at, view, point)
+        parts = np.tensordot(doubt.root.T, basis.position.reshape(len(doubt.keys), -1, 3), 1)
         measured = evaluate_first_order(model, self.errors, at, view, point)
         both = np.concatenate([parts, measured.error_um.reshape(1, -1, 3)])
         return np.ascontiguousarray(np.moveaxis(both, -1, 0))
@@ -156,18 +149,13 @@ def uncertain_case(
     loop: Loop = Loop.TOOL,
     distribution: Distribution = Distribution.NORMAL,
 ) -> UncertainCase:
-    """Give what a measured machine may be: its errors, each off by its standard uncertainty."""
-    own = ErrorSet(scene_uncertainty(scene, loop))
-    keys = tuple(own)
-    size = SIGMAS_OF[distribution] * np.abs(amplitudes_of(own, keys))
-    drawn = Draws(keys, amplitudes_of(scene.errors, keys), size, distribution)
-    view = scene.view(loop)
-    return UncertainCase(scene.model, drawn, scene.workspace, view, plan, scene.errors, own)
-
-
-def scene_uncertainty(scene: Scene, loop: Loop) -> Mapping[str, ErrorFunction]:
-    if not scene.uncertainty:
+    """Give what a measured machine may be: its errors, off as their uncertainties say."""
+    if (doubt := find_doubt(scene, loop)) is None:
         problem = "has no uncertainties; expected an [uncertainty] section, for instance EXX = 0.4"
         raise SceneError(scene.name, [problem])
-    keys = loop_keys(scene.model, loop, tuple(scene.uncertainty))
-    return {key: scene.uncertainty[key] for key in keys}
+    size = SIGMAS_OF[distribution] * np.diagonal(doubt.covariance) ** 0.5
+    drawn = Draws(doubt.keys, amplitudes_of(scene.errors, doubt.keys), size, distribution)
+    view = scene.view(loop)
+    return UncertainCase(
+        scene.model, drawn, scene.workspace, view, plan, doubt=doubt, errors=scene.errors
+    )

@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import field as attribute
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from warpspace.analysis.adjusting import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
+from warpspace.analysis.doubt import NAMES, FieldDoubt, field_doubt, plus_minus
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Statistics, Summary, volume_statistics
 from warpspace.exceptions import OptionError
@@ -23,13 +25,22 @@ from warpspace.units import Array, spell, spell_short
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
 MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
 FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
+Numbers: TypeAlias = Mapping[str, float | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Best(Summary):
+class Sure(Summary):
+    """The whole volume; where the scene says how sure its errors are, U95 of its numbers too."""
+
+    keys: ClassVar[tuple[str, ...]] = (*FOUR, "sure")
+    sure: Numbers = attribute(default_factory=dict[str, float | None])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Best(Sure):
     """The whole volume with one error at its best value."""
 
-    keys: ClassVar[tuple[str, ...]] = ("value", *FOUR)
+    keys: ClassVar[tuple[str, ...]] = ("value", *FOUR, "sure")
     value: float  # µm or µrad; within its limit
 
 
@@ -37,11 +48,12 @@ class Best(Summary):
 class Effect:
     """One error alone: left out, or at its best value, with all others as they are."""
 
-    keys: ClassVar[tuple[str, ...]] = ("key", "unit", "present", "left_out", "best")
+    keys: ClassVar[tuple[str, ...]] = ("key", "unit", "present", "left_out", "best", "sure")
     key: str
     present: float  # µm or µrad
     left_out: Summary
     best: Best
+    sure: Numbers = attribute(default_factory=dict[str, float | None])
 
     @property
     def parameter(self) -> Parameter:
@@ -53,10 +65,10 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AdjustedSet(Summary):
+class AdjustedSet(Sure):
     """The best set of so many adjustments, and the whole volume with it."""
 
-    keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact")
+    keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact", "sure")
     adjust: Mapping[str, float]  # µm or µrad; new values by key
     # whether all sets of this size were compared; else the set was built up and improved by
     # swapping its members
@@ -139,7 +151,10 @@ class Repair(Analysis):
             for one, numbers in zip(found.repairs, exact, strict=True)
         ]
         left_out = second_order(scene, self.seen_loop)
-        return replace(found, repairs=tuple(sets), second_order=left_out)
+        found = replace(found, repairs=tuple(sets), second_order=left_out)
+        field = basis.evaluate(values)
+        doubt = field_doubt(scene, field, nodes.coordinates, view, nodes.point_mm)
+        return found if doubt is None else _with_doubt(found, replace(doubt, grid=nodes), basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
@@ -158,7 +173,7 @@ class RepairResult(Result):
     no_change = "there is nothing to adjust in this loop"
     asked: Repair
     scene: Scene
-    before: Summary
+    before: Sure
     # every error that is not zero and acts in the loop; the one whose best value helps the
     # objective most comes first
     errors: tuple[Effect, ...]
@@ -184,8 +199,12 @@ class RepairResult(Result):
     def blocks(self) -> Iterator[Block]:
         smallest = f"smallest {self._objective_words}"
         yield " · ".join((self.scene.title, *self._where, smallest))
-        mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
-        yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
+        sure = {name: plus_minus(u95) for name, u95 in self.before.sure.items()}
+        each = (
+            " ".join((words, f"{getattr(self.before, name):.2f}", sure.get(f"u95_{name}", "")))
+            for name, words in NAMES.items()
+        )
+        yield f"  before: {', '.join(map(str.rstrip, each))} µm"
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
@@ -205,6 +224,10 @@ class RepairResult(Result):
             empty="  all errors that act in this loop are zero",
         )
         yield from self._set_blocks()
+        for one in self.errors:
+            if (share := one.best.sure.get("probability")) is not None:
+                now = f"{one.key} {one.present:.4g} {plus_minus(one.sure['u95_present'], '.3g')}"
+                yield f"  {now} {one.unit}: best value {one.best.value:.1f} helps with {share:.1%}"
         yield self.bars()
 
     @property
@@ -338,12 +361,36 @@ def find_repairs(
     return RepairResult(
         asked=asked,
         scene=scene,
-        before=Summary(**_four(volume.statistics(amplitudes))),
+        before=Sure(**_four(volume.statistics(amplitudes))),
         errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
         repairs=tuple(sets),
         adjustable={key: asked.limit_of(key) for key in keys},
         present={key: float(amplitudes[i]) for key, i in zip(keys, candidates, strict=True)},
     )
+
+
+def _with_doubt(found: RepairResult, before: FieldDoubt, basis: ErrorBasis) -> RepairResult:
+    """Say U95 of all numbers, and how probable it is that an adjustment helps."""
+
+    def sure(adjust: Mapping[str, float]) -> Numbers:
+        values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
+        after = replace(before, field=basis.evaluate(values))
+        u95 = {f"u95_{name}": value for name, value in after.statistics().items()}
+        return u95 | (
+            {"probability": before.falls(after, f"{found.objective}_um")} if adjust else {}
+        )
+
+    errors = [
+        replace(
+            one,
+            best=replace(one.best, sure=sure({one.key: one.best.value})),
+            sure={"u95_present": before.doubt.u95_of(one.key)},
+        )
+        for one in found.errors
+    ]
+    sets = [replace(one, sure=sure(one.adjust)) for one in found.repairs]
+    whole = replace(found.before, sure=sure({}))
+    return replace(found, before=whole, errors=tuple(errors), repairs=tuple(sets))
 
 
 def _candidates(volume: Volume, asked: Repair) -> tuple[int, ...]:
@@ -393,7 +440,7 @@ def _effect(search: Search, index: int) -> Effect:
     )
 
 
-def _four(found: Statistics) -> dict[str, float]:
+def _four(found: Statistics) -> dict[str, Any]:
     return {name: getattr(found, name) for name in FOUR}
 
 

@@ -1,6 +1,6 @@
 """How sure the map of a machine is, whether it keeps its limit, and what makes it unsure."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from warpspace.scene.model import Scene, choose_view, evaluate_grid
 from warpspace.units import Array
 
 MOST_SHARES = 10  # errors that the table of the largest shares has
+UNSTATED = "the scene does not state how sure its errors are; expected [uncertainty]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,13 +59,16 @@ class Trust(Analysis):
             limit_um=limit,
             statistics=statistics if found is None else with_u95(statistics, found.statistics()),
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
-            found=found,
+            k=found and found.doubt.factor,
+            unknown=found.doubt.unknown if found else [*scene.errors],
+            remarks=tuple(found.doubt.remarks()) if found else (UNSTATED,),
             title=f"{scene.title} · {self.loop} loop",
         )
         if found is None or not found.doubt.is_known:
             return result
         above = found.field.norm_um > found.doubt.factor * found.u_norm_um
-        result = replace(result, significant_percent=100.0 * float(grid.weights[above].sum()))
+        significant = 100.0 * float(grid.weights[above].sum())
+        result = replace(result, significant_percent=significant, shares=_shares(found))
         if limit is None and not self.verify:
             return result
         worst, drawn = int(np.argmax(found.field.norm_um)), list[Array]()
@@ -94,15 +98,15 @@ def _spread(drawn: Array) -> Mapping[str, float]:
     return {"mean_um": float(drawn.mean()), "u95_um": float(high - low) / 2.0}
 
 
-@dataclass(frozen=True, slots=True)
-class Share:
-    """What one error adds to the variances of largest and mean |E|, correlations included."""
-
-    key: str
-    unit: str
-    u: float  # standard uncertainty of its amplitude
-    percent_of_max: float
-    percent_of_mean: float
+def _shares(found: FieldDoubt) -> list[Mapping[str, Any]]:
+    """Say what errors add to the variances of largest and mean |E|, the largest share first."""
+    doubt, (mean, _, _, largest) = found.doubt, found.gradients
+    parts = np.array([way * (doubt.covariance @ way) for way in (largest, mean)])
+    percent = 100.0 * parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
+    names = "u", "percent_of_max", "percent_of_mean"
+    columns = np.vstack([np.diagonal(doubt.covariance) ** 0.5, percent]).T.tolist()
+    rows = sorted(zip(doubt.keys, columns, strict=True), key=lambda row: -abs(row[1][1]))
+    return [{"key": key, **dict(zip(names, three, strict=True))} for key, three in rows]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,30 +124,11 @@ class TrustResult(Result):
     significant_percent: float | None = None  # of the volume, where |E| is above its U95
     never_measured_percent: float  # of the volume, beyond the positions of the data
     montecarlo: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    found: FieldDoubt | None
+    k: float | None  # U95 / u
+    unknown: Sequence[str]  # errors of which nobody says how sure they are
+    shares: Sequence[Mapping[str, Any]] = ()  # in the variances of largest and mean |E|
+    remarks: tuple[str, ...]
     title: str
-
-    @property
-    def k(self) -> float | None:
-        return self.found and self.found.doubt.factor
-
-    @property
-    def unknown(self) -> tuple[str, ...] | None:
-        """Errors of which nobody says how sure they are; None for all of them."""
-        return self.found and self.found.doubt.unknown
-
-    @property
-    def shares(self) -> list[Share]:
-        """Say where the variances come from, the largest first; empty where that is unknown."""
-        if self.found is None or self.unknown:
-            return []
-        doubt, (mean, _, _, largest) = self.found.doubt, self.found.gradients
-        parts = np.array([way * (doubt.covariance @ way) for way in (largest, mean)])
-        sums = parts.sum(axis=1, keepdims=True)
-        percent = 100.0 * parts / np.where(sums > 0.0, sums, 1.0)
-        rows = zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, *percent, strict=True)
-        found = [Share(key, parameter(key).unit, *map(float, three)) for key, *three in rows]
-        return sorted(found, key=lambda one: -abs(one.percent_of_max))
 
     def blocks(self) -> Iterator[Block]:
         yield self.title + (f" · U95 with k = {self.k:.3g}" if self.k else "")
@@ -162,10 +147,7 @@ class TrustResult(Result):
             more += [100.0 * (more[1] / u95 - 1.0) if u95 else 0.0] if more else []
             rows.append((words, self.statistics[name], plus_minus(u95), u95, *more))
         yield Table(columns, rows)
-        if self.found is None:
-            yield "  the scene does not state how sure its errors are; expected [uncertainty]"
-        else:
-            yield from self.found.doubt.remarks()
+        yield from (f"  {words}" for words in self.remarks)
         if self.probability_worst is not None and self.probability_everywhere is not None:
             yield (
                 f"  |E| ≤ {self.limit_um:g} µm with {100.0 * self.probability_worst:.1f} % at the"
@@ -176,8 +158,9 @@ class TrustResult(Result):
             yield f"  |E| is above its own U95 in {self.significant_percent:.1f} % of the volume"
         if self.never_measured_percent:
             yield f"  {self.never_measured_percent:.1f} % of the volume was never measured"
-        if shares := self.shares:
-            columns = (Column("error", leads=True), Column("unit"), Column("u", ".3g"))
-            columns += number_columns(("of max", "of mean"), ".1f", "%")
-            rows = [tuple(asdict(one).values()) for one in shares[:MOST_SHARES]]
-            yield Table(columns, rows, title="Where it comes from, in shares of the variance:")
+        numbers = Column("u", ".3g"), *number_columns(("of max", "of mean"), ".1f", "%")
+        each = (one.values() for one in self.shares[:MOST_SHARES])
+        rows = [(key, parameter(key).unit, *three) for key, *three in each]
+        if rows:
+            title = "Where it comes from, in shares of the variance:"
+            yield Table((Column("error", leads=True), Column("unit"), *numbers), rows, title)

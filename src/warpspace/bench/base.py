@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, ClassVar
@@ -12,11 +13,12 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.distribution import round_width
+from warpspace.analysis.doubt import find_doubt, plus_minus, with_u95
 from warpspace.analysis.options import File, Option, Place, option, options_of
 from warpspace.bench.data import DataColumn, read_table, unit_notes
 from warpspace.bench.data import Table as DataTable
-from warpspace.bench.plan import Outcome, Plan, fit_setup, simulate
-from warpspace.kinematics.model import Model, complete_coordinates
+from warpspace.bench.plan import Outcome, Plan, fit_setup, respond, simulate
+from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.plugins import Registry, load_plugins
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -37,6 +39,10 @@ class Run:
     @property
     def is_measured(self) -> bool:
         return self.who == "measured"
+
+    @property
+    def values(self) -> dict[str, float]:
+        return {one.key: one.value for one in self.outcome.quantities}
 
     def named(self, words: str) -> str:
         """Name a curve; the model has the plain words."""
@@ -176,6 +182,21 @@ class BenchResult(Result):
         difference = self.measured.readings - self.model.readings
         return float(np.sqrt(np.mean(fit_setup(self.model.plan, difference)[1] ** 2)))
 
+    @cached_property
+    def u95(self) -> dict[str, float | None]:
+        """Give U95 of what the model comes to; empty where a scene does not say how sure it is."""
+        run, doubt = self.model, find_doubt(self.scene, Loop.RELATIVE)
+        if doubt is None:
+            return {}
+        gains = respond(replace(self.scene, errors=doubt.errors), run.plan, doubt.keys).matrix
+
+        def ask(change: Array) -> Array:
+            found = self.test.evaluate(run.plan, run.readings + gains @ change)
+            return np.array([one.value for one in found.quantities])
+
+        keys = (one.key for one in run.outcome.quantities)
+        return dict(zip(keys, doubt.through(ask), strict=True))
+
     @property
     def charts(self) -> tuple[Lines, ...]:
         return self.test.charts(self.runs)
@@ -191,11 +212,11 @@ class BenchResult(Result):
             "scene": self.scene.name,
             "of": shown.who,
             "place": shown.plan.place,
-            **{quantity.key: quantity.value for quantity in shown.outcome.quantities},
+            **with_u95(shown.values, {} if shown.is_measured else self.u95),
             **shown.outcome.details,
         }
         if self.measured is not None:
-            found["model"] = {q.key: q.value for q in self.model.outcome.quantities}
+            found["model"] = with_u95(self.model.values, self.u95)
             found["rms_difference"] = self.rms_difference
         return found | {"notes": list(self.notes)}
 
@@ -209,6 +230,9 @@ class BenchResult(Result):
                 row[1 + index] = 0.0 if abs(one.value) < PRINTED else one.value
         numbers = (Column(run.who, ".3f") for run in self.runs)
         columns = (Column("", leads=True, wraps=True), *numbers, Column("unit"))
+        if self.u95:
+            columns = (*columns, Column("U95 of the model"))
+            rows = {key: [*row, plus_minus(self.u95[key], ".3f")] for key, row in rows.items()}
         yield Table(columns, list(rows.values()))
         yield from self.charts
 
