@@ -13,22 +13,29 @@ import shutil
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import numpy as np
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from warpspace.app.server.viewer import Viewer
 from warpspace.cli.services import build_services
+from warpspace.machine.errors import Covariance
 from warpspace.scene.library import load_scene
+from warpspace.scene.model import Scene
 
 SCENES = (
     *("dvf5000_first", "dvf5000_second", "teach_wobbling_table", "fork_head_bc"),
     *("review_dvf5000", "part_on_dvf5000"),
 )
+UNCERTAIN = {
+    "EAX": 1.0, "EAY": 3.0, "ECY": 2.0, "EAZ": 3.0, "EC0Y": 4.0, "EA0Z": 5.0, "EB0Z": 5.0,
+}  # fmt: skip
+"""Standard uncertainties, µrad, of the machine that is drawn with its uncertainty."""
 SIZE = (1440, 900)
 """Width and height of the page, CSS pixels."""
 CHROMIUM = [
@@ -73,6 +80,24 @@ class Visit:
     scene: str = "dvf5000_first"
     size: tuple[int, int] = SIZE
     part: str = ""
+
+
+def uncertain() -> Scene:
+    """Give a measured machine that states how sure its errors are, and where it was measured."""
+    variances = np.diag(np.square(list(UNCERTAIN.values())))
+    rows = tuple(map(tuple, variances.tolist()))
+    covariance = Covariance(tuple(UNCERTAIN), rows, reach={"Z": (-400.0, -80.0)})
+    title = "First machine, with its uncertainty"
+    return replace(load_scene("dvf5000_first"), title=title, covariance=covariance)
+
+
+def unsure(page: Page) -> None:
+    """Colour only what is significant, with ellipsoids at the corners."""
+    page.locator("[data-key=menu-surface] > summary").click()
+    for words in ("Significant only", "Uncertainty at the corners"):
+        page.locator("label.ws-switch", has_text=words).click()
+        page.wait_for_timeout(PAUSE_MS)
+    page.keyboard.press("Escape")
 
 
 def as_opened(page: Page) -> None:
@@ -226,6 +251,7 @@ VISITS = {
     "review_distance": Visit(measured),
     "part_box": Visit(clamped, "part_on_dvf5000"),
     "part_program": Visit(programmed, "part_on_dvf5000"),
+    "uncertainty": Visit(unsure, "uncertain"),
     "errors_row": Visit(opened_row, part="#ws-left"),
 }
 """File name to visit."""
@@ -268,7 +294,7 @@ def main() -> None:
     if path is None:
         sys.exit("no Chromium found (Debian package chromium)")
     options.to.mkdir(parents=True, exist_ok=True)
-    scenes = {name: load_scene(name) for name in SCENES}
+    scenes = {name: load_scene(name) for name in SCENES} | {"uncertain": uncertain()}
     shelf = {scene.title: scene for scene in scenes.values()}
     with ExitStack() as open_apps, sync_playwright() as playwright:
         viewers: dict[str, Viewer] = {}

@@ -13,8 +13,12 @@ from warpspace.units import MICROMETRE, MICRORADIAN, Array
 
 SEQUENTIAL = "viridis"
 DIVERGING = "crameri:vik"
-SYMBOLS = {"position": ("E", MICROMETRE), "orientation": ("φ", MICRORADIAN)}
-"""Symbol and unit of what can be coloured."""
+SYMBOLS = {
+    "position": ("E", MICROMETRE),
+    "orientation": ("φ", MICRORADIAN),
+    "uncertainty": ("E", MICROMETRE),
+}
+"""Symbol and unit of what can be coloured; uncertainties are U95 of position errors."""
 COMPONENTS = ("norm", "x", "y", "z")
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _INTERVALS = 10

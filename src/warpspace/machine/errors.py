@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
@@ -101,6 +102,13 @@ class Covariance:
     @property
     def matrix(self) -> Array:
         return np.array(self.rows, dtype=float).reshape(len(self.keys), len(self.keys))
+
+    def outside(self, at: Mapping[str, Array], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+        """Tell where axes stand outside what was reached, of a shape."""
+        found = np.zeros(shape, dtype=bool)
+        for axis, (low, high) in self.reach.items():
+            found |= (at[axis] < low) | (at[axis] > high)
+        return found
 
 
 TOLERANCE_CLASSES = ("translation", "rotation", "squareness")

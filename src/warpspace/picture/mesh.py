@@ -31,6 +31,7 @@ class MapMesh:
     vertices_mm: Array  # [M, 3]
     triangles: NDArray[np.intp]  # [T, 3] or [S, 2]
     values: Array  # [M]; what is coloured, in the unit of the picture's scale
+    faded: NDArray[np.bool_] | None  # [M]; where colours fade; None for nowhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,7 @@ class Part:
     drawn_of: Topology
     lifts: tuple[float, ...]
     ways: Array  # direction of each axis of the grid, +1 or −1: an axis may run against its name
+    faded: NDArray[np.bool_] | None = None
 
     def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
         """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
@@ -62,9 +64,11 @@ def map_parts(picture: Picture) -> list[Part]:
 def _part(picture: Picture, lifts: tuple[float, ...]) -> Part:
     if is_thin(picture.shape):
         drawn_mm = thick_nodes(picture, picture.drawn_mm)
-        values = spread(picture.values)
-        return Part(drawn_mm, values, topology(values.shape), lifts, picture.grid.ways)
-    return Part(picture.drawn_mm, picture.values, picture.topology, lifts, picture.grid.ways)
+        values, faded = spread(picture.values), picture.faded
+        drawn = drawn_mm, values, topology(values.shape), lifts, picture.grid.ways
+        return Part(*drawn, None if faded is None else spread(faded.astype(float)) > 0.0)
+    drawn = picture.drawn_mm, picture.values, picture.topology, lifts
+    return Part(*drawn, picture.grid.ways, picture.faded)
 
 
 def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
@@ -108,11 +112,13 @@ def line_mesh(picture: Picture, *, grid: bool = True) -> MapMesh:
 def _collect(found: list[tuple[Part, Index, Index]]) -> MapMesh:
     vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in found]
     values = [part.values.reshape(-1).take(used) for part, used, _ in found]
+    faded = [part.faded.reshape(-1)[at] for part, at, _ in found if part.faded is not None]
+    where = np.concatenate(faded) if faded else None  # all parts have it, or none
     if len(found) == 1:
-        return MapMesh(vertices[0], found[0][2], values[0])
+        return MapMesh(vertices[0], found[0][2], values[0], where)
     first = np.cumsum([0, *map(len, vertices)])
     cells = [cells + at for (_, _, cells), at in zip(found, first, strict=False)]
-    return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values))
+    return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values), where)
 
 
 def grid_pieces(picture: Picture) -> Pieces:

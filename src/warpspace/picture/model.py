@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.concepts import Concept, expected_um, zero_field
+from warpspace.analysis.doubt import FieldDoubt, field_doubt
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, View, placed_words, second_order_words
@@ -89,6 +90,13 @@ def _normal(face: surfaces.Index, shape: surfaces.Shape) -> Array:
     return normal * np.sign(np.cross(down - corner, right - corner) @ normal)
 
 
+QUANTITIES = {
+    "position": "position error",
+    "orientation": "tool-orientation error",
+    "uncertainty": "uncertainty of the position error",
+}
+"""What can be coloured."""
+NOT_STATED = "the scene does not state how sure its errors are; expected [uncertainty]"
 DIFFERENCE_LENGTH = "|E_B − E_A|"
 """What the statistics of a change are of: the length of the change of the error vector."""
 SAME_PLACE_MM = 1e-6  # nodes nearer to each other than this are the same
@@ -103,8 +111,11 @@ class Picture:
     field: ErrorField  # errors of all nodes of the grid
     exaggeration: float  # display factor of displacements; 1 is true scale
     component: str = "norm"  # what is coloured: "norm", "x", "y" or "z" ..
-    # ... of the "position" error, µm, or of the "orientation" error of the tool axis, µrad.
+    # ... of the "position" error, µm, of the "orientation" error of the tool axis, µrad, or of the
+    # "uncertainty" of the position error, its U95, µm.
     quantity: str = "position"
+    uncertainty: FieldDoubt | None = None  # of its errors; None where nothing is stated
+    significant: bool = False  # whether colours fade where an error is not above its U95
     # the colours where they are given, for instance shared with other pictures; None for round ends
     # that hold all values
     colours: ColourScale | None = None
@@ -147,7 +158,27 @@ class Picture:
     @cached_property
     def values(self) -> Array:
         """What is coloured at each node, [nx, ny, nz], in the unit of the scale."""
+        if self.quantity == "uncertainty" and self.u95_um is not None:
+            return self.u95_um
         return coloured_values(self.field, self.component, self.quantity)
+
+    @cached_property
+    def u95_um(self) -> Array | None:
+        """U95 of the component of position errors, [nx, ny, nz]; None where it is not known."""
+        found = self.uncertainty
+        if found is None or not found.doubt.is_known:
+            return None
+        of = found.u_norm_um
+        if self.component != "norm":
+            of = component_values(found.u_um, self.component)
+        return found.doubt.factor * of
+
+    @cached_property
+    def faded(self) -> NDArray[np.bool_] | None:
+        """Where the position error is not above its U95, if colours fade there, [nx, ny, nz]."""
+        if not self.significant or self.u95_um is None or self.tilts:
+            return None
+        return np.abs(coloured_values(self.field, self.component)) <= self.u95_um
 
     @cached_property
     def scale(self) -> ColourScale:
@@ -186,6 +217,9 @@ def choose_scale(
 ) -> ColourScale:
     symbol, unit = SYMBOLS[quantity]
     largest = max((float(np.abs(part).max(initial=0.0)) for part in values), default=0.0)
+    if quantity == "uncertainty":
+        label = "U95 |E|" if component == "norm" else f"U95 E_{component}"
+        return replace(build_scale(largest, "norm", unit=unit, end=end), label=label)
     return build_scale(largest, component, quantity=symbol, unit=unit, end=end, change=change)
 
 
@@ -209,7 +243,10 @@ def subtract_pictures(one: P, other: Picture) -> P:
     if not same_nodes(one.grid.nominal_mm, other.grid.nominal_mm):
         raise OptionError("the working volumes are not the same: there is no difference")
     field = subtract_fields(one.field, other.field)
-    return replace(one, field=field, colours=None, is_difference=True)
+    quantity = "position" if one.quantity == "uncertainty" else one.quantity
+    return replace(
+        one, field=field, quantity=quantity, uncertainty=None, colours=None, is_difference=True
+    )
 
 
 def subtract_traces(
@@ -326,7 +363,7 @@ class ScenePicture(Picture):
             "nodes": list(self.grid.shape),
             "exaggeration": self.exaggeration,
             "component": self.component,
-            "coloured": "tool-orientation error" if self.tilts else "position error",
+            "coloured": QUANTITIES[self.quantity],
             "conditions": list(self.conditions),
         }
 
@@ -395,7 +432,12 @@ def evaluate_picture(
     nodes = build_grid(scene.model, scene.workspace, grid)
     field = evaluate(scene, grid=grid, loop=loop)
     coloured_values(field, component, quantity)  # refuses a component that does not exist
-    largest = float(field.norm_um.max())
+    largest, uncertainty = float(field.norm_um.max()), None
+    if quantity == "uncertainty":
+        uncertainty = field_doubt(scene, field, nodes.coordinates, view, nodes.point_mm)
+        if uncertainty is None or not uncertainty.doubt.is_known:
+            remarks = () if uncertainty is None else uncertainty.doubt.remarks()
+            raise OptionError("; ".join(remarks) or NOT_STATED)
     return ScenePicture(
         view=view,
         grid=nodes,
@@ -405,6 +447,7 @@ def evaluate_picture(
         ),
         component=component,
         quantity=quantity,
+        uncertainty=uncertainty,
         colours=colours,
         conditions=(
             *direction_words(scene),

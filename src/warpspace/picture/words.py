@@ -3,8 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
+from warpspace.analysis.distribution import loop_keys
+from warpspace.analysis.doubt import FieldDoubt
 from warpspace.kinematics.model import Convention, Loop, Model
-from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, is_rotary
+from warpspace.machine.axes import (
+    DIRECTION_WORDS,
+    TravelDirection,
+    is_linear,
+    is_rotary,
+    parameter,
+)
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
@@ -64,6 +72,39 @@ def spell_at(axes: Mapping[str, SupportsFloat]) -> str:
 
 def _plain(value: float) -> str:
     return f"{round(value, _DIGITS) + 0.0:.{_DIGITS}f}".rstrip("0").rstrip(".")
+
+
+# How sure a number is.
+
+
+def plus_minus(u95: float | None) -> str:
+    """Say U95 behind a number, `` ± 1.2``; None is not known: `` ± ?``."""
+    if u95 is None:
+        return " ± ?"
+    return f" ± {u95:.1f}" if u95 >= 0.95 or u95 == 0.0 else f" ± {u95:.2g}"
+
+
+def length_words(found: FieldDoubt | None, point: int = 0) -> str:
+    """Say U95 of |E| at a point of a field, by its flat number; empty where none is stated."""
+    if found is None:
+        return ""
+    u95 = found.doubt.factor * float(found.u_norm_um.flat[point])
+    return plus_minus(u95 if found.doubt.is_known else None)
+
+
+def beyond_words(scene: Scene, loop: Loop) -> str:
+    """Say where axes of a loop stood at no time while a scene was measured: ``Z below −300``."""
+    reach = scene.covariance.reach if scene.covariance else {}
+    axes = {parameter(key).axis for key in loop_keys(scene.model, loop, scene.parameter_keys)}
+    said: list[str] = []
+    for axis, (low, high) in reach.items():
+        first, last = scene.workspace.ranges[axis]
+        if axis in axes and first == last and not low <= first <= high:
+            said.append(f"{axis} at {spell_coordinate(first)}")
+        elif axis in axes:
+            said += [f"{axis} below {spell_coordinate(low)}"] if first < low else []
+            said += [f"{axis} above {spell_coordinate(high)}"] if last > high else []
+    return f"never measured: {', '.join(said)}" if said else ""
 
 
 TIMES = "\N{MULTIPLICATION SIGN}"

@@ -59,8 +59,8 @@ def marks(picture: LivePicture) -> list[Mark]:
 def marked(picture: LivePicture) -> dict[str, float]:
     """Name what is marked on the colours: statistics of what is coloured, and the limit."""
     field, values = picture.field, picture.values
-    if picture.component != "norm":
-        # the length of the error says nothing of a signed component: its own ends do
+    if picture.component != "norm" or picture.quantity == "uncertainty":
+        # the length of the error says nothing of another number: its own ends do
         mean = volume_mean(values, picture.grid)
         return {"min": float(values.min()), "mean": mean, "max": float(values.max())}
     if picture.tilts:  # summarised as the length of the position error is
@@ -90,7 +90,8 @@ def legend_html(picture: LivePicture) -> Markup:
     return fill(
         '<b>{label} [{unit}]</b><div class="ws-scale" role="img" aria-label="{words}">'
         '<i class="ws-colours" style="background:linear-gradient(to top,{colours})"></i>'
-        '<svg viewBox="0 0 10 100" preserveAspectRatio="none">{leads}</svg>{names}</div>',
+        '<svg viewBox="0 0 10 100" preserveAspectRatio="none">{leads}</svg>{names}</div>{faded}',
+        faded=join(tag("p", lowered(said), class_="ws-tiny") for said in faded_words(picture)),
         label=lowered(scale.label), unit=scale.unit, leads=leads, names=names,
         words=f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
         + ", ".join(mark.words for mark in named if mark.name),
@@ -134,10 +135,16 @@ def part_html(picture: LivePicture) -> Markup:
 
 
 def numbers_words(picture: LivePicture) -> str:
-    """Say mean and max: ``mean 30.9 µm · max 51.7 µm``."""
+    """Say mean and max: ``mean 30.9 µm · max 51.7 µm``; ± U95 where the scene states it."""
     norm, change = picture.field.norm_um, "change: " if picture.is_difference else ""
-    mean, most = volume_mean(norm, picture.grid), float(norm.max())
-    return f"{change}mean {number(mean)} µm · max {number(most)} µm"
+    numbers = {"mean": volume_mean(norm, picture.grid), "max": float(norm.max())}
+    found, sure, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
+    if found is not None:
+        u95 = found.statistics()
+        sure = {name: words.plus_minus(u95[f"{name}_um"]) for name in numbers}
+        factor = f" (k = {found.doubt.factor:.3g})"
+    said = (f"{name} {number(value)}{sure[name]} µm" for name, value in numbers.items())
+    return f"{change}{' · '.join(said)}{factor}"
 
 
 def place_words(picture: LivePicture) -> str:
@@ -177,7 +184,8 @@ def subject_words(picture: LivePicture) -> list[str]:
         found.append(f"{edited} error{'s' if edited > 1 else ''} changed")
     if excluded := len(_left_out(state)):
         found.append(f"{excluded} excluded")
-    return [*found, *words.direction_words(state.scene)]
+    beyond = words.beyond_words(state.active_scene(), state.loop)
+    return [*found, *words.direction_words(state.scene), *filter(None, [beyond])]
 
 
 # --- Conditions: what a reader must know who takes a picture for all of its scene -----------------
@@ -211,13 +219,23 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
 
     def of(state: AppState) -> tuple[str, ...]:
         view = (*words.direction_words(state.scene), *placed_words(state.view()))
-        return (*view, *state_conditions(state), *filter(None, [table_words(state)]))
+        more = table_words(state), words.beyond_words(state.active_scene(), state.loop)
+        return (*view, *state_conditions(state), *filter(None, more))
 
     if picture.is_difference and picture.compared is not None:
         found = conditions_of_both(*map(of, picture.compared.sides))
     else:
         found = of(picture.drawn_state)
-    return (*found, *order_conditions(picture), *range_conditions(picture))
+    return (*found, *order_conditions(picture), *range_conditions(picture), *faded_words(picture))
+
+
+def faded_words(picture: LivePicture) -> tuple[str, ...]:
+    """Say where colours fade, and how much of the volume that is."""
+    if picture.faded is None:
+        return ()
+    percent = 100.0 * float(picture.grid.weights[picture.faded].sum())
+    of = "|E|" if picture.component == "norm" else f"|E_{picture.component}|"
+    return (f"grey: {of} ≤ U95, {number(percent, 0)} % of the volume",)
 
 
 def range_conditions(picture: LivePicture) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from warpspace.app.drawing.shapes import (
     dashes,
     dots,
     lines,
+    mesh,
     polylines,
 )
 from warpspace.app.evaluation.budget import answer, measured
@@ -23,9 +24,9 @@ from warpspace.app.evaluation.in_box import AT_LINE
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
 from warpspace.formats.source import MAX_LINES
-from warpspace.geometry.surfaces import corners, round_down
+from warpspace.geometry.surfaces import Index, corners, round_down, triangulate
 from warpspace.picture.mesh import outline_pieces
-from warpspace.units import Array
+from warpspace.units import MM_PER_UM, Array
 
 # --- Sizes, as parts of the longest edge of the box -----------------------------------------------
 
@@ -36,6 +37,8 @@ ASKED, AXIS_HALF, DASH = 0.011, 0.32, 0.02
 """Marker of the point that was asked about, half the axis that turns it, dash of its lever."""
 RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
 MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # points beyond the travel that are marked, and their size
+UNMEASURED, SEEN_THROUGH = 0.008, 0.5  # size of dots, and opacity of ellipsoids
+GREY = (70, 78, 90)
 GIZMO = "/part/gizmo"  # what moves the part
 
 ACCENT = (194, 24, 91)  # colour of everything that answers "why?"; it is in no colour map
@@ -48,7 +51,8 @@ STROKES, SLANT = 12, 0.3  # lines of a head, and how far they slant, as a part o
 
 def around(picture: LivePicture) -> Shapes:
     """Draw all that follows the picture beside the box and the machine."""
-    draws = (_axes, _traces, _path, _part, _program, _other_side, _asked, _measured, _marks)
+    draws = (_axes, _traces, _path, _part, _program, _other_side, _asked, _measured, _marks,
+             _uncertainty)  # fmt: skip
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
 
 
@@ -187,6 +191,51 @@ def _marks(picture: LivePicture) -> Shapes:
         at = picture.drawn_mm.reshape(-1, 3)[worst]
         shapes["/marks/ball"] = ball(at, BALL * size, rgb)
     return shapes
+
+
+def _uncertainty(picture: LivePicture) -> Shapes:
+    """Draw U95 at corners and the clicked point as ellipsoids, and dots on what was not measured.
+
+    The extent of an ellipsoid along any direction is U95 of the error along it, exaggerated.
+    """
+    found, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
+    shapes: dict[str, Shape | None] = {}
+    if found is not None and scene.covariance is not None and look.unmeasured:
+        surface = picture.topology.surface.nodes
+        outside = scene.covariance.outside(picture.grid.coordinates, picture.shape)
+        seen = surface[outside.reshape(-1)[surface]]
+        at = picture.drawn_mm.reshape(-1, 3)[seen]
+        shapes["/uncertainty/unmeasured"] = dots(at, UNMEASURED * picture.size_mm, GREY)
+    if found is None or not found.doubt.is_known or not look.ellipsoids:
+        return shapes
+    chosen, picked = corners(picture.shape), picture.state.picked
+    at = [*picture.drawn_mm.reshape(-1, 3)[chosen]]
+    covariances = [*found.covariance_um2.reshape(-1, 3, 3)[chosen]]
+    if picked is not None:
+        asked = answer(picture.drawn_state, picked, picture.exaggeration)
+        if asked.uncertainty is not None:
+            at.append(asked.drawn_mm)
+            covariances.append(asked.uncertainty.covariance_um2)
+    factor = found.doubt.factor * picture.exaggeration * MM_PER_UM
+    points, triangles = ellipsoids(np.stack(at), factor**2 * np.stack(covariances))
+    shapes["/uncertainty/ellipsoids"] = mesh(points, triangles, ACCENT, opacity=SEEN_THROUGH)
+    return shapes
+
+
+def ellipsoids(middle: Array, square: Array) -> tuple[Array, Index]:
+    """Give vertices, [n · m, 3], and triangles of ellipsoids about points, [n, 3].
+
+    Their extent along a unit vector v is the root of v · square · v; squares are [n, 3, 3].
+    """
+    around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(-np.pi / 2, np.pi / 2, 13))
+    ball = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1)
+    ball = ball.reshape(-1, 3)
+    values, vectors = np.linalg.eigh(square)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    points = middle[:, None] + ball @ np.swapaxes(root, -1, -2)
+    triangles = triangulate([np.arange(len(ball)).reshape(around.shape)]).triangles
+    each = triangles + len(ball) * np.arange(len(middle))[:, None, None]
+    return points.reshape(-1, 3), each.reshape(-1, 3)
 
 
 def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:

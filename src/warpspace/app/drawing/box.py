@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 from viser import SceneApi
 
 from warpspace.app.browser.page import Page
-from warpspace.app.drawing.colours import Rgb, colour, colour_levels, level_colours
+from warpspace.app.drawing.colours import (
+    COLOURS,
+    Rgb,
+    colour,
+    colour_levels,
+    inverse_tone_map,
+    level_colours,
+)
 from warpspace.app.drawing.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.leaf import Identity
@@ -28,6 +35,7 @@ from warpspace.picture.mesh import (
 from warpspace.units import Array
 
 SURFACE = "/box/surface"
+FADED = 0.85  # part of grey in a colour that fades
 DASH, GAP = 0.022, 0.014
 """Dash and gap of the nominal box, as parts of the longest edge."""
 ISOLINES: tuple[Rgb, Rgb] = ((226, 230, 236), (60, 68, 80))
@@ -46,14 +54,25 @@ def surface(picture: LivePicture) -> Shape:
     has_lines, alone = picture.state.look.surface == "grid", picture.state.part.is_empty
     # lines of the grid would stand before a part
     mesh = line_mesh(picture, grid=alone) if has_lines else map_mesh(picture)
-    return coloured_shape(mesh.vertices_mm, mesh.triangles, mesh.values, picture.scale)
+    drawn = mesh.vertices_mm, mesh.triangles, mesh.values
+    return coloured_shape(*drawn, picture.scale, mesh.faded)
 
 
 def coloured_shape(
-    points: Array, indices: NDArray[Any], values: Array, scale: ColourScale
+    points: Array,
+    indices: NDArray[Any],
+    values: Array,
+    scale: ColourScale,
+    faded: NDArray[np.bool_] | None = None,
 ) -> Shape:
-    """Give a surface or lines, points in mm, in the colours of the values at their points."""
+    """Give a surface or lines, points in mm, in the colours of the values at their points.
+
+    Where they fade they are nearly the grey of the ghost.
+    """
     colours = level_colours(diverging=scale.diverging)[colour_levels(scale, values)]
+    if faded is not None:
+        grey = inverse_tone_map(np.array(COLOURS["ghost"][0], dtype=np.uint8))
+        colours[faded] = FADED * grey + (1.0 - FADED) * colours[faded]
     filled = _template(Identity(indices), len(points)).fill(points, colours)
     return Shape("add_glb", UNLIT, {"glb_data": filled})
 
@@ -125,7 +144,7 @@ def only_bent(held: LivePicture, picture: LivePicture) -> bool:
         and picture.compared is None and held.compared is None
         and picture.grid.nominal_mm is held.grid.nominal_mm
         and after.look == before.look and after.shown == before.shown
-        and not after.look.isolines and not after.look.pass_fail
+        and not after.look.isolines and not after.look.pass_fail and picture.faded is None
         and after.look.surface in ("surface", "cut")
     )  # fmt: skip
 

@@ -18,7 +18,14 @@ from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
 from warpspace.machine.axes import is_linear, parameter
-from warpspace.picture.words import list_axes, own_axes, spell_coordinate, spell_factor
+from warpspace.picture.words import (
+    length_words,
+    list_axes,
+    own_axes,
+    plus_minus,
+    spell_coordinate,
+    spell_factor,
+)
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
@@ -114,11 +121,11 @@ def _axis_labels(of: tuple[Axis, ...], tick: float) -> list[Label]:
     return found
 
 
-def _spell(value: float, unit: str = MICROMETRE) -> str:
-    """Spell an error: ``23.6 µm``, from 10 mm up ``12.3 mm``."""
+def _spell(value: float, unit: str = MICROMETRE, plus_minus: str = "") -> str:
+    """Spell an error: ``23.6 µm``, ``23.6 ± 1.2 µm``, from 10 mm up ``12.3 mm``."""
     if unit == MICROMETRE and abs(value) >= 1e4:
-        value, unit = value * MM_PER_UM, "mm"
-    return f"{value:.1f} {unit}".replace("-", MINUS)
+        value, unit, plus_minus = value * MM_PER_UM, "mm", ""
+    return f"{value:.1f}{plus_minus} {unit}".replace("-", MINUS)
 
 
 def point_labels(picture: LivePicture) -> list[Label]:
@@ -135,18 +142,27 @@ def _worst(picture: LivePicture) -> Iterator[Label]:
     worst = picture.worst_node
     value = float(picture.values.flat[worst])
     if picture.state.look.worst and value != 0.0:
-        text = f"max {_spell(value, picture.scale.unit)}"
+        sure = _plus_minus(picture, worst) if picture.quantity == "position" else ""
+        text = f"max {_spell(value, picture.scale.unit, sure)}"
         yield Label(text, picture.drawn_mm.reshape(-1, 3)[worst], "worst")
 
 
+def _plus_minus(picture: LivePicture, node: int) -> str:
+    """Say U95 of what is coloured of the position error at a node; empty where none is stated."""
+    if picture.uncertainty is None:
+        return ""
+    return plus_minus(None if picture.u95_um is None else float(picture.u95_um.flat[node]))
+
+
 def _corners(picture: LivePicture) -> Iterator[Label]:
-    look = picture.state.look
-    if not look.arrows:
+    look, found = picture.state.look, picture.uncertainty
+    if not look.arrows and not (look.ellipsoids and found):
         return
-    says_max = look.worst and not look.tilts and picture.state.component == "norm"
+    is_length = picture.quantity == "position" and picture.component == "norm"
     for node in corners(picture.shape):
-        if not (says_max and node == picture.worst_node):
-            text = _spell(float(picture.field.norm_um.flat[node]))
+        if not (look.worst and is_length and node == picture.worst_node):
+            sure = length_words(found, int(node))
+            text = _spell(float(picture.field.norm_um.flat[node]), plus_minus=sure)
             yield Label(text, picture.drawn_mm.reshape(-1, 3)[node], "corner")
 
 
@@ -157,7 +173,8 @@ def _asked(picture: LivePicture) -> Iterator[Label]:
     found = answer(state, picked, picture.exaggeration)
     length = float(np.linalg.norm(found.drawn_um))
     where = list_axes(own_axes(state.scene, found.at))
-    yield Label(f"{length:.1f} µm at {where}", found.drawn_mm, "asked")
+    words = f"{length:.1f}{length_words(found.uncertainty)} µm at {where}"
+    yield Label(words, found.drawn_mm, "asked")
     for part in found.explanation.contributions:
         if part.key != picture.state.lever:
             continue

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.contributions import Contribution, Explanation, explain
 from warpspace.analysis.distance import Distance, DistanceResult
+from warpspace.analysis.doubt import FieldDoubt, field_doubt
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.forms import option_values, read_form, with_form
@@ -45,6 +46,7 @@ class Answer:
     drawn_mm: Array  # [3]; where the displaced point is drawn
     # [3]; the error that it is drawn with: the one explained, or what a table leaves of it
     drawn_um: Array
+    uncertainty: FieldDoubt | None  # of the error that is explained; None where nothing is stated
 
     @property
     def is_corrected(self) -> bool:
@@ -161,8 +163,10 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
     if state.controller is not None:
         nominal = found.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
-    drawn = deform(found.nominal_mm + shift, drawn_um, exaggeration)
-    return Answer(at, loop, found, shift, drawn, drawn_um)
+    drawn, view = deform(found.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
+    field = ErrorField(found.nominal_mm, found.error_um, found.orientation_urad)
+    sure = field_doubt(scene, field, coordinates, view, found.nominal_mm)
+    return Answer(at, loop, found, shift, drawn, drawn_um, sure)
 
 
 def drawn_places(

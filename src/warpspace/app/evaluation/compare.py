@@ -65,6 +65,9 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     chosen = state.comparison
     other_side = chosen.b or Side()
     sides = [single(side_state(state, side)) for side in (chosen.a, other_side)]
+    if len({one.quantity for one in sides}) > 1:  # one of them states no uncertainty
+        plain = replace(state, look=replace(state.look, quantity="position"))
+        sides = [single(side_state(plain, side)) for side in (chosen.a, other_side)]
     factor = min(one.exaggeration for one in sides)
     a, b = (
         one if one.exaggeration == factor else single(replace(one.state, exaggeration=factor))
@@ -117,7 +120,7 @@ def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
     if state.look.range_mode == "fixed":
         return maps[0].scale
     widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
-    held = choose_scale([picture.values for picture in maps], state.component, state.look.quantity)
+    held = choose_scale([one.values for one in maps], state.component, maps[0].quantity)
     return held if held.high > widest.high else widest
 
 

@@ -5,12 +5,14 @@ rotary positions and the loop; a slider move is then one matrix-vector product.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+from warpspace.analysis.distribution import loop_keys
+from warpspace.analysis.doubt import FieldDoubt, field_doubt
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.compare import compare_pictures
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -55,20 +57,33 @@ class LiveModel:
         factor = model.choose_exaggeration(
             state.exaggeration, None, float(field.norm_um.max()), size
         )
+        uncertainty, quantity = self._uncertainty(state, grid, field), state.look.quantity
+        if quantity == "uncertainty" and not (uncertainty and uncertainty.doubt.is_known):
+            quantity = "position"
         common: dict[str, Any] = {
             "view": state.view(),
             "exaggeration": factor,
             "component": state.component,
-            "quantity": state.look.quantity,
-            "colours": _chosen_colours(state, field, basis),
+            "quantity": quantity,
+            "significant": state.look.significant,
         }
+        volume = model.Picture(**common, grid=grid, field=field, uncertainty=uncertainty)
+        common["colours"] = _chosen_colours(state, volume, basis)
         return LivePicture(
             **common,
             grid=grid,
             field=field,
+            uncertainty=uncertainty,
             cut=state.look.surface == "cut",
             slices=tuple(
-                model.Slice(**common, grid=plane, axis=axis, position_mm=at, field=on_plane)
+                model.Slice(
+                    **common,
+                    grid=plane,
+                    axis=axis,
+                    position_mm=at,
+                    field=on_plane,
+                    uncertainty=self._uncertainty(state, plane, on_plane),
+                )
                 for axis, at, plane, on_plane in self._slices(state)
             ),
             state=state,
@@ -77,6 +92,23 @@ class LiveModel:
                 for group, own in traces
             ),
         )
+
+    def _uncertainty(self, state: AppState, grid: Grid, field: ErrorField) -> FieldDoubt | None:
+        """Say how sure errors over a grid are; a slider that is moved keeps its covariance."""
+        scene = state.scene
+        if scene.covariance is None and not scene.uncertainty:
+            return None
+
+        def build() -> FieldDoubt | None:  # something is stated
+            return field_doubt(scene, field, grid.coordinates, state.view(), grid.point_mm)
+
+        key = "uncertainty", Identity(grid), _place(state)
+        found: FieldDoubt = self._kept.get(key, build, lambda one: _size(((grid, one.basis), ())))
+        acting = [key for key, value in state.active.items() if value]
+        through = loop_keys(scene.model, state.loop, acting)
+        unknown = [key for key in through if key not in found.doubt.keys]
+        doubt = replace(found.doubt, unknown=tuple(unknown))
+        return replace(found, doubt=doubt, field=field, grid=grid)
 
     def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
@@ -150,15 +182,15 @@ class PassFail(ColourScale):
         return (self.low, self.limit, self.high)
 
 
-def _chosen_colours(state: AppState, field: ErrorField, basis: ErrorBasis) -> ColourScale:
+def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -> ColourScale:
     """Give the colours that a user has chosen: fixed, shared, or with round ends."""
-    quantity, component, look = state.look.quantity, state.component, state.look
-    values = model.coloured_values(field, component, quantity)
-    if look.pass_fail and not look.tilts and component == "norm":
+    quantity, component, look = volume.quantity, state.component, state.look
+    field, values = volume.field, volume.values
+    if look.pass_fail and quantity == "position" and component == "norm":
         scale, limit = model.choose_scale([values], component), state.specification.limit_um
         top = max(scale.high, limit)
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
-    if look.range_mode == "shared":
+    if look.range_mode == "shared" and quantity != "uncertainty":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
         both = (model.coloured_error(one, quantity) for one in (field, opened))
         lengths = [np.linalg.norm(error, axis=-1) for error in both]

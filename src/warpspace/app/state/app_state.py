@@ -54,6 +54,7 @@ COMPONENT_NAMES = {
         "y": "φ_y tilt about y",
         "z": "φ_z tilt about z",
     },
+    "uncertainty": {"norm": "U95 |E|", "x": "U95 E_x", "y": "U95 E_y", "z": "U95 E_z"},
 }
 """What the components are called, for each quantity that can be coloured."""
 LOOP_NAMES = {

@@ -19,6 +19,7 @@ SURFACES = {
 QUANTITIES = {
     "position": "position error [µm]",
     "orientation": "tool-orientation error [µrad]",
+    "uncertainty": "uncertainty of the position error, U95 [µm]",
 }
 RANGES = {"auto": "auto", "fixed": "fixed", "shared": "shared"}
 RANGE_TOP = Span(*limits.RANGE_TOP, 0.001)
@@ -48,6 +49,20 @@ class Look:
     worst: bool = described(True, "Worst point", hint="Where the coloured value is largest.")
     bars: bool = described(
         True, "Scale bars", hint="Two lengths in the picture: geometry in mm, error in µm."
+    )
+    significant: bool = described(
+        False,
+        "Significant only",
+        hint="Colours fade to grey where the error is not above its uncertainty U95.",
+    )
+    ellipsoids: bool = described(
+        False,
+        "Uncertainty at the corners",
+        hint="Ellipsoids of U95 at the eight corners and the clicked point, exaggerated as the box"
+        " is: their extent along a direction is U95 of the error along it.",
+    )
+    unmeasured: bool = described(
+        True, "Never measured", hint="Dots where axes stood at no time while it was measured."
     )
     # which part of the volume keeps the limit, and which does not
     pass_fail: bool = described(False, "Pass or fail")

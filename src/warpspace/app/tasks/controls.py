@@ -32,6 +32,7 @@ from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.parts import Part
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
+from warpspace.picture.model import NOT_STATED
 from warpspace.picture.words import spell_factor
 
 MACHINES = {"off": "off", "ghost": "ghost", "solid": "solid"}
@@ -56,10 +57,8 @@ def _leaf_picks(state: AppState, path: str) -> Markup:
 
 def chosen_map(state: AppState) -> str:
     """Name what is coloured: a word of the event ``controls:map``."""
-    look = state.look
-    if look.pass_fail and not look.tilts and state.component == "norm":
-        return "limit"
-    return f"{look.quantity}.{state.component}"
+    chosen = f"{state.look.quantity}.{state.component}"
+    return "limit" if state.look.pass_fail and chosen == "position.norm" else chosen
 
 
 class ControlsPart(Part):
@@ -70,7 +69,8 @@ class ControlsPart(Part):
         return (picture.exaggeration, picture.scale.high, state.exaggeration, state.component,
                 Identity(state.look), Identity(state.shown), Identity(state.machine), state.loop,
                 state.placed, state.nodes, state.specification.limit_um, Identity(state.scene),
-                self.context.camera.view, self.context.camera.orthographic)  # fmt: skip
+                self.context.camera.view, self.context.camera.orthographic, picture.quantity,
+                picture.uncertainty and picture.uncertainty.doubt.unknown)  # fmt: skip
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         camera = self.context.camera
@@ -79,7 +79,7 @@ class ControlsPart(Part):
         triad = fill(
             '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
         )
-        menus = (_exaggeration(picture), _colours(picture), _surface(picture.state),
+        menus = (_exaggeration(picture), _colours(picture), _surface(picture),
                  _machine(picture.state))  # fmt: skip
         return {
             "controls": join(menus),
@@ -125,13 +125,19 @@ def _exaggeration(picture: LivePicture) -> Markup:
 
 def _colours(picture: LivePicture) -> Markup:
     state, look, chosen = picture.state, picture.state.look, chosen_map(picture.state)
+    found = picture.uncertainty
     limit = f"within {state.specification.limit_um:g} µm or not"
     body: list[Markup] = []
     words: object = limit
     for quantity, title in QUANTITIES.items():
         names = {key: lowered(said) for key, said in COMPONENT_NAMES[quantity].items()}
+        if quantity == "uncertainty" and (found is None or not found.doubt.is_known):
+            said = NOT_STATED if found is None else "; ".join(found.doubt.remarks())
+            if not picture.is_difference:
+                body += [tag("h3", title), tag("p", said, class_="ws-tiny")]
+            continue
         body += [tag("h3", title), _picks("controls:map", names, chosen, f"{quantity}.")]
-        if quantity == look.quantity and chosen != "limit":
+        if quantity == picture.quantity and chosen != "limit":
             words = names[state.component]
     body.insert(2, _picks("controls:map", {"limit": limit}, chosen))
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
@@ -140,13 +146,16 @@ def _colours(picture: LivePicture) -> Markup:
     return menu(words, join(body), key="map", kind="up", hint="What the colours mean")
 
 
-def _surface(state: AppState) -> Markup:
+def _surface(picture: LivePicture) -> Markup:
+    state, switches = picture.state, [*SWITCHES]
+    if picture.uncertainty is not None:
+        switches += ["look.significant", "look.ellipsoids", "look.unmeasured"]
     body = [_leaf_picks(state, "look.surface")]
     if state.look.surface == "slices":
         axes = slice_positions(state.scene, state.look, state.machine)
         body += [setting(state, f"look.slices_mm.{axis}", bar=True) for axis in axes]
         body.append(setting(state, "look.follow"))
-    body += [tag("h3", "Shown too"), *(setting(state, path) for path in (*SWITCHES, "loop"))]
+    body += [tag("h3", "Shown too"), *(setting(state, path) for path in (*switches, "loop"))]
     if state.loop is Loop.RELATIVE:
         body.append(setting(state, "placed"))
     direction, name = state.scene.model.direction, "controls:set.travel"

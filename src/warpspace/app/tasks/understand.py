@@ -7,6 +7,7 @@ from markupsafe import Markup
 
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.contributions import Contribution
+from warpspace.analysis.doubt import NAMES
 from warpspace.app.browser.html import (
     EMPTY,
     button,
@@ -37,7 +38,7 @@ from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.parts import Section, actions
 from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
-from warpspace.picture.words import LOOP_WORDS, spell_axes, spell_in_r
+from warpspace.picture.words import LOOP_WORDS, length_words, plus_minus, spell_axes, spell_in_r
 from warpspace.scene.model import evaluate_grid
 from warpspace.units import spell_count
 
@@ -63,7 +64,8 @@ class WorstPart(Section):
         if picture.is_difference:
             return self.title
         kind = self.title if picture.state.picked is None else "This point"
-        return f"{kind}: why {number(self._answer(picture).length_um)} µm"
+        found = self._answer(picture)
+        return f"{kind}: why {number(found.length_um)}{length_words(found.uncertainty)} µm"
 
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
@@ -77,7 +79,7 @@ class WorstPart(Section):
         best = tag("div", "", data_piece="best")
         details = tag("summary", "Details") + _details(found, picture.state.lever)
         details = tag("details", details, class_="ws-details", data_key="worst.details")
-        return asked + _contributions(found) + best + details
+        return asked + _contributions(found) + _uncertainty(found) + best + details
 
     def _answer(self, picture: LivePicture) -> Answer:
         if self._found is None or self._found[0] is not picture:
@@ -134,6 +136,29 @@ def _contributions(found: Answer) -> Markup:
         rest = number(float(np.linalg.norm(found.drawn_um)))
         told = tag("p", f"The table leaves {rest} µm of it, as drawn.")
     return rows(lines, "ws-rows ws-causes") + told
+
+
+def _uncertainty(found: Answer) -> Markup:
+    """Say which errors the uncertainty of |E| comes from, the largest share of its variance first.
+
+    Shares are below zero where correlations make it smaller; all of them add up to 100 %.
+    """
+    sure = found.uncertainty
+    if sure is None or not sure.doubt.is_known:
+        words = [] if sure is None else sure.doubt.remarks()
+        return join(tag("p", said, class_="ws-tiny") for said in words)
+    along = sure.basis.position @ sure.direction
+    parts = along * (sure.doubt.covariance @ along)
+    shares = 100.0 * parts / (float(parts.sum()) or 1.0)
+    order = np.argsort(-np.abs(shares))
+    named = [(sure.doubt.keys[k], f"{number(float(shares[k]), 0)} %") for k in order]
+    named = [(key, share) for key, share in named if share != "0 %"]
+    said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
+    words = f"U95{length_words(sure)} µm, share of its variance: {said}"
+    rest = rows(named[FIRST:]) if len(named) > FIRST else EMPTY
+    rest = rest and tag("details", tag("summary", "All shares") + rest, class_="ws-details",
+                        data_key="worst.shares")  # fmt: skip
+    return tag("p", words, class_="ws-tiny") + rest
 
 
 def _details(found: Answer, lever: str) -> Markup:
@@ -214,7 +239,10 @@ class VolumePart(Section):
         found, state = picture.statistics, picture.drawn_state
         numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um,
                    "max": found.max_um}  # fmt: skip
-        lines = [(name, f"{number(value, 2)} µm") for name, value in numbers.items()]
+        u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
+        sure = {NAMES[key]: plus_minus(value) for key, value in u95.items()}
+        lines = [(name, f"{number(value, 2)}{sure.get(name, '')} µm")
+                 for name, value in numbers.items()]  # fmt: skip
         if not picture.is_difference:
             # the picture has it only where it is coloured
             errors = evaluate_grid(state.active_scene(), picture.grid, picture.view)
