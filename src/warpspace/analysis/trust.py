@@ -14,6 +14,7 @@ from warpspace.analysis.statistics import P95, volume_statistics
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
+from warpspace.machine.errors import Covariance
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
 from warpspace.units import Array
@@ -52,9 +53,7 @@ class Trust(Analysis):
         found = volume_doubt(scene, view, self.nodes)
         limit = scene.limit_um if self.limit_um is None else self.limit_um
         statistics = asdict(volume_statistics(evaluate_grid(scene, grid, view), grid))
-        beyond = np.zeros(grid.shape, dtype=bool)
-        for axis, (low, high) in scene.covariance.reach.items() if scene.covariance else ():
-            beyond |= (grid.coordinates[axis] < low) | (grid.coordinates[axis] > high)
+        beyond = (scene.covariance or Covariance((), ())).outside(grid.coordinates, grid.shape)
         result = TrustResult(
             limit_um=limit,
             statistics=statistics if found is None else with_u95(statistics, found.statistics()),

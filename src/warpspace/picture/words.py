@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
 from warpspace.analysis.distribution import loop_keys
-from warpspace.analysis.doubt import FieldDoubt
+from warpspace.analysis.doubt import FieldDoubt, plus_minus
 from warpspace.kinematics.model import Convention, Loop, Model
 from warpspace.machine.axes import (
     DIRECTION_WORDS,
@@ -77,11 +77,9 @@ def _plain(value: float) -> str:
 # How sure a number is.
 
 
-def plus_minus(u95: float | None) -> str:
+def u95_behind(u95: float | None) -> str:
     """Say U95 behind a number, `` ± 1.2``; None is not known: `` ± ?``."""
-    if u95 is None:
-        return " ± ?"
-    return f" ± {u95:.1f}" if u95 >= 0.95 or u95 == 0.0 else f" ± {u95:.2g}"
+    return f" {plus_minus(u95, '.2g' if u95 and u95 < 0.95 else '.1f')}"
 
 
 def length_words(found: FieldDoubt | None, point: int = 0) -> str:
@@ -89,7 +87,7 @@ def length_words(found: FieldDoubt | None, point: int = 0) -> str:
     if found is None:
         return ""
     u95 = found.doubt.factor * float(found.u_norm_um.flat[point])
-    return plus_minus(u95 if found.doubt.is_known else None)
+    return u95_behind(u95 if found.doubt.is_known else None)
 
 
 def beyond_words(scene: Scene, loop: Loop) -> str:

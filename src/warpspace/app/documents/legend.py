@@ -141,7 +141,7 @@ def numbers_words(picture: LivePicture) -> str:
     found, sure, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
     if found is not None:
         u95 = found.statistics()
-        sure = {name: words.plus_minus(u95[f"{name}_um"]) for name in numbers}
+        sure = {name: words.u95_behind(u95[f"{name}_um"]) for name in numbers}
         factor = f" (k = {found.doubt.factor:.3g})"
     said = (f"{name} {number(value)}{sure[name]} µm" for name, value in numbers.items())
     return f"{change}{' · '.join(said)}{factor}"

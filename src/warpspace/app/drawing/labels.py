@@ -22,9 +22,9 @@ from warpspace.picture.words import (
     length_words,
     list_axes,
     own_axes,
-    plus_minus,
     spell_coordinate,
     spell_factor,
+    u95_behind,
 )
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
@@ -151,7 +151,7 @@ def _plus_minus(picture: LivePicture, node: int) -> str:
     """Say U95 of what is coloured of the position error at a node; empty where none is stated."""
     if picture.uncertainty is None:
         return ""
-    return plus_minus(None if picture.u95_um is None else float(picture.u95_um.flat[node]))
+    return u95_behind(None if picture.u95_um is None else float(picture.u95_um.flat[node]))
 
 
 def _corners(picture: LivePicture) -> Iterator[Label]:

@@ -38,7 +38,7 @@ from warpspace.app.tasks.charts import block_html
 from warpspace.app.tasks.parts import Section, actions
 from warpspace.field.evaluate import placed_words
 from warpspace.machine.axes import parameter
-from warpspace.picture.words import LOOP_WORDS, length_words, plus_minus, spell_axes, spell_in_r
+from warpspace.picture.words import LOOP_WORDS, length_words, spell_axes, spell_in_r, u95_behind
 from warpspace.scene.model import evaluate_grid
 from warpspace.units import spell_count
 
@@ -240,7 +240,7 @@ class VolumePart(Section):
         numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um,
                    "max": found.max_um}  # fmt: skip
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
-        sure = {NAMES[key]: plus_minus(value) for key, value in u95.items()}
+        sure = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
         lines = [(name, f"{number(value, 2)}{sure.get(name, '')} µm")
                  for name, value in numbers.items()]  # fmt: skip
         if not picture.is_difference:
