@@ -7,12 +7,15 @@ import GTC
 import numpy as np
 import pytest
 
-from warpspace.analysis.doubt import field_doubt
+from warpspace.analysis.doubt import field_doubt, volume_doubt
 from warpspace.calibration import Calibrate, calibrate
-from warpspace.calibration.instruments import NO_INSTRUMENT, instrument_names, load_instrument
+from warpspace.calibration.instruments import instrument_names, load_instrument
+from warpspace.calibration.kinds import VIEW
 from warpspace.calibration.next_best import candidates, observability
 from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.calibration.solve import build_terms
 from warpspace.exceptions import SceneError, UnknownNameError
+from warpspace.field.evaluate import evaluate_first_order
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
@@ -211,24 +214,106 @@ def test_what_makes_a_point_sure_is_what_acts_there():
     x = np.array([-100.0, 0.0, 300.0])
     readings = vectors(scene, {"X": x}, np.zeros((3, 3)))
     request = Calibrate(fit=("EXX:ramp",), instrument=load_instrument("laser"), next_count=1)
-    step, far, zero = (
+    corner, far, zero = (
         calibrate_next(scene, readings, replace(request, target=target))
         for target in ("corner", (("X", 300.0),), (("X", -100.0),))
     )
-    assert step.before_um == pytest.approx(far.before_um)  # a ramp is largest at its end
+    assert corner.before_um == pytest.approx(far.before_um)  # a ramp is largest at its end
     assert far.before_um > far.after_um > 0.0
     assert zero.before_um == zero.after_um == 0.0
-    line = next(one for one in candidates(scene) if one.name == far.measurement)
-    both = calibrate(
-        scene,
-        [replace(one, sigma_mm=np.full(len(one), request.instrument.scatter[0] * 1e-3))
-         for one in (readings, line.readings)],
-        replace(request, instrument=NO_INSTRUMENT),
-    )  # fmt: skip
-    assert far.after_um == pytest.approx(2.0 * both.parameters[0].standard_uncertainty, rel=0.01)
+    # what is known: readings that share a zero and a scale; what comes: a line with its own zero
+    share, away = (x + 100.0) / 400.0, x - x.mean()
+    parts = {
+        acts: sum(one.at(1.0) ** 2 for one in request.instrument.contributions if one.acts == acts)
+        for acts in ("each", "all", "scale")
+    }
+    spread = parts["each"] * np.eye(3) + parts["all"] + parts["scale"] * np.outer(away, away)
+    known = share @ np.linalg.solve(spread, share) + 1e-6  # 1000 µm where nothing is known
+    assert far.before_um == pytest.approx(2.0 / math.sqrt(known))
+    line = next(one for one in candidates(scene) if one.name == far.measurement).readings
+    share = (line.coordinates["X"] + 100.0) / 400.0
+    known += np.sum((share - share.mean()) ** 2) / parts["each"]
+    assert far.after_um == pytest.approx(2.0 / math.sqrt(known))
 
 
 def calibrate_next(scene, readings, request):
     (step,) = request.find(scene, [readings]).steps
     assert step.minutes > 0.0
     return step
+
+
+KEYS = ("EC0Y:constant", "EA0Z:constant", "EB0Z:constant", "EXX:ramp", "EYY:ramp", "EZZ:ramp",
+        "EYX:ramp", "EAX:ramp")  # fmt: skip
+CORNER = {"X": 300.0, "Y": 100.0, "Z": -200.0}
+DRAWS = {
+    "normal": lambda draw: draw.standard_normal(),
+    "rectangular": lambda draw: draw.uniform(-1.0, 1.0),
+    "triangular": lambda draw: draw.triangular(-1.0, 0.0, 1.0),
+    "u-shaped": lambda draw: np.sin(draw.uniform(0.0, 2.0 * np.pi)),
+}
+
+
+def stated_and_true(instrument, draw):
+    """Give the instrument as its owner knows it, and the standard deviation or value of each."""
+    stated, true = [], []
+    for one in instrument.contributions:
+        known = np.sqrt(draw.chisquare(one.freedom) / one.freedom) if one.type == "A" else 1.0
+        stated.append(replace(one, value=one.value * known))
+        each = one.acts == "each"
+        true.append(one.sensitivity * one.value * (1.0 if each else DRAWS[one.distribution](draw)))
+    return replace(instrument, contributions=tuple(stated)), true
+
+
+def held_by_planted_machines(name, trials):
+    """Machines with errors of their own, read with scatter and errors of the instrument."""
+    scene, held = (
+        parse_scene(MACHINE, "s"),
+        {"parameters": [], "point": [], "mean": [], "limit": []},
+    )
+    grid = np.meshgrid([-100.0, 100.0, 300.0], [-100.0, 0.0, 100.0], [-200.0, -100.0, 0.0])
+    poses = {axis: part.ravel() for axis, part in zip("XYZ", grid, strict=True)}
+    terms = build_terms(scene, KEYS)
+    clean = vectors(scene, poses, np.zeros((27, 3)))
+    away_m = 1e-3 * (clean.nominal_mm - clean.nominal_mm.mean(axis=0))
+    for seed in range(trials):
+        draw = np.random.default_rng(seed)
+        truth = replace(scene, errors=terms.errors_with(draw.normal(0.0, 40.0, len(KEYS))))
+        instrument, true = stated_and_true(load_instrument(name), draw)
+        read = evaluate_first_order(scene.model, truth.errors, poses, VIEW).error_um
+        for one, value in zip(instrument.contributions, true, strict=True):
+            if one.acts == "each":
+                unit = [DRAWS[one.distribution](draw) for _ in range(read.size)]
+                read = read + value * np.reshape(unit, read.shape)
+            elif one.acts == "all":
+                signs = [DRAWS[one.distribution](draw) for _ in range(3)]
+                read = read + one.sensitivity * one.value * np.array(signs)
+            else:
+                read = read + value * away_m
+        readings = replace(clean, observed_mm=1e-3 * read)
+        asked = Calibrate(fit=KEYS, instrument=instrument)
+        found = calibrate(truth, [readings], asked)  # a fit that begins there is soon at its end
+        for one in found.parameters:
+            low, high = one.interval_95
+            held["parameters"].append(low <= truth.errors.amplitude(one.key) <= high)
+        axes = complete_coordinates(scene.machine, CORNER, scene.workspace.positions)
+        own, wanted = (evaluate(one, at=CORNER) for one in (found.scene, truth))
+        sure = field_doubt(found.scene, own, axes, scene.view())
+        off, k = own.error_um - wanted.error_um, sure.doubt.factor
+        held["point"] += list(np.abs(off) <= k * sure.u_um)
+        held["limit"].append(abs(own.norm_um - wanted.norm_um) <= k * sure.u_norm_um)
+        volume = volume_doubt(found.scene, scene.view(), 5)
+        off = volume.field.norm_um - evaluate(truth, grid=5).norm_um
+        u95 = volume.statistics()["mean_um"]
+        held["mean"].append(abs(np.sum(volume.grid.weights * off)) <= u95)
+    return {what: float(np.mean(each)) for what, each in held.items()}
+
+
+NIGHTLY = [
+    pytest.param(name, 1000, 0.02, marks=pytest.mark.nightly) for name in ("ball_plate", "tracker")
+]
+
+
+@pytest.mark.parametrize(("name", "trials", "near"), [("tracker", 100, 0.05), *NIGHTLY])
+def test_what_is_stated_holds_for_95_percent_of_planted_machines(name, trials, near):
+    for what, share in held_by_planted_machines(name, trials).items():
+        assert share == pytest.approx(0.95, abs=near), what

@@ -156,8 +156,8 @@ class Calibrate(Analysis):
         count = self.next_count or int(self.target != "map")
         if not count and not found.rank.confounded:
             return found
-        weighed = [one.readings for one in found.fitted]
-        steps = next_best(scene, weighed, found, count, watch=watch, target=self.target)
+        weighed, asked = [one.readings for one in found.fitted], (self.target, self.instrument)
+        steps = next_best(scene, weighed, found, count, None, watch, *asked)
         apart = separating(scene, sets, found, watch=watch)
         return replace(found, apart=apart, steps=steps, target=self.target)
 

@@ -10,6 +10,7 @@ import numpy as np
 from warpspace.analysis.doubt import coverage_factor
 from warpspace.bench.placing import PLANES
 from warpspace.calibration import solve
+from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
 from warpspace.calibration.readings import Readings, nominal_tip
 from warpspace.calibration.registry import TestReadings
 from warpspace.calibration.results import Calibration, Candidate, Step, Target
@@ -172,14 +173,16 @@ def next_best(
     choice: Sequence[Candidate] | None = None,
     watch: solve.Watch = solve.unwatched,
     target: Target = "map",
+    instrument: Instrument = NO_INSTRUMENT,
 ) -> tuple[Step, ...]:
     """Choose measurements one after the other, each for the greatest gain per minute.
 
     Notes
     -----
-    The information JᵀWJ of what is measured, plus that of the tolerances (1000 µm or µrad where
-    there is none), plus that of the candidate; what a set-up leaves unknown is eliminated, and each
-    candidate has one of its own. First order, at the errors found.
+    The information of what is measured, JᵀWJ less what its instrument shares, plus that of the
+    tolerances (1000 µm or µrad where there is none), plus that of the candidate; what a set-up
+    leaves unknown is eliminated, and each candidate has one of its own. First order, at the errors
+    found.
     """
     if not count:
         return ()
@@ -189,7 +192,8 @@ def next_best(
     stated = [one.sigma_mm for one in sets if one.sigma_mm is not None]
     if len(stated) == len(sets):
         noise = float(np.median(np.concatenate(stated)))
-    known = _information(solve.Stack.of(scene, sets, watch), terms, noise) + _prior(scene, keys)
+    made = solve.Stack.of(scene, sets, watch)
+    known = _information(made, terms, noise, instrument) + _prior(scene, keys)
     over_map = u95_at(found.scene, terms, "map")
     told = u95_at(found.scene, terms, target)
     rows = [
@@ -235,11 +239,22 @@ def separating(
     return {group: told[group] for group in found.rank.confounded if group in told}
 
 
-def _information(stack: solve.Stack, terms: solve.Terms, noise_mm: float) -> Array:
+def _information(
+    stack: solve.Stack,
+    terms: solve.Terms,
+    noise_mm: float,
+    instrument: Instrument = NO_INSTRUMENT,
+) -> Array:
     by_parameter, by_unknown = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
     weights = np.concatenate(stack.weights(noise_mm))[:, None]
-    rows = solve.without(weights * by_parameter, solve.orthonormal(weights * by_unknown))
-    return rows.T @ rows
+    common = [common_mode(stack, one) for one in instrument.shared]
+    seen = weights * np.hstack([by_parameter, *common])
+    seen = solve.without(seen, solve.orthonormal(weights * by_unknown))
+    whole, count = seen.T @ seen, len(terms.keys)
+    # what readings share is unknown as well, but by a standard uncertainty of one
+    shared = whole[count:, count:] + np.eye(len(whole) - count)
+    lost = whole[:count, count:] @ np.linalg.solve(shared, whole[count:, :count])
+    return whole[:count, :count] - lost
 
 
 def _prior(scene: Scene, keys: Sequence[str]) -> Array:
@@ -300,21 +315,19 @@ def observability(
     terms = solve.build_terms(scene, [row.key for row in rows])
     scale = np.array([UM_PER_MM * (UM_PER_MM / ARM_MM if row.is_rotation else 1.0) for row in rows])
 
-    def seen(readings: Sequence[Readings]) -> Array:
-        stack = solve.Stack.of(scene, readings, watch)
-        gains, own = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
-        return np.vstack(
-            [solve.without(gains * scale, solve.orthonormal(own)), 0.0 * np.diag(scale)]
-        )
+    def gram(readings: Sequence[Readings]) -> Array:
+        alike = [replace(one, sigma_mm=None) for one in readings]
+        stack = solve.Stack.of(scene, alike, watch)
+        return _information(stack, terms, 1.0) * np.outer(scale, scale)
 
     draw, ends = np.random.default_rng(0), {n: a.travel for n, a in scene.machine.axes.items()}
     anywhere = {name: draw.uniform(*np.clip(ends[name], *REACH), size=POSES) for name in ends}
-    found, most = seen(sets), seen([_nominal(scene, "points", anywhere, np.zeros((POSES, 3)))])
+    found, most = gram(sets), gram([_nominal(scene, "points", anywhere, np.zeros((POSES, 3)))])
     merit: dict[str, float] = {}
     for axis in dict.fromkeys(row.axis for row in rows):
-        own = [at for at, row in enumerate(rows) if row.axis == axis]
-        _, values, told = np.linalg.svd(most[:, own])
-        told = told[values > solve.BLIND * max(values[0], 1e-300)]
-        if len(told):
-            merit[axis] = float(np.linalg.svd(found[:, own] @ told.T, compute_uv=False)[-1])
+        own = np.ix_(*[[at for at, row in enumerate(rows) if row.axis == axis]] * 2)
+        values, told = np.linalg.eigh(most[own])
+        told = told[:, values > solve.BLIND**2 * values[-1]]
+        least = np.linalg.eigvalsh(told.T @ found[own] @ told).min(initial=np.inf)
+        merit |= {axis: float(np.sqrt(max(least, 0.0)))} if told.size else {}
     return merit
