@@ -36,10 +36,12 @@ from warpspace.calibration.solve import (
     covariance_of,
     find_rank,
     named,
+    orthonormal,
     read_keys,
     rms_mm,
     solve,
     unwatched,
+    without,
 )
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import Covariance
@@ -256,6 +258,8 @@ def _fit(
 ) -> Calibration:
     instrument, is_assumed = request.instrument, any(one.sigma_mm is None for one in sets)
     sets, assumed = _weighed(scene, sets, request, watch)
+    if instrument.scatter[0]:
+        predict = _weighed(scene, predict, request, watch)[0]
     stack = Stack.of(scene, sets, watch)
     terms = build_terms(scene, automatic(scene, sets) if request.fit is None else request.fit)
     if not terms.keys:
@@ -274,7 +278,8 @@ def _fit(
     misses = np.concatenate([row.ravel() for row in after]) * np.concatenate(stack.weights())
     sigma = solved.scale or float(np.sqrt(np.sum(misses**2) / max(freedom, 1)))
     is_scaled = stack.has_uncertainties or solved.scale is not None
-    scattered = covariance_of(solved, len(free)) * (1.0 if is_scaled else sigma**2)
+    whole = covariance_of(solved, solved.weighted.shape[1]) * (1.0 if is_scaled else sigma**2)
+    scattered = whole[: len(free), : len(free)]
     shared = _shared(instrument, stack, solved, len(free))
     covariance = scattered + shared.sum(axis=0)
     own = float(max(freedom, 1))
@@ -303,7 +308,10 @@ def _fit(
         covariance=_covariance(scene, part.keys, covariance, degrees.min(initial=np.inf), stack),
     )
     outliers = _outliers(stack, after)
-    held, held_notes = _predict(stack, terms, part, predict, begin, solved, robust=request.robust)
+    held, coverage, held_notes = _predict(
+        stack, terms, part, predict, begin, solved, whole, (sigma, own), robust=request.robust
+    )
+    lack, lack_notes = _lack_of_fit(stack, after, sigma, freedom)
     return Calibration(
         scene=fitted_scene,
         title=scene.title,
@@ -323,11 +331,17 @@ def _fit(
         rms_after_mm=rms_mm(after),
         rms_predicted_before_mm=rms_mm([one.before_mm for one in held]) if held else None,
         rms_predicted_after_mm=rms_mm([one.after_mm for one in held]) if held else None,
+        predicted_coverage_95=coverage,
         sigma_mm=sigma,
         freedom=freedom,
-        lack_of_fit=sigma if stack.has_uncertainties else None,
+        lack_of_fit=lack,
         instrument=share_out(instrument, stack, shares) if instrument.name else None,
-        notes=(*assumed, *(note for one in (*sets, *predict) for note in one.notes), *held_notes),
+        notes=(
+            *assumed,
+            *(note for one in (*sets, *predict) for note in one.notes),
+            *held_notes,
+            *lack_notes,
+        ),
     )
 
 
@@ -360,7 +374,8 @@ def _shared(instrument: Instrument, stack: Stack, solved: Solved, count: int) ->
 def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
     by_parameter, by_unknown = stack.derivatives(terms, terms.start, unknown)
     weights = np.concatenate(stack.weights())[:, None]
-    return find_rank(terms.keys, weights * np.vstack(by_parameter), weights * np.vstack(by_unknown))
+    both = weights * np.vstack(by_parameter), weights * np.vstack(by_unknown)
+    return find_rank(terms.keys, *both, stack.blind)
 
 
 def _check_count(stack: Stack, rank: Rank, fitted: int, has_prior: bool) -> None:
@@ -473,12 +488,18 @@ def _predict(
     predict: Sequence[Readings],
     begin: Solved,
     solved: Solved,
+    covariance: Array,
+    scatter: tuple[float, float],
     *,
     robust: bool,
-) -> tuple[tuple[Residuals, ...], tuple[str, ...]]:
-    """Predict readings that were not fitted; set-ups that were not fitted are placed by them."""
+) -> tuple[tuple[Residuals, ...], float | None, tuple[str, ...]]:
+    """Predict readings that were not fitted; set-ups that were not fitted are placed by them.
+
+    Beside them the share of components inside the 95 % intervals stated for them: of what readings
+    scatter (mm, degrees of freedom) and of the covariance of all that was fitted.
+    """
     if not predict:
-        return (), ()
+        return (), None, ()
     held = Stack.of(stack.scene, predict, stack.watch)
     before = named(stack.unknowns, begin.unknown)
     after = named(stack.unknowns, solved.unknown)
@@ -495,4 +516,58 @@ def _predict(
     rows_before = held.residuals(terms, terms.start, values[0])
     rows_after = held.residuals(part, solved.amplitudes, values[1])
     rows = zip(held.sets, rows_before, rows_after, _outliers(held, rows_after), strict=True)
-    return tuple(Residuals(*row) for row in rows), notes
+    found = tuple(Residuals(*row) for row in rows)
+    if stack.has_uncertainties and not held.has_uncertainties:
+        return found, None, notes  # nobody says how well these were read
+    from scipy.stats import t
+
+    weights = np.concatenate(held.weights(scatter[0]))[:, None]
+    by_parameter, by_unknown = map(
+        np.vstack, held.derivatives(part, solved.amplitudes, values[1])
+    )
+    own = np.isin(held.unknowns, new)
+    at = [len(part.keys) + stack.unknowns.index(n) for n in held.unknowns if n not in new]
+    chosen = [*range(len(part.keys)), *at]
+    placed = orthonormal(weights * by_unknown[:, own])  # what placing its own set-up takes away
+    slopes = without(weights * np.hstack([by_parameter, by_unknown[:, ~own]]), placed)
+    variance = np.sum((slopes @ covariance[np.ix_(chosen, chosen)]) * slopes, axis=1)
+    width = t.ppf(0.975, scatter[1]) * np.sqrt(variance + 1.0 - np.sum(placed**2, axis=1))
+    misses = weights[:, 0] * np.concatenate([row.ravel() for row in rows_after])
+    return found, float(np.mean(np.abs(misses) <= width)), notes
+
+
+CHANCE = 0.01  # of calling a model incomplete that is not
+
+
+def _lack_of_fit(
+    stack: Stack, after: Sequence[Array], sigma_mm: float, freedom: int
+) -> tuple[float | None, tuple[str, ...]]:
+    """Compare the scatter of residuals with that of readings, stated or seen in repeated ones.
+
+    The root of χ²/ν, or of F of lack of fit over pure error (Draper and Smith, Applied Regression
+    Analysis, 2.1). None where readings state no uncertainty and no pose is repeated.
+    """
+    from scipy.stats import chi2, f
+
+    ratio, rest = sigma_mm**2, max(freedom, 1)
+    if stack.has_uncertainties:
+        what = "their uncertainty allows"
+        limit = float(chi2.isf(CHANCE, rest)) / rest
+    else:
+        scatter, repeated, weights = 0.0, 0, stack.weights()
+        for one, left, weight in zip(stack.sets, after, weights, strict=True):
+            row = left * weight.reshape(left.shape)
+            labels = np.unique(one.session, return_inverse=True)[1]
+            poses = np.round(np.column_stack([labels, *one.coordinates.values()]), 6)
+            group = np.unique(poses, axis=0, return_inverse=True)[1].ravel()
+            means = np.array([row[group == at].mean(axis=0) for at in range(group.max() + 1)])
+            scatter += float(np.sum((row - means[group]) ** 2))
+            repeated += (len(row) - len(means)) * row.shape[1]
+        if repeated < 1 or rest <= repeated or scatter <= 0.0:
+            return None, ()
+        total, rest = ratio * rest, rest - repeated
+        ratio, what = (total - scatter) / rest * repeated / scatter, "repeated readings scatter"
+        limit = float(f.isf(CHANCE, rest, repeated))
+    times = f"residuals are {np.sqrt(ratio):.1f} times what {what}"
+    notes = (f"the model misses something: {times}",) if ratio > limit else ()
+    return float(np.sqrt(max(ratio, 0.0))), notes

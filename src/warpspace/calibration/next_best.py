@@ -231,7 +231,8 @@ def separating(
             break
         stack = solve.Stack.of(scene, [*sets, one.readings], watch)
         by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
-        rank = solve.find_rank(keys, np.vstack(by_parameter), np.vstack(by_unknown))
+        both = np.vstack(by_parameter), np.vstack(by_unknown)
+        rank = solve.find_rank(keys, *both, stack.blind)
         still = {group[0] for group in rank.confounded}
         for group in [group for group in missing if group[0] not in still]:
             told[group] = one.name

@@ -23,6 +23,8 @@ from warpspace.units import Array
 MAX_READINGS = 20_000  # rows that a file of readings may have
 LABELS = ("session", "run")
 """Columns that hold a name; the first that is there tells sessions apart."""
+TEXTS = (*LABELS, "time")
+"""Columns that need not hold numbers."""
 MAX_NUMBER = 1e9
 FRAMES = {"machine": "r", "workpiece": "w"}
 """How names of columns spell the frame of vectors, in small letters."""
@@ -36,7 +38,7 @@ class ReadingTable:
 
     source: str  # name of the file, for messages
     columns: Mapping[str, Array]  # [n]; numbers by the name of their column, in small letters
-    labels: Mapping[str, tuple[str, ...]]  # (n,); names by column: `session` and `run`
+    labels: Mapping[str, tuple[str, ...]]  # (n,); words by column: `session`, `run`, `time`
     lines: tuple[int, ...]  # (n,); line of the file that each row stands on
     text: str = ""  # all of the file, for kinds that have columns of their own
     notes: tuple[str, ...] = ()  # what a reader should doubt
@@ -72,8 +74,8 @@ def parse_table(text: str, source: str) -> ReadingTable:
     repeated = {name for name in header if header.count(name) > 1}
     if repeated:
         raise SceneError(source, [f"names column {min(repeated)!r} twice; expected each once"])
-    numbers: dict[str, list[float]] = {name: [] for name in header if name not in LABELS}
-    labels: dict[str, list[str]] = {name: [] for name in header if name in LABELS}
+    numbers: dict[str, list[float]] = {name: [] for name in header if name not in TEXTS}
+    labels: dict[str, list[str]] = {name: [] for name in header if name in TEXTS}
     lines: list[int] = []
     for line, row in rows:
         lines.append(line)
@@ -154,6 +156,8 @@ class Readings:
     # "machine" or "workpiece": what vectors were read in; they are kept in the latter
     frame: str = ""
     plan: Plan | None = None  # of the test they were taken with, along its path
+    # what the set-up leaves unknown, as a first fit has it; where a kind makes one on reading
+    first_fit: tuple[float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -182,14 +186,22 @@ def read_readings(
 def parse_readings(
     text: str, source: str, scene: Scene, kind: str | None = None, frame: str | None = None
 ) -> Readings:
-    from warpspace.calibration.registry import find_kind, recognise
+    from warpspace.calibration.registry import KINDS, find_kind, recognise
 
     found = None if kind is None else find_kind(kind)
     if found is not None and found.own_columns:
         return found.read(ReadingTable(source, {}, {}, (), text), scene)
     table = replace(parse_table(text, source), frame=frame)
-    readings = (found or recognise(table, scene)).read(table, scene)
+    if found is None or (found.name == "points" and KINDS["positions"].fits(table, scene)):
+        found = recognise(table, scene)
+    readings = found.read(table, scene)
     return replace(readings, notes=(*readings.notes, *table.notes))
+
+
+def axis_column(scene: Scene, name: str) -> str:
+    """Name the column of the positions of an axis, such as ``b_deg`` or ``x_mm``."""
+    head = scene.machine.columns.get(name, name).lower()
+    return f"{head}_{'mm' if scene.machine.axes[name].is_linear else 'deg'}"
 
 
 def axis_columns(
@@ -197,17 +209,20 @@ def axis_columns(
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Give positions of all axes, [n], out of columns such as ``b_deg`` and ``x_mm``, and notes."""
     axes = scene.machine.axes
+    own = {name: axis_column(scene, name) for name in axes}
     coordinates: dict[str, Array] = {}
     notes: list[str] = []
     for name in names:
-        unit = "mm" if axes[name].is_linear else "deg"
-        for column in (f"{name.lower()}_{unit}", f"axis_{name.lower()}_{unit}"):
+        for column in (own[name], f"axis_{name.lower()}_{own[name].rpartition('_')[2]}"):
             if column in table.columns:
                 coordinates[name] = table.columns[column]
+    if lacking := [own[n] for n in names if n in scene.machine.columns and n not in coordinates]:
+        table.need(lacking)
+    heads = [own[name].removesuffix("_deg") for name, axis in axes.items() if not axis.is_linear]
     for column in table.columns:
         head, _, unit = column.removeprefix("axis_").rpartition("_")
-        if unit == "deg" and head.upper() not in axes:
-            known = ", ".join(name for name, axis in axes.items() if not axis.is_linear)
+        if unit == "deg" and head not in heads and head.upper() not in axes:
+            known = ", ".join(heads).upper()
             found = f"has column {column}, but the machine has no axis {head.upper()}"
             raise SceneError(table.source, [f"{found}; expected {known or 'no rotary axis'}"])
     if needed and not any(name in coordinates for name in needed):

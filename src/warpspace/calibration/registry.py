@@ -12,6 +12,7 @@ from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
 from warpspace.bench.plan import Plan, respond, simulate
 from warpspace.calibration.kinds import Guess, Kind, Lengths, Points, Tracker
+from warpspace.calibration.positions import Positions
 from warpspace.calibration.readings import Readings, ReadingTable, check_spread
 from warpspace.calibration.spheres import Sphere, SphereTcp
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
@@ -136,7 +137,7 @@ def _value(option: Option, text: str, given: str) -> Any:
 
 
 KINDS: Mapping[str, Kind] = {
-    kind.name: kind for kind in (Points(), Tracker(), Sphere(), SphereTcp(), Lengths())
+    kind.name: kind for kind in (Points(), Tracker(), Positions(), Sphere(), SphereTcp(), Lengths())
 }
 
 

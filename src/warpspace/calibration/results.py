@@ -30,7 +30,6 @@ from warpspace.units import MICROMETRE, MICRORADIAN, UM_PER_MM, Array
 
 Target: TypeAlias = str | tuple[tuple[str, float], ...]
 """What is to be made sure: the map, its least sure corner, or axis positions of a point."""
-LACK = 1.5  # scatter of residuals, of what is stated, beyond which a model lacks something
 MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their uncertainty
 
 
@@ -183,11 +182,16 @@ class Calibration(Result):
     rms_after_mm: float
     rms_predicted_before_mm: float | None
     rms_predicted_after_mm: float | None
+    # share of predicted components inside their stated 95 % intervals; none where no reading was
+    # predicted, or where only those that were fitted state their uncertainty
+    predicted_coverage_95: float | None
     # standard deviation of one component, from the residuals (of a robust fit: their median); of a
     # weight of one where uncertainties are given
     sigma_mm: float
     freedom: int  # components less what was fitted
-    lack_of_fit: float | None  # scatter of the residuals in units of what is stated of readings
+    # scatter of the residuals in units of what is stated of readings, else of repeated ones; none
+    # where there is neither
+    lack_of_fit: float | None
     instrument: Mapping[str, Any] | None  # its contributions, and what they bring
     notes: tuple[str, ...] = ()
     # groups that cannot be told apart, and the measurement that would
@@ -222,6 +226,7 @@ class Calibration(Result):
             "rms_after_mm": self.rms_after_mm,
             "rms_predicted_before_mm": self.rms_predicted_before_mm,
             "rms_predicted_after_mm": self.rms_predicted_after_mm,
+            "predicted_coverage_95": self.predicted_coverage_95,
             "sigma_mm": self.sigma_mm,
             "degrees_of_freedom": self.freedom,
             "set_up_mm": dict(self.unknowns),
@@ -258,15 +263,17 @@ class Calibration(Result):
                 f"  predicted, not fitted: {self.rms_predicted_before_mm:.4f} mm before,"
                 f" {self.rms_predicted_after_mm:.4f} mm after"
             )
+        if self.predicted_coverage_95 is not None:
+            share = f"{100.0 * self.predicted_coverage_95:.1f} %"
+            yield f"  {share} of their components are inside the 95 % intervals stated for them"
         yield from (f"  note: {note}" for note in self.notes)
         yield from map(_circle_words, self.circles)
         yield from self._errors()
         wide = self.sigma_mm >= 1.0
         width = f"{self.sigma_mm:.2f} mm" if wide else f"{UM_PER_MM * self.sigma_mm:.2f} µm"
         width = f"standard deviation of one component {width}"
-        if self.lack_of_fit is not None:
-            width = f"residuals scatter {self.lack_of_fit:.2f} times as far as stated"
-            width += ": errors act that are not looked for" * (self.lack_of_fit > LACK)
+        if all(one.readings.sigma_mm is not None for one in self.fitted):
+            width = f"residuals scatter {self.sigma_mm:.2f} times as far as stated"
         yield f"  {width}, {self.freedom} degrees of freedom"
         yield from budget_blocks(self.instrument) if self.instrument else ()
         if self.merit:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from warpspace.calibration.kinds import Guess
+from warpspace.calibration.kinds import Guess, Kind
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import find_kind
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -14,11 +14,6 @@ from warpspace.machine.errors import Constant, ErrorSet, Ramp
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-BLIND = 2e-4
-"""Share of its own effect below which what is left of a parameter counts as nothing.
-
-With less, noise of a thousandth makes values that no machine has.
-"""
 SHARE = 1e-3  # of a combination, below which a parameter is not named as part of it
 
 
@@ -44,7 +39,9 @@ class Rank:
         return {key: 1.0, **others}
 
 
-def find_rank(keys: Sequence[str], by_parameter: Array, by_unknown: Array) -> Rank:
+def find_rank(
+    keys: Sequence[str], by_parameter: Array, by_unknown: Array, blind: float = Kind.blind
+) -> Rank:
     """Go through the parameters in order and see which adds something new.
 
     The likelier come first: where two look alike the later one is left out. Readings are weighted;
@@ -59,19 +56,19 @@ def find_rank(keys: Sequence[str], by_parameter: Array, by_unknown: Array) -> Ra
     unseen: list[str] = []
     alike: dict[str, Mapping[str, float]] = {}
     for at, key in enumerate(keys):
-        if norms[at] <= BLIND * largest or not norms[at]:
+        if norms[at] <= Kind.blind * largest or not norms[at]:
             unseen.append(key)
             continue
         rest = units[:, at]
         for _ in range(2):  # twice: the second pass takes what rounding left
             for direction in basis:
                 rest = rest - direction * (direction @ rest)
-        if np.linalg.norm(rest) > BLIND:
+        if np.linalg.norm(rest) > blind:
             kept.append(at)
             basis.append(rest / np.linalg.norm(rest))
             continue
         alike[key] = {}
-        if kept and np.linalg.norm(units[:, at]) > BLIND:
+        if kept and np.linalg.norm(units[:, at]) > blind:
             shares, *_ = np.linalg.lstsq(units[:, kept], units[:, at], rcond=None)
             alike[key] = {
                 keys[one]: float(share * norms[at] / norms[one])
@@ -194,7 +191,7 @@ def automatic(scene: Scene, together: Sequence[Readings]) -> tuple[str, ...]:
         for key in find_kind(readings.kind).automatic_keys(readings, scene):
             row = parameter(key)
             rotary = not scene.machine.axes[row.axis].is_linear
-            whole = readings.kind in {"points", "tracker", "lengths"}
+            whole = readings.kind in {"points", "tracker", "positions", "lengths"}
             if whole and rotary and not row.is_constant and key not in scene.errors:
                 continue  # a constant there is a location error by another name
             keys[key] = None
@@ -276,6 +273,11 @@ class Stack:
             else np.repeat(1.0 / one.sigma_mm, one.observed_mm.shape[1])
             for one in self.sets
         ]
+
+    @property
+    def blind(self) -> float:
+        """Share of its effect below which nothing is told of a parameter; see `Kind.blind`."""
+        return max(find_kind(one.kind).blind for one in self.sets)
 
     @property
     def has_uncertainties(self) -> bool:

@@ -191,6 +191,7 @@ class Machine:
     # bodies of frames that the description gives; all others are generated
     bodies: Mapping[str, BodySource] = field(default_factory=dict[str, BodySource])
     source: str = ""  # where its structure is published
+    columns: Mapping[str, str] = field(default_factory=dict[str, str])  # names of axes in data
 
     def axis(self, name: str) -> Axis:
         try:

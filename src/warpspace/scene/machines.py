@@ -124,7 +124,7 @@ def machine_of(
         problems.add(f"{prefix}chain", str(error))
         return None
     tables = {part: section[part] for part in ("offset_mm", "rotation_deg", "travel", "direction")}
-    for part, entries in {**tables, "gantry": section["gantry"]}.items():
+    for part, entries in {**tables, **{k: section[k] for k in ("gantry", "columns")}}.items():
         known = (
             *chain.axes,
             *(description.FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()),
@@ -139,9 +139,23 @@ def machine_of(
         body_dir=body_dir,
         source=section["source"],
     )
+    _check_columns(section["columns"], chain.axes, f"{prefix}columns", problems)
+    machine = replace(machine, columns=section["columns"])
     if not section["bodies"]:
         return machine
     return replace(machine, bodies=read_bodies(section["bodies"], machine, folder, problems))
+
+
+def _check_columns(
+    section: Mapping[str, str], axes: Sequence[str], key: str, problems: Problems
+) -> None:
+    """Refuse a name in data that two axes would answer to."""
+    named = {axis: section.get(axis, axis).lower() for axis in axes}
+    for axis, name in section.items():
+        others = [other for other in axes if other != axis and named[other] == name.lower()]
+        if others:
+            expected = f"is the name of {others[0]} as well; expected a name for each axis"
+            problems.add(f"{key}.{axis}", expected, name)
 
 
 def _gantries(

@@ -220,6 +220,7 @@ def _machine_sections(machine: Machine) -> list[str]:
         spell_section("machine.travel", travel),
         spell_section("machine.direction", direction),
         spell_section("machine.gantry", gantry),
+        spell_section("machine.columns", machine.columns),
     ]
 
 

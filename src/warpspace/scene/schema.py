@@ -214,6 +214,7 @@ MACHINE = Section(
         "travel": (_by_name(_span), {}),
         "direction": (_by_name(_choice(lambda: (1, -1))), {}),
         "gantry": (_by_name(GANTRY), {}),
+        "columns": (_by_name(_text(20, 1, "[A-Za-z][A-Za-z0-9]*", "letters and digits")), {}),
         "bodies": (_by_name(lambda _reader, value, _path: value), {}),
     }
 )
