@@ -15,7 +15,7 @@ from warpspace.scene.library import scene_names
 from warpspace.scene.machines import load_machine, machine_names, machine_picture
 
 MACHINES = machine_names()
-LIBRARY = tuple(name for name in MACHINES if name != "dvf5000")
+LIBRARY = tuple(name for name in MACHINES if name not in ("dvf5000", "ur10"))
 POSES = 20
 
 

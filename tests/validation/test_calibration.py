@@ -99,6 +99,10 @@ def test_poses_left_out_are_predicted(tmp_path):
     assert found.rms_predicted_before_mm == pytest.approx(0.447, abs=0.001)
     assert found.rms_predicted_after_mm is not None
     assert found.rms_predicted_after_mm < 0.3 * found.rms_predicted_before_mm
+    # the intervals do not hold there, and the repeated pose B0 C0 tells that the model is too small
+    assert found.predicted_coverage_95 == pytest.approx(0.583, abs=0.001)
+    assert found.lack_of_fit == pytest.approx(3.19, abs=0.01)
+    assert any("3.2 times what repeated readings scatter" in note for note in found.notes)
 
 
 def planted(errors, kind, poses, noise=0.0, seed=0):
