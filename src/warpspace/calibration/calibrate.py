@@ -522,9 +522,7 @@ def _predict(
     from scipy.stats import t
 
     weights = np.concatenate(held.weights(scatter[0]))[:, None]
-    by_parameter, by_unknown = map(
-        np.vstack, held.derivatives(part, solved.amplitudes, values[1])
-    )
+    by_parameter, by_unknown = map(np.vstack, held.derivatives(part, solved.amplitudes, values[1]))
     own = np.isin(held.unknowns, new)
     at = [len(part.keys) + stack.unknowns.index(n) for n in held.unknowns if n not in new]
     chosen = [*range(len(part.keys)), *at]

@@ -42,6 +42,13 @@ class Guess:
     values: Array  # [m], mm
 
 
+BLIND = 2e-4
+"""Share of its own effect below which what is left of a parameter counts as nothing.
+
+With less, noise of a thousandth makes values that no machine has.
+"""
+
+
 class Kind(ABC):
     """A kind of measurement.
 
@@ -54,9 +61,7 @@ class Kind(ABC):
     columns: ClassVar[str]  # of its file
     # whether it takes the text of the file, columns of words among them, rather than its table
     own_columns: ClassVar[bool] = False
-    # share of its own effect below which what is left of a parameter counts as nothing: with less,
-    # noise of a thousandth makes values that no machine has
-    blind: ClassVar[float] = 2e-4
+    blind: ClassVar[float] = BLIND
 
     @abstractmethod
     def fits(self, table: ReadingTable, scene: Scene) -> bool:

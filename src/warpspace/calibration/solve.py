@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from warpspace.calibration.kinds import Guess, Kind
+from warpspace.calibration.kinds import BLIND, Guess
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import find_kind
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -40,7 +40,7 @@ class Rank:
 
 
 def find_rank(
-    keys: Sequence[str], by_parameter: Array, by_unknown: Array, blind: float = Kind.blind
+    keys: Sequence[str], by_parameter: Array, by_unknown: Array, blind: float = BLIND
 ) -> Rank:
     """Go through the parameters in order and see which adds something new.
 
@@ -56,7 +56,7 @@ def find_rank(
     unseen: list[str] = []
     alike: dict[str, Mapping[str, float]] = {}
     for at, key in enumerate(keys):
-        if norms[at] <= Kind.blind * largest or not norms[at]:
+        if norms[at] <= BLIND * largest or not norms[at]:
             unseen.append(key)
             continue
         rest = units[:, at]
@@ -276,7 +276,7 @@ class Stack:
 
     @property
     def blind(self) -> float:
-        """Share of its effect below which nothing is told of a parameter; see `Kind.blind`."""
+        """Share of its effect below which nothing is told of a parameter."""
         return max(find_kind(one.kind).blind for one in self.sets)
 
     @property
