@@ -93,7 +93,7 @@ def test_numbers_have_their_uncertainty_beside_them():
 def test_a_slider_keeps_its_covariance_and_the_grid_its_response():
     state = state_of()
     before, after = LIVE.evaluate(state), LIVE.evaluate(state.with_amplitude("EXX", -30.0))
-    assert after.uncertainty.basis is before.uncertainty.basis
+    assert after.uncertainty.response is before.uncertainty.response
     np.testing.assert_allclose(after.uncertainty.covariance_um2, before.uncertainty.covariance_um2)
     assert not np.allclose(after.u95_um, before.u95_um)  # |E| has turned
 

@@ -60,13 +60,13 @@ matrix = [[4.0], [3.0, 9.0]]
 """
     scene, at = parse_scene(MACHINE + text, "s"), {"X": 40.0, "Y": -70.0, "Z": -150.0}
     axes = complete_coordinates(scene.machine, at, scene.workspace.positions)
-    found = field_doubt(scene, evaluate(scene, at=at), axes, scene.view())
+    found = field_doubt(scene, evaluate(scene, at=at).error_um, axes, scene.view())
     turn, tilt = GTC.ureal(20.0, 2.0, independent=False), GTC.ureal(-30.0, 3.0, independent=False)
     GTC.set_correlation(0.5, turn, tilt)
     # a rotation about z at Y, about x at Z: lever times angle, mm times µrad is nm
     error = (-turn * -70e-3, -tilt * (-150.0 - 300.0) * 1e-3)
     wanted = [[GTC.get_covariance(a, b) for b in error] for a in error]
-    assert found.field.error_um[:2] == pytest.approx([GTC.value(one) for one in error])
+    assert found.error_um[:2] == pytest.approx([GTC.value(one) for one in error])
     np.testing.assert_allclose(found.covariance_um2[:2, :2], wanted, rtol=1e-9)
     norm = GTC.sqrt(error[0] ** 2 + error[1] ** 2)
     assert float(found.u_norm_um) == pytest.approx(GTC.uncertainty(norm), rel=1e-9)
@@ -297,14 +297,14 @@ def held_by_planted_machines(name, trials):
             held["parameters"].append(low <= truth.errors.amplitude(one.key) <= high)
         axes = complete_coordinates(scene.machine, CORNER, scene.workspace.positions)
         own, wanted = (evaluate(one, at=CORNER) for one in (found.scene, truth))
-        sure = field_doubt(found.scene, own, axes, scene.view())
+        sure = field_doubt(found.scene, own.error_um, axes, scene.view())
         off, k = own.error_um - wanted.error_um, sure.doubt.factor
         held["point"] += list(np.abs(off) <= k * sure.u_um)
         held["limit"].append(abs(own.norm_um - wanted.norm_um) <= k * sure.u_norm_um)
         volume = volume_doubt(found.scene, scene.view(), 5)
-        off = volume.field.norm_um - evaluate(truth, grid=5).norm_um
+        off = volume.norm_um - evaluate(truth, grid=5).norm_um
         u95 = volume.statistics()["mean_um"]
-        held["mean"].append(abs(np.sum(volume.grid.weights * off)) <= u95)
+        held["mean"].append(abs(np.sum(volume.shares * off)) <= u95)
     return {what: float(np.mean(each)) for what, each in held.items()}
 
 

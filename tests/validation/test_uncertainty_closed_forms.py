@@ -37,7 +37,7 @@ def trust(text, **options):
 def test_one_squareness(limit):
     # |E| = γ·|y|: 2 µm at the ends of Y and half of it in the mean; γ = 20 ± 1.5 µrad
     found = trust(ONE, limit_um=limit)
-    said = found.statistics
+    said = found.as_json()["statistics"]
     assert said["mean_um"] == pytest.approx(1.0)
     assert said["u95_mean_um"] == pytest.approx(2 * 1.5e-3 * 50.0)
     assert said["u95_max_um"] == pytest.approx(2 * 1.5e-3 * 100.0)
@@ -52,7 +52,7 @@ def test_one_squareness_of_few_degrees_of_freedom():
     covariance = "[uncertainty.covariance]\nkeys = ['EC0Y']\nmatrix = [[2.25]]\nfreedom = 4\n"
     text = ONE.partition("[uncertainty]")[0] + covariance
     found = trust(text, limit_um=2.25, verify=True)
-    assert found.statistics["u95_max_um"] == pytest.approx(coverage_factor(4) * 0.15)
+    assert found.as_json()["statistics"]["u95_max_um"] == pytest.approx(coverage_factor(4) * 0.15)
     assert found.probability_worst == pytest.approx(t.cdf(2.5 / 1.5, 4), abs=0.005)
     # the spread of machines drawn is that of the interval which is stated
     assert found.montecarlo["max_um"]["u95_um"] == pytest.approx(
@@ -66,8 +66,8 @@ def test_two_translations(between, second):
     found = trust(TWO.format(between=between, second=second), limit_um=7.0)
     u = math.sqrt(0.36 * 4.0 + 2 * 0.48 * between + 0.64 * second)
     for name in ("mean", "rms", "p95", "max"):
-        assert found.statistics[f"{name}_um"] == pytest.approx(5.0)
-        assert found.statistics[f"u95_{name}_um"] == pytest.approx(2 * u)
+        assert found.as_json()["statistics"][f"{name}_um"] == pytest.approx(5.0)
+        assert found.as_json()["statistics"][f"u95_{name}_um"] == pytest.approx(2 * u)
     share = {one["key"]: one["percent_of_max"] for one in found.shares}
     assert share["EXX"] == pytest.approx(100 * (0.36 * 4.0 + 0.48 * between) / u**2)
     assert sum(share.values()) == pytest.approx(100.0)
@@ -98,7 +98,7 @@ def test_numbers_move_by_one_standard_uncertainty_up_and_down():
 def test_what_is_not_stated_leaves_all_of_it_unknown():
     found = trust(ONE.replace("EC0Y = 20", "EC0Y = 20\nEXX = 1"), limit_um=2.0, verify=True)
     assert found.unknown == ("EXX",)
-    assert found.statistics["u95_mean_um"] is None
+    assert found.as_json()["statistics"]["u95_mean_um"] is None
     assert (found.probability_everywhere, found.montecarlo, found.shares) == (None, {}, ())
     assert "± ?" in str([*found.blocks()])
 

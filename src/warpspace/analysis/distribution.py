@@ -280,9 +280,13 @@ class Draws:
         )
 
 
-def loop_keys(model: Model, loop: Loop, keys: Sequence[str]) -> tuple[str, ...]:
+def loop_axes(model: Model, loop: Loop) -> set[str]:
     sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
-    axes = {axis.name for side in sides for axis in model.machine.branch(side)}
+    return {axis.name for side in sides for axis in model.machine.branch(side)}
+
+
+def loop_keys(model: Model, loop: Loop, keys: Sequence[str]) -> tuple[str, ...]:
+    axes = loop_axes(model, loop)
     if not axes:
         raise OptionError(f"loop {loop}: the machine {model.machine.chain} has no axis in it")
     return tuple(key for key in keys if parameter(key).axis in axes)

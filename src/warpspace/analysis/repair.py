@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as attribute
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table,
 from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
 from warpspace.analysis.doubt import NAMES, FieldDoubt, field_doubt, plus_minus
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
-from warpspace.analysis.statistics import Statistics, Summary, volume_statistics
+from warpspace.analysis.statistics import Numbers, Statistics, Summary, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
@@ -25,19 +25,10 @@ from warpspace.units import Array, spell, spell_short
 DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
 MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
 FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
-Numbers: TypeAlias = Mapping[str, float | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sure(Summary):
-    """The whole volume; where the scene says how sure its errors are, U95 of its numbers too."""
-
-    keys: ClassVar[tuple[str, ...]] = (*FOUR, "sure")
-    sure: Numbers = attribute(default_factory=dict[str, float | None])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Best(Sure):
+class Best(Summary):
     """The whole volume with one error at its best value."""
 
     keys: ClassVar[tuple[str, ...]] = ("value", *FOUR, "sure")
@@ -65,7 +56,7 @@ class Effect:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AdjustedSet(Sure):
+class AdjustedSet(Summary):
     """The best set of so many adjustments, and the whole volume with it."""
 
     keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact", "sure")
@@ -152,9 +143,10 @@ class Repair(Analysis):
         ]
         left_out = second_order(scene, self.seen_loop)
         found = replace(found, repairs=tuple(sets), second_order=left_out)
-        field = basis.evaluate(values)
-        doubt = field_doubt(scene, field, nodes.coordinates, view, nodes.point_mm)
-        return found if doubt is None else _with_doubt(found, replace(doubt, grid=nodes), basis)
+        error = basis.evaluate(values, orientation=False).error_um
+        at = nodes.coordinates, view, nodes.point_mm, nodes.weights
+        doubt = field_doubt(scene, error, *at)
+        return found if doubt is None else _with_doubt(found, doubt, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
@@ -173,7 +165,7 @@ class RepairResult(Result):
     no_change = "there is nothing to adjust in this loop"
     asked: Repair
     scene: Scene
-    before: Sure
+    before: Summary
     # every error that is not zero and acts in the loop; the one whose best value helps the
     # objective most comes first
     errors: tuple[Effect, ...]
@@ -361,7 +353,7 @@ def find_repairs(
     return RepairResult(
         asked=asked,
         scene=scene,
-        before=Sure(**_four(volume.statistics(amplitudes))),
+        before=Summary(**_four(volume.statistics(amplitudes))),
         errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
         repairs=tuple(sets),
         adjustable={key: asked.limit_of(key) for key in keys},
@@ -374,7 +366,7 @@ def _with_doubt(found: RepairResult, before: FieldDoubt, basis: ErrorBasis) -> R
 
     def sure(adjust: Mapping[str, float]) -> Numbers:
         values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
-        after = replace(before, field=basis.evaluate(values))
+        after = replace(before, error_um=basis.evaluate(values).error_um)
         u95 = {f"u95_{name}": value for name, value in after.statistics().items()}
         return u95 | (
             {"probability": before.falls(after, f"{found.objective}_um")} if adjust else {}

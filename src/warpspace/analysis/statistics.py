@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import field as attribute
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import Grid
 from warpspace.units import Array
 
+Numbers: TypeAlias = Mapping[str, float | None]
 P95 = 0.95
 SAMPLED = 61
 
@@ -23,6 +25,8 @@ class Summary:
     rms_um: float
     p95_um: float
     max_um: float
+    # U95 of these, u95_mean_um and so on, µm; None is not known, empty where nothing is stated
+    sure: Numbers = attribute(default_factory=dict[str, float | None], kw_only=True)
 
     @property
     def three(self) -> tuple[float, float, float]:

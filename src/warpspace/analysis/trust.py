@@ -1,16 +1,16 @@
 """How sure the map of a machine is, whether it keeps its limit, and what makes it unsure."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.doubt import COVERED, NAMES, FieldDoubt, plus_minus, volume_doubt, with_u95
+from warpspace.analysis.doubt import COVERED, NAMES, FieldDoubt, plus_minus, volume_doubt
 from warpspace.analysis.options import LOOP_HELP, option, place_words
-from warpspace.analysis.statistics import P95, volume_statistics
+from warpspace.analysis.statistics import P95, Statistics, volume_statistics
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -52,11 +52,11 @@ class Trust(Analysis):
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         found = volume_doubt(scene, view, self.nodes)
         limit = scene.limit_um if self.limit_um is None else self.limit_um
-        statistics = asdict(volume_statistics(evaluate_grid(scene, grid, view), grid))
+        statistics = volume_statistics(evaluate_grid(scene, grid, view), grid)
         beyond = (scene.covariance or Covariance((), ())).outside(grid.coordinates, grid.shape)
         result = TrustResult(
             limit_um=limit,
-            statistics=statistics if found is None else with_u95(statistics, found.statistics()),
+            statistics=found.said_of(statistics) if found else statistics,
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
             k=found and found.doubt.factor,
             unknown=found.doubt.unknown if found else [*scene.errors],
@@ -65,12 +65,12 @@ class Trust(Analysis):
         )
         if found is None or not found.doubt.is_known:
             return result
-        above = found.field.norm_um > found.doubt.factor * found.u_norm_um
+        above = found.norm_um > found.doubt.factor * found.u_norm_um
         significant = 100.0 * float(grid.weights[above].sum())
         result = replace(result, significant_percent=significant, shares=_shares(found))
         if limit is None and not self.verify:
             return result
-        worst, drawn = int(np.argmax(found.field.norm_um)), list[Array]()
+        worst, drawn = int(np.argmax(found.norm_um)), list[Array]()
         for norm in found.machines(self.samples, self.seed):
             others = _three(norm, grid.weights.reshape(-1)) if self.verify else ()
             drawn.append(np.stack([norm[:, worst], *others, norm.max(axis=1)]))
@@ -117,7 +117,7 @@ class TrustResult(Result):
         "significant_percent", "never_measured_percent", "shares", "montecarlo",
     )  # fmt: skip
     limit_um: float | None
-    statistics: Mapping[str, Any]  # of |E| over the volume, with U95
+    statistics: Statistics  # of |E| over the volume
     probability_worst: float | None = None  # that the limit is kept where |E| is largest
     probability_everywhere: float | None = None
     significant_percent: float | None = None  # of the volume, where |E| is above its U95
@@ -142,15 +142,15 @@ class TrustResult(Result):
         )
         rows: list[tuple[Any, ...]] = []
         for name, words in NAMES.items():
-            u95, more = self.statistics.get(f"u95_{name}"), [*drawn.get(name, {}).values()]
+            u95, more = self.statistics.sure.get(f"u95_{name}"), [*drawn.get(name, {}).values()]
             more += [100.0 * (more[1] / u95 - 1.0) if u95 else 0.0] if more else []
-            rows.append((words, self.statistics[name], plus_minus(u95), u95, *more))
+            rows.append((words, getattr(self.statistics, name), plus_minus(u95), u95, *more))
         yield Table(columns, rows)
         yield from (f"  {words}" for words in self.remarks)
         if self.probability_worst is not None and self.probability_everywhere is not None:
             yield (
                 f"  |E| ≤ {self.limit_um:g} µm with {100.0 * self.probability_worst:.1f} % at the"
-                f" worst point, {place_words(self.statistics['max_at_axes'])};"
+                f" worst point, {place_words(self.statistics.max_at_axes)};"
                 f" with {100.0 * self.probability_everywhere:.1f} % everywhere"
             )
         if self.significant_percent is not None:

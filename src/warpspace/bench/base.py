@@ -13,7 +13,7 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table
 from warpspace.analysis.description import Analysis, Result, Watch
 from warpspace.analysis.distribution import round_width
-from warpspace.analysis.doubt import find_doubt, plus_minus, with_u95
+from warpspace.analysis.doubt import find_doubt, plus_minus
 from warpspace.analysis.options import File, Option, Place, option, options_of
 from warpspace.bench.data import DataColumn, read_table, unit_notes
 from warpspace.bench.data import Table as DataTable
@@ -207,16 +207,18 @@ class BenchResult(Result):
     def as_json(self) -> dict[str, Any]:
         """Spell it: the numbers of what was measured at the top, else those of the model."""
         shown = self.measured or self.model
+        u95 = {f"u95_{key}": value for key, value in self.u95.items()}
         found: dict[str, Any] = {
             "test": self.test.name,
             "scene": self.scene.name,
             "of": shown.who,
             "place": shown.plan.place,
-            **with_u95(shown.values, {} if shown.is_measured else self.u95),
+            **shown.values,
+            **({} if shown.is_measured else u95),
             **shown.outcome.details,
         }
         if self.measured is not None:
-            found["model"] = with_u95(self.model.values, self.u95)
+            found["model"] = {**self.model.values, **u95}
             found["rms_difference"] = self.rms_difference
         return found | {"notes": list(self.notes)}
 

@@ -5,12 +5,14 @@ Geometry only: no forces, heat, wear or servo.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.doubt import Doubt, u95_lines
 from warpspace.analysis.options import File, option
 from warpspace.analysis.statistics import Statistics, statistics
 from warpspace.bodies.gltf import to_gltf
@@ -20,7 +22,15 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
-from warpspace.parts.part import Made, OfPart, PartMesh, fit_out, make_points, place_part
+from warpspace.parts.part import (
+    Made,
+    OfPart,
+    PartMesh,
+    fit_out,
+    made_doubt,
+    make_points,
+    place_part,
+)
 from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MM_PER_UM, Array
@@ -72,14 +82,18 @@ class Part(OfPart):
         made = make_points(scene, part.vertices_mm)
         watch(0.5)
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        placed_um = fit_out(made.point_mm, made.error_um)
-        cut, placed = _off(part, made, made.error_um, placed_um)
+        fit = partial(fit_out, made.point_mm)
+        cut, placed = _off(part, made, made.error_um, fit(made.error_um))
+        if (sure := None if is_large else made_doubt(scene, made)) is not None:
+            cut = replace(cut, deviation=sure.said_of(cut.deviation))
+            placed = replace(placed, deviation=sure.seen(fit).said_of(placed.deviation))
         return PartResult(
             vertices=len(mesh.vertices_mm),
             outside=int(made.outside.sum()),
             **vars(cut),
             placed=placed,
-            features=() if is_large else inspect(scene, mesh, made, tolerances),
+            features=() if is_large else inspect(scene, mesh, made, tolerances, sure),
+            doubt=sure and sure.doubt,
             part=part,
             made=made,
             scene=scene,
@@ -119,6 +133,7 @@ class PartResult(Off, Result):
     made: Made  # its vertices
     scene: Scene
     asked: Part
+    doubt: Doubt | None  # how sure its errors are
 
     def doubts(self) -> Iterator[str]:
         yield from self.part.warnings
@@ -127,7 +142,7 @@ class PartResult(Off, Result):
             yield f"{far} are beyond the travel; their errors are continued"
         if (count := len(self.part.triangles)) > MAX_FEATURE_TRIANGLES:
             most = f"up to {MAX_FEATURE_TRIANGLES:,}"
-            yield f"{count:,} triangles: features are looked for in {most}"
+            yield f"{count:,} triangles: features, and U95, are looked for in {most}"
 
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.deviation.max_at_mm
@@ -140,6 +155,7 @@ class PartResult(Off, Result):
         rows = [(word, *astuple(one.deviation)[:4], *one.normal.values()) for word, one in both]
         heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
+        yield from u95_lines(self.doubt, {word: one.deviation for word, one in both})
         yield features_table(self.features)
 
     def texts(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.contributions import budget_words
+from warpspace.analysis.doubt import Doubt, FieldDoubt, plus_minus
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
@@ -41,6 +42,7 @@ STEPS, STILL_MM, FAR_MM = 40, 1e-11, 1e6  # of a fit; changes of a distance that
 MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
 RIGHT_RAD = 1e-4  # nominal angles this close to 90° or 0 are right or none; datums fix no less
 NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
+SURE = 0.95  # least probability of what is said of a tolerance
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
 SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circles fit a sphere, too
 
@@ -262,7 +264,11 @@ class FeatureResult:
 
 
 def inspect(
-    scene: Scene, mesh: PartMesh, made: Made, tolerances: tuple[str, str] | None = None
+    scene: Scene,
+    mesh: PartMesh,
+    made: Made,
+    tolerances: tuple[str, str] | None = None,
+    sure: FieldDoubt | None = None,
 ) -> tuple[FeatureResult, ...]:
     """Measure the features of a part, in its own frame, and made at some place in a scene.
 
@@ -305,11 +311,18 @@ def inspect(
             alone = fit_out(points, amplitude * point_basis(scene, made, [key]).position @ turn)
             low, high = take(placed[0] / 2.0 + NUDGE * np.concatenate([-alone, alone]))
             budget[key] = (high - low) / (2.0 * NUDGE)
+    u95: list[float | None] = [None] * len(wanted)
+    if sure is not None:
+        changes = fit_out(points, sure.response @ turn)
+        u95 = sure.doubt.through(
+            lambda change: take(placed[:1] + np.tensordot(change, changes, 1))[0]
+        )
     measures = [dict[str, Mapping[str, Any]]() for _ in features]
     for index, ((kind, of), band) in enumerate(wanted.items()):
         to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
         split = {key: float(part[index]) for key, part in budget.items()}
-        measures[of[0]][kind + to] = _numbers(KINDS[kind], values[:, index], band, split)
+        known = (sure.doubt, u95[index]) if sure else None
+        measures[of[0]][kind + to] = _numbers(KINDS[kind], values[:, index], band, split, known)
     results: list[FeatureResult] = []
     for name, shape, row in zip(names, shapes, measures, strict=True):
         of = next((key for key, one in row.items() if "tolerance_um" in one), "position")
@@ -317,18 +330,37 @@ def inspect(
     return tuple(results)
 
 
-def _numbers(kind: Kind, values: Array, band: Band, budget: dict[str, float]) -> dict[str, Any]:
-    """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad."""
+def _numbers(
+    kind: Kind,
+    values: Array,
+    band: Band,
+    budget: dict[str, float],
+    known: tuple[Doubt, float | None] | None,
+) -> dict[str, Any]:
+    """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad.
+
+    Where a scene states how sure its errors are, a tolerance is kept, or missed, with at least 95 %
+    probability (ISO 14253-1); else that cannot be told.
+    """
     large, small = ("deg", "urad") if kind.is_angle else ("mm", "um")
     per = np.rad2deg(RAD_PER_URAD) if kind.is_angle else MM_PER_UM
     difference, placed, *exact = (values[1:] - values[0]).tolist()
     names = (f"{word}_{large}" for word in ("nominal", "actual", "placed"))
     found: dict[str, Any] = dict(zip(names, (values * per).tolist(), strict=False))
     found |= {f"difference_{small}": difference, f"placed_difference_{small}": placed}
+    doubt, u95 = known or (None, None)
+    found |= {f"u95_placed_difference_{small}": u95} if doubt else {}
     if band is not None:
-        doubt, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
-        verdict = "in doubt" if abs(beyond) < doubt else "missed" if beyond > 0.0 else "kept"
-        found |= {f"tolerance_{small}": band, f"doubt_{small}": doubt, "verdict": verdict}
+        left_out, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
+        share = float(beyond <= 0.0)
+        if doubt is not None:
+            share = None if u95 is None else float(doubt.within(placed, u95 / doubt.factor, *band))
+            found["probability"] = share
+        verdict = "kept" if (share or 0.0) >= SURE else "missed"
+        if share is None or 1.0 - SURE < share < SURE:
+            verdict = "cannot be told"
+        verdict = "in doubt" if abs(beyond) < left_out else verdict
+        found |= {f"tolerance_{small}": band, f"doubt_{small}": left_out, "verdict": verdict}
     return found | {"budget": dict(sorted(budget.items(), key=lambda pair: -abs(pair[1])))}
 
 
@@ -393,8 +425,10 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
         for name, one in result.measures.items():
             nominal, _, placed, *differences = [*one.values()][:5]
             tolerance = one.get("tolerance_um") or one.get("tolerance_urad") or ()
+            u95 = [value for key, value in one.items() if key.startswith("u95_")]
+            sure = plus_minus(u95[0]) if u95 else None
             rows.append((
-                f"{result.name} · {name.replace('_', ' ')}", nominal, placed, *differences,
+                f"{result.name} · {name.replace('_', ' ')}", nominal, placed, *differences, sure,
                 " … ".join(map(spell_signed, tolerance)), one.get("verdict", ""),
                 budget_words(one["budget"]),
             ))  # fmt: skip
@@ -402,6 +436,7 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
         Column("measure", key="measure", leads=True, wraps=True),
         *number_columns(("nominal", "placed"), ".4f", "mm, °", ("nominal", "actual")),
         *number_columns(("deviation", "placed"), "+.2f", "µm, µrad", ("deviation", "placed")),
+        Column("U95", key="u95", shows=any(row[5] for row in rows)),
         Column("tolerance", key="tolerance"),
         Column("verdict", key="verdict"),
         Column("most of it", key="most_of_it", wraps=True),

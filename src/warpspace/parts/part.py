@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.description import Analysis
+from warpspace.analysis.doubt import FieldDoubt, combine, find_doubt
 from warpspace.analysis.options import File, Grammar, option
 from warpspace.bench.placing import ball_point, follow, within_travel
 from warpspace.bodies.mesh import CREASE_DEG
@@ -237,6 +238,14 @@ def point_basis(
     point = transforms.apply(branch_pose(scene.model, "workpiece", at), made.point_mm[rows])
     view = scene.view(Loop.RELATIVE, "workpiece")
     return build_basis(scene.model, scene.errors, keys, at, view, point)
+
+
+def made_doubt(scene: Scene, made: Made) -> FieldDoubt | None:
+    """Say how sure errors of points are; None where a scene does not say."""
+    if (doubt := find_doubt(scene, Loop.RELATIVE)) is None:
+        return None
+    basis = point_basis(replace(scene, errors=doubt.errors), made, doubt.keys)
+    return combine(doubt, basis.position, made.error_um)
 
 
 def fit_out(point_mm: Array, error_um: Array) -> Array:

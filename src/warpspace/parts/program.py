@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.contributions import budget_words, explain
 from warpspace.analysis.description import Analysis, Result, Watch, plain
+from warpspace.analysis.doubt import FieldDoubt, combine, find_doubt, plus_minus, u95_lines
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Statistics
 from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import evaluate_first_order
+from warpspace.field.evaluate import build_basis, evaluate_first_order
 from warpspace.formats.source import MAX_LINES, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
@@ -46,6 +47,7 @@ CHORD_MM = 0.01  # most that a bent path leaves the line between samples
 MOST_AT_ONCE = 50_000  # samples
 WORST = 10  # blocks that are split by parameter
 SAID = 20  # words that a remark lists
+MOST_SURE = 200_000  # samples whose uncertainty is told
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,7 @@ class ToolPath:
     error_um: Array  # [n, 3], relative, actual − nominal, w
     outside: NDArray[np.bool_]  # [n], beyond the travel; errors are continued
     step_mm: Array  # [n, 3], from the sample before; zero where the path begins or a tool changes
+    sure: FieldDoubt | None  # how sure its errors are; statistics over the way
 
     @cached_property
     def norm_um(self) -> Array:
@@ -77,16 +80,29 @@ class ToolPath:
         bend = np.where(follows, back - np.roll(back, 1, axis=0), 0.0)
         tangent = 2.0 * back + np.where(np.roll(follows, -1, axis=0), ahead - back, bend)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
-        along_um = np.abs(np.sum(self.error_um * tangent, axis=1))
-        across_um = np.sqrt(np.maximum(self.norm_um**2 - along_um**2, 0.0))
-        weights = np.linalg.norm(back, axis=1) + np.append(np.linalg.norm(ahead[:-1], axis=1), 0.0)
-        weights = weights if weights.any() else np.ones(len(weights))
-        for um in (self.norm_um, along_um, across_um):
-            mean, square = np.average([um, um**2], axis=1, weights=weights).tolist()
-            p95 = float(np.quantile(um, P95, weights=weights, method="inverted_cdf"))
+        for seen in (
+            np.asarray,
+            lambda um: _along(um, tangent),
+            lambda um: um - _along(um, tangent),
+        ):
+            um = np.linalg.norm(seen(self.error_um), axis=1)
+            mean, square = np.average([um, um**2], axis=1, weights=self.shares).tolist()
+            p95 = float(np.quantile(um, P95, weights=self.shares, method="inverted_cdf"))
             at = int(np.argmax(um))
             x, y, z = self.tip_mm[at].tolist()
-            yield Statistics(mean, square**0.5, p95, float(um[at]), (x, y, z), self.axes_at(at))
+            found = Statistics(mean, square**0.5, p95, float(um[at]), (x, y, z), self.axes_at(at))
+            yield self.sure.seen(seen).said_of(found) if self.sure else found
+
+    @cached_property
+    def shares(self) -> Array:
+        """Of the way, [n]; equal ones where nothing moves."""
+        step = np.linalg.norm(self.step_mm, axis=1)
+        ways = step + np.append(step[1:], 0.0)
+        return ways / ways.sum() if ways.any() else np.full(len(ways), 1.0 / len(ways))
+
+
+def _along(error_um: Array, tangent: Array) -> Array:
+    return np.sum(error_um * tangent, axis=-1, keepdims=True) * tangent
 
 
 def trace_program(read: control.ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
@@ -98,7 +114,23 @@ def trace_program(read: control.ReadProgram, chord_mm: float = CHORD_MM) -> Tool
     same_tool = np.diff(read.length_mm[move], prepend=read.length_mm[move[:1]]) == 0.0
     step = np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None]
     outside = ~within_travel(read.scene.machine, at)
-    return ToolPath(read.line[move], move, at, tip, error, outside, step)
+    found = ToolPath(read.line[move], move, at, tip, error, outside, step, None)
+    return replace(found, sure=_path_doubt(read, found))
+
+
+def _path_doubt(read: control.ReadProgram, path: ToolPath) -> FieldDoubt | None:
+    """Say how sure the errors along a path are; None where a scene does not say, or it is long."""
+    doubt, scene = find_doubt(read.scene, Loop.RELATIVE), read.scene
+    if doubt is None or len(path.line) > MOST_SURE:
+        return None
+    view, length = scene.view(Loop.RELATIVE, "workpiece"), read.length_mm[path.move]
+    response = np.empty((len(doubt.keys), *path.error_um.shape))
+    for one in np.unique(length):
+        here = {name: at[length == one] for name, at in path.coordinates.items()}
+        model = control.with_length(scene.model, one)
+        basis = build_basis(model, doubt.errors, doubt.keys, here, view)
+        response[:, length == one] = basis.position
+    return combine(doubt, response, path.error_um, path.shares)
 
 
 def count_samples(read: control.ReadProgram, chord_mm: float) -> Integers:
@@ -163,6 +195,7 @@ class PathPoint:
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
     budget: Mapping[str, float]  # µm of |E| by parameter, which add up to it, the largest first
+    sure: Mapping[str, float | None]  # u95_um of |E|; empty where nothing is stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,7 +245,8 @@ class Program(control.Setup, Analysis):
             parts = explain(model, scene.errors, axes, view).contributions
             ranked = sorted(parts, key=lambda part: -part.along_um)
             budget, um = {part.key: part.along_um for part in ranked}, float(path.norm_um[sample])
-            return PathPoint(int(path.line[sample]), um, axes, path.error_um[sample], budget)
+            at = int(path.line[sample]), um, axes, path.error_um[sample], budget
+            return PathPoint(*at, {"u95_um": path.sure.u95_at(sample)} if path.sure else {})
 
         ends = np.flatnonzero(path.line == self.at_line)
         if self.at_line and not len(ends):
@@ -274,14 +308,17 @@ class ProgramResult(Result):
         names = {"error": self.deviation, "along the path": self.along, "across it": self.across}
         rows = [(name, *astuple(one)[:4]) for name, one in names.items()]
         yield Table((Column("", leads=True), *heads), rows)
+        sure = self.path.sure
+        yield from u95_lines(sure and sure.doubt, names)
         columns = (
             Column("line", "d", leads=True),
             *number_columns(("|E|", "x", "y", "z"), ".2f", "µm"),
+            Column("U95", lambda one: plus_minus(one.get("u95_um")), shows=sure is not None),
             Column("where", place_words, wraps=True),
             Column("most of it", budget_words, "µm", wraps=True),
         )
         told = [*self.worst, *([self.line] if self.line else [])]
-        rows = [(one.line, one.um, *one.error_um, one.axes, one.budget) for one in told]
+        rows = [(one.line, one.um, *one.error_um, one.sure, one.axes, one.budget) for one in told]
         title = "Worst blocks" + ", and the line asked for" * bool(self.line)
         yield Table(columns, rows, title)
 

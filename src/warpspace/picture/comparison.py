@@ -1,11 +1,12 @@
 """Two scenes over one working volume: what they share, and the change from A to B."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, cast
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.description import plain
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
@@ -66,7 +67,7 @@ class DifferencePicture(ScenePicture):
             "scene": self.scene.name,
             "title": self.scene.title,
             "settings": self.settings,
-            "statistics": asdict(self.statistics),
+            "statistics": plain(self.statistics),
             "statistics_of": DIFFERENCE_LENGTH,
             "change": statistics_change(self.a.statistics, self.b.statistics),
             "a": self.a.provenance,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any, Literal, TypeVar
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.concepts import Concept, expected_um, zero_field
+from warpspace.analysis.description import plain
 from warpspace.analysis.doubt import FieldDoubt, field_doubt
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
@@ -385,7 +386,7 @@ class ScenePicture(Picture):
             "machine": scene.machine.title,
             "chain": str(scene.machine.chain),
             "settings": self.settings,
-            "statistics": asdict(self.statistics),
+            "statistics": plain(self.statistics),
             "parameters": {
                 key: {"amplitude": scene.errors.amplitude(key), "unit": parameter(key).unit}
                 for key in scene.errors
@@ -434,7 +435,7 @@ def evaluate_picture(
     coloured_values(field, component, quantity)  # refuses a component that does not exist
     largest, uncertainty = float(field.norm_um.max()), None
     if quantity == "uncertainty":
-        uncertainty = field_doubt(scene, field, nodes.coordinates, view, nodes.point_mm)
+        uncertainty = field_doubt(scene, field.error_um, nodes.coordinates, view, nodes.point_mm)
         if uncertainty is None or not uncertainty.doubt.is_known:
             remarks = () if uncertainty is None else uncertainty.doubt.remarks()
             raise OptionError("; ".join(remarks) or NOT_STATED)

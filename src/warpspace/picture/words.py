@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
-from warpspace.analysis.distribution import loop_keys
+from warpspace.analysis.distribution import loop_axes
 from warpspace.analysis.doubt import FieldDoubt, plus_minus
 from warpspace.kinematics.model import Convention, Loop, Model
 from warpspace.machine.axes import (
@@ -11,7 +11,6 @@ from warpspace.machine.axes import (
     TravelDirection,
     is_linear,
     is_rotary,
-    parameter,
 )
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
@@ -84,16 +83,13 @@ def u95_behind(u95: float | None) -> str:
 
 def length_words(found: FieldDoubt | None, point: int = 0) -> str:
     """Say U95 of |E| at a point of a field, by its flat number; empty where none is stated."""
-    if found is None:
-        return ""
-    u95 = found.doubt.factor * float(found.u_norm_um.flat[point])
-    return u95_behind(u95 if found.doubt.is_known else None)
+    return u95_behind(found.u95_at(point)) if found else ""
 
 
 def beyond_words(scene: Scene, loop: Loop) -> str:
     """Say where axes of a loop stood at no time while a scene was measured: ``Z below −300``."""
     reach = scene.covariance.reach if scene.covariance else {}
-    axes = {parameter(key).axis for key in loop_keys(scene.model, loop, scene.parameter_keys)}
+    axes = loop_axes(scene.model, loop)
     said: list[str] = []
     for axis, (low, high) in reach.items():
         first, last = scene.workspace.ranges[axis]

@@ -8,7 +8,9 @@ import pytest
 
 from warpspace import load_scene
 from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt, volume_doubt
+from warpspace.analysis.statistics import volume_statistics
 from warpspace.exceptions import SceneError
+from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.errors import Covariance
 from warpspace.scene.library import parse_scene
@@ -40,7 +42,7 @@ EBX = 1
 def sure(scene, at):
     field = evaluate(scene, at=at)
     axes = complete_coordinates(scene.machine, at, scene.workspace.positions)
-    return field_doubt(scene, field, axes, scene.view())
+    return field_doubt(scene, field.error_um, axes, scene.view())
 
 
 def test_gains_times_uncertainties_add_up_in_squares():
@@ -87,10 +89,10 @@ def test_two_amplitudes_together_against_the_law_of_propagation():
     step = []
     for key in ("EC0Y", "EA0Z"):
         more = scene.errors.with_amplitude(key, scene.errors.amplitude(key) + 1.0, (0.0, 1.0))
-        step.append(evaluate(replace(scene, errors=more), at=at).error_um - found.field.error_um)
+        step.append(evaluate(replace(scene, errors=more), at=at).error_um - found.error_um)
     gain, matrix = np.array(step).T, np.array([[4.0, 3.0], [3.0, 9.0]])
     np.testing.assert_allclose(found.covariance_um2, gain @ matrix @ gain.T, atol=1e-9)
-    along = found.field.error_um / found.field.norm_um
+    along = found.error_um / found.norm_um
     expected = math.sqrt(along @ gain @ matrix @ gain.T @ along)
     assert float(found.u_norm_um) == pytest.approx(expected, rel=1e-9)
     assert found.statistics()["max_um"] == pytest.approx(coverage_factor(12) * expected)
@@ -103,7 +105,7 @@ def test_one_error_makes_all_statistics_as_unsure_as_itself():
     found = volume_doubt(scene, scene.view(), 11)
     mean = evaluate(scene, grid=11)
     u95 = found.statistics()
-    weights = found.grid.weights
+    weights = found.shares
     assert u95["mean_um"] == pytest.approx(2.0 * 1.5 / 20.0 * float(np.sum(weights * mean.norm_um)))
     assert u95["max_um"] == pytest.approx(2.0 * 1.5 / 20.0 * float(mean.norm_um.max()))
 
@@ -111,12 +113,12 @@ def test_one_error_makes_all_statistics_as_unsure_as_itself():
 def test_statistics_move_by_their_gradient():
     scene = parse_scene(TWO, "s")
     found, names = volume_doubt(scene, scene.view(), 21), ("mean_um", "rms_um", "max_um")
-    from warpspace.analysis.statistics import volume_statistics
+    grid = build_grid(scene.model, scene.workspace, 21)
 
     def numbers(key, by):
         more = scene.errors.with_amplitude(key, scene.errors.amplitude(key) + by, (0.0, 1.0))
         field = evaluate(replace(scene, errors=more), grid=21)
-        of = volume_statistics(field, found.grid)
+        of = volume_statistics(field, grid)
         return np.array([getattr(of, name) for name in names])
 
     slope = np.array([(numbers(k, 1e-3) - numbers(k, -1e-3)) / 2e-3 for k in found.doubt.keys])

@@ -164,8 +164,7 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         nominal = found.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
     drawn, view = deform(found.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
-    field = ErrorField(found.nominal_mm, found.error_um, found.orientation_urad)
-    sure = field_doubt(scene, field, coordinates, view, found.nominal_mm)
+    sure = field_doubt(scene, found.error_um, coordinates, view, found.nominal_mm)
     return Answer(at, loop, found, shift, drawn, drawn_um, sure)
 
 

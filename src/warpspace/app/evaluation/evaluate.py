@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from warpspace.analysis.distribution import loop_keys
+from warpspace.analysis.distribution import loop_axes
 from warpspace.analysis.doubt import FieldDoubt, field_doubt
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.compare import compare_pictures
@@ -22,6 +22,7 @@ from warpspace.app.state.look import slice_positions
 from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
 from warpspace.field.grid import Grid, build_grid, build_slice
 from warpspace.geometry.colour import ColourScale
+from warpspace.machine.axes import parameter
 from warpspace.picture import model
 from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
 from warpspace.scene.model import grid_basis
@@ -100,15 +101,15 @@ class LiveModel:
             return None
 
         def build() -> FieldDoubt | None:  # something is stated
-            return field_doubt(scene, field, grid.coordinates, state.view(), grid.point_mm)
+            return field_doubt(scene, field.error_um, grid.coordinates, state.view(), grid.point_mm)
 
         key = "uncertainty", Identity(grid), _place(state)
-        found: FieldDoubt = self._kept.get(key, build, lambda one: _size(((grid, one.basis), ())))
-        acting = [key for key, value in state.active.items() if value]
-        through = loop_keys(scene.model, state.loop, acting)
-        unknown = [key for key in through if key not in found.doubt.keys]
+        found: FieldDoubt = self._kept.get(key, build, lambda one: 3 * one.response.nbytes)
+        axes, known = loop_axes(scene.model, state.loop), found.doubt.keys
+        acting = (key for key, value in state.active.items() if value and key not in known)
+        unknown = [key for key in acting if parameter(key).axis in axes]
         doubt = replace(found.doubt, unknown=tuple(unknown))
-        return replace(found, doubt=doubt, field=field, grid=grid)
+        return replace(found, doubt=doubt, error_um=field.error_um, shares=grid.weights)
 
     def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)

@@ -147,7 +147,7 @@ def _uncertainty(found: Answer) -> Markup:
     if sure is None or not sure.doubt.is_known:
         words = [] if sure is None else sure.doubt.remarks()
         return join(tag("p", said, class_="ws-tiny") for said in words)
-    along = sure.basis.position @ sure.direction
+    along = sure.response @ sure.direction
     parts = along * (sure.doubt.covariance @ along)
     shares = 100.0 * parts / (float(parts.sum()) or 1.0)
     order = np.argsort(-np.abs(shares))

@@ -2,7 +2,6 @@
 
 import os
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -213,7 +212,8 @@ def compare(
     same working volume. With -o both and the change are drawn on one sheet, with one colour scale
     and one exaggeration.
     """
-    from warpspace.analysis.doubt import u95_words, volume_doubt, with_u95
+    from warpspace.analysis.description import plain
+    from warpspace.analysis.doubt import u95_lines, volume_doubt
     from warpspace.analysis.statistics import statistics
     from warpspace.picture.comparison import scene_change, statistics_blocks, statistics_change
     from warpspace.picture.model import evaluate_picture
@@ -226,31 +226,23 @@ def compare(
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
     compared = [*pictures, scene_change(pictures[0], pictures[1])]
     say_first_order(settings.loop, *scenes)
-    found = [picture.statistics for picture in compared]
-    sure = [volume_doubt(one.scene, one.view, settings.grid) for one in pictures]
+    sure = [*(volume_doubt(one.scene, one.view, settings.grid) for one in pictures), None]
+    both = zip(sure, (picture.statistics for picture in compared), strict=True)
+    found = [one.said_of(numbers) if one else numbers for one, numbers in both]
     if output is not None:
         draw_figure_file("comparison", scenes, settings, output, force=force, silent=as_json)
     if as_json:
         names = ("a", "b", "difference")
         nodes = [statistics(picture.field, picture.grid.coordinates) for picture in compared]
-        u95 = [*({} if one is None else one.statistics() for one in sure), {}]
-        both = zip(names, found, u95, strict=True)
-        print_json(
-            {
-                **{name: with_u95(asdict(part), its) for name, part, its in both},
-                "change": statistics_change(found[0], found[1]),
-                "statistics_nodes": {
-                    name: asdict(part) for name, part in zip(names, nodes, strict=True)
-                },
-            }
-        )
+        change = {"change": statistics_change(found[0], found[1])}
+        at_nodes = {"statistics_nodes": plain(dict(zip(names, nodes, strict=True)))}
+        print_json({**plain(dict(zip(names, found, strict=True))), **change, **at_nodes})
         return
     for letter, scene in zip("AB", scenes, strict=True):
         print_text(f"{letter}  {scene.name}: {scene.title}")
     print_blocks(statistics_blocks(scenes[0], "AB", found))
-    for letter, one in zip("AB", sure, strict=True):
-        if one is not None:
-            print_text(f"{letter}  {u95_words(one)}")
+    for letter, one, numbers in zip("AB", sure, found, strict=False):
+        print_blocks(u95_lines(one and one.doubt, {letter: numbers}))
     if output is not None:
         echo(f"wrote {output}")
 

@@ -75,9 +75,8 @@ def field(
     Errors are actual − nominal, in µm; the orientation error is the rotation vector of the tool
     axis, in µrad. Without --at the grid of the working volume is evaluated.
     """
-    from dataclasses import asdict
-
-    from warpspace.analysis.doubt import field_doubt, find_doubt, u95_words, volume_doubt, with_u95
+    from warpspace.analysis.description import plain
+    from warpspace.analysis.doubt import field_doubt, find_doubt, u95_lines, volume_doubt
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.field.evaluate import placed_words
     from warpspace.picture.words import direction_words, own_axes, spell_at, spell_point
@@ -99,12 +98,12 @@ def field(
             raise OptionError(f"{loaded.name} has no [uncertainty], for instance EXX = 0.4")
         shown = uncertain or bool(points)
         where = None if nodes is None else nodes.point_mm
-        spread = field_doubt(loaded, result, axes, view, where) if shown else None
+        spread = field_doubt(loaded, result.error_um, axes, view, where) if shown else None
         over = spread if points else volume_doubt(loaded, view, max(result.norm_um.shape))
-        u95 = {} if over is None else over.statistics()
         said = {} if exact else options.say_second_order(second_order(loaded, loop, at=places))
-        plain = statistics(result, axes)
-        summary = plain if nodes is None else volume_statistics(result, nodes)
+        even = statistics(result, axes)
+        summary = even if nodes is None else volume_statistics(result, nodes)
+        summary = over.said_of(summary) if over else summary
     files = [path for path in (csv_path, output) if path is not None]
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
@@ -116,11 +115,11 @@ def field(
                 write_field(FieldRecord(axes, result, about, spread), path, overwrite=force)
     if as_json:
         found: dict[str, object] = {"loop": loop, "frame": frame}
-        found["statistics"] = with_u95(asdict(summary), u95)
+        found["statistics"] = plain(summary)
         found |= {} if view.placed_over is None else {"placement": "fitted out"}
         found |= said if view.reference is None else {**said, "reference": dict(view.reference)}
         if nodes is not None:
-            found["statistics_nodes"] = asdict(plain)
+            found["statistics_nodes"] = plain(even)
         if output is not None:
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(options.spell_json({**size, **found}))
@@ -138,12 +137,10 @@ def field(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
-    if over is not None:
-        print_text(f"  {u95_words(over)}")
-        for remark in over.doubt.remarks():
-            print_text(f"  {remark}")
+    for said in u95_lines(over and over.doubt, {"": summary}):
+        print_text(said)
     if nodes is not None:
-        print_text(f"  each node counted once: mean {plain.mean_um:.2f} µm")
+        print_text(f"  each node counted once: mean {even.mean_um:.2f} µm")
     worst = own_axes(loaded, summary.max_at_axes)
     print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
     print_text(f"  --at {spell_at(worst)}")

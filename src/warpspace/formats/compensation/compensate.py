@@ -8,6 +8,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch, plain
+from warpspace.analysis.doubt import u95_lines
 from warpspace.analysis.options import PLACED_HELP, Grammar, option
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
@@ -202,6 +203,15 @@ class Compensation(BeforeAfter, Result):
         return (*self.controller.notes, *self.reversal)
 
     @property
+    def expected(self) -> dict[str, float | None]:
+        """RMS that the machine has to be expected to keep, as its errors are not known better."""
+        if self.sure is None:
+            return {}
+        square = self.after.norm_um**2 + np.trace(self.sure.covariance_um2, axis1=-2, axis2=-1)
+        rms = float(np.sqrt(np.sum(self.grid.weights * square)))
+        return {"expected_rms_um": rms if self.sure.doubt.is_known else None}
+
+    @property
     def points_words(self) -> str:
         return spell_points(self.format, self.points)
 
@@ -223,7 +233,7 @@ class Compensation(BeforeAfter, Result):
             "numbers": self.size,
             "files": [],
             "before": plain(self.before_statistics),
-            "after": plain(after),
+            "after": plain(after) | self.expected,
             "worst_after_um": after.max_um,
             "orientation": {
                 word: dict(zip(("mean_urad", "max_urad"), self.tilt_urad(field), strict=True))
@@ -256,6 +266,10 @@ class Compensation(BeforeAfter, Result):
             )
         ]
         yield Table(columns, rows)
+        named = {"before": self.before_statistics, "after": self.after_statistics}
+        yield from u95_lines(self.sure and self.sure.doubt, named)
+        if (rms := self.expected.get("expected_rms_um")) is not None:
+            yield f"  expected on the machine: RMS {rms:.2f} µm, as its errors are not known better"
         yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_words}"
         yield from (f"  assumed: {text}" for text in self.assumed)
         yield from (f"  {text}" for text in self.notes)
@@ -336,8 +350,8 @@ def compensate(
         reversal = reversal_notes(there, back, scene.errors, scene.model.direction)
         watch()
     return Compensation(
-        own.before, own.after, grid, kind, files, points, controller, directions, reversal,
-        asked.resolution,
+        own.before, own.after, grid, own.sure, kind, files, points, controller, directions,
+        reversal, asked.resolution,
     )  # fmt: skip
 
 

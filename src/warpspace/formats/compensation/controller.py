@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from warpspace.analysis.doubt import FieldDoubt, field_doubt
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, fit_placement
@@ -214,14 +215,19 @@ class BeforeAfter:
     before: ErrorField
     after: ErrorField
     grid: Grid
+    sure: FieldDoubt | None  # how sure the errors before are; those after are no surer
 
     @property
     def before_statistics(self) -> Statistics:
-        return volume_statistics(self.before, self.grid)
+        return self._summed_up(self.before)
 
     @property
     def after_statistics(self) -> Statistics:
-        return volume_statistics(self.after, self.grid)
+        return self._summed_up(self.after)
+
+    def _summed_up(self, field: ErrorField) -> Statistics:
+        found = volume_statistics(field, self.grid)
+        return replace(self.sure, error_um=field.error_um).said_of(found) if self.sure else found
 
     def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
         """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""
@@ -232,7 +238,9 @@ class BeforeAfter:
 def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
     at, nominal, scene = grid.coordinates, grid.nominal_mm, toward(controller.scene, direction)
     before = controller.without().field(at, nominal, scene)
-    return BeforeAfter(before, controller.field(at, nominal, scene), grid)
+    view = scene.view(controller.loop)
+    sure = field_doubt(scene, before.error_um, at, view, grid.point_mm, grid.weights)
+    return BeforeAfter(before, controller.field(at, nominal, scene), grid, sure)
 
 
 def reversal_notes(

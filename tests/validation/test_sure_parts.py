@@ -1,0 +1,134 @@
+"""U95 of parts, programs and compensations against closed forms of one squareness error.
+
+Y turned by γ about z moves a point by −γ·y along x, mm times µrad being nm. What an inspector fits
+out is a turn by γ/2; what is left is (−γ/2·y, −γ/2·x).
+"""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.stats import norm, t
+
+from warpspace.analysis.description import silent
+from warpspace.formats.compensation.compensate import Compensate
+from warpspace.parts.as_cut import Part
+from warpspace.parts.part import PartMesh
+from warpspace.parts.program import Program
+from warpspace.scene.library import parse_scene
+
+MACHINE = """[machine]
+chain = "wFXYZt"
+[workspace]
+X = [-150, 150]
+Y = [-120, 120]
+Z = [-100, 100]
+[errors]
+EC0Y = 20
+"""
+STATED = MACHINE + "[uncertainty]\nEC0Y = 1.5\n"
+FEW = MACHINE + '[uncertainty.covariance]\nkeys = ["EC0Y"]\nmatrix = [[2.25]]\nfreedom = 5\n'
+U, PLACE = 1.5, (0.0, 0.0, 0.0)
+TOLERANCE = """[[features]]
+is = "plane"
+near = [50.0, 0.0, 0.0]
+name = "side"
+[[features]]
+is = "plane"
+near = [0.0, 50.0, 0.0]
+measure = "squareness"
+to = ["side"]
+tolerance_urad = {limit}
+"""
+
+
+def cube(text, **more):
+    mesh = trimesh.creation.box((100.0, 100.0, 100.0))
+    own = PartMesh("cube", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
+    found = Part(mesh=own, place=PLACE, **more).run(parse_scene(text, "s"), silent)
+    return found, found.as_json()
+
+
+def test_the_deviation_of_a_part_is_as_unsure_as_its_errors():
+    _, told = cube(STATED)
+    lengths = {"deviation": (told["deviation"], 50.0)}
+    lengths["placed"] = told["placed"]["deviation"], math.hypot(50.0, 50.0) / 2.0
+    for numbers, arm in lengths.values():
+        for name in ("mean", "rms", "p95", "max"):
+            assert numbers[f"{name}_um"] == pytest.approx(20.0 * arm * 1e-3)
+            assert numbers[f"u95_{name}_um"] == pytest.approx(2.0 * U * arm * 1e-3)
+    for feature in told["features"]:  # planes stay flat, whatever the squareness
+        flatness = feature["measures"]["flatness"]
+        assert flatness["u95_placed_difference_um"] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("limit", "verdict"), [(25.0, "kept"), (22.0, "cannot be told"), (17.0, "missed")]
+)
+@pytest.mark.parametrize(("text", "law"), [(STATED, norm), (FEW, t(5))])
+def test_a_tolerance_is_kept_or_missed_with_95_percent(text, law, limit, verdict):
+    found, told = cube(text, tolerances=("f.toml", TOLERANCE.format(limit=limit)))
+    (one,) = [
+        measure
+        for feature in told["features"]
+        for name, measure in feature["measures"].items()
+        if name.startswith("squareness")
+    ]
+    assert abs(one["placed_difference_urad"]) == pytest.approx(20.0, rel=1e-4)
+    factor = 2.0 if law is norm else law.ppf(0.5 + 0.9545 / 2.0)
+    assert one["u95_placed_difference_urad"] == pytest.approx(factor * U, rel=1e-4)
+    expected = law.cdf((limit - 20.0) / U) - law.cdf((-limit - 20.0) / U)
+    assert one["probability"] == pytest.approx(expected, rel=1e-3)
+    if text is FEW and limit == 25.0:
+        assert expected > 0.95
+    if text is FEW and limit == 17.0:  # 5 degrees of freedom: 5.1 %
+        verdict = "cannot be told"
+    assert one["verdict"] == verdict
+    assert any(verdict in " ".join(row) for row in list(found.blocks())[-1].cells())
+
+
+def test_where_an_error_acts_of_which_nothing_is_stated_no_verdict_is_given():
+    text = STATED.replace("[uncertainty]", "EA0Z = 3\n[uncertainty]")
+    found, told = cube(text, tolerances=("f.toml", TOLERANCE.format(limit=500)))
+    assert told["deviation"]["u95_mean_um"] is None
+    said = [one for feature in told["features"] for one in feature["measures"].values()]
+    assert {one.get("verdict", "cannot be told") for one in said} == {"cannot be told"}
+    assert any("EA0Z" in words for words in found.blocks() if isinstance(words, str))
+
+
+def test_without_a_statement_verdicts_are_those_of_the_model():
+    _, told = cube(MACHINE, tolerances=("f.toml", TOLERANCE.format(limit=20.5)))
+    said = [one for feature in told["features"] for one in feature["measures"].values()]
+    assert {one["verdict"] for one in said if "verdict" in one} == {"kept"}
+    assert not [key for one in (*said, told["deviation"]) for key in one if "u95" in key]
+
+
+def path(text, lines):
+    return Program(file="p.ngc", text=lines).run(parse_scene(text, "s"), silent).as_plain()
+
+
+def test_a_path_is_as_unsure_along_it_as_across_it():
+    along = path(STATED, "G21 G90 G1 F500 X-100 Y100 Z0\nX100\n")  # from where the machine stands
+    line = [one for one in along["worst"] if one["line"] == 2]
+    assert [(one["um"], one["u95_um"]) for one in line] == [pytest.approx((2.0, 0.3))]
+    rise = path(STATED, "G21 G90 G0 X0 Y0 Z0\nG1 F500 Y100\n")
+    across, none = rise["across"], rise["along"]
+    shares = {"mean": 0.5, "rms": 1.0 / math.sqrt(3.0), "max": 1.0}
+    for name, share in shares.items():  # samples every 10 mm: trapezoids
+        for numbers in (across, rise["deviation"]):
+            assert numbers[f"{name}_um"] == pytest.approx(2.0 * share, rel=6e-3)
+            assert numbers[f"u95_{name}_um"] == pytest.approx(0.3 * share, rel=6e-3)
+        assert none[f"u95_{name}_um"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_what_a_table_leaves_is_not_below_what_is_not_known():
+    asked = Compensate(formats=("isg-csv",))
+    bare, sure = (asked.run(parse_scene(text, "s"), silent) for text in (MACHINE, STATED))
+    before, after = sure.as_json()["before"], sure.as_json()["after"]
+    assert before["u95_max_um"] == pytest.approx(2.0 * U * 0.12)
+    assert after["rms_um"] < 0.01
+    # RMS of γ·y over −120 … 120, nodes of a grid weighed
+    assert after["expected_rms_um"] == pytest.approx(U * 0.12 / math.sqrt(3.0), rel=5e-3)
+    assert "expected_rms_um" not in bare.as_json()["after"]
+    assert not [key for key in bare.as_json()["before"] if "u95" in key]
