@@ -244,8 +244,10 @@ def made_doubt(scene: Scene, made: Made) -> FieldDoubt | None:
     """Say how sure errors of points are; None where a scene does not say."""
     if (doubt := find_doubt(scene, Loop.RELATIVE)) is None:
         return None
-    basis = point_basis(replace(scene, errors=doubt.errors), made, doubt.keys)
-    return combine(doubt, basis.position, made.error_um)
+    response = doubt.respond(
+        lambda errors, keys: point_basis(replace(scene, errors=errors), made, keys).position
+    )
+    return combine(doubt, response, made.error_um)
 
 
 def fit_out(point_mm: Array, error_um: Array) -> Array:

@@ -128,8 +128,9 @@ def _path_doubt(read: control.ReadProgram, path: ToolPath) -> FieldDoubt | None:
     for one in np.unique(length):
         here = {name: at[length == one] for name, at in path.coordinates.items()}
         model = control.with_length(scene.model, one)
-        basis = build_basis(model, doubt.errors, doubt.keys, here, view)
-        response[:, length == one] = basis.position
+        response[:, length == one] = doubt.respond(
+            lambda *layer, at=(model, here): build_basis(at[0], *layer, at[1], view).position
+        )
     return combine(doubt, response, path.error_um, path.shares)
 
 

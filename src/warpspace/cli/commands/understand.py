@@ -199,8 +199,8 @@ def _print_json(
         }
     if spread is not None and spread.doubt.is_known and result.norm_um.ndim == 1:
         columns |= {
-            "u95_um": spread.doubt.factor * spread.u_um,
-            "u95_norm_um": spread.doubt.factor * spread.u_norm_um,
+            "u95_um": spread.u95_um,
+            "u95_norm_um": spread.u95_norm_um,
             "covariance_um2": spread.covariance_um2,
         }
     shape, size = result.norm_um.shape, result.norm_um.size
