@@ -18,9 +18,9 @@ import numpy as np
 
 from warpspace.analysis.distribution import loop_axes
 from warpspace.analysis.statistics import P95, Summary
-from warpspace.field.evaluate import View, build_basis
+from warpspace.field.evaluate import ErrorBasis, View, build_basis
 from warpspace.field.grid import DEFAULT_NODES, build_grid
-from warpspace.kinematics.model import Coordinates, Loop
+from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ErrorFunction, ErrorSet, Table
 from warpspace.scene.model import Scene, evaluate_grid
@@ -59,9 +59,13 @@ class Doubt:
         """Keys of the amplitudes, (K,); one may come twice."""
         return tuple(key for _, keys in self.layers for key in keys)
 
-    def respond(self, build: Callable[[ErrorSet, tuple[str, ...]], Array]) -> Array:
-        """Put together what responds to the amplitudes, [K, ...]: `build` gives it of a layer."""
-        return np.concatenate([build(*layer) for layer in self.layers])
+    def respond(
+        self, model: Model, at: Coordinates, view: View, point_mm: Array | None = None
+    ) -> ErrorBasis:
+        """Give how errors of points respond to the amplitudes."""
+        bases = [build_basis(model, *layer, at, view, point_mm) for layer in self.layers]
+        both = zip(*((one.position, one.orientation) for one in bases), strict=True)
+        return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, both))
 
     @cached_property
     def freedom(self) -> float:
@@ -371,12 +375,8 @@ def field_doubt(
     """Say how sure a field of a scene is; None where the scene says nothing of that."""
     if (doubt := find_doubt(scene, view.loop)) is None:
         return None
-    bases = [build_basis(scene.model, *layer, at, view, point_mm) for layer in doubt.layers]
-    response, turning = (
-        np.concatenate([getattr(basis, of) for basis in bases])
-        for of in ("position", "orientation")
-    )
-    return replace(combine(doubt, response, error_um, shares), turning=turning)
+    basis = doubt.respond(scene.model, at, view, point_mm)
+    return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
 
 
 def combine(

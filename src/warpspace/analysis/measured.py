@@ -11,7 +11,7 @@ from warpspace.analysis.distribution import SIGMAS, Distribution, Draws
 from warpspace.analysis.doubt import Doubt, find_doubt
 from warpspace.analysis.statistics import Statistics, statistics, volume_statistics
 from warpspace.exceptions import SceneError
-from warpspace.field.evaluate import ErrorField, amplitudes_of, build_basis, evaluate_first_order
+from warpspace.field.evaluate import ErrorField, amplitudes_of, evaluate_first_order
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import PARAMETERS, parameter
@@ -136,7 +136,7 @@ class UncertainCase(Case):
         """Give responses to what is off, the measured error last, [3, K + 1, N]."""
         model, view, doubt = self.model, self.view, self.doubt
         at, point = places.coordinates, places.point_mm
-        parts = doubt.respond(lambda *layer: build_basis(model, *layer, at, view, point).position)
+        parts = doubt.respond(model, at, view, point).position
         measured = evaluate_first_order(model, self.errors, at, view, point).error_um
         both = np.concatenate([parts, measured[None]]).reshape(len(doubt.keys) + 1, -1, 3)
         return np.ascontiguousarray(np.moveaxis(both, -1, 0))

@@ -188,12 +188,14 @@ class BenchResult(Result):
         run, scene, doubt = self.model, self.scene, find_doubt(self.scene, Loop.RELATIVE)
         if doubt is None:
             return {}
-        gains = doubt.respond(
-            lambda errors, keys: respond(replace(scene, errors=errors), run.plan, keys).matrix.T
+        each = (
+            respond(replace(scene, errors=errors), run.plan, keys).matrix
+            for errors, keys in doubt.layers
         )
+        gains = np.hstack([*each])
 
         def ask(change: Array) -> Array:
-            found = self.test.evaluate(run.plan, run.readings + change @ gains)
+            found = self.test.evaluate(run.plan, run.readings + gains @ change)
             return np.array([one.value for one in found.quantities])
 
         keys = (one.key for one in run.outcome.quantities)

@@ -244,10 +244,10 @@ def made_doubt(scene: Scene, made: Made) -> FieldDoubt | None:
     """Say how sure errors of points are; None where a scene does not say."""
     if (doubt := find_doubt(scene, Loop.RELATIVE)) is None:
         return None
-    response = doubt.respond(
-        lambda errors, keys: point_basis(replace(scene, errors=errors), made, keys).position
-    )
-    return combine(doubt, response, made.error_um)
+    point = transforms.apply(branch_pose(scene.model, "workpiece", made.coordinates), made.point_mm)
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    basis = doubt.respond(scene.model, made.coordinates, view, point)
+    return combine(doubt, basis.position, made.error_um)
 
 
 def fit_out(point_mm: Array, error_um: Array) -> Array:
