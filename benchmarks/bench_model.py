@@ -1,17 +1,51 @@
 """How long the model takes: a slider move and a new basis."""
 
+from dataclasses import replace
+
 import numpy as np
 from table import Growth, Row, Section
 from timing import best, in_turns
 
 from warpspace import load_scene
+from warpspace.analysis.doubt import volume_doubt
+from warpspace.analysis.statistics import volume_statistics
 from warpspace.field.evaluate import ErrorBasis, amplitudes_of
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
+from warpspace.machine.errors import Constant, Covariance, ErrorSet
+from warpspace.scene.library import parse_scene
 from warpspace.scene.model import grid_basis
+from warpspace.scene.starter import starter_text
 
 NODES = 21
 PARAMETERS = (5, 10, 20, 40)
+
+
+SURE = 60  # errors of a full covariance
+AXES = "wC1B1FXYZUA2C2t"  # that a chain of eight axes has
+
+
+def sure_move() -> Row:
+    """Measure U95 of a slider move: of mean, RMS, P95 and max, and at each node."""
+    bare = parse_scene(starter_text(AXES, "eight axes"), "eight axes")
+    rng, keys = np.random.default_rng(0), bare.parameter_keys[:SURE]
+    errors = ErrorSet({key: Constant(bare.axis_span(parameter(key).axis), 1.0) for key in keys})
+    half = rng.standard_normal((SURE, SURE))
+    rows = tuple(map(tuple, (half @ half.T).tolist()))
+    scene = replace(bare, errors=errors, covariance=Covariance(keys, rows))
+    grid = build_grid(scene.model, scene.workspace, NODES)
+    basis, found = grid_basis(scene, grid), volume_doubt(scene, scene.view(), NODES)
+    values = rng.standard_normal(len(basis.keys))
+    moved = basis.evaluate(values).error_um
+
+    def sure() -> object:
+        now = replace(found, error_um=moved)
+        return now.statistics(), now.u95_norm_um
+
+    took, floor = in_turns(sure, lambda: volume_statistics(basis.evaluate(values), grid), 50)
+    what = f"U95 of a slider move, covariance of {SURE} errors"
+    return Row(what, took, "the move itself, with its statistics", floor, most_ratio=5.0)
 
 
 def measure() -> Section:
@@ -57,5 +91,6 @@ def measure() -> Section:
             [best(lambda: small.evaluate(every[:n]), 50) for n, small in parts.items()],  # noqa: B023
         )
     ]
+    rows.append(sure_move())
     text = f"What the app works out, over {NODES}³ = {NODES**3} nodes."
     return Section("The model behind a slider", text, rows, growth)

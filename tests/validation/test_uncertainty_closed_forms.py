@@ -15,6 +15,7 @@ from warpspace.bench.base import run_test
 from warpspace.bench.kinds.circular import Circular
 from warpspace.bench.kinds.straightness import Squareness
 from warpspace.kinematics.model import complete_coordinates
+from warpspace.machine.errors import ErrorSet
 from warpspace.scene.library import parse_scene
 
 HEAD = """[machine]
@@ -201,3 +202,7 @@ def test_where_nothing_that_is_stated_acts_all_is_unknown():
     found = Trust(nodes=3).run(scene, lambda _: None)
     assert found.as_json()["statistics"]["u95_mean_um"] is None
     assert find_doubt(scene).draw(np.random.default_rng(0), 3).shape == (3, 0)
+    bare = replace(scene, errors=ErrorSet())  # what is stated moves the table only
+    found = Trust(nodes=3, limit_um=1.0, verify=True).run(bare, lambda _: None)
+    assert found.as_json()["statistics"]["u95_max_um"] == 0.0
+    assert (found.probability_everywhere, found.shares) == (1.0, [])

@@ -330,12 +330,12 @@ class FieldDoubt:
     @cached_property
     def gradients(self) -> Array:
         """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
-        response, found = self.response.reshape(len(self.doubt.keys), -1, 3), list[Array]()
+        response, found = self.response.reshape(-1, self.norm_um.size, 3), list[Array]()
         way = self.direction.reshape(-1, 3)
         for count in self.counts:
             few = np.flatnonzero(count) if not count.all() else slice(None)  # tell P95 and max
-            gains = response[:, few].reshape(len(response), -1)
-            found.append(gains @ (count[few, None] * way[few]).reshape(-1))
+            own = (count[few, None] * way[few]).reshape(-1)
+            found.append(response[:, few].reshape(len(response), own.size) @ own)
         return np.stack(found)
 
     def falls(self, after: "FieldDoubt", name: str) -> float | None:
