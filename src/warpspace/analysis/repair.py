@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.analysis.adjusting import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
-from warpspace.analysis.doubt import NAMES, FieldDoubt, field_doubt, plus_minus
+from warpspace.analysis.doubt import FieldDoubt, field_doubt, find_doubt, plus_minus, u95_lines
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Numbers, Statistics, Summary, volume_statistics
 from warpspace.exceptions import OptionError
@@ -191,12 +191,9 @@ class RepairResult(Result):
     def blocks(self) -> Iterator[Block]:
         smallest = f"smallest {self._objective_words}"
         yield " · ".join((self.scene.title, *self._where, smallest))
-        sure = {name: plus_minus(u95) for name, u95 in self.before.sure.items()}
-        each = (
-            " ".join((words, f"{getattr(self.before, name):.2f}", sure.get(f"u95_{name}", "")))
-            for name, words in NAMES.items()
-        )
-        yield f"  before: {', '.join(map(str.rstrip, each))} µm"
+        mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
+        yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
+        yield from u95_lines(find_doubt(self.scene, self.asked.seen_loop), {"": self.before})
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
@@ -366,23 +363,20 @@ def _with_doubt(found: RepairResult, before: FieldDoubt, basis: ErrorBasis) -> R
 
     def sure(adjust: Mapping[str, float]) -> Numbers:
         values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
-        after = replace(before, error_um=basis.evaluate(values).error_um)
-        u95 = {f"u95_{name}": value for name, value in after.statistics().items()}
-        return u95 | (
-            {"probability": before.falls(after, f"{found.objective}_um")} if adjust else {}
-        )
+        after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
+        helps = {"probability": before.falls(after, f"{found.objective}_um")} if adjust else {}
+        return {**after.said_of(found.before).sure, **helps}
 
-    errors = [
-        replace(
-            one,
-            best=replace(one.best, sure=sure({one.key: one.best.value})),
-            sure={"u95_present": before.doubt.u95_of(one.key)},
-        )
-        for one in found.errors
-    ]
-    sets = [replace(one, sure=sure(one.adjust)) for one in found.repairs]
-    whole = replace(found.before, sure=sure({}))
-    return replace(found, before=whole, errors=tuple(errors), repairs=tuple(sets))
+    def sure_effect(one: Effect) -> Effect:
+        best = replace(one.best, sure=sure({one.key: one.best.value}))
+        return replace(one, best=best, sure={"u95_present": before.doubt.u95_of(one.key)})
+
+    return replace(
+        found,
+        before=replace(found.before, sure=sure({})),
+        errors=tuple(map(sure_effect, found.errors)),
+        repairs=tuple(replace(one, sure=sure(one.adjust)) for one in found.repairs),
+    )
 
 
 def _candidates(volume: Volume, asked: Repair) -> tuple[int, ...]:
