@@ -95,7 +95,6 @@ def variance_contributions(case: Case, sobol: int | None = None) -> "SharesResul
 
 
 def _sampled_variance(case: Case) -> Array:
-    """Estimate each parameter's variance of E from sampled machines, [K], µm²."""
     draws, gains = case.draws, _average_gains(case)
     gains = gains[:, :, :: max(1, gains.shape[2] // CHECK_NODES)]
     values = draws.draw(np.random.default_rng(case.plan.seed), CHECK_MACHINES)

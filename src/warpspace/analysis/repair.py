@@ -359,8 +359,6 @@ def find_repairs(
 
 
 def _with_doubt(found: RepairResult, before: FieldDoubt, basis: ErrorBasis) -> RepairResult:
-    """Say U95 of all numbers, and how probable it is that an adjustment helps."""
-
     def sure(adjust: Mapping[str, float]) -> Numbers:
         values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)

@@ -99,7 +99,6 @@ def _spread(drawn: Array) -> Mapping[str, float]:
 
 
 def _shares(found: FieldDoubt) -> list[Mapping[str, Any]]:
-    """Say what errors add to the variances of largest and mean |E|, the largest share first."""
     mean, _, _, largest = found.gradients
     of_mean, doubt = found.parts_of(mean), found.doubt
     u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))

@@ -237,7 +237,6 @@ def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:
 
 
 def _share(errors: ErrorSet, acting: ErrorSet, key: str) -> float:
-    """Amplitude of the curve that acts, by that of the whole: 1 unless the direction matters."""
     whole, part = errors.functions.get(key), acting.functions.get(key)
     if whole is None or part is None or whole is part:
         return 1.0

@@ -76,7 +76,6 @@ def view_motions(
 
 
 def _held_displacement(model: Model, motions: Mapping[str, BodyMotion], loop: Loop) -> Array:
-    """Position error of the loop at the reference point, [3], mm."""
     point = transforms.apply(motions["t"].nominal, model.tool_point_mm)
 
     def moved(frame: str) -> Array:

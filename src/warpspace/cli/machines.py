@@ -155,7 +155,6 @@ def _cluster(address: str) -> "Generator[Workers]":
 def _machine_table(
     output: str | None, names: Sequence[str], *, force: bool
 ) -> "Generator[Take | None]":
-    """Give what takes |E| of a case's machines and writes it; None where nothing is written."""
     import numpy as np
 
     from warpspace.outputs.exports.fields import write_rows

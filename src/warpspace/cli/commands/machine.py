@@ -287,7 +287,6 @@ def notes(
 
 
 def _add_note(scene: "Scene", name: str, path: str, *, force: bool, **about: Any) -> "Scene":
-    """Add a note to the file of a scene, or to a copy; what its author has written stays."""
     from warpspace.analysis.reviewing import note_numbers
     from warpspace.machine.limits import MAX_SCENE_BYTES
     from warpspace.scene.files import read_text

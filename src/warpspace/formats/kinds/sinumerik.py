@@ -304,7 +304,6 @@ def _cross_tables(wanted: Wanted, factor: float, most: int) -> list[CrossTable]:
 
 
 def _half_reversals(wanted: Wanted, axis: str) -> Needed:
-    """Give half the difference that the direction of an axis makes: over it, and it and another."""
     base = wanted.toward(TravelDirection.MEAN)
     ways = [base.toward(way, axis) for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)]
     found: dict[tuple[str, ...], Array] = {}

@@ -325,7 +325,6 @@ SHORTEST = 40.0  # axes seen nearly end-on, shorter than this in the picture, ar
 
 
 def _draw_axes(stage: Stage) -> None:
-    """Draw the axes of the machine frame beside the silhouette of the nominal volume."""
     projection = stage.projection
     flat = stage.picture.grid.nominal_mm.reshape(-1, 3)
     low, high = flat.min(axis=0), flat.max(axis=0)

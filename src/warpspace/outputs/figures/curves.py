@@ -71,7 +71,6 @@ def _keys(axis: Axis, letters: str) -> list[str]:
 
 
 def _shown(scene: Scene) -> list[Errors]:
-    """List what there is to draw: kinds of errors of an axis with one that is not zero."""
     every = [(axis, *kind) for axis in scene.machine.axes.values() for kind in KINDS]
 
     def is_given(key: str) -> bool:
