@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import cKDTree
 
 from bench_scenes import scene_with
 from warpspace import load_scene
 from warpspace.analysis.description import silent
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
+from warpspace.machine.curves.simple import Harmonics
 from warpspace.parts.as_cut import Part
 from warpspace.parts.part import (
     fit_out,
@@ -16,6 +18,7 @@ from warpspace.parts.part import (
     make_points,
     place_part,
     point_basis,
+    points_between,
 )
 from warpspace.parts.program import Program
 from warpspace.scene.library import parse_scene
@@ -157,8 +160,8 @@ def test_what_is_off_is_told_by_closed_forms():
 
 def test_a_pitch_over_the_travel_shears_what_is_high():
     made = cut(BOX, None, EBX=(0.0, 550.0)).made  # 1 µrad for each mm
-    sides = np.sign(made.point_mm - made.point_mm.mean(axis=0))
-    assert np.sum(sides[:, 0] * sides[:, 2] * made.error_um[:, 0]) / 2 == pytest.approx(4.0)
+    sides = np.sign(made.point_mm - made.point_mm.mean(axis=0))[:8]  # the vertices
+    assert np.sum(sides[:, 0] * sides[:, 2] * made.error_um[:8, 0]) / 2 == pytest.approx(4.0)
 
 
 def test_a_part_beyond_the_travel_is_counted_and_said():
@@ -214,3 +217,30 @@ def test_a_bent_file_is_as_cut_and_a_predistorted_one_is_cut_nominal(ending, tmp
     made = make_points(scene, place_part(asked, scene, place).vertices_mm)
     off = made.point_mm[:, None] + 1e-3 * made.error_um[:, None] - found.made.point_mm
     assert np.linalg.norm(off, axis=-1).min(axis=1).max() < 2e-5
+
+
+def test_errors_that_wave_between_vertices_are_found():
+    # 12 µm · cos(9 · X): 12 at all vertices, as if the part were too high; −12 at X = ±20
+    wave = {"EZX": Harmonics((-275.0, 275.0), ((9, 12.0, 0.0),))}
+    found = cut(trimesh.creation.box([160.0, 120.0, 40.0]), None, **wave)
+    assert found.vertices == 8
+    assert found.deviation.max_um == pytest.approx(12.0)
+    flat = sorted(one.measures["flatness"]["placed_difference_um"] for one in found.features)
+    assert flat == pytest.approx([0.0] * 4 + [24.0] * 2, abs=1e-9)
+    assert min(found.placed.normal.values()) < -11.0
+
+
+def test_points_between_vertices_are_on_the_surface_and_near_everywhere():
+    for mesh in (BOX, BALL, trimesh.creation.cylinder(radius=20.0, height=90.0)):
+        part = mesh_of(mesh)
+        points, of, apart = points_between(part)
+        corners = part.vertices_mm[part.triangles[of]]
+        assert points == pytest.approx(trimesh.triangles.closest_point(corners, points), abs=1e-6)
+        anywhere, _ = trimesh.sample.sample_surface(part.surface, 2000, seed=0)
+        every = cKDTree(np.concatenate([part.vertices_mm, points]))
+        assert (apart, every.query(anywhere)[0].max() < 7.0) == (5.0, True)
+    huge = trimesh.creation.box([4000.0, 4000.0, 4000.0])
+    assert len(points_between(mesh_of(huge))[0]) < 50_000
+    assert any("within 80 mm are not seen" in said for said in cut(huge, None).doubts())
+    fine = trimesh.creation.icosphere(subdivisions=5, radius=50.0)
+    assert not len(points_between(mesh_of(fine))[0])
