@@ -10,7 +10,8 @@ and rotary axes swing the tip. **With it** (G43.4 to G49) X, Y, Z are the tip on
 point of the workpiece frame where the tip is with these words at rotary axes zero. The tip then
 runs along lines and arcs of the workpiece, rotary axes turn in proportion, linear axes follow.
 
-The path begins where the first straight block ends: nobody knows where the machine stood before.
+The path begins where straight blocks have named all linear axes that they name: nobody knows where
+these stood before.
 G28 goes to axis positions zero, or to the end of the travel that is nearest.
 """
 
@@ -178,6 +179,7 @@ def read_program(
         pass
     rows = np.frombuffer(control.rows).reshape(-1, control.width)
     line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
+    kind[: control.first] = STAND
     return ReadProgram(
         scene, control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
         rows[:, 6] + 1j * rows[:, 7], rows[:, 8:], control.refused, control.unknown,
@@ -200,7 +202,9 @@ class Control:
         self.index = {x: first.index(x) for x in first if first.count(x) == 1}
         self.motion, self.system, self.across, self.unit_mm = "G0", "G54", 2, 1.0
         self.absolute, self.to_initial, self.inverse_time = True, True, False
-        self.is_compensated, self.has_blocks, self.begun = False, False, False
+        self.is_compensated, self.has_blocks = False, False
+        self.unnamed = {i for i, axis in enumerate(self.names) if is_linear(axis)}
+        self.first = 0  # row that the path begins with
         self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
         self.rows, self.width = array("d"), 8 + len(self.names)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
@@ -344,11 +348,14 @@ class Control:
         tcp = self.tcp
         self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
         before, self.at = self.at, [to.get(index, at) for index, at in enumerate(self.at)]
-        if not self.begun:
-            self.record(STAND)
         kind = kind or (RAPID if self.motion == "G0" else FEED)
-        self.record(STAND if self.begun and before == self.at else kind)
-        self.begun = True
+        if not self.first or self.unnamed & to.keys():
+            self.unnamed -= to.keys()
+            self.record(STAND)
+            self.first = len(self.rows) // self.width
+        elif before == self.at:
+            kind = STAND
+        self.record(kind)
         self.switch(tcp=tcp, length_mm=self.length_mm)
 
     def arc_to(self, to: Mapping[int, float]) -> None:
@@ -374,7 +381,6 @@ class Control:
         if not radius or abs(radius - other) > max(SLACK_MM, SLACK * radius):
             self.fail(f"{self.motion}: radii {radius:.4f} and {other:.4f} mm; expected one radius")
         turn = sense * phase((end - centre) / (start - centre))
-        self.begun = True
         self.record(ARC, sense * (turn if turn > FULL_TURN_RAD else turn + tau), centre)
 
     def drill(self) -> None:

@@ -222,3 +222,13 @@ def test_errors_name_line_and_word(dvf: Scene, text: str, said: str):
     with pytest.raises(SceneError, match="line 1: ") as caught:
         run(dvf, text)
     assert said in str(caught.value)
+
+
+def test_the_way_from_an_unknown_place_does_not_count(dvf: Scene):
+    text = "G90 G0 Z-100\nG1 X250\nG0 Y200\nG1 X240\nY230"  # of 10 and 30 mm
+    found = Program(file="x", text=text).run(dvf, lambda _: None)
+    assert found.length_mm == pytest.approx(40.0, abs=1e-9)
+    assert found.read.blocks == 3
+    assert found.path.line[0] == 3
+    _, plane = run(dvf, "G0 X250\nY200\nG1 X240")  # Z stands as in the scene
+    assert np.linalg.norm(plane.step_mm, axis=1).sum() == pytest.approx(10.0, abs=1e-9)
