@@ -44,15 +44,17 @@ FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
 STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in other words
 PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
 CYCLES = "G81", "G82", "G83"
+_IDLE = {"G2": "L", "G3": "L", **dict.fromkeys(CYCLES, "IJ")}  # letters that count nothing there
 MOST_SAID = 1000  # words that are listed as not understood
 SHOWN = 40  # characters of a word that a message shows
 WORD = re.compile(
-    r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=])"  # a letter and its number
+    r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=]|E\d)"  # a letter and its number
     r"|\([^()]*\)|;.*"  # comments
     r"|(\S[^\s(;]*)",  # anything else
     re.IGNORECASE,
 )
-_TITLE = re.compile(r"%?\s*O\s*\d+\s*(\([^()]*\)\s*)*", re.IGNORECASE)  # number of a program
+_SKIP = re.compile(r"(N\s*\d+\s*)?(/[/\d]*\s*)(.*)", re.IGNORECASE)
+_TITLE = re.compile(r"%?\s*<?[O:]\s*\d+>?\s*(\([^()]*\)\s*)*", re.IGNORECASE)  # number of a program
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _MODAL: Mapping[str, tuple[str, object]] = {
@@ -68,11 +70,12 @@ _MODAL: Mapping[str, tuple[str, object]] = {
 _OTHER = "4 9 15 28 40 43 43.4 49 50 53 61 61.1 64 67 69 91.1 96 97"
 _UNDERSTOOD = _MODAL.keys() | {f"G{number}" for number in _OTHER.split()}
 _BENDING = (
-    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 30 33 33.1 38.2 38.3 38.4 38.5"
-    " 41 41.1 42 42.1 43.1 43.2 43.5 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65 66 68 68.2 68.3 72"
-    " 73 74 76 84 85 86 87 88 89 90.1 92"
+    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 27 29 30 31 33 33.1 34 37 38.2"
+    " 38.3 38.4 38.5 41 41.1 42 42.1 43.1 43.2 43.5 47 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65"
+    " 66 68 68.2 68.3 70 72 73 74 76 84 85 86 87 88 89 90.1 92 150 154"
 )
-REFUSED = {"M96", "M97", "M98", "M99"} | {f"G{number}" for number in _BENDING.split()}
+REFUSED = {f"G{number}" for number in (*_BENDING.split(), *range(110, 130))}
+REFUSED |= {"M96", "M97", "M98", "M99", "M198"}
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
 
 
@@ -217,16 +220,15 @@ class Control:
         """Do what lines say, and give them one by one, up to the first word that is refused."""
         for line, raw in enumerate(lines, start=1):
             self.line, self.codes, self.words, self.tokens = line, [], {}, []
-            text = raw.strip()
+            self.skip, text = "", raw.strip()
             if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MOST_SAID:
                 most = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MOST_SAID:,} other words"
                 self.fail(f"is no program in G-code; expected at most {most}")
             if text.startswith("%") and self.has_blocks:
                 return
-            if text.startswith("/"):
+            if skipped := _SKIP.fullmatch(text):
                 self.unknown.setdefault("/", line)
-                text = text.lstrip("/0123456789")
-            self.skip = raw.strip().removesuffix(text)
+                self.skip, text = skipped[2], (skipped[1] or "") + skipped[3]
             if self.has_blocks or not _TITLE.fullmatch(text):
                 for found in WORD.finditer(text.lstrip("%")):
                     self.take(found)
@@ -249,9 +251,9 @@ class Control:
             self.refused.setdefault(self.line, word)
         elif is_code:
             self.codes.append(word)
-            if letter == "G" and word not in _UNDERSTOOD:
+            if (letter == "G" and word not in _UNDERSTOOD) or word in {"M128", "M129"}:
                 self.unknown.setdefault(word, self.line)
-        elif letter in {"E", "L"} or (word[:2].isalpha() and len(word) > 1):
+        elif letter == "E" or (word[:2].isalpha() and len(word) > 1):
             self.unknown.setdefault(word, self.line)
         elif other and not self.refused:  # behind one may be a language that is not read
             end = "the end of the comment" if word.startswith("(") else "a letter and a number"
@@ -269,8 +271,6 @@ class Control:
     def move(self) -> None:
         """Do what the words of a line say."""
         words, once = self.words, ""
-        if len(self.rows) > MAX_PATH_POINTS * self.width:
-            self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
         for code in self.codes:
             if code in _MODAL:
                 setattr(self, *_MODAL[code])
@@ -283,6 +283,9 @@ class Control:
         for letter in letters - self.index.keys():
             known = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
             self.fail(f"{letter}{words[letter]:g}; expected {known}")
+        idle = self.words.keys() & set(_IDLE.get(self.motion, "IJKLR") if letters else "L")
+        for letter in idle:
+            self.unknown.setdefault(f"{letter} with {once or self.motion}", self.line)
         if once == "G28":
             if letters and any(self.at[index] != at for index, at in self.target().items()):
                 self.line_to(self.target(), RAPID)
@@ -322,6 +325,8 @@ class Control:
         self.length_mm = length_mm
 
     def record(self, kind: int, turn: float = 0.0, centre: complex = 0j) -> None:
+        if len(self.rows) > MAX_PATH_POINTS * self.width:
+            self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
         mode = self.line, kind, self.tcp, self.across, self.length_mm
         self.rows.extend((*mode, turn, centre.real, centre.imag, *self.at))
 
@@ -381,28 +386,30 @@ class Control:
         if not radius or abs(radius - other) > max(SLACK_MM, SLACK * radius):
             self.fail(f"{self.motion}: radii {radius:.4f} and {other:.4f} mm; expected one radius")
         turn = sense * phase((end - centre) / (start - centre))
-        self.record(ARC, sense * (turn if turn > FULL_TURN_RAD else turn + tau), centre)
+        more = max(ceil(words.get("P", 1.0)), 1) - (turn > FULL_TURN_RAD)  # P: turns begun
+        self.record(ARC, sense * (turn + more * tau), centre)
 
     def drill(self) -> None:
-        """Drill a hole at the place of the line: R plane, depth, in pecks of Q with G83."""
+        """Drill at the place of the line, K or L times: R plane, depth, in pecks of Q with G83."""
         deep = "XYZ"[self.across]
         self.cycle |= {x: self.value(x) for x in {deep, "R", "Q", "P"} & self.words.keys()}
         if deep not in self.index or not {deep, "R"} <= self.cycle.keys():
             self.fail(f"{self.motion} without {deep} and R")
-        index, place = self.index[deep], self.target()
+        index, repeats = self.index[deep], self.words.get("K", self.words.get("L", 1.0))
         initial = self.cycle.setdefault("initial", self.at[index])
         clear = initial + self.cycle["R"]
         bottom = clear + self.cycle[deep]
         if self.absolute:
             clear, bottom = (self.place(deep, self.cycle[letter]) for letter in ("R", deep))
-        peck = self.cycle.get("Q", 0.0) if self.motion == "G83" else clear - bottom or 1.0
+        peck = abs(self.cycle.get("Q", 0.0)) if self.motion == "G83" else clear - bottom or 1.0
         if bottom > clear or peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
             wanted = f"a depth below R, in up to {MAX_CYCLE:,} pecks of Q above 0"
             self.fail(f"{self.motion} from {clear:g} to {bottom:g} mm; expected {wanted}")
-        self.line_to({index: max(clear, self.at[index])}, RAPID)
-        self.line_to({**place, index: self.at[index]}, RAPID)
-        for number in range(ceil((clear - bottom) / peck)):
-            self.line_to({index: clear}, RAPID)
-            self.line_to({index: clear - number * peck}, RAPID)
-            self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)
-        self.line_to({index: max(initial, clear) if self.to_initial else clear}, RAPID)
+        for _ in range(min(int(repeats), MAX_PATH_POINTS)):
+            self.line_to({index: max(clear, self.at[index])}, RAPID)
+            self.line_to({**self.target(), index: self.at[index]}, RAPID)
+            for number in range(ceil((clear - bottom) / peck)):
+                self.line_to({index: clear}, RAPID)
+                self.line_to({index: clear - number * peck}, RAPID)
+                self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)
+            self.line_to({index: max(initial, clear) if self.to_initial else clear}, RAPID)
