@@ -53,10 +53,18 @@ def test_what_is_wrong_with_a_surface_is_said(tmp_path):
     found = mesh_of(inside)
     assert "face inwards" in found.warnings[0]
     assert found.surface.volume == pytest.approx(240_000.0)
+    hollow = BOX + BOX.copy().apply_scale(0.5)
+    hollow.faces[12:] = hollow.faces[12:, ::-1]
+    assert not mesh_of(hollow).warnings
+    assert mesh_of(hollow).surface.volume == pytest.approx(240_000.0 * 7.0 / 8.0)
+    apart = BOX + inside.apply_scale(0.9).apply_translation([200.0, 0.0, 0.0])
+    assert "some of its shells face inwards" in mesh_of(apart).warnings[0]
     lid = trimesh.Trimesh(BOX.vertices, BOX.faces[2:], process=False)
     assert "not closed" in mesh_of(lid).warnings[0]
     with pytest.raises(OptionError, match="probably in m"):
         load_part("x.stl", data=trimesh.creation.box([0.1] * 3).export(file_type="stl"))
+    with pytest.raises(OptionError, match="in another unit; give"):  # 160 mm in inches
+        load_part("x.stl", data=trimesh.creation.box([6.299] * 3).export(file_type="stl"))
     with pytest.raises(OptionError, match="no such file"):
         load_part(tmp_path / "none.stl")
 
