@@ -393,7 +393,8 @@ def _read(source: str, text: str, shapes: Sequence[Shape], names: list[str]) -> 
         names[of[0]] = name = entry["name"] or names[of[0]]
         if known.setdefault(name, of[0]) != of[0]:
             problems.add(f"{where}.name", "another feature has it", name)
-        if wrong := _wrong(entry, [shapes[at] for at in of]):
+        twice = "an entry before has the same measure" * ((entry["measure"], of) in wanted)
+        if wrong := twice or _wrong(entry, [shapes[at] for at in of]):
             problems.add(where, wrong)
         elif entry["measure"]:
             wanted[entry["measure"], of] = entry["tolerance_um"] or entry["tolerance_urad"]
