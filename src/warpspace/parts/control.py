@@ -38,7 +38,7 @@ from warpspace.scene.files import check_file
 from warpspace.scene.model import Scene
 from warpspace.units import Array, Integers
 
-MM_PER_INCH = 25.4
+MM_PER_INCH, MAX_TOOL_MM = 25.4, 1e4  # the latter of offsets, too
 SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
 FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
 STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in other words
@@ -81,7 +81,9 @@ REFUSED |= {"M96", "M97", "M98", "M99", "M198"}
 
 def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
     found = read_numbers(text, "G54X=position and H1=length", "G54X=10,H1=85.5")
-    for name in found:
+    for name, value in found.items():
+        if abs(value) > MAX_TOOL_MM:
+            raise ValueError(f"{name}={value:g}; expected at most ±{MAX_TOOL_MM:g}")
         if not re.fullmatch(rf"G5[4-9]({'|'.join(scene.machine.axes)})|H\d+", name):
             raise ValueError(f"{name}; expected G54 to G59 with an axis of the machine, or H1")
     return tuple(found.items())
@@ -95,8 +97,9 @@ class Setup:
         "program", "Tool centre point: switched by G43.4 and G49, or on or off throughout"
     )
     length_mm: float = option(
-        0.0, "Length of the tool beyond the tool point of the scene", unit="mm", low=-1e4, high=1e4
-    )
+        0.0, "Length of the tool beyond the tool point of the scene", unit="mm",
+        low=-MAX_TOOL_MM, high=MAX_TOOL_MM,
+    )  # fmt: skip
     offset: Annotated[
         tuple[tuple[str, float], ...], Grammar("G54X=..,H1=..", _offsets, many=True)
     ] = option(

@@ -155,7 +155,7 @@ def test_holes_and_turns_are_written_out(dvf: Scene):
         "G90 G0 X0 Y0 Z-200",
         "G99 G81 X9 Z-220 R-205 K1",
         "G80",
-        "G17 G3 X10 I-5 Z-190 P2",
+        "G17 G3 X9 I-5 Z-190 P2",
     ]
     found = correct(dvf, lines)
     assert not [line for line in found if re.search("[IJKLPR]", line) and "(" not in line]

@@ -266,3 +266,9 @@ def test_as_controls_take_it(dvf: Scene):
 def test_words_that_count_nothing_are_said(dvf: Scene, text: str, said: str):
     read, _ = run(dvf, f"G0 X0 Y0 Z0\n{text}")
     assert read.unknown == {said: 2}
+
+
+@pytest.mark.parametrize("offset", ["H1=1e9", "G54X=-10001"])
+def test_offsets_are_bounded_as_lengths_are(dvf: Scene, offset: str):
+    with pytest.raises(OptionError, match="expected at most ±10000"):
+        verb("program")(dvf, file="x.ngc", offset=offset)
