@@ -74,8 +74,9 @@ _BENDING = (
     " 38.3 38.4 38.5 41 41.1 42 42.1 43.1 43.2 43.5 47 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65"
     " 66 68 68.2 68.3 70 72 73 74 76 84 85 86 87 88 89 90.1 92 150 154"
 )
-REFUSED = {f"G{number}" for number in (*_BENDING.split(), *range(110, 130))}
-REFUSED |= {"M96", "M97", "M98", "M99", "M198"}
+REFUSED = {"M96", "M97", "M98", "M99", "M198"} | {
+    f"G{number}" for number in (*_BENDING.split(), *range(110, 130))
+}
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
 
 

@@ -100,7 +100,7 @@ class Feature:
     area_mm2: float
     slack_mm: float  # that its points may be off the shape
 
-    def seen_at(self, point_mm: Array, chosen: NDArray[np.intp]) -> Callable[[Array], Motion]:
+    def seen_at(self, point_mm: Array, chosen: NDArray[Any]) -> Callable[[Array], Motion]:
         """Give how the shape follows moves, [F, n, 3], µm, of points, [n, 3], by those chosen."""
         chosen = chosen[np.abs(self.shape.respond(point_mm[chosen])[0]) <= self.slack_mm]
         _, normal, design = self.shape.respond(point_mm[chosen])

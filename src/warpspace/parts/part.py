@@ -175,18 +175,23 @@ def points_between(part: PartMesh) -> tuple[Array, Integers, float]:
     start, end, top = np.swapaxes(np.take_along_axis(corner, turn[..., None], axis=1), 0, 1)
     is_bent = surface.face_adjacency_angles > FLAT_RAD
     one, other = np.swapaxes(part.vertices_mm[surface.face_adjacency_edges[is_bent]], 0, 1)
-    for apart in BETWEEN_MM * 2.0 ** np.arange(32):
+    apart = BETWEEN_MM
+    while True:
         # lines along the longest edge of each triangle, and edges where two meet that are not flat
         height = 2.0 * surface.area_faces / np.maximum(edge.max(axis=1), apart)
-        rows, up = _spread(np.maximum(np.ceil(height / apart), 1.0), 0.5)
+        high = np.maximum(np.ceil(height / apart), 1.0)
+        if high.sum() > len(high) + MOST_BETWEEN:
+            apart *= 2.0
+            continue
+        rows, up = _spread(high, 0.5)
         of = np.concatenate([rows, *surface.face_adjacency[is_bent].T])
         first = np.concatenate([start[rows] + up * (top - start)[rows], one, one])
         way = np.concatenate([end[rows] + up * (top - end)[rows], other, other]) - first
         count = np.ceil(np.linalg.norm(way, axis=1) / apart) - 1.0
         if count.sum() < MOST_BETWEEN:
-            break
-    line, along = _spread(np.maximum(count, 0.0), 1.0)
-    return first[line] + along * way[line], of[line], float(apart)
+            line, along = _spread(np.maximum(count, 0.0), 1.0)
+            return first[line] + along * way[line], of[line], apart
+        apart *= 2.0
 
 
 def _spread(count: Array, first: float) -> tuple[Integers, Array]:

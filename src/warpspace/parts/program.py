@@ -363,7 +363,7 @@ def _corrected(read: control.ReadProgram, count: Integers) -> tuple[Integers, Ar
 def correct_program(asked: Program, read: control.ReadProgram) -> Iterator[str]:
     """Give the lines of a program that leaves the nominal path of another one on this machine."""
     idle = {line: word for word, line in read.unknown.items() if " with G" in word}
-    for line, word in (read.refused | idle).items():
+    for line, word in {**read.refused, **idle}.items():
         raise OptionError(f"line {line}: {word} is not followed; expected a program that is")
     row, places = corrected_places(read, asked.within_um / 1e3)
     scene, lines, own = read.scene, [*asked.lines()], read.line[row]

@@ -270,5 +270,6 @@ def test_words_that_count_nothing_are_said(dvf: Scene, text: str, said: str):
 
 @pytest.mark.parametrize("offset", ["H1=1e9", "G54X=-10001"])
 def test_offsets_are_bounded_as_lengths_are(dvf: Scene, offset: str):
-    with pytest.raises(OptionError, match="expected at most ±10000"):
-        verb("program")(dvf, file="x.ngc", offset=offset)
+    asked = next(one for one in Program.options() if one.name == "offset")
+    with pytest.raises(ValueError, match="expected at most ±10000"):
+        asked.grammar.read(offset, dvf)
