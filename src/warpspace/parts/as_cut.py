@@ -23,7 +23,6 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
 from warpspace.parts.part import (
-    BETWEEN_MM,
     Made,
     OfPart,
     PartMesh,
@@ -31,18 +30,18 @@ from warpspace.parts.part import (
     made_doubt,
     make_points,
     place_part,
-    points_between,
 )
 from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, second_order
-from warpspace.units import MM_PER_UM, Array, Integers
+from warpspace.units import MM_PER_UM, Array
 
+LOOKED_AT, SEEN_UM = 500, 0.5  # longest edges; errors amid them that are said
 TRIANGLES_AT_ONCE = 200_000  # what lies between needs memory, too
 
 
 @dataclass(frozen=True, kw_only=True)
 class Off:
-    """How far points of a part are from where they should be."""
+    """How far the vertices of a part are from where they should be."""
 
     deviation: Statistics
     normal: Mapping[str, float]  # min_um and max_um along normals of triangles, at their corners
@@ -55,7 +54,7 @@ class Part(OfPart):
     The part stands where it is clamped; rotary axes stand as they do in the scene, linear axes
     bring the tool to each vertex. Errors are those of the tool against the workpiece, in the
     workpiece frame, actual − nominal: as they are, and placed, after the best rigid fit of all
-    points, as an inspector makes it. Planes, cylinders, cones and spheres are found and measured.
+    vertices, as an inspector makes it. Planes, cylinders, cones and spheres are found and measured.
     Geometry only: no forces, heat, wear or servo.
     """
 
@@ -76,47 +75,61 @@ class Part(OfPart):
         mesh = self.find_mesh(scene)
         is_own = not (self.mesh or self.file)
         features = self.features or (scene.part.path("features") if is_own else None)
-        wanted = self.tolerances
-        if features and not wanted:
-            wanted = features, read_text(Path(features), MAX_SCENE_BYTES)
+        tolerances = self.tolerances
+        if features and not tolerances:
+            tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
         watch(0.2)
         part = place_part(mesh, scene, self.place)
-        between, whose, apart = points_between(part)
-        made = make_points(scene, np.concatenate([part.vertices_mm, between]))
+        made = make_points(scene, part.vertices_mm)
         watch(0.5)
-        at, is_large = (part.place, whose), len(mesh.triangles) > MAX_FEATURE_TRIANGLES
+        is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
+        between = _between(scene, part, made)
+        unseen = between if between > SEEN_UM else 0.0
         fit = partial(fit_out, made.point_mm)
-        cut, placed = _off(part, whose, made, made.error_um, fit(made.error_um))
+        cut, placed = _off(part, made, made.error_um, fit(made.error_um))
         if (sure := None if is_large else made_doubt(scene, made)) is not None:
             cut = replace(cut, deviation=sure.said_of(cut.deviation))
             placed = replace(placed, deviation=sure.seen(fit).said_of(placed.deviation))
         return PartResult(
             vertices=len(mesh.vertices_mm),
-            outside=int(made.outside[: len(mesh.vertices_mm)].sum()),
+            outside=int(made.outside.sum()),
             **vars(cut),
             placed=placed,
-            features=() if is_large else inspect(scene, mesh, at, made, wanted, sure),
+            features=() if is_large else inspect(scene, mesh, made, tolerances, sure, unseen),
             doubt=sure and sure.doubt,
+            unseen_um=unseen,
             part=part,
             made=made,
-            apart_mm=apart,
             scene=scene,
             asked=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
 
 
-def _off(part: PartMesh, whose: Integers, made: Made, *errors_um: Array) -> Iterator[Off]:
-    """Sum errors up, [n, 3] each, of the vertices and of points of triangles."""
+def _between(scene: Scene, part: PartMesh, made: Made) -> float:
+    """Give how far the errors amid the longest edges are from those of their ends, at most, µm."""
+    corner = np.take(part.vertices_mm, part.triangles, axis=0)
+    length = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).reshape(-1)
+    longest = np.argsort(-length)[:LOOKED_AT]
+    ends = np.stack([part.triangles, np.roll(part.triangles, -1, axis=1)], -1).reshape(-1, 2)[
+        longest
+    ]
+    amid = make_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
+    off = amid - made.error_um[ends].mean(axis=1)
+    return float(np.linalg.norm(off, axis=1).max())
+
+
+def _off(part: PartMesh, made: Made, *errors_um: Array) -> Iterator[Off]:
+    """Sum errors of the vertices up, [V, 3] each."""
     from trimesh import triangles
 
     spans = np.array([[np.inf, -np.inf]] * len(errors_um))
-    pieces = np.array_split(part.triangles, 1 + len(part.triangles) // TRIANGLES_AT_ONCE)
-    beyond = np.arange(len(part.vertices_mm), len(made.point_mm))[:, None]
-    for some, points in (*zip(pieces, pieces, strict=True), (part.triangles[whose], beyond)):
+    for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
+        some = part.triangles[first : first + TRIANGLES_AT_ONCE]
         normals, is_valid = triangles.normals(np.take(part.vertices_mm, some, axis=0))
         for span, error in zip(spans, errors_um, strict=True):
-            away = np.einsum("tcx,tx->tc", np.take(error, points[is_valid], axis=0), normals)
+            at_corners = np.take(error, some[is_valid], axis=0)
+            away = np.einsum("tcx,tx->tc", at_corners, normals)
             span[:] = away.min(initial=span[0]), away.max(initial=span[1])
     for (low, high), error in zip(spans.tolist(), errors_um, strict=True):
         field = ErrorField(made.point_mm, error, np.broadcast_to(np.nan, error.shape))
@@ -134,22 +147,23 @@ class PartResult(Off, Result):
     placed: Off
     features: Sequence[FeatureResult]
     part: PartMesh  # nominal, in the workpiece frame
-    made: Made  # its vertices, and points between them
-    apart_mm: float  # how far these are apart
+    made: Made  # its vertices
     scene: Scene
     asked: Part
     doubt: Doubt | None  # how sure its errors are
+    unseen_um: float  # how far errors between vertices are off, at most; 0 where that is little
 
     def doubts(self) -> Iterator[str]:
         yield from self.part.warnings
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
             yield f"{far} are beyond the travel; their errors are continued"
-        if self.apart_mm > BETWEEN_MM:
-            yield f"errors that wave within {self.apart_mm:g} mm are not seen; give a finer mesh"
+        if self.unseen_um:
+            off = f"errors are off by up to {self.unseen_um:.1f} µm more"
+            yield f"between its vertices {off}: expected a finer mesh"
         if (count := len(self.part.triangles)) > MAX_FEATURE_TRIANGLES:
             most = f"up to {MAX_FEATURE_TRIANGLES:,}"
-            yield f"{count:,} triangles: features, U95 and errors between vertices: in {most}"
+            yield f"{count:,} triangles: features, and U95, are looked for in {most}"
 
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.deviation.max_at_mm
@@ -167,8 +181,7 @@ class PartResult(Off, Result):
 
     def texts(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
         """Spell the part in its own frame and unit: as it is cut, or so that it is cut nominal."""
-        nominal = self.part.vertices_mm
-        moved = self.made.error_um[: self.vertices] * MM_PER_UM
+        nominal, moved = self.made.point_mm, self.made.error_um * MM_PER_UM
         for _ in range(2 * self.asked.predistorted):
             moved = -make_points(self.scene, nominal + moved).error_um * MM_PER_UM
         place, (unit, up) = self.part.place, FORMATS[ending]

@@ -17,11 +17,11 @@ from warpspace.analysis.options import option
 from warpspace.bench.placing import ball_point, following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.parts.part import OfPart, PartMesh, fit_out, make_points, place_part, points_between
+from warpspace.parts.part import OfPart, PartMesh, fit_out, make_points, place_part
 from warpspace.scene.model import Scene, second_order
 
-SEARCHED = 800  # points that tell where a part deviates least; all do at the best places
-RIVALS = 3  # best places of the search that are judged by all points
+SEARCHED = 800  # vertices that tell where a part deviates least; all do at the best places
+RIVALS = 3  # best places of the search that are judged by all vertices
 TILTS = (0, 0), (90, 0), (180, 0), (270, 0), (0, 90), (0, 270)  # degrees about x and y
 SHOWN, CLASSES = 10, 5  # places of the table; colours of the map
 
@@ -33,7 +33,7 @@ class Clamping:
     place: tuple[float, ...]  # [6], mm and degrees, in the workpiece frame
     max_um: float
     placed_um: float  # after the best rigid fit
-    outside: int  # points beyond the travel
+    outside: int  # vertices beyond the travel
 
 
 JUDGED = attrgetter("max_um"), attrgetter("placed_um")
@@ -62,8 +62,6 @@ class Clamp(OfPart):
 
     def run(self, scene: Scene, watch: Watch, /) -> "ClampResult":
         mesh = self.find_mesh(scene)
-        points = np.concatenate([mesh.vertices_mm, points_between(mesh)[0]])
-        mesh = replace(mesh, vertices_mm=points)
         part = place_part(mesh, scene, self.place)
         a, b, c = part.place[3:]
         tilts = TILTS if self.turns == "all" else [(a, b)]
@@ -115,7 +113,7 @@ class ClampResult(Result):
     """Places of a part, the best one, and what it gains."""
 
     keys = ("places", "best", "present", "gain_um")
-    places: list[Clamping]  # by some of the points, best first
+    places: list[Clamping]  # by some of the vertices, best first
     best: Clamping
     present: Clamping
     gain_um: float
@@ -150,4 +148,4 @@ class ClampResult(Result):
     def doubts(self) -> Iterator[str]:
         yield from self.warnings
         if self.present.outside:
-            yield f"at present {self.present.outside:,} points are beyond the travel"
+            yield f"at present {self.present.outside:,} vertices are beyond the travel"

@@ -5,7 +5,7 @@ distance ρ from it, (ρ − radius) · cos φ − h · sin φ is the way to the
 cylinder and the half angle of a cone; −90° makes it a plane whose axis is its normal; without an
 axis it is a sphere. Shapes are fitted to vertices by least squares of these distances, and follow
 small moves of them in first order. A measure is taken on the part as it lies in the machine, and
-`placed`, after the best rigid fit of all points; each parameter adds to it what it does where all
+`placed`, after the best rigid fit of all vertices; each parameter adds to it what it does where all
 errors are half as large, so that the parts add up.
 """
 
@@ -20,15 +20,16 @@ from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.contributions import budget_words
 from warpspace.analysis.doubt import Doubt, FieldDoubt, plus_minus
 from warpspace.exceptions import SceneError, near_miss
-from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop
-from warpspace.parts.part import FLAT_RAD, Made, PartMesh, fit_out, point_basis
+from warpspace.kinematics.transforms import skew, vector_rotation
+from warpspace.parts.part import Made, PartMesh, fit_out, point_basis
 from warpspace.scene import schema
 from warpspace.scene.files import parse_toml
 from warpspace.scene.model import Scene, evaluate
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array, spell_signed
 
 SMOOTH_DEG = 30.5  # triangles meeting at less may belong to one curved surface: 12 around a hole
+FLAT_RAD = 1e-3  # triangles meeting at less lie in one facet
 FINE = 5e-6  # share of the largest coordinate that vertices are rounded by: files of six digits
 CLOSE = 2e-5  # share of its extent that a feature's vertices may be off its shape, beside rounding
 NEAR_DEG = 12.0  # angle between triangles and the first guess of the shape, at most
@@ -96,25 +97,20 @@ class Feature:
     """One surface of a part."""
 
     shape: Shape  # in the frame of the mesh
-    triangles: NDArray[np.intp]  # of the mesh
+    vertices: NDArray[np.int32]  # [n], of the mesh
     area_mm2: float
-    slack_mm: float  # that its points may be off the shape
+    normal: Array  # [n, 3]; see `Shape.respond`
+    design: Array  # [n, 8]
 
-    def seen_at(self, point_mm: Array, chosen: NDArray[Any]) -> Callable[[Array], Motion]:
-        """Give how the shape follows moves, [F, n, 3], µm, of points, [n, 3], by those chosen."""
-        chosen = chosen[np.abs(self.shape.respond(point_mm[chosen])[0]) <= self.slack_mm]
-        _, normal, design = self.shape.respond(point_mm[chosen])
-
-        def follow(move_um: Array) -> Motion:
-            move = move_um[:, chosen] * MM_PER_UM
-            mean = move.mean(axis=1)  # what no distance tells follows this
-            away = np.einsum("fnc,nc->fn", move - mean[:, None], normal)
-            step = -np.linalg.lstsq(design, away.T, WEAK)[0].T
-            radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
-            form = np.ptp(away + step @ design.T, axis=1)
-            return Motion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
-
-        return follow
+    def follow(self, move_um: Array) -> Motion:
+        """Fit how the shape follows moves of all vertices of the mesh, [F, V, 3]."""
+        move = move_um[:, self.vertices] * MM_PER_UM
+        mean = move.mean(axis=1)  # what no distance tells follows this
+        away = np.einsum("fnc,nc->fn", move - mean[:, None], self.normal)
+        step = -np.linalg.lstsq(self.design, away.T, WEAK)[0].T
+        radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
+        form = np.ptp(away + step @ self.design.T, axis=1)
+        return Motion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
 
 
 def fit_shape(start: Shape, point_mm: Array) -> Shape:
@@ -123,9 +119,9 @@ def fit_shape(start: Shape, point_mm: Array) -> Shape:
     for _ in range(STEPS):
         distance, _, design = shape.respond(point_mm)
         step = -np.linalg.lstsq(design, distance, WEAK)[0]
-        axis = transforms.vector_rotation(step[3:6]) @ shape.axis
+        centre, axis = shape.centre_mm + step[:3], vector_rotation(step[3:6]) @ shape.axis
         radius, angle = shape.radius_mm + step[6], shape.angle_rad + step[7]
-        shape = Shape(shape.kind, shape.centre_mm + step[:3], axis, radius, angle)
+        shape = Shape(shape.kind, centre, axis, radius, angle)
         if not STILL_MM < np.abs(design @ step).max() < FAR_MM:
             break
     return shape
@@ -183,11 +179,13 @@ def _fitted(mesh: PartMesh, kind: str, part: NDArray[np.intp]) -> Feature | None
     turned = np.sum(start.respond(place)[1] * normal, axis=1)
     if area @ (turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))) > ODD * area.sum():
         return None
-    points = mesh.vertices_mm[np.unique(mesh.triangles[part])]
-    distance, *_ = (shape := fit_shape(start, points)).respond(points)
-    slack = CLOSE * np.linalg.norm(np.ptp(points, axis=0)) + FINE * np.abs(mesh.vertices_mm).max()
-    is_close = np.abs(distance).max() <= slack
-    return Feature(shape, part, float(area.sum()), float(slack)) if is_close else None
+    vertices = np.unique(mesh.triangles[part])
+    points = mesh.vertices_mm[vertices]
+    shape = fit_shape(start, points)
+    distance, *response = shape.respond(points)
+    most = CLOSE * np.linalg.norm(np.ptp(points, axis=0)) + FINE * np.abs(mesh.vertices_mm).max()
+    is_close = np.abs(distance).max() <= most
+    return Feature(shape, vertices, float(area.sum()), *response) if is_close else None
 
 
 def _distance(one: Motion, other: Motion) -> Array:
@@ -218,7 +216,7 @@ def _position(own: Motion, *datums: Motion) -> Array:
 
     found, left, rigid = np.zeros(6), np.eye(6), np.eye(6)
     for shape, shifted, turned, *_ in datums:
-        rigid[3:, :3] = transforms.skew((shape.centre_mm - own.shape.centre_mm) / LEVER_MM)
+        rigid[3:, :3] = skew((shape.centre_mm - own.shape.centre_mm) / LEVER_MM)
         turns = np.eye(3) * (shape.axis @ shape.axis) - np.outer(shape.axis, shape.axis)
         ways: Any = block_diag(shape.across, turns)
         rest = np.hstack([shifted, turned * LEVER_MM]) @ ways - found @ rigid @ ways
@@ -268,20 +266,21 @@ class FeatureResult:
 def inspect(
     scene: Scene,
     mesh: PartMesh,
-    at: tuple[Sequence[float], NDArray[np.int64]],
     made: Made,
     tolerances: tuple[str, str] | None = None,
     sure: FieldDoubt | None = None,
+    between_um: float = 0.0,
 ) -> tuple[FeatureResult, ...]:
-    """Measure the features of a mesh, in its own frame, that is made in a scene.
+    """Measure the features of a part, in its own frame, and made at some place in a scene.
 
-    It stands at a place, and is made at its vertices and at points of some triangles, [n].
-
+    What errors are off between vertices leaves in doubt what is no further from a tolerance.
     Tolerances are the name and the text of a TOML file that names features and says what they have
     to keep; SceneError says all that is wrong with it.
     """
-    known, beyond, (place, whose) = find_features(mesh), len(mesh.vertices_mm), at
-    names, shapes = [*known], [one.shape for one in known.values()]
+    from scipy.spatial.transform import Rotation
+
+    known, points = find_features(mesh), mesh.vertices_mm
+    names, features, shapes = [*known], known.values(), [one.shape for one in known.values()]
     wanted: Wanted = {
         (kind, (at,)): None
         for at, shape in enumerate(shapes)
@@ -290,16 +289,13 @@ def inspect(
     }
     if tolerances:
         wanted |= _read(*tolerances, shapes, names)
-    pose = transforms.placed(place[:3], place[3:])  # from the part to the workpiece
-    turn, points = pose[:3, :3], transforms.apply(transforms.inverse(pose), made.point_mm)
-    follows = list[Callable[[Array], Motion]]()
-    for one in known.values():
-        corners, amid = mesh.triangles[one.triangles], np.isin(whose, one.triangles)
-        chosen = np.append(np.unique(corners), beyond + np.flatnonzero(amid))
-        follows.append(one.seen_at(points, chosen))
+    if not wanted:
+        return ()
+    arms = (at - at.mean(axis=0) for at in (made.point_mm, points))
+    turn = Rotation.align_vectors(*arms)[0].as_matrix()  # from the part to the workpiece
 
     def take(move_um: Array) -> Array:  # [F, V, 3] → [F, m], µm or µrad
-        motions = [follow(move_um) for follow in follows]
+        motions = [one.follow(move_um) for one in features]
         found = np.empty((len(move_um), len(wanted)))
         for index, (kind, of) in enumerate(wanted):
             taken = KINDS[kind].take(*(motions[at] for at in of))
@@ -308,8 +304,8 @@ def inspect(
 
     errors = [made.error_um]
     if any(wanted.values()):
-        stand = made.coordinates
-        exact = evaluate(scene, at=stand, loop=Loop.RELATIVE, frame="workpiece", exact=True)
+        at = made.coordinates
+        exact = evaluate(scene, at=at, loop=Loop.RELATIVE, frame="workpiece", exact=True)
         errors.append(exact.error_um)
     placed = fit_out(points, np.array(errors) @ turn)
     values = take(np.stack([0.0 * placed[0], made.error_um @ turn, *placed]))
@@ -325,12 +321,13 @@ def inspect(
         u95 = sure.doubt.through(
             lambda change: take(placed[:1] + np.tensordot(change, changes, 1))[0]
         )
-    measures = [dict[str, Mapping[str, Any]]() for _ in shapes]
+    measures = [dict[str, Mapping[str, Any]]() for _ in features]
     for index, ((kind, of), band) in enumerate(wanted.items()):
         to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
         split = {key: float(part[index]) for key, part in budget.items()}
         known = (sure.doubt, u95[index]) if sure else None
-        measures[of[0]][kind + to] = _numbers(KINDS[kind], values[:, index], band, split, known)
+        told = KINDS[kind], values[:, index], band, split, known, between_um
+        measures[of[0]][kind + to] = _numbers(*told)
     results: list[FeatureResult] = []
     for name, shape, row in zip(names, shapes, measures, strict=True):
         of = next((key for key, one in row.items() if "tolerance_um" in one), "position")
@@ -344,6 +341,7 @@ def _numbers(
     band: Band,
     budget: dict[str, float],
     known: tuple[Doubt, float | None] | None,
+    between_um: float,
 ) -> dict[str, Any]:
     """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad.
 
@@ -360,6 +358,7 @@ def _numbers(
     found |= {f"u95_placed_difference_{small}": u95} if doubt else {}
     if band is not None:
         left_out, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
+        left_out += 0.0 if kind.is_angle else between_um
         share = float(beyond <= 0.0)
         if doubt is not None:
             share = None if u95 is None else float(doubt.within(placed, u95 / doubt.factor, *band))

@@ -31,8 +31,6 @@ from warpspace.scene.model import Scene, evaluate
 from warpspace.units import Array, Integers
 
 POINTS_AT_ONCE, PAIRS_AT_ONCE = 50_000, 500_000  # what lies between needs memory, too
-BETWEEN_MM, MOST_BETWEEN = 5.0, 50_000  # most between points, about; most points
-FLAT_RAD = 1e-3  # triangles meeting at less lie in one facet
 TOUCHING = 1e-5  # share of the largest coordinate up to which triangles only touch others
 TOGETHER, MOST_PAIRS = 100, 2e8  # triangles that are not parted any more; pairs that are looked at
 
@@ -159,46 +157,6 @@ def _ends(one: Array, other: Array, normal: Array, line: Array) -> tuple[Array, 
     passes = (away < 0.0) != (ahead < 0.0)  # edges through the plane of the other, two of three
     place = at + (to - at) * away / np.where(passes, away - ahead, 1.0)
     return np.where(passes, place, np.inf).min(axis=1), np.where(passes, place, -np.inf).max(axis=1)
-
-
-def points_between(part: PartMesh) -> tuple[Array, Integers, float]:
-    """Give points amid long triangles, [n, 3], since errors wave between vertices.
-
-    Beside them stand their triangles, [n], and how far they are apart, mm. Meshes too large for
-    features get none.
-    """
-    if len(part.triangles) > MAX_FEATURE_TRIANGLES:
-        return np.empty((0, 3)), np.empty(0, np.int64), 0.0
-    corner, surface = part.vertices_mm[part.triangles], part.surface
-    edge = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
-    turn = (edge.argmax(axis=1)[:, None] + [0, 1, 2]) % 3
-    start, end, top = np.swapaxes(np.take_along_axis(corner, turn[..., None], axis=1), 0, 1)
-    is_bent = surface.face_adjacency_angles > FLAT_RAD
-    one, other = np.swapaxes(part.vertices_mm[surface.face_adjacency_edges[is_bent]], 0, 1)
-    apart = BETWEEN_MM
-    while True:
-        # lines along the longest edge of each triangle, and edges where two meet that are not flat
-        height = 2.0 * surface.area_faces / np.maximum(edge.max(axis=1), apart)
-        high = np.maximum(np.ceil(height / apart), 1.0)
-        if high.sum() > len(high) + MOST_BETWEEN:
-            apart *= 2.0
-            continue
-        rows, up = _spread(high, 0.5)
-        of = np.concatenate([rows, *surface.face_adjacency[is_bent].T])
-        first = np.concatenate([start[rows] + up * (top - start)[rows], one, one])
-        way = np.concatenate([end[rows] + up * (top - end)[rows], other, other]) - first
-        count = np.ceil(np.linalg.norm(way, axis=1) / apart) - 1.0
-        if count.sum() < MOST_BETWEEN:
-            line, along = _spread(np.maximum(count, 0.0), 1.0)
-            return first[line] + along * way[line], of[line], apart
-        apart *= 2.0
-
-
-def _spread(count: Array, first: float) -> tuple[Integers, Array]:
-    """Give numbers of things, [n], each as often as it counts, and shares amid them, [n, 1]."""
-    of = np.repeat(np.arange(len(count)), count.astype(np.int64))
-    place = np.arange(len(of)) - (np.cumsum(count) - count)[of] + first
-    return of, (place / (count[of] + 2.0 * first - 1.0))[:, None]
 
 
 def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:

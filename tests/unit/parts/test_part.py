@@ -1,16 +1,16 @@
 """The part as it is made, against closed forms; its mesh, merged and split at creases."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial import cKDTree
 
 from bench_scenes import scene_with
 from warpspace import load_scene
 from warpspace.analysis.description import silent
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
-from warpspace.machine.curves.simple import Harmonics
 from warpspace.parts.as_cut import Part
 from warpspace.parts.part import (
     fit_out,
@@ -18,7 +18,6 @@ from warpspace.parts.part import (
     make_points,
     place_part,
     point_basis,
-    points_between,
 )
 from warpspace.parts.program import Program
 from warpspace.scene.library import parse_scene
@@ -168,8 +167,42 @@ def test_what_is_off_is_told_by_closed_forms():
 
 def test_a_pitch_over_the_travel_shears_what_is_high():
     made = cut(BOX, None, EBX=(0.0, 550.0)).made  # 1 µrad for each mm
-    sides = np.sign(made.point_mm - made.point_mm.mean(axis=0))[:8]  # the vertices
-    assert np.sum(sides[:, 0] * sides[:, 2] * made.error_um[:8, 0]) / 2 == pytest.approx(4.0)
+    sides = np.sign(made.point_mm - made.point_mm.mean(axis=0))
+    assert np.sum(sides[:, 0] * sides[:, 2] * made.error_um[:, 0]) / 2 == pytest.approx(4.0)
+
+
+WAVE = """[machine]
+chain = "wFXYZt"
+[workspace]
+X = [-150, 150]
+Y = [-120, 120]
+Z = [-100, 100]
+[errors]
+EXX = { poly = [0.0, 0.0, 0.004] }
+"""
+KEEPS = """[[features]]
+is = "plane"
+near = [0.0, 0.0, 20.0]
+measure = "flatness"
+tolerance_um = %s
+"""
+
+
+@pytest.mark.parametrize(("limit", "verdict"), [(11, "kept"), (9, "in doubt")])
+def test_what_waves_between_vertices_is_said_and_leaves_verdicts_in_doubt(limit, verdict):
+    # 0.004 x² µm: 10 µm at the corners of a box from x −50 to 50, none amid its edges
+    asked = Part(mesh=mesh_of(BOX), place=(0.0, 0.0, 0.0), tolerances=("f", KEEPS % limit))
+    found = asked.run(parse_scene(WAVE, "s"), silent)
+    assert [*found.doubts()] == [
+        "between its vertices errors are off by up to 10.0 µm more: expected a finer mesh"
+    ]
+    (one,) = [m for f in found.features for m in f.measures.values() if "verdict" in m]
+    assert one["verdict"] == verdict
+    fine = BOX.subdivide().subdivide().subdivide().subdivide()
+    finer = replace(asked, mesh=mesh_of(fine)).run(parse_scene(WAVE, "s"), silent)
+    assert [*finer.doubts()] == []
+    (one,) = [m for f in finer.features for m in f.measures.values() if "verdict" in m]
+    assert one["verdict"] == "kept"
 
 
 def test_a_part_beyond_the_travel_is_counted_and_said():
@@ -225,30 +258,3 @@ def test_a_bent_file_is_as_cut_and_a_predistorted_one_is_cut_nominal(ending, tmp
     made = make_points(scene, place_part(asked, scene, place).vertices_mm)
     off = made.point_mm[:, None] + 1e-3 * made.error_um[:, None] - found.made.point_mm
     assert np.linalg.norm(off, axis=-1).min(axis=1).max() < 2e-5
-
-
-def test_errors_that_wave_between_vertices_are_found():
-    # 12 µm · cos(9 · X): 12 at all vertices, as if the part were too high; −12 at X = ±20
-    wave = {"EZX": Harmonics((-275.0, 275.0), ((9, 12.0, 0.0),))}
-    found = cut(trimesh.creation.box([160.0, 120.0, 40.0]), None, **wave)
-    assert found.vertices == 8
-    assert found.deviation.max_um == pytest.approx(12.0)
-    flat = sorted(one.measures["flatness"]["placed_difference_um"] for one in found.features)
-    assert flat == pytest.approx([0.0] * 4 + [24.0] * 2, abs=1e-9)
-    assert min(found.placed.normal.values()) < -11.0
-
-
-def test_points_between_vertices_are_on_the_surface_and_near_everywhere():
-    for mesh in (BOX, BALL, trimesh.creation.cylinder(radius=20.0, height=90.0)):
-        part = mesh_of(mesh)
-        points, of, apart = points_between(part)
-        corners = part.vertices_mm[part.triangles[of]]
-        assert points == pytest.approx(trimesh.triangles.closest_point(corners, points), abs=1e-6)
-        anywhere, _ = trimesh.sample.sample_surface(part.surface, 2000, seed=0)
-        every = cKDTree(np.concatenate([part.vertices_mm, points]))
-        assert (apart, every.query(anywhere)[0].max() < 7.0) == (5.0, True)
-    huge = trimesh.creation.box([4000.0, 4000.0, 4000.0])
-    assert len(points_between(mesh_of(huge))[0]) < 50_000
-    assert any("within 80 mm are not seen" in said for said in cut(huge, None).doubts())
-    fine = trimesh.creation.icosphere(subdivisions=5, radius=50.0)
-    assert not len(points_between(mesh_of(fine))[0])
