@@ -48,26 +48,32 @@ def measure() -> Section:
         for around, path in zip(GROWING, files, strict=True):
             ball(around).export(path)
         costs = [best(lambda: Part(file=str(path)).run(scene, silent), 3) for path in files]  # noqa: B023
-        copied = best(lambda: trimesh.load_mesh(files[-1], process=False).copy(), 3)
-        tracemalloc.start()
-        found = Part(file=str(files[-1])).run(scene, silent)
-        most = tracemalloc.get_traced_memory()[1] / MEGABYTE
-        tracemalloc.stop()
-    own = (found.part.vertices_mm.nbytes + found.part.triangles.nbytes) / MEGABYTE
+        files.append(files[-1].with_suffix(".stl"))
+        ball(AROUND).export(files[-1])
+        costs.append(best(lambda: Part(file=str(files[-1])).run(scene, silent), 3))
+        rows = list[Row]()
+        for path, cost in zip(files[-2:], costs[-2:], strict=True):
+            of, beside = path.suffix[1:].upper(), "reading and copying it"
+            copied = best(lambda: trimesh.load_mesh(path, process=False).copy(), 3)  # noqa: B023
+            tracemalloc.start()
+            made = Part(file=str(path)).run(scene, silent).part
+            most = tracemalloc.get_traced_memory()[1] / MEGABYTE
+            tracemalloc.stop()
+            own = (made.vertices_mm.nbytes + made.triangles.nbytes) / MEGABYTE
+            about = f"memory for it, {of}", most, "its vertices and triangles", own, "MB"
+            rows.append(Row(f"part of 10⁶ vertices, {of}", cost, beside, copied, most=2.0))
+            rows.append(Row(*about, most_ratio=8.0))
     small = load_part("ball.ply", data=ball(316).export(file_type="ply"))
     basis = point_basis(scene, make_points(scene, small.vertices_mm))
     values = np.array([scene.errors.amplitude(key) for key in basis.keys])
     moved = best(lambda: basis.evaluate(values))
     copied_small = best(basis.position.copy)
-    rows = [
-        Row("part of 10⁶ vertices, PLY", costs[-1], "reading and copying it", copied, most=2.0),
-        Row("memory for it", most, "its vertices and triangles", own, "MB", most_ratio=8.0),
-        Row("slider move, 10⁵ vertices", moved, "copying their responses", copied_small, most=0.06),
-    ]
+    said = "slider move, 10⁵ vertices", moved, "copying their responses", copied_small
+    rows.append(Row(*said, most=0.06))
     counts = [float(around * around + 2) for around in GROWING]
     words = (
         "A closed mesh, read, checked, clamped, moved vertex by vertex by the relative error, and"
         " summed up as it is and after the best fit. The memory is the most that was held at once."
     )
-    growth = [Growth("part as it is cut", "vertices", counts, costs)]
+    growth = [Growth("part as it is cut", "vertices", counts, costs[:-1])]
     return Section("A part as it is cut", words, rows, growth)

@@ -5,11 +5,13 @@ from table import Growth, Row, Section
 from timing import best
 
 from warpspace import load_scene
+from warpspace.analysis.description import silent
 from warpspace.parts.control import Setup, read_program
-from warpspace.parts.program import trace_program
+from warpspace.parts.program import Program, trace_program
 
 BLOCKS = 5600
 GROWING = (700, 1400, 2800, 5600, 11200)
+MENDED = (5000, 10_000, 20_000, 40_000)
 
 
 def program(blocks: int) -> str:
@@ -49,6 +51,10 @@ def measure() -> Section:
     texts = [program(blocks) for blocks in GROWING]
     costs = [best(lambda: trace(text), 3) for text in texts]  # noqa: B023
     growth = [Growth("program, tool centre point", "blocks", [*map(float, GROWING)], costs)]
+    asked = [Program(file="x", text=program(blocks)) for blocks in MENDED]
+    ran = [one.run(scene, silent) for one in asked]
+    costs = [best(one.texts, 2) for one in ran]
+    growth.append(Growth("program mended", "blocks", [*map(float, MENDED)], costs))
     words = (
         "A program in G-code whose short blocks move five axes: read, its modal words followed,"
         " the path sampled so that it bends by 0.01 mm at most between samples, and the error of"

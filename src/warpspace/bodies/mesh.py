@@ -18,7 +18,9 @@ from warpspace.units import Array
 
 # A small file can ask for much.
 
-_STL_HEAD, _STL_TRIANGLE = 84, 50
+_STL_HEAD = 84
+_STL_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+_MIXERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9  # odd numbers of 64 bits
 _GROUPS = re.compile(r"^[ \t]*(?:usemtl|mtllib|[ogs])\b[^\n]*", re.MULTILINE)
 _NEXT_SOLID = re.compile(rb"endsolid[^\n]*\n\s*solid[^\n]*", re.IGNORECASE)
 _FACE = re.compile("^f([^\n]*)", re.MULTILINE)
@@ -50,18 +52,43 @@ def _limit(count: int, limit: int, what: str) -> None:
 
 
 def _count_stl(data: bytes, most: int) -> None:
+    stated = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
     if _is_binary(data):
-        _limit((len(data) - _STL_HEAD) // _STL_TRIANGLE, most, "triangles")
+        _limit(stated, most, "triangles")
         return
     _count_text(data, most)
     text = data.lower()
     _limit(text.count(b"endsolid"), limits.MAX_SOLIDS, "solids")
     _limit(text.count(b"vertex") // 3, most, "triangles")
+    if b"vertex" not in text:
+        held = max(len(data) - _STL_HEAD, 0) // _STL_ROW.itemsize
+        raise ValueError(f"its head says {stated:,} triangles, {held:,} follow")
 
 
 def _is_binary(data: bytes) -> bool:
     stated = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
-    return len(data) == _STL_HEAD + _STL_TRIANGLE * stated
+    return len(data) == _STL_HEAD + _STL_ROW.itemsize * stated
+
+
+def _merge_stl(data: bytes) -> Any:
+    """Give what trimesh makes of a binary STL, equal corners merged; None where keys are shared."""
+    import trimesh
+
+    rows = np.frombuffer(data, _STL_ROW, offset=_STL_HEAD)
+    corner = rows["corners"].reshape(-1, 3) + np.float32(0.0)  # −0 becomes 0
+    key = np.zeros(len(corner), np.uint64)
+    for column, mixer in zip(corner.view(np.uint32).T, _MIXERS, strict=True):
+        key ^= column * np.uint64(mixer)
+    order = np.argsort(key)
+    key = key[order]
+    is_new = np.append(True, key[1:] != key[:-1])[: len(key)]
+    first, place = np.unique(order[is_new], return_inverse=True)  # near ones stay near
+    vertices, faces = corner[first], np.empty(len(corner), np.int32)
+    faces[order] = place.astype(np.int32)[np.cumsum(is_new, dtype=np.int32) - 1]
+    del key, order, is_new
+    if not np.array_equal(vertices[faces], corner):
+        return None
+    return trimesh.Scene(trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False))
 
 
 def _count_text(data: bytes, most: int) -> int:
@@ -237,7 +264,9 @@ def open_meshes(
         with np.errstate(all="ignore"):
             ending = path.suffix.lower()
             data = count_mesh(data, ending, most)
-            found = trimesh.load_scene(io.BytesIO(data), file_type=ending[1:], process=False)
+            merged = _merge_stl(data) if ending == ".stl" and _is_binary(data) else None
+            file = io.BytesIO(data)
+            found = merged or trimesh.load_scene(file, file_type=ending[1:], process=False)
             _check_geometry(found, most)
             return found
     except OptionError as error:

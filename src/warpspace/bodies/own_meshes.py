@@ -12,7 +12,7 @@ from warpspace.bodies.mesh import MIDDLE, Body, build_body, open_meshes
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.transforms import apply, placed
 from warpspace.machine.description import BodySource, Machine
-from warpspace.machine.limits import MAX_TRIANGLES, MAX_URDF_TRIANGLES
+from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_TRIANGLES, MAX_URDF_TRIANGLES
 from warpspace.units import Array
 
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -40,7 +40,7 @@ def read_mesh(
 
     Vertices are merged, triangles without three of them left out, closed surfaces face outwards.
     """
-    from trimesh import grouping
+    from trimesh import graph, grouping
 
     if path.suffix.lower() not in FORMATS:
         raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
@@ -65,7 +65,7 @@ def read_mesh(
         mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     longest = float(np.ptp(mesh.vertices, axis=0).max())
     if not (is_told or SMALL_MM <= longest <= LARGE_MM):
-        is_usual = (unit == "mm") == (longest < SMALL_MM)
+        is_usual = longest < 1.0 if unit == "mm" else longest > LARGE_MM
         other = {"mm": "m", "m": "mm"}[unit] if is_usual else "another unit"
         raise OptionError(
             f"{path}: taken as {unit}, its longest edge is {longest:.4g} mm. It is probably in"
@@ -78,10 +78,21 @@ def read_mesh(
     x, y, z = np.ascontiguousarray((mesh.vertices - mesh.vertices[0]).T)
     one, two, three = mesh.faces.T
     across = (y[two] - y[one]) * (z[three] - z[one]) - (z[two] - z[one]) * (y[three] - y[one])
-    if (x[one] + x[two] + x[three]) @ across >= 0.0:  # six times the volume
+    across *= x[one] + x[two] + x[three]  # six times the volume
+    if across.sum() < 0.0:
+        mesh.invert()
+        return mesh, (f"{path}: its triangles face inwards; they are turned outwards",)
+    if len(mesh.faces) > MAX_FEATURE_TRIANGLES:
         return mesh, ()
-    mesh.invert()
-    return mesh, (f"{path}: its triangles face inwards; they are turned outwards",)
+    shell = graph.connected_component_labels(mesh.edges, node_count=len(x))
+    volume, low, high = np.bincount(shell[one], across), *np.full((2, shell.max() + 1, 3), np.inf)
+    np.minimum.at(low, shell, mesh.vertices)
+    np.minimum.at(high, shell, -mesh.vertices)
+    for number in np.flatnonzero(volume < 0.0):  # a cavity is within another one
+        is_within = (low <= low[number]) & (high <= high[number])
+        if not (is_within.all(axis=1) & (volume > -volume[number])).any():
+            return mesh, (f"{path}: some of its shells face inwards; they are taken as they are",)
+    return mesh, ()
 
 
 def _is_closed(faces: NDArray[np.int64]) -> bool:

@@ -35,6 +35,7 @@ from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import MM_PER_UM, Array
 
+LOOKED_AT, SEEN_UM = 500, 0.5  # longest edges; errors amid them that are said
 TRIANGLES_AT_ONCE = 200_000  # what lies between needs memory, too
 
 
@@ -82,6 +83,8 @@ class Part(OfPart):
         made = make_points(scene, part.vertices_mm)
         watch(0.5)
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
+        between = _between(scene, part, made)
+        unseen = between if between > SEEN_UM else 0.0
         fit = partial(fit_out, made.point_mm)
         cut, placed = _off(part, made, made.error_um, fit(made.error_um))
         if (sure := None if is_large else made_doubt(scene, made)) is not None:
@@ -92,14 +95,28 @@ class Part(OfPart):
             outside=int(made.outside.sum()),
             **vars(cut),
             placed=placed,
-            features=() if is_large else inspect(scene, mesh, made, tolerances, sure),
+            features=() if is_large else inspect(scene, mesh, made, tolerances, sure, unseen),
             doubt=sure and sure.doubt,
+            unseen_um=unseen,
             part=part,
             made=made,
             scene=scene,
             asked=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
+
+
+def _between(scene: Scene, part: PartMesh, made: Made) -> float:
+    """Give how far the errors amid the longest edges are from those of their ends, at most, µm."""
+    corner = np.take(part.vertices_mm, part.triangles, axis=0)
+    length = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).reshape(-1)
+    longest = np.argsort(-length)[:LOOKED_AT]
+    ends = np.stack([part.triangles, np.roll(part.triangles, -1, axis=1)], -1).reshape(-1, 2)[
+        longest
+    ]
+    amid = make_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
+    off = amid - made.error_um[ends].mean(axis=1)
+    return float(np.linalg.norm(off, axis=1).max())
 
 
 def _off(part: PartMesh, made: Made, *errors_um: Array) -> Iterator[Off]:
@@ -134,12 +151,16 @@ class PartResult(Off, Result):
     scene: Scene
     asked: Part
     doubt: Doubt | None  # how sure its errors are
+    unseen_um: float  # how far errors between vertices are off, at most; 0 where that is little
 
     def doubts(self) -> Iterator[str]:
         yield from self.part.warnings
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
             yield f"{far} are beyond the travel; their errors are continued"
+        if self.unseen_um:
+            off = f"errors are off by up to {self.unseen_um:.1f} µm more"
+            yield f"between its vertices {off}: expected a finer mesh"
         if (count := len(self.part.triangles)) > MAX_FEATURE_TRIANGLES:
             most = f"up to {MAX_FEATURE_TRIANGLES:,}"
             yield f"{count:,} triangles: features, and U95, are looked for in {most}"

@@ -10,7 +10,8 @@ and rotary axes swing the tip. **With it** (G43.4 to G49) X, Y, Z are the tip on
 point of the workpiece frame where the tip is with these words at rotary axes zero. The tip then
 runs along lines and arcs of the workpiece, rotary axes turn in proportion, linear axes follow.
 
-The path begins where the first straight block ends: nobody knows where the machine stood before.
+The path begins where straight blocks have named all linear axes that they name: nobody knows where
+these stood before.
 G28 goes to axis positions zero, or to the end of the travel that is nearest.
 """
 
@@ -37,21 +38,23 @@ from warpspace.scene.files import check_file
 from warpspace.scene.model import Scene
 from warpspace.units import Array, Integers
 
-MM_PER_INCH = 25.4
+MM_PER_INCH, MAX_TOOL_MM = 25.4, 1e4  # the latter of offsets, too
 SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
 FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
 STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in other words
 PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
 CYCLES = "G81", "G82", "G83"
+_IDLE = {"G2": "L", "G3": "L", **dict.fromkeys(CYCLES, "IJ")}  # letters that count nothing there
 MOST_SAID = 1000  # words that are listed as not understood
 SHOWN = 40  # characters of a word that a message shows
 WORD = re.compile(
-    r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=])"  # a letter and its number
+    r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=]|E\d)"  # a letter and its number
     r"|\([^()]*\)|;.*"  # comments
     r"|(\S[^\s(;]*)",  # anything else
     re.IGNORECASE,
 )
-_TITLE = re.compile(r"%?\s*O\s*\d+\s*(\([^()]*\)\s*)*", re.IGNORECASE)  # number of a program
+_SKIP = re.compile(r"(N\s*\d+\s*)?(/[/\d]*\s*)(.*)", re.IGNORECASE)
+_TITLE = re.compile(r"%?\s*<?[O:]\s*\d+>?\s*(\([^()]*\)\s*)*", re.IGNORECASE)  # number of a program
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _MODAL: Mapping[str, tuple[str, object]] = {
@@ -67,17 +70,21 @@ _MODAL: Mapping[str, tuple[str, object]] = {
 _OTHER = "4 9 15 28 40 43 43.4 49 50 53 61 61.1 64 67 69 91.1 96 97"
 _UNDERSTOOD = _MODAL.keys() | {f"G{number}" for number in _OTHER.split()}
 _BENDING = (
-    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 30 33 33.1 38.2 38.3 38.4 38.5"
-    " 41 41.1 42 42.1 43.1 43.2 43.5 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65 66 68 68.2 68.3 72"
-    " 73 74 76 84 85 86 87 88 89 90.1 92"
+    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 27 29 30 31 33 33.1 34 37 38.2"
+    " 38.3 38.4 38.5 41 41.1 42 42.1 43.1 43.2 43.5 47 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65"
+    " 66 68 68.2 68.3 70 72 73 74 76 84 85 86 87 88 89 90.1 92 150 154"
 )
-REFUSED = {"M96", "M97", "M98", "M99"} | {f"G{number}" for number in _BENDING.split()}
+REFUSED = {"M96", "M97", "M98", "M99", "M198"} | {
+    f"G{number}" for number in (*_BENDING.split(), *range(110, 130))
+}
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
 
 
 def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
     found = read_numbers(text, "G54X=position and H1=length", "G54X=10,H1=85.5")
-    for name in found:
+    for name, value in found.items():
+        if abs(value) > MAX_TOOL_MM:
+            raise ValueError(f"{name}={value:g}; expected at most ±{MAX_TOOL_MM:g}")
         if not re.fullmatch(rf"G5[4-9]({'|'.join(scene.machine.axes)})|H\d+", name):
             raise ValueError(f"{name}; expected G54 to G59 with an axis of the machine, or H1")
     return tuple(found.items())
@@ -91,8 +98,9 @@ class Setup:
         "program", "Tool centre point: switched by G43.4 and G49, or on or off throughout"
     )
     length_mm: float = option(
-        0.0, "Length of the tool beyond the tool point of the scene", unit="mm", low=-1e4, high=1e4
-    )
+        0.0, "Length of the tool beyond the tool point of the scene", unit="mm",
+        low=-MAX_TOOL_MM, high=MAX_TOOL_MM,
+    )  # fmt: skip
     offset: Annotated[
         tuple[tuple[str, float], ...], Grammar("G54X=..,H1=..", _offsets, many=True)
     ] = option(
@@ -178,6 +186,7 @@ def read_program(
         pass
     rows = np.frombuffer(control.rows).reshape(-1, control.width)
     line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
+    kind[: control.first] = STAND
     return ReadProgram(
         scene, control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
         rows[:, 6] + 1j * rows[:, 7], rows[:, 8:], control.refused, control.unknown,
@@ -200,7 +209,9 @@ class Control:
         self.index = {x: first.index(x) for x in first if first.count(x) == 1}
         self.motion, self.system, self.across, self.unit_mm = "G0", "G54", 2, 1.0
         self.absolute, self.to_initial, self.inverse_time = True, True, False
-        self.is_compensated, self.has_blocks, self.begun = False, False, False
+        self.is_compensated, self.has_blocks = False, False
+        self.unnamed = {i for i, axis in enumerate(self.names) if is_linear(axis)}
+        self.first = 0  # row that the path begins with
         self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
         self.rows, self.width = array("d"), 8 + len(self.names)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
@@ -213,16 +224,15 @@ class Control:
         """Do what lines say, and give them one by one, up to the first word that is refused."""
         for line, raw in enumerate(lines, start=1):
             self.line, self.codes, self.words, self.tokens = line, [], {}, []
-            text = raw.strip()
+            self.skip, text = "", raw.strip()
             if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MOST_SAID:
                 most = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MOST_SAID:,} other words"
                 self.fail(f"is no program in G-code; expected at most {most}")
             if text.startswith("%") and self.has_blocks:
                 return
-            if text.startswith("/"):
+            if skipped := _SKIP.fullmatch(text):
                 self.unknown.setdefault("/", line)
-                text = text.lstrip("/0123456789")
-            self.skip = raw.strip().removesuffix(text)
+                self.skip, text = skipped[2], (skipped[1] or "") + skipped[3]
             if self.has_blocks or not _TITLE.fullmatch(text):
                 for found in WORD.finditer(text.lstrip("%")):
                     self.take(found)
@@ -245,9 +255,9 @@ class Control:
             self.refused.setdefault(self.line, word)
         elif is_code:
             self.codes.append(word)
-            if letter == "G" and word not in _UNDERSTOOD:
+            if (letter == "G" and word not in _UNDERSTOOD) or word in {"M128", "M129"}:
                 self.unknown.setdefault(word, self.line)
-        elif letter in {"E", "L"} or (word[:2].isalpha() and len(word) > 1):
+        elif letter == "E" or (word[:2].isalpha() and len(word) > 1):
             self.unknown.setdefault(word, self.line)
         elif other and not self.refused:  # behind one may be a language that is not read
             end = "the end of the comment" if word.startswith("(") else "a letter and a number"
@@ -265,8 +275,6 @@ class Control:
     def move(self) -> None:
         """Do what the words of a line say."""
         words, once = self.words, ""
-        if len(self.rows) > MAX_PATH_POINTS * self.width:
-            self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
         for code in self.codes:
             if code in _MODAL:
                 setattr(self, *_MODAL[code])
@@ -279,6 +287,9 @@ class Control:
         for letter in letters - self.index.keys():
             known = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
             self.fail(f"{letter}{words[letter]:g}; expected {known}")
+        idle = self.words.keys() & set(_IDLE.get(self.motion, "IJKLR") if letters else "L")
+        for letter in idle:
+            self.unknown.setdefault(f"{letter} with {once or self.motion}", self.line)
         if once == "G28":
             if letters and any(self.at[index] != at for index, at in self.target().items()):
                 self.line_to(self.target(), RAPID)
@@ -318,6 +329,8 @@ class Control:
         self.length_mm = length_mm
 
     def record(self, kind: int, turn: float = 0.0, centre: complex = 0j) -> None:
+        if len(self.rows) > MAX_PATH_POINTS * self.width:
+            self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
         mode = self.line, kind, self.tcp, self.across, self.length_mm
         self.rows.extend((*mode, turn, centre.real, centre.imag, *self.at))
 
@@ -344,11 +357,14 @@ class Control:
         tcp = self.tcp
         self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
         before, self.at = self.at, [to.get(index, at) for index, at in enumerate(self.at)]
-        if not self.begun:
-            self.record(STAND)
         kind = kind or (RAPID if self.motion == "G0" else FEED)
-        self.record(STAND if self.begun and before == self.at else kind)
-        self.begun = True
+        if not self.first or self.unnamed & to.keys():
+            self.unnamed -= to.keys()
+            self.record(STAND)
+            self.first = len(self.rows) // self.width
+        elif before == self.at:
+            kind = STAND
+        self.record(kind)
         self.switch(tcp=tcp, length_mm=self.length_mm)
 
     def arc_to(self, to: Mapping[int, float]) -> None:
@@ -374,29 +390,30 @@ class Control:
         if not radius or abs(radius - other) > max(SLACK_MM, SLACK * radius):
             self.fail(f"{self.motion}: radii {radius:.4f} and {other:.4f} mm; expected one radius")
         turn = sense * phase((end - centre) / (start - centre))
-        self.begun = True
-        self.record(ARC, sense * (turn if turn > FULL_TURN_RAD else turn + tau), centre)
+        more = max(ceil(words.get("P", 1.0)), 1) - (turn > FULL_TURN_RAD)  # P: turns begun
+        self.record(ARC, sense * (turn + more * tau), centre)
 
     def drill(self) -> None:
-        """Drill a hole at the place of the line: R plane, depth, in pecks of Q with G83."""
+        """Drill at the place of the line, K or L times: R plane, depth, in pecks of Q with G83."""
         deep = "XYZ"[self.across]
         self.cycle |= {x: self.value(x) for x in {deep, "R", "Q", "P"} & self.words.keys()}
         if deep not in self.index or not {deep, "R"} <= self.cycle.keys():
             self.fail(f"{self.motion} without {deep} and R")
-        index, place = self.index[deep], self.target()
+        index, repeats = self.index[deep], self.words.get("K", self.words.get("L", 1.0))
         initial = self.cycle.setdefault("initial", self.at[index])
         clear = initial + self.cycle["R"]
         bottom = clear + self.cycle[deep]
         if self.absolute:
             clear, bottom = (self.place(deep, self.cycle[letter]) for letter in ("R", deep))
-        peck = self.cycle.get("Q", 0.0) if self.motion == "G83" else clear - bottom or 1.0
+        peck = abs(self.cycle.get("Q", 0.0)) if self.motion == "G83" else clear - bottom or 1.0
         if bottom > clear or peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
             wanted = f"a depth below R, in up to {MAX_CYCLE:,} pecks of Q above 0"
             self.fail(f"{self.motion} from {clear:g} to {bottom:g} mm; expected {wanted}")
-        self.line_to({index: max(clear, self.at[index])}, RAPID)
-        self.line_to({**place, index: self.at[index]}, RAPID)
-        for number in range(ceil((clear - bottom) / peck)):
-            self.line_to({index: clear}, RAPID)
-            self.line_to({index: clear - number * peck}, RAPID)
-            self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)
-        self.line_to({index: max(initial, clear) if self.to_initial else clear}, RAPID)
+        for _ in range(min(int(repeats), MAX_PATH_POINTS)):
+            self.line_to({index: max(clear, self.at[index])}, RAPID)
+            self.line_to({**self.target(), index: self.at[index]}, RAPID)
+            for number in range(ceil((clear - bottom) / peck)):
+                self.line_to({index: clear}, RAPID)
+                self.line_to({index: clear - number * peck}, RAPID)
+                self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)
+            self.line_to({index: max(initial, clear) if self.to_initial else clear}, RAPID)

@@ -269,9 +269,11 @@ def inspect(
     made: Made,
     tolerances: tuple[str, str] | None = None,
     sure: FieldDoubt | None = None,
+    between_um: float = 0.0,
 ) -> tuple[FeatureResult, ...]:
     """Measure the features of a part, in its own frame, and made at some place in a scene.
 
+    What errors are off between vertices leaves in doubt what is no further from a tolerance.
     Tolerances are the name and the text of a TOML file that names features and says what they have
     to keep; SceneError says all that is wrong with it.
     """
@@ -287,6 +289,8 @@ def inspect(
     }
     if tolerances:
         wanted |= _read(*tolerances, shapes, names)
+    if not wanted:
+        return ()
     arms = (at - at.mean(axis=0) for at in (made.point_mm, points))
     turn = Rotation.align_vectors(*arms)[0].as_matrix()  # from the part to the workpiece
 
@@ -322,7 +326,8 @@ def inspect(
         to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
         split = {key: float(part[index]) for key, part in budget.items()}
         known = (sure.doubt, u95[index]) if sure else None
-        measures[of[0]][kind + to] = _numbers(KINDS[kind], values[:, index], band, split, known)
+        told = KINDS[kind], values[:, index], band, split, known, between_um
+        measures[of[0]][kind + to] = _numbers(*told)
     results: list[FeatureResult] = []
     for name, shape, row in zip(names, shapes, measures, strict=True):
         of = next((key for key, one in row.items() if "tolerance_um" in one), "position")
@@ -336,6 +341,7 @@ def _numbers(
     band: Band,
     budget: dict[str, float],
     known: tuple[Doubt, float | None] | None,
+    between_um: float,
 ) -> dict[str, Any]:
     """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad.
 
@@ -352,6 +358,7 @@ def _numbers(
     found |= {f"u95_placed_difference_{small}": u95} if doubt else {}
     if band is not None:
         left_out, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
+        left_out += 0.0 if kind.is_angle else between_um
         share = float(beyond <= 0.0)
         if doubt is not None:
             share = None if u95 is None else float(doubt.within(placed, u95, *band))
@@ -385,7 +392,8 @@ def _read(source: str, text: str, shapes: Sequence[Shape], names: list[str]) -> 
         names[of[0]] = name = entry["name"] or names[of[0]]
         if known.setdefault(name, of[0]) != of[0]:
             problems.add(f"{where}.name", "another feature has it", name)
-        if wrong := _wrong(entry, [shapes[at] for at in of]):
+        twice = "an entry before has the same measure" * ((entry["measure"], of) in wanted)
+        if wrong := twice or _wrong(entry, [shapes[at] for at in of]):
             problems.add(where, wrong)
         elif entry["measure"]:
             wanted[entry["measure"], of] = entry["tolerance_um"] or entry["tolerance_urad"]

@@ -361,10 +361,11 @@ def _corrected(read: control.ReadProgram, count: Integers) -> tuple[Integers, Ar
 
 def correct_program(asked: Program, read: control.ReadProgram) -> Iterator[str]:
     """Give the lines of a program that leaves the nominal path of another one on this machine."""
-    for line, word in read.refused.items():
+    idle = {line: word for word, line in read.unknown.items() if " with G" in word}
+    for line, word in {**read.refused, **idle}.items():
         raise OptionError(f"line {line}: {word} is not followed; expected a program that is")
     row, places = corrected_places(read, asked.within_um / 1e3)
-    scene, lines = read.scene, [*asked.lines()]
+    scene, lines, own = read.scene, [*asked.lines()], read.line[row]
     state = control.Control(scene, asked, asked.file or "")
     linear = {name[0] for name in following_axes(scene.model)}
     if missing := ", ".join(linear - state.index.keys()):
@@ -380,7 +381,7 @@ def correct_program(asked: Program, read: control.ReadProgram) -> Iterator[str]:
             known -= letters or known
         elif codes & {"M6", "G43", "G43.4", "G49"}:
             known -= {"Z"}
-        here = np.arange(*np.searchsorted(read.line[row], [number, number + 1]))
+        here = np.arange(*np.searchsorted(own, [number, number + 1]))
         moving = here[read.kind[row[here]] != control.STAND]
         if codes & {"G4", "G28", "G53"} or not (letters or len(moving)):
             kept = [word for key, word in state.tokens if key not in _MODES]
@@ -413,8 +414,9 @@ def _blocks(
 ) -> Iterator[str]:
     """Write the line that a control is at as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]
-    said = _MODES | _LAST | {"N", "G0", "G1", *"IJKR", *state.index}
-    said |= {*("PQ" if state.cycle else ""), *("F" if state.inverse_time else "")}
+    said = _MODES | _LAST | {"N", "G0", "G1", *state.index}
+    said |= {*("KLPQR" if state.cycle else ""), *("F" if state.inverse_time else "")}
+    said |= {*("IJKPR" if state.motion in {"G2", "G3"} else "")}
     rest = [word for key, word in state.tokens if key not in said]
     last = [code for code in state.codes if code in _LAST]
     for left, kind, place in zip(range(len(kinds))[::-1], kinds, places, strict=True):

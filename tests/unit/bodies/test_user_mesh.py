@@ -1,6 +1,7 @@
 """Meshes of users: read as bodies from all formats, and counted before they are built."""
 
 import copy
+import io
 import json
 import re
 import struct
@@ -13,7 +14,7 @@ import pytest
 import trimesh
 
 from warpspace.bodies.mesh import open_meshes
-from warpspace.bodies.own_meshes import FORMATS, frame_meshes, load_mesh
+from warpspace.bodies.own_meshes import FORMATS, frame_meshes, load_mesh, read_mesh
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.scene.urdf import place_robot, read_robot
 
@@ -406,3 +407,41 @@ def test_a_mesh_of_many_shapes_is_read_once_and_their_triangles_are_limited(tmp_
     with pytest.raises(WarpspaceError, match="more than 1,000,000 triangles"):
         frame_meshes(robot, place_robot(robot, "a.urdf").frame_of, tmp_path)
     assert [path.name for path in loads] == ["bad.obj", "one.obj"]
+
+
+def corners_of(mesh):
+    """Spell triangles by their corners, wherever they begin and in whatever order they come."""
+    rows = np.asarray(mesh.vertices)[np.asarray(mesh.faces)]
+    return sorted(min(np.roll(row, k, axis=0).tolist() for k in range(3)) for row in rows)
+
+
+@pytest.mark.parametrize("opened", [False, True])
+def test_a_binary_stl_is_what_trimesh_makes_of_it(opened, tmp_path):
+    mesh = trimesh.creation.icosphere(3, 70.0)
+    mesh.update_faces(np.arange(len(mesh.faces)) >= 5 * opened)
+    data = bytearray(mesh.export(file_type="stl"))
+    rows = np.frombuffer(data, "<f4,<f4,<f4,(3,3)<f4,<u2", offset=84)["f3"]
+    assert (rows == 0.0).any()
+    rows[rows == 0.0] = np.resize(np.float32([0.0, -0.0]), (rows == 0.0).sum())
+    (tmp_path / "ball.stl").write_bytes(data)
+    found, said = read_mesh(tmp_path / "ball.stl", "mm")
+    wanted = trimesh.load_mesh(io.BytesIO(data), file_type="stl", process=False)
+    wanted.merge_vertices()
+    assert len(found.vertices) == len(wanted.vertices) == 642
+    assert corners_of(found) == corners_of(wanted)
+    assert bool(said) == opened
+
+
+def test_corners_that_share_a_key_are_left_to_trimesh(tmp_path, monkeypatch):
+    monkeypatch.setattr("warpspace.bodies.mesh._MIXERS", (0, 0, 1))  # x and y do not count
+    (tmp_path / "box.stl").write_bytes(trimesh.creation.box([30.0] * 3).export(file_type="stl"))
+    found, _ = read_mesh(tmp_path / "box.stl", "mm")
+    assert (len(found.vertices), found.volume) == (8, pytest.approx(27_000.0))
+
+
+@pytest.mark.parametrize(("stated", "said"), [(7, "7 triangles, 5 follow"), (0, "no triangles")])
+def test_a_binary_stl_of_other_length_than_it_says_is_refused(stated, said, tmp_path):
+    rows = b"\0" * 50 * (5 if stated else 0)
+    (tmp_path / "a.stl").write_bytes(b"\0" * 80 + stated.to_bytes(4, "little") + rows)
+    with pytest.raises(OptionError, match=said):
+        read_mesh(tmp_path / "a.stl", "mm")

@@ -128,7 +128,8 @@ def test_words_that_do_not_lead_are_kept(dvf: Scene):
 
 @pytest.mark.parametrize(
     ("lines", "said"),
-    [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G91 G1 X1"], "expected G90 and X, Y, Z before"),
+    [(["G0 X1 Y1 Z1", "M98 P1"], "line 2: M98"), (["G0 X1 Y1 Z1", "G1 X9 R2"], "line 2: R with G1"),
+     (["G91 G1 X1"], "expected G90 and X, Y, Z before"),
      (["G0 X1 Z1", "G2 X1 I5"], "expected G90 and Y before"),
      (["G90 X1 Y1 Z1", "G55 G91 Z1"], "line 2: moves from a place not known")],
 )  # fmt: skip
@@ -147,3 +148,17 @@ def test_the_command_keeps_what_it_reads(tmp_path: Path):
     first = other.read_text()
     assert CliRunner().invoke(cli, [*arguments, str(other), "--force"]).exit_code == 0
     assert other.read_text() == first
+
+
+def test_holes_and_turns_are_written_out(dvf: Scene):
+    lines = [
+        "G90 G0 X0 Y0 Z-200",
+        "G99 G81 X9 Z-220 R-205 K1",
+        "G80",
+        "G17 G3 X9 I-5 Z-190 P2",
+    ]
+    found = correct(dvf, lines)
+    assert not [line for line in found if re.search("[IJKLPR]", line) and "(" not in line]
+    wanted, path = (trace(dvf, some) for some in (lines, found))
+    length = [np.linalg.norm(one.step_mm, axis=1).sum() for one in (wanted, path)]
+    assert length[1] == pytest.approx(length[0], abs=0.1)

@@ -277,6 +277,8 @@ def test_a_plate_of_holes_is_the_ball_plate_of_the_bench():
         (entry(**{"is": "plane 1", "name": "plane 2"}), "another feature has it"),
         (entry(**{"is": "plane 1", "measure": "flatness", "tolerance_um": -1}), "at least 0"),
         (entry(**{"is": "cone", "near": [0, 0, 0]}), "unknown feature"),
+        (2 * entry(**{"is": "plane 1", "measure": "flatness", "tolerance_um": 5}),
+         "features[1]: an entry before has the same measure"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_tolerances_is_said(toml, said):

@@ -1,5 +1,7 @@
 """The part as it is made, against closed forms; its mesh, merged and split at creases."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -50,10 +52,18 @@ def test_what_is_wrong_with_a_surface_is_said(tmp_path):
     found = mesh_of(inside)
     assert "face inwards" in found.warnings[0]
     assert found.surface.volume == pytest.approx(240_000.0)
+    hollow = BOX + BOX.copy().apply_scale(0.5)
+    hollow.faces[12:] = hollow.faces[12:, ::-1]
+    assert not mesh_of(hollow).warnings
+    assert mesh_of(hollow).surface.volume == pytest.approx(240_000.0 * 7.0 / 8.0)
+    apart = BOX + inside.apply_scale(0.9).apply_translation([200.0, 0.0, 0.0])
+    assert "some of its shells face inwards" in mesh_of(apart).warnings[0]
     lid = trimesh.Trimesh(BOX.vertices, BOX.faces[2:], process=False)
     assert "not closed" in mesh_of(lid).warnings[0]
     with pytest.raises(OptionError, match="probably in m"):
         load_part("x.stl", data=trimesh.creation.box([0.1] * 3).export(file_type="stl"))
+    with pytest.raises(OptionError, match="in another unit; give"):  # 160 mm in inches
+        load_part("x.stl", data=trimesh.creation.box([6.299] * 3).export(file_type="stl"))
     with pytest.raises(OptionError, match="no such file"):
         load_part(tmp_path / "none.stl")
 
@@ -159,6 +169,40 @@ def test_a_pitch_over_the_travel_shears_what_is_high():
     made = cut(BOX, None, EBX=(0.0, 550.0)).made  # 1 µrad for each mm
     sides = np.sign(made.point_mm - made.point_mm.mean(axis=0))
     assert np.sum(sides[:, 0] * sides[:, 2] * made.error_um[:, 0]) / 2 == pytest.approx(4.0)
+
+
+WAVE = """[machine]
+chain = "wFXYZt"
+[workspace]
+X = [-150, 150]
+Y = [-120, 120]
+Z = [-100, 100]
+[errors]
+EXX = { poly = [0.0, 0.0, 0.004] }
+"""
+KEEPS = """[[features]]
+is = "plane"
+near = [0.0, 0.0, 20.0]
+measure = "flatness"
+tolerance_um = %s
+"""
+
+
+@pytest.mark.parametrize(("limit", "verdict"), [(11, "kept"), (9, "in doubt")])
+def test_what_waves_between_vertices_is_said_and_leaves_verdicts_in_doubt(limit, verdict):
+    # 0.004 x² µm: 10 µm at the corners of a box from x −50 to 50, none amid its edges
+    asked = Part(mesh=mesh_of(BOX), place=(0.0, 0.0, 0.0), tolerances=("f", KEEPS % limit))
+    found = asked.run(parse_scene(WAVE, "s"), silent)
+    assert [*found.doubts()] == [
+        "between its vertices errors are off by up to 10.0 µm more: expected a finer mesh"
+    ]
+    (one,) = [m for f in found.features for m in f.measures.values() if "verdict" in m]
+    assert one["verdict"] == verdict
+    fine = BOX.subdivide().subdivide().subdivide().subdivide()
+    finer = replace(asked, mesh=mesh_of(fine)).run(parse_scene(WAVE, "s"), silent)
+    assert [*finer.doubts()] == []
+    (one,) = [m for f in finer.features for m in f.measures.values() if "verdict" in m]
+    assert one["verdict"] == "kept"
 
 
 def test_a_part_beyond_the_travel_is_counted_and_said():

@@ -202,7 +202,8 @@ def test_json_holds_together(dvf: Scene, tmp_path: Path):
     ("text", "word"),
     [("#1=5", "#1=5"), ("G1 X[1+2]", "X[1+2]"), ("X#3", "X#3"), ("M98 P100", "M98"),
      ("G41 D1 X5", "G41"), ("O100 sub", "O100"), ("IF [#1 GT 2] GOTO 5", "IF"), ("G68 R30", "G68"),
-     ("G05.1 X5", "G5")],
+     ("G05.1 X5", "G5"), ("M198 P5", "M198"),
+     *((f"G{g} X5", f"G{g}") for g in (27, 29, 31, 34, 37, 47, 70, 110, 129, 150, 154))],
 )  # fmt: skip
 def test_what_is_refused_ends_the_path(dvf: Scene, text: str, word: str):
     read, _ = run(dvf, f"G0 X1 Y1 Z-200\n{text}\nG1 X50\nM98 P5")
@@ -213,7 +214,7 @@ def test_what_is_refused_ends_the_path(dvf: Scene, text: str, word: str):
 @pytest.mark.parametrize(
     ("text", "said"),
     [("G1 X1.2.3", "line 1: 'X1.2.3'"), ("G1 X", "'X'"), ("G1 A5", "A5; expected an axis"),
-     ("X1 X2", "expected X once"), ("G2 X1", "without I, J"),
+     ("X1 X2", "expected X once"), ("G0 X1e2", "'X1E2'"), ("G2 X1", "without I, J"),
      ("(open", "end of the comment"),
      ("G0 X999999", "at most ±100000"), ("G2 X10 R1", "R1; expected a radius"),
      ("G2 X10 I2", "one radius"), ("G83 X1 Z-9 R1", "pecks of Q"), ("G81 X1", "without Z and R")],
@@ -222,3 +223,53 @@ def test_errors_name_line_and_word(dvf: Scene, text: str, said: str):
     with pytest.raises(SceneError, match="line 1: ") as caught:
         run(dvf, text)
     assert said in str(caught.value)
+
+
+def test_the_way_from_an_unknown_place_does_not_count(dvf: Scene):
+    text = "G90 G0 Z-100\nG1 X250\nG0 Y200\nG1 X240\nY230"  # of 10 and 30 mm
+    found = Program(file="x", text=text).run(dvf, lambda _: None)
+    assert found.length_mm == pytest.approx(40.0, abs=1e-9)
+    assert found.read.blocks == 3
+    assert found.path.line[0] == 3
+    _, plane = run(dvf, "G0 X250\nY200\nG1 X240")  # Z stands as in the scene
+    assert np.linalg.norm(plane.step_mm, axis=1).sum() == pytest.approx(10.0, abs=1e-9)
+
+
+def test_holes_are_repeated_and_arcs_turn_more_than_once(dvf: Scene):
+    text = "G90 G0 X0 Y0 Z-200\nG91 G99 G81 X10 Z-15 R-5 {}5\nX7 {}0\nX10"
+    for letter in "KL":  # five holes, none, and one more
+        read, _ = run(dvf, text.format(letter, letter))
+        deep = read.end[:, 2] == -220.0
+        assert read.end[deep, 0] == pytest.approx([10.0, 20.0, 30.0, 40.0, 50.0, 60.0])
+        assert not read.unknown
+    _, path = run(dvf, "G0 X10 Y0 Z-200\nG3 X10 Y0 Z-230 I-10 P3")
+    assert np.linalg.norm(path.step_mm, axis=1).sum() == pytest.approx(
+        math.hypot(3.0 * math.tau * 10.0, 30.0), rel=1e-3
+    )
+    _, path = run(dvf, "G0 X10 Y0 Z-200\nG3 X0 Y10 I-10 P2")
+    way = np.linalg.norm(path.step_mm, axis=1).sum()
+    assert way == pytest.approx(1.25 * math.tau * 10.0, rel=1e-3)
+
+
+def test_as_controls_take_it(dvf: Scene):
+    read, path = run(dvf, ":1000\nG0 X0 Y0 Z-200\nN30 /2 G1 X10\nG83 X20 Z-212 R-202 Q-4")
+    assert (read.unknown, path.coordinates["X"][-1], read.blocks) == ({"/": 3}, 20.0, 3)
+    assert run(dvf, "%\n<O1000>\nG0 X0 Y0 Z-200")[0].blocks == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("G1 X10 R2 F100", "R with G1"), ("G0 X10 K4", "K with G0"),
+     ("G81 X1 Z-9 R-1 I4", "I with G81"),
+     ("G3 X1 I.5 L2", "L with G3"), ("M128", "M128"), ("M129", "M129")],
+)  # fmt: skip
+def test_words_that_count_nothing_are_said(dvf: Scene, text: str, said: str):
+    read, _ = run(dvf, f"G0 X0 Y0 Z0\n{text}")
+    assert read.unknown == {said: 2}
+
+
+@pytest.mark.parametrize("offset", ["H1=1e9", "G54X=-10001"])
+def test_offsets_are_bounded_as_lengths_are(dvf: Scene, offset: str):
+    asked = next(one for one in Program.options() if one.name == "offset")
+    with pytest.raises(ValueError, match="expected at most ±10000"):
+        asked.grammar.read(offset, dvf)
