@@ -52,6 +52,8 @@ class Doubt:
     covariance: Array  # [K, K], µm and µrad; of their amplitudes
     unknown: tuple[str, ...]  # errors of which nobody says how sure they are
     freedom: float  # degrees of freedom
+    untold: tuple[str, ...] = ()  # of the unknown: what a calibration left open
+    lack_of_fit: float = 0.0  # that it saw
 
     @property
     def factor(self) -> float:
@@ -59,7 +61,7 @@ class Doubt:
 
     @property
     def is_known(self) -> bool:
-        return not self.unknown
+        return not (self.unknown or self.untold)
 
     @cached_property
     def root(self) -> Array:
@@ -104,11 +106,19 @@ class Doubt:
         return (self.factor * _root(variance)).tolist()
 
     def remarks(self) -> Iterator[str]:
-        """Say what is not stated."""
-        if self.unknown:
+        """Say what is not stated, and what the data did not determine."""
+        if unstated := [key for key in self.unknown if key not in self.untold]:
             yield (
-                f"uncertainty not stated of {', '.join(self.unknown)}: it is unknown wherever they"
+                f"uncertainty not stated of {', '.join(unstated)}: it is unknown wherever they"
                 " act, not zero"
+            )
+        if self.untold:
+            names = ", ".join(self.untold)
+            yield f"the readings did not determine {names}: unknown wherever they act"
+        if self.lack_of_fit:
+            yield (
+                f"the calibration missed something: its residuals were {self.lack_of_fit:.1f} times"
+                " what its readings scatter; U95 does not contain that"
             )
 
 
@@ -126,10 +136,12 @@ def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
         own = [key for key in keys if key in together]
         rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
         covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
-    acting = (key for key in scene.errors if parameter(key).axis in axes)
+    open_keys = () if joint is None else joint.untold
+    untold = tuple(key for key in open_keys if parameter(key).axis in axes)
+    acting = (key for key in scene.errors if parameter(key).axis in axes and key not in untold)
     unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
-    freedom = np.inf if joint is None else joint.freedom
-    return Doubt(keys, errors, covariance, unknown, freedom)
+    freedom, lack = (np.inf, 0.0) if joint is None else (joint.freedom, joint.lack_of_fit)
+    return Doubt(keys, errors, covariance, (*unknown, *untold), freedom, untold, lack)
 
 
 def _root(variance: Array) -> Array:

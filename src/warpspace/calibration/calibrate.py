@@ -1,6 +1,6 @@
 """Calibration: least squares of the errors of a machine to readings, and what is left."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,6 +44,8 @@ from warpspace.calibration.solve import (
     without,
 )
 from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import build_basis
+from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Covariance
 from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_SPAN
 from warpspace.scene.model import Scene
@@ -53,6 +55,8 @@ LEFT = "what a fit leaves"
 CALIBRATED = ", calibrated"  # behind the title of a calibrated scene
 OUTLIER = 4.0  # robust standard deviations beyond which a reading is named
 MOST_NEXT = 10
+POSES = 60  # at which it is seen whether errors act
+ACTS = 0.01  # share of the effect of one error, below which together they do nothing
 Budget: TypeAlias = Annotated[Instrument, Grammar("NAME|FILE.toml", load_instrument, is_file=True)]
 
 
@@ -288,7 +292,8 @@ def _fit(
     variances = np.diagonal(np.stack([scattered, *shared]), axis1=1, axis2=2)
     degrees = effective_freedom(variances, [own, *(one.freedom for one in instrument.shared)])
     told = u95_at(scene, part, "map")
-    shares = [(told(one) / told(covariance)) ** 2 for one in (scattered * is_assumed, *shared)]
+    whole_map = told(covariance) or 1.0  # nothing acts there
+    shares = [(told(one) / whole_map) ** 2 for one in (scattered * is_assumed, *shared)]
     parameters, combinations = _found(
         terms, part, rank, solved, covariance, degrees, has_prior=prior is not None
     )
@@ -299,19 +304,31 @@ def _fit(
                 f"{row.key} comes out as {value:.4g} {row.unit}; expected at most ±{MAX_ERROR:g}."
                 " Are units, kind of readings and machine right?"
             )
+    lack, lack_notes = _lack_of_fit(stack, after, sigma, freedom)
+    even, least = (covariance + covariance.T) / 2.0, float(degrees.min(initial=np.inf))
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
     fitted_scene = replace(
         scene,
         title=title,
         errors=errors,
         uncertainty={key: one for key, one in scene.uncertainty.items() if key not in part.keys},
-        covariance=_covariance(scene, part.keys, covariance, degrees.min(initial=np.inf), stack),
+        covariance=_covariance(
+            scene,
+            terms,
+            () if request.priors else rank.open_ways,
+            Covariance(
+                part.keys,
+                tuple(map(tuple, even.tolist())),
+                least,
+                _reach(stack),
+                lack_of_fit=lack if lack and lack_notes else 0.0,
+            ),
+        ),
     )
     outliers = _outliers(stack, after)
     held, coverage, held_notes = _predict(
         stack, terms, part, predict, begin, solved, whole, (sigma, own), robust=request.robust
     )
-    lack, lack_notes = _lack_of_fit(stack, after, sigma, freedom)
     return Calibration(
         scene=fitted_scene,
         title=scene.title,
@@ -405,26 +422,51 @@ def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _covariance(
-    scene: Scene, keys: tuple[str, ...], found: Array, freedom: float, stack: Stack
+    scene: Scene, terms: Terms, ways: Sequence[Mapping[str, float]], found: Covariance
 ) -> Covariance | None:
-    """Join what was found with what the scene knew of other errors."""
-    kept = [key for key in scene.covariance.keys if key not in keys] if scene.covariance else []
-    if not (keys or kept):
+    """Join what was found with what the scene knew of other errors, and say what is left open.
+
+    A way is a sum of errors that does not show in the readings. Where it moves no point either,
+    in the working volume and at the poses of the readings, nothing is lost by holding one of them.
+    """
+    known = (scene.covariance or Covariance((), ())).without(found.keys)
+    stated = {*scene.uncertainty} - {*found.keys} | {*known.keys}
+    reach, draw = dict(found.reach), np.random.default_rng(0)
+    poses: dict[str, Array] = {}
+    for axis, ends in reach.items():
+        both = *ends, *scene.workspace.ranges[axis]
+        poses[axis] = draw.uniform(min(both), max(both), POSES)
+        both = *ends, *known.reach.get(axis, ends)
+        reach[axis] = min(both), max(both)
+    untold: dict[str, float] = {}
+    for loop in (Loop.TOOL, Loop.RELATIVE) if ways else ():
+        basis = build_basis(scene.model, terms.errors, terms.keys, poses, scene.view(loop))
+        for way in ways:
+            parts = [share * basis.position[terms.keys.index(key)] for key, share in way.items()]
+            if np.abs(sum(parts)).max() > ACTS * max(np.abs(part).max() for part in parts):
+                untold |= way
+    left = tuple(key for key in (*untold, *known.untold) if key not in stated)
+    found = found.without(left)
+    if not (keys := (*found.keys, *known.keys)) and not left:
         return None
-    matrix = np.zeros((len(keys) + len(kept),) * 2)
-    matrix[: len(keys), : len(keys)] = found
-    reach = dict.fromkeys(scene.machine.axes, (np.inf, -np.inf))
-    if scene.covariance:
-        places = [scene.covariance.keys.index(key) for key in kept]
-        matrix[len(keys) :, len(keys) :] = scene.covariance.matrix[np.ix_(places, places)]
-        reach |= scene.covariance.reach
-    for one in stack.sets:
-        for axis, at in one.coordinates.items():
-            low, high = reach[axis]
-            reach[axis] = min(low, float(np.min(at))), max(high, float(np.max(at)))
-    moved = {axis: ends for axis, ends in reach.items() if ends[1] - ends[0] >= MIN_SPAN}
-    rows = tuple(map(tuple, ((matrix + matrix.T) / 2.0).tolist()))
-    return Covariance((*keys, *kept), rows, freedom, moved)
+    matrix = np.zeros((len(keys),) * 2)
+    cut = len(found.keys)
+    matrix[:cut, :cut], matrix[cut:, cut:] = found.matrix, known.matrix
+    rows, freedom = tuple(map(tuple, matrix.tolist())), min(found.freedom, known.freedom)
+    lack = max(found.lack_of_fit, known.lack_of_fit)
+    return Covariance(keys, rows, freedom, reach, tuple(dict.fromkeys(left)), lack)
+
+
+def _reach(stack: Stack) -> dict[str, tuple[float, float]]:
+    """Give the positions between which axes stood, mm or degrees; equal ends where one stood."""
+    ends = {
+        axis: np.concatenate([one.coordinates[axis] for one in stack.sets])
+        for axis in stack.scene.machine.axes
+    }
+    spans = {axis: (float(at.min()), float(at.max())) for axis, at in ends.items()}
+    return {
+        axis: (low, high if high - low >= MIN_SPAN else low) for axis, (low, high) in spans.items()
+    }
 
 
 def _correlation(covariance: Array) -> Array:

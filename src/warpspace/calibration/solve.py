@@ -33,6 +33,15 @@ class Rank:
     def is_identifiable(self, key: str) -> bool:
         return key in self.kept and not any(key in group for group in self.confounded)
 
+    @property
+    def open_ways(self) -> list[dict[str, float]]:
+        """Sums of parameters that do not show in the readings."""
+        alike = [
+            {first: 1.0, **{key: -share for key, share in row.items()}}
+            for first, row in self.alike.items()
+        ]
+        return [*({key: 1.0} for key in self.unseen), *alike]
+
     def told_with(self, key: str) -> dict[str, float]:
         """Give the sum of parameters that the readings tell where they tell one of them in part."""
         others = {first: row[key] for first, row in self.alike.items() if key in row}

@@ -314,16 +314,20 @@ class _Document:
                 problems.add(f"{section}.{key}", f"the machine {machine.chain} has no axis {axis}")
             else:
                 known[key] = value
-            if key in self.refused:
-                reference = PARAMETERS[key].axis
-                usual = [name for name in machine.parameter_keys if PARAMETERS[name].is_constant]
-                problems.add(
-                    f"{section}.{key}",
-                    f"is zero by definition of the frame, {reference} being the reference axis"
-                    f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
-                    value,
-                )
+            self.check_free(f"{section}.{key}", key, value)
         return known
+
+    def check_free(self, where: str, key: str, value: object) -> None:
+        """Refuse an error that is zero by definition of the frame."""
+        if key in self.refused:
+            reference = PARAMETERS[key].axis
+            usual = [name for name in self.machine.parameter_keys if PARAMETERS[name].is_constant]
+            self.problems.add(
+                where,
+                f"is zero by definition of the frame, {reference} being the reference axis"
+                f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
+                value,
+            )
 
     def curves(self, key: str) -> CurveReader:
         """Give the reader of an error's curves, which run over `Scene.axis_span`."""
@@ -399,31 +403,44 @@ class _Document:
         found: dict[str, Any] | None = problems.read(schema.COVARIANCE, where, raw)
         if found is None:
             return None
-        keys, rows = found["keys"], found["matrix"]
-        problems.only(f"{where}.keys", keys, self.machine.allowed_keys, "error parameter")
+        keys, rows, count = found["keys"], found["matrix"], len(found["keys"])
+        every = *keys, *found["untold"]
+        problems.only(f"{where}.keys", every, self.machine.allowed_keys, "error parameter")
         problems.only(f"{where}.reach", found["reach"], self.machine.axes, OF_MACHINE)
-        if twice := [key for at, key in enumerate(keys) if key in keys[:at] or key in alone]:
-            expected = "expected each error once, here or as uncertainty.KEY"
-            problems.add(f"{where}.keys", expected, twice[0])
-        lengths, count = [*map(len, rows)], len(keys)
-        if lengths not in ([count] * count, [*range(1, count + 1)]):
-            expected = f"expected {count} rows of {count} numbers, or of 1 to {count}"
-            problems.add(f"{where}.matrix", expected)
+        for at, key in enumerate(every):
+            self.check_free(f"{where}.keys", key, key)
+            if key in every[:at] or key in alone:
+                expected = "expected each error once, here or as uncertainty.KEY"
+                problems.add(f"{where}.keys", expected, key)
+        lengths, where = [*map(len, rows)], f"{where}.matrix"
+        is_whole = lengths == [count] * count
+        if not is_whole and lengths != [*range(1, count + 1)]:
+            problems.add(where, f"expected {count} rows of {count} numbers, or of 1 to {count}")
             return None
         half = np.zeros((count, count))
         for at, row in enumerate(rows):
             half[at, : len(row)] = row
         matrix = np.tril(half) + np.tril(half, -1).T
-        width = np.sqrt(np.abs(np.diag(matrix)))
-        if len(rows[0]) == count and np.abs(half - matrix).max() > ROUNDED * np.abs(half).max():
-            problems.add(f"{where}.matrix", "is not symmetric; expected numbers mirrored")
-        if not width.all() or np.linalg.eigvalsh(matrix / np.outer(width, width))[0] < -ROUNDED:
-            expected = "is no covariance; expected a positive matrix, its diagonal above 0"
-            problems.add(f"{where}.matrix", expected)
+        if (none := np.flatnonzero(np.diag(matrix) <= 0.0)).size:
+            at = int(none[0])
+            expected = (
+                f"is no square of an uncertainty of {keys[at]}; expected its diagonal above 0"
+            )
+            problems.add(f"{where}[{at}][{at}]", expected, float(half[at, at]))
+            return None
+        scale = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)))
+        for a, b in np.argwhere(np.abs(half - matrix) > ROUNDED * scale) if is_whole else ():
+            other = f"is not symmetric; expected {float(half[b, a])!r} as in [{b}][{a}]"
+            problems.add(f"{where}[{a}][{b}]", other, float(half[a, b]))
+        values, ways = np.linalg.eigh(matrix / scale)
+        if values.min(initial=0.0) < -ROUNDED:
+            at = int(np.argmax(np.abs(ways[:, 0])))
+            expected = f"is no covariance of {keys[at]} and others; expected a positive matrix"
+            problems.add(f"{where}[{at}]", expected, rows[at])
         if len(problems.lines) > before:
             return None
-        spelled = tuple(map(tuple, matrix.tolist()))
-        return Covariance(keys, spelled, found["freedom"], found["reach"])
+        del found["matrix"]
+        return Covariance(**found, rows=tuple(map(tuple, matrix.tolist())))
 
     def measurements(self) -> dict[str, Measurement]:
         found: dict[str, Measurement] = {}

@@ -119,11 +119,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         convention["direction"] = str(scene.model.direction)
     convention |= notation.to_toml()
     parts.append(spell_section("convention", convention))
-    ranges = {
-        axis: low if low == high else [low, high]
-        for axis, (low, high) in scene.workspace.ranges.items()
-    }
-    parts.append(spell_section("workspace", ranges))
+    parts.append(spell_section("workspace", _ranges(scene.workspace.ranges)))
     points = {
         "tool": scene.model.tool_point_mm,
         "workpiece": scene.model.workpiece_point_mm,
@@ -164,7 +160,12 @@ def _covariance(found: Covariance | None) -> dict[str, object]:
         "matrix": [row[: at + 1] for at, row in enumerate(found.rows)],
     }
     values |= {} if isinf(found.freedom) else {"freedom": found.freedom}
-    return {"covariance": values | ({"reach": found.reach} if found.reach else {})}
+    rest = {"reach": _ranges(found.reach), "untold": found.untold, "lack_of_fit": found.lack_of_fit}
+    return {"covariance": values | {name: value for name, value in rest.items() if value}}
+
+
+def _ranges(found: Mapping[str, Span]) -> dict[str, object]:
+    return {axis: low if low == high else [low, high] for axis, (low, high) in found.items()}
 
 
 def spell_note(note: Note) -> str:
