@@ -106,7 +106,7 @@ def load_instrument(name: str, _scene: object = None) -> Instrument:
 
 def _levers_mm(stack: Stack, one: Readings) -> Array:
     """Give what readings take of a scale: distances from the mean point as they are sensed."""
-    if one.kind == "lengths":
+    if one.kind in {"lengths", "positions"}:  # in the frame of the instrument
         return one.observed_mm - one.observed_mm.mean(axis=0)
     if (plan := one.plan) is None:
         return one.nominal_mm - one.nominal_mm.mean(axis=0)
