@@ -47,7 +47,7 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import build_basis
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Covariance
-from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_SPAN
+from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, UM_PER_MM, Array
 
@@ -320,9 +320,8 @@ def _fit(
                 part.keys,
                 tuple(map(tuple, even.tolist())),
                 least,
-                _reach(stack),
                 lack_of_fit=lack if lack and lack_notes else 0.0,
-            ),
+            ).reaching(stack.positions),
         ),
     )
     outliers = _outliers(stack, after)
@@ -431,13 +430,8 @@ def _covariance(
     """
     known = (scene.covariance or Covariance((), ())).without(found.keys)
     stated = {*scene.uncertainty} - {*found.keys} | {*known.keys}
-    reach, draw = dict(found.reach), np.random.default_rng(0)
-    poses: dict[str, Array] = {}
-    for axis, ends in reach.items():
-        both = *ends, *scene.workspace.ranges[axis]
-        poses[axis] = draw.uniform(min(both), max(both), POSES)
-        both = *ends, *known.reach.get(axis, ends)
-        reach[axis] = min(both), max(both)
+    ends, draw = found.reaching(scene.workspace.ranges).reach, np.random.default_rng(0)
+    poses = {axis: draw.uniform(*ends[axis], POSES) for axis in ends}
     untold: dict[str, float] = {}
     for loop in (Loop.TOOL, Loop.RELATIVE) if ways else ():
         basis = build_basis(scene.model, terms.errors, terms.keys, poses, scene.view(loop))
@@ -452,21 +446,14 @@ def _covariance(
     matrix = np.zeros((len(keys),) * 2)
     cut = len(found.keys)
     matrix[:cut, :cut], matrix[cut:, cut:] = found.matrix, known.matrix
-    rows, freedom = tuple(map(tuple, matrix.tolist())), min(found.freedom, known.freedom)
-    lack = max(found.lack_of_fit, known.lack_of_fit)
-    return Covariance(keys, rows, freedom, reach, tuple(dict.fromkeys(left)), lack)
-
-
-def _reach(stack: Stack) -> dict[str, tuple[float, float]]:
-    """Give the positions between which axes stood, mm or degrees; equal ends where one stood."""
-    ends = {
-        axis: np.concatenate([one.coordinates[axis] for one in stack.sets])
-        for axis in stack.scene.machine.axes
-    }
-    spans = {axis: (float(at.min()), float(at.max())) for axis, at in ends.items()}
-    return {
-        axis: (low, high if high - low >= MIN_SPAN else low) for axis, (low, high) in spans.items()
-    }
+    return Covariance(
+        keys,
+        tuple(map(tuple, matrix.tolist())),
+        min(found.freedom, known.freedom),
+        known.reaching(found.reach).reach,
+        tuple(dict.fromkeys(left)),
+        max(found.lack_of_fit, known.lack_of_fit),
+    )
 
 
 def _correlation(covariance: Array) -> Array:

@@ -284,6 +284,12 @@ class Stack:
         ]
 
     @property
+    def positions(self) -> dict[str, Array]:
+        """Positions of all axes at all readings, [n], mm or degrees."""
+        each = [one.coordinates for one in self.sets]
+        return {axis: np.concatenate([at[axis] for at in each]) for axis in each[0]}
+
+    @property
     def blind(self) -> float:
         """Share of its effect below which nothing is told of a parameter."""
         return max(find_kind(one.kind).blind for one in self.sets)

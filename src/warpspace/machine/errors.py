@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
@@ -112,6 +112,15 @@ class Covariance:
         rows = tuple(tuple(self.rows[a][b] for b in kept) for a in kept)
         untold = tuple(key for key in self.untold if key not in keys)
         return replace(self, keys=tuple(self.keys[at] for at in kept), rows=rows, untold=untold)
+
+    def reaching(self, places: Mapping[str, ArrayLike]) -> "Covariance":
+        """Count positions where axes stood as measured, mm or degrees."""
+        reach = dict(self.reach)
+        for axis, at in places.items():
+            every = np.append(at, reach.get(axis, ()))
+            low, high = float(every.min()), float(every.max())
+            reach[axis] = low, high if high - low >= MIN_SPAN else low
+        return replace(self, reach=reach)
 
     def outside(self, at: Mapping[str, Array], shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Tell where axes stand outside what was reached, of a shape."""
