@@ -1,5 +1,6 @@
 """Finding scenes and reading them: bundled by name, or any file by path, each in one pass."""
 
+import zlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -282,7 +283,8 @@ def read_npz(path: Path, where: str, problems: Problems) -> dict[str, object] | 
         if size <= limits.MAX_SCENE_BYTES:
             with np.load(path, allow_pickle=False) as arrays:
                 return {name: arrays[name].tolist() for name in arrays.files}
-    except (BadZipFile, OSError, ValueError, EOFError):
+    except (BadZipFile, zlib.error, OSError, ValueError, EOFError, RuntimeError, MemoryError,
+            AttributeError):  # fmt: skip
         size = 0
     most = f" of at most {limits.MAX_SCENE_BYTES:,} bytes" if size else ""
     expected = f"expected a file of numpy{most} with the arrays keys and matrix"
@@ -382,10 +384,9 @@ class _Document:
                 self.problems.add(where, expected, raw)
                 continue
             values = [curve.value] if isinstance(curve, Constant) else [v for _, v in curve.points]
-            if min(values) < 0.0:
-                self.problems.add(where, "a standard uncertainty is not negative", min(values))
-            elif not any(values):
-                self.problems.add(where, "expected it above 0; leave out what is not known", 0.0)
+            if min(values) <= 0.0:
+                expected = "expected it above 0 everywhere; leave out what is not known"
+                self.problems.add(where, expected, min(values))
             found[key] = curve
         return found
 

@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import replace
+from io import BytesIO
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import pytest
 from warpspace.analysis.doubt import find_doubt
 from warpspace.exceptions import SceneError
 from warpspace.machine.errors import Covariance
-from warpspace.scene.library import parse_scene
+from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.save import scene_to_toml
 
 SCENE = """[machine]
@@ -25,6 +27,7 @@ EA0Z = -30
 keys = ["EC0Y", "EA0Z"]
 matrix = [[4.0], [3.0, 9.0]]
 """
+SAID = 'covariance = "c.npz": expected a file of numpy with the arrays keys and matrix'
 WHOLE = Covariance(
     ("EC0Y", "EA0Z"),
     ((4.0, 3.0), (3.0, 9.0)),
@@ -90,6 +93,63 @@ def test_an_axis_that_stood_still_was_measured_nowhere_else():
 def test_what_is_wrong_is_said_with_its_row_and_value(old, new, said):
     with pytest.raises(SceneError, match=said):
         parse_scene(SCENE.replace(old, new), "s")
+
+
+@pytest.mark.parametrize(("curve", "value"), [("0", "0"), ("-1", "-1"),
+    ("{ table = [[-100, 0.5], [0, 0], [100, 1]] }", "0.0")])  # fmt: skip
+def test_an_uncertainty_is_above_zero_at_every_position(curve, value):
+    text = SCENE.replace("[uncertainty.", f"[uncertainty]\nEXX = {curve}\n[uncertainty.")
+    with pytest.raises(
+        SceneError, match=rf"uncertainty.EXX = {value}.*: expected it above 0 every"
+    ):
+        parse_scene(text, "s")
+
+
+def packed(path, **files):
+    with ZipFile(path, "w", ZIP_DEFLATED) as pack:
+        for name, content in files.items():
+            pack.writestr(f"{name}.npy", content)
+
+
+def plain_bytes(path):
+    packed(path, keys=b"hello", matrix=b"world")
+
+
+def enormous(path):
+    head = BytesIO()
+    shape = {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)}
+    np.lib.format.write_array_header_1_0(head, shape)
+    packed(path, keys=head.getvalue(), matrix=head.getvalue())
+
+
+def damaged(path):
+    np.savez_compressed(
+        path, keys=np.array(["EC0Y"]), matrix=np.random.default_rng(0).random((60, 60))
+    )
+    content = bytearray(path.read_bytes())
+    at = content.find(b"matrix.npy") + 200
+    content[at : at + 60] = b"\xff" * 60
+    path.write_bytes(content)
+
+
+def locked(path):
+    np.savez(path, keys=np.array(["EC0Y"]), matrix=[[1.0]])
+    content = bytearray(path.read_bytes())
+    for mark, flag in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        for at in range(len(content)):
+            if content.startswith(mark, at):
+                content[at + flag] |= 1
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("write", [plain_bytes, enormous, damaged, locked])
+def test_a_file_of_numpy_that_cannot_be_read_is_named(tmp_path, write):
+    write(tmp_path / "c.npz")
+    text = SCENE[: SCENE.index("[uncertainty.")] + '[uncertainty]\ncovariance = "c.npz"\n'
+    (tmp_path / "s.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(SceneError) as error:
+        load_scene(tmp_path / "s.toml")
+    assert str(error.value).endswith(SAID)
 
 
 def test_degrees_of_freedom_that_are_not_given_are_infinite():
