@@ -1,4 +1,4 @@
-"""U95 of parts, programs and compensations against closed forms of one squareness error.
+"""U95 of parts, programs, distances and compensations against closed forms of one squareness error.
 
 Y turned by γ about z moves a point by −γ·y along x, mm times µrad being nm. What an inspector fits
 out is a turn by γ/2; what is left is (−γ/2·y, −γ/2·x).
@@ -12,6 +12,7 @@ import trimesh
 from scipy.stats import norm, t
 
 from warpspace.analysis.description import silent
+from warpspace.analysis.distance import Distance
 from warpspace.formats.compensation.compensate import Compensate
 from warpspace.parts.as_cut import Part
 from warpspace.parts.part import PartMesh
@@ -43,10 +44,14 @@ tolerance_urad = {limit}
 """
 
 
+def scene(text):
+    return parse_scene(text, "s")
+
+
 def cube(text, **more):
     mesh = trimesh.creation.box((100.0, 100.0, 100.0))
     own = PartMesh("cube", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
-    found = Part(mesh=own, place=PLACE, **more).run(parse_scene(text, "s"), silent)
+    found = Part(mesh=own, place=PLACE, **more).run(scene(text), silent)
     return found, found.as_json()
 
 
@@ -105,7 +110,7 @@ def test_without_a_statement_verdicts_are_those_of_the_model():
 
 
 def path(text, lines):
-    return Program(file="p.ngc", text=lines).run(parse_scene(text, "s"), silent).as_plain()
+    return Program(file="p.ngc", text=lines).run(scene(text), silent).as_plain()
 
 
 def test_a_path_is_as_unsure_along_it_as_across_it():
@@ -122,9 +127,22 @@ def test_a_path_is_as_unsure_along_it_as_across_it():
         assert none[f"u95_{name}_um"] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_difference_between_points_is_as_unsure_as_the_squareness():
+    asked = Distance(start=(("X", 50.0),), end=(("Y", 100.0),), corner=(("Y", 0.0),))
+    found = asked.run(scene(STATED), silent)
+    told = found.as_json()
+    assert told["u95_along_um"] == pytest.approx([2 * U * 0.1, 0.0, 0.0], abs=1e-9)
+    assert told["u95_deviation_urad"] == pytest.approx(2 * U, rel=1e-6)  # the angle is γ wider
+    # from X 50 to Y 100: x shrinks by γ · 100, of which 50 / √(50² + 100²) is along the line
+    assert told["u95_difference_um"] == pytest.approx(
+        2 * U * 0.1 * 50 / math.hypot(50, 100), rel=1e-4
+    )
+    assert not [key for key in asked.run(scene(MACHINE), silent).as_json() if "u95" in key]
+
+
 def test_what_a_table_leaves_is_not_below_what_is_not_known():
     asked = Compensate(formats=("isg-csv",))
-    bare, sure = (asked.run(parse_scene(text, "s"), silent) for text in (MACHINE, STATED))
+    bare, sure = (asked.run(scene(text), silent) for text in (MACHINE, STATED))
     before, after = sure.as_json()["before"], sure.as_json()["after"]
     assert before["u95_max_um"] == pytest.approx(2.0 * U * 0.12)
     assert after["rms_um"] < 0.01

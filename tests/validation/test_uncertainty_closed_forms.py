@@ -5,15 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import ncx2, norm, t
+from scipy.stats import chi2, ncx2, norm, t
 
-from warpspace.analysis.doubt import coverage_factor, find_doubt
+from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt
 from warpspace.analysis.machines import Machines
 from warpspace.analysis.repair import Repair
 from warpspace.analysis.trust import Trust
 from warpspace.bench.base import run_test
 from warpspace.bench.kinds.circular import Circular
 from warpspace.bench.kinds.straightness import Squareness
+from warpspace.kinematics.model import complete_coordinates
 from warpspace.scene.library import parse_scene
 
 HEAD = """[machine]
@@ -133,3 +134,70 @@ def test_machines_drawn_move_together():
     scene = parse_scene(TWO.format(between=-2.999999, second=2.25), "s")
     found = Machines(source="uncertainty", samples=20_000, over="max").run(scene, lambda _: None)
     assert found.p95_um == pytest.approx(math.sqrt(25 + 6.25 * norm.ppf(0.975) ** 2), rel=0.01)
+
+
+MIXED = (
+    HEAD
+    + """EXX = 10
+[uncertainty]
+EXX = 4
+[uncertainty.covariance]
+keys = ["EYY"]
+matrix = [[0.0001]]
+freedom = 3
+"""
+)
+
+
+def test_each_error_counts_by_its_own_degrees_of_freedom():
+    # u 4 of infinite, 0.01 of three degrees of freedom; |E| is along x
+    scene = parse_scene(MIXED, "s")
+    doubt = find_doubt(scene)
+    at = complete_coordinates(scene.machine, {"X": 100.0, "Y": 0.0}, scene.workspace.positions)
+    found = field_doubt(scene, np.array([10.0, 0.0, 0.0]), at, scene.view())
+    assert found.u95_norm_um == pytest.approx(8.0)
+    assert found.u95_um == pytest.approx([8.0, coverage_factor(3) * 0.01, 0.0])
+    assert doubt.factor == 2.0
+    drawn = doubt.draw(np.random.default_rng(1), 200_000)
+    inside = [np.mean(np.abs(drawn[:, k]) <= doubt.u95_of(key)) for k, key in enumerate(doubt.keys)]
+    assert inside == pytest.approx([0.9545] * 3, abs=2e-3)
+
+
+@pytest.mark.parametrize("errors", ["", "EXX = 3\n"])
+def test_where_there_is_no_error_its_uncertainty_is_all_there_is(errors):
+    stated = "[uncertainty.covariance]\nkeys = ['EXX', 'EYX']\nmatrix = [[4.0], [0.0, 4.0]]\n"
+    found = trust(HEAD + errors + stated, verify=True)
+    said = found.as_json()["statistics"]
+    expected = 2 * 2.0 if errors else 2 * math.sqrt(8.0)
+    for name in ("mean", "rms", "p95", "max"):
+        assert said[f"u95_{name}_um"] == pytest.approx(expected)
+    assert ("first order" in " ".join(map(str, found.blocks()))) == (not errors or expected > 3.0)
+
+
+@pytest.mark.parametrize("limit", [1.0, 4.0, 7.0])
+@pytest.mark.parametrize("error", [[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [6.0, 8.0, 0.0]])
+def test_the_probability_that_a_point_keeps_a_limit(limit, error):
+    # u = 2 µm along x, y and z: |E|² / 4 is noncentral χ² of three degrees of freedom
+    keys = "[uncertainty.covariance]\nkeys = ['EXX', 'EYX', 'EZX']\n"
+    scene = parse_scene(HEAD + "EXX = 3\n" + keys + "matrix = [[4], [0, 4], [0, 0, 4]]\n", "s")
+    at = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+    found = field_doubt(scene, np.array(error), at, scene.view())
+    square = float(np.sum(np.square(error)))
+    expected = ncx2.cdf(limit**2 / 4.0, 3, square / 4.0) if square else chi2.cdf(limit**2 / 4.0, 3)
+    assert float(found.keeps(limit)) == pytest.approx(expected, abs=0.02 if square else 1e-9)
+
+
+def test_a_sure_point_keeps_its_limit_or_not():
+    scene = parse_scene(HEAD + "EXX = 3\n[uncertainty]\nEC0Y = 1\n", "s")
+    at = complete_coordinates(scene.machine, {"Y": 0.0}, scene.workspace.positions)
+    found = field_doubt(scene, np.array([3.0, 0.0, 0.0]), at, scene.view())
+    assert [float(found.keeps(limit)) for limit in (2.9, 3.1)] == [0.0, 1.0]
+
+
+def test_where_nothing_that_is_stated_acts_all_is_unknown():
+    scene = parse_scene(
+        HEAD.replace("wFXYZt", "wCFXYZt") + "EXX = 3\n[uncertainty]\nEXC = 1\n", "s"
+    )
+    found = Trust(nodes=3).run(scene, lambda _: None)
+    assert found.as_json()["statistics"]["u95_mean_um"] is None
+    assert find_doubt(scene).draw(np.random.default_rng(0), 3).shape == (3, 0)

@@ -1,12 +1,15 @@
 """Distance between two points and the angle at a third: nominal, actual, and how they differ."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from dataclasses import field as attribute
+from typing import Any
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.description import Result, Watch, plain
+from warpspace.analysis.doubt import find_doubt, plus_minus
 from warpspace.analysis.line import Between
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.exceptions import OptionError
@@ -45,7 +48,19 @@ class Distance(Between):
         solve = evaluate_exact if self.exact else evaluate_first_order
         field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
         watch(1.0)
-        return self.between(scene, at, field)
+        found, doubt = self.between(scene, at, field), find_doubt(scene, self.loop)
+        if doubt is None:
+            return found
+        ways = doubt.respond(scene.model, at, scene.view(self.loop), point).position
+
+        def ask(change: Array) -> Array:
+            error = field.error_um + np.tensordot(change, ways, 1)
+            off = self.between(scene, at, replace(field, error_um=error))
+            return np.array([off.difference_um, off.deviation_urad or 0.0, *off.along_um])
+
+        distance, angle, *along = doubt.through(ask)
+        sure = {"u95_difference_um": distance, "u95_along_um": along}
+        return replace(found, sure=sure | ({"u95_deviation_urad": angle} if self.corner else {}))
 
     def between(self, scene: Scene, at: Coordinates, field: ErrorField) -> "DistanceResult":
         """Measure between points, [n], of a field in R."""
@@ -97,6 +112,10 @@ class DistanceResult(Result):
     deviation_urad: float | None
     is_squareness: bool
     title: str
+    sure: Mapping[str, Any] = attribute(default_factory=dict[str, Any])  # U95 of what differs
+
+    def as_plain(self) -> dict[str, Any]:
+        return {**plain(self), **self.sure}
 
     def words(self) -> list[str]:
         """Say it in short: the distance, its parts, and the angle where there is one."""
@@ -121,17 +140,22 @@ class DistanceResult(Result):
             (name, float(mm), float(mm + um / UM_PER_MM), float(um))
             for name, mm, um in zip(names, nominal_mm, added_um, strict=True)
         ]
+        if self.sure:
+            u95 = self.sure["u95_difference_um"], *self.sure["u95_along_um"]
+            rows = [(*row, plus_minus(one)) for row, one in zip(rows, u95, strict=True)]
         columns = (
             Column(key="of", leads=True),
             *number_columns(("nominal", "actual"), ".4f", "mm", ("nominal_mm", "actual_mm")),
             Column("difference", "+.2f", "µm", key="difference_um"),
+            *([Column("U95", unit="µm", key="u95_um")] if self.sure else []),
         )
         yield Table(columns, rows)
         if self.angle_deg is not None:
             nominal, actual = self.angle_deg
             kind = "squareness" if self.is_squareness else "deviation"
+            angle = f" {plus_minus(self.sure['u95_deviation_urad'])}" if self.sure else ""
             yield f"angle at {place_words(self.at[2])}: {nominal:.6f}° → {actual:.6f}°"
             yield (
                 f"  {kind} of the edge to {end} against the edge to {start}:"
-                f" {self.deviation_urad:+.2f} µrad; positive is wider"
+                f" {self.deviation_urad:+.2f} µrad{angle}; positive is wider"
             )

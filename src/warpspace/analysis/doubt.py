@@ -1,10 +1,10 @@
 """How sure numbers are: the covariance of a machine's errors, carried to points and statistics.
 
-An error of a scene is sure by its standard uncertainty along its axis (``[uncertainty]``, errors
-independent of each other, one number for a whole curve), or by the covariance of amplitudes that a
-calibration found. To first order a result f moves by its gradient g per unit of the amplitudes, so
-that its variance is gᵀ C g (ISO/IEC Guide 98-3, 5.2). U95 = k · u, k being Student's t for 95.45 %:
-2 for infinite degrees of freedom (ibid., table G.2; ISO 230-9 takes k = 2).
+An error of a scene is sure by its standard uncertainty at points of its axis (``[uncertainty]``,
+errors independent of each other), or by the covariance of amplitudes that a calibration found. To
+first order a result f moves by its gradient g per unit of the amplitudes, so that its variance is
+gᵀ C g (ISO/IEC Guide 98-3, 5.2). U95 = k · u, k being Student's t for 95.45 %: 2 for infinite
+degrees of freedom (ibid., table G.2; ISO 230-9 takes k = 2).
 
 An error that a scene gives without saying how sure it is, is *unknown*: so is all that it moves.
 """
@@ -12,17 +12,17 @@ An error that a scene gives without saying how sure it is, is *unknown*: so is a
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
 from warpspace.analysis.distribution import loop_axes
 from warpspace.analysis.statistics import P95, Summary
-from warpspace.field.evaluate import View, build_basis
+from warpspace.field.evaluate import ErrorBasis, View, build_basis
 from warpspace.field.grid import DEFAULT_NODES, build_grid
-from warpspace.kinematics.model import Coordinates, Loop
+from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import ErrorSet
+from warpspace.machine.errors import Covariance, ErrorFunction, ErrorSet, Table
 from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
@@ -30,7 +30,9 @@ NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
 COVERED = 0.9545  # of a normal distribution, within two standard deviations
 NEAR = 0.01  # part of the points that tells how their 95th percentile moves
 MOST_DRAWN = 2_000_000  # |E| of machines that are held at a time
+SAMPLES = 17  # points that a mode along an axis is drawn through
 S = TypeVar("S", bound=Summary)
+Layer: TypeAlias = tuple[ErrorSet, tuple[str, ...]]
 
 
 @lru_cache(maxsize=256)
@@ -47,17 +49,44 @@ def coverage_factor(freedom: float) -> float:
 class Doubt:
     """How sure the errors of a scene are, through one loop."""
 
-    keys: tuple[str, ...]  # (K,); errors that are not sure
-    errors: ErrorSet  # their curves; the amplitudes play no part
-    covariance: Array  # [K, K], µm and µrad; of their amplitudes
+    layers: tuple[Layer, ...]  # curves that are not sure; their amplitudes play no part
+    covariance: Array  # [K, K], µm and µrad; of the amplitudes, one layer behind the other
+    freedoms: Array  # [K], degrees of freedom
     unknown: tuple[str, ...]  # errors of which nobody says how sure they are
-    freedom: float  # degrees of freedom
     untold: tuple[str, ...] = ()  # of the unknown: what a calibration left open
     lack_of_fit: float = 0.0  # that it saw
+
+    @cached_property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the amplitudes, (K,); one may come twice."""
+        return tuple(key for _, keys in self.layers for key in keys)
+
+    def respond(
+        self, model: Model, at: Coordinates, view: View, point_mm: Array | None = None
+    ) -> ErrorBasis:
+        """Give how errors of points respond to the amplitudes."""
+        bases = [build_basis(model, *layer, at, view, point_mm) for layer in self.layers]
+        both = zip(*((one.position, one.orientation) for one in bases), strict=True)
+        return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, both))
+
+    @cached_property
+    def freedom(self) -> float:
+        """Degrees of freedom that all have, else infinite; `expanded` counts each by its own."""
+        return float(self.freedoms[0]) if len({*self.freedoms.tolist()}) == 1 else np.inf
 
     @property
     def factor(self) -> float:
         return coverage_factor(self.freedom)
+
+    @cached_property
+    def factors(self) -> Array:
+        """U95 / u by the degrees of freedom of each, [K]."""
+        return np.array([coverage_factor(one) for one in self.freedoms.tolist()])
+
+    @cached_property
+    def expanded(self) -> Array:
+        """Covariance times the factors: U95 of what grows by g is the root of g · this · g."""
+        return self.covariance * np.outer(self.factors, self.factors)
 
     @property
     def is_known(self) -> bool:
@@ -72,23 +101,29 @@ class Doubt:
 
     def u95_of(self, key: str) -> float | None:
         """Give U95 of the amplitude of one error; None where it is not stated."""
-        width = dict(zip(self.keys, np.diagonal(self.covariance).tolist(), strict=True))
-        return self.factor * width[key] ** 0.5 if key in width else None
+        at = self.keys.index(key) if key in self.keys else None
+        return None if at is None else float(self.expanded[at, at]) ** 0.5
 
-    def within(self, value: Array | float, u: Array | float, low: float, high: float) -> Array:
-        """Give the probability that numbers lie between two, by their standard uncertainties."""
+    def within(self, value: Array | float, u95: Array | float, low: float, high: float) -> Array:
+        """Give the probability that numbers lie between two, by their U95."""
         from scipy.stats import t
 
-        ends = ((end - value) / np.maximum(u, 1e-12) for end in (low, high))
-        below, above = (t.cdf(end, self.freedom) for end in ends)
+        unit = np.maximum(u95, 1e-12) / self.factor
+        below, above = (t.cdf((end - value) / unit, self.freedom) for end in (low, high))
         return above - below
 
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of its freedom."""
-        found = rng.standard_normal((count, len(self.keys))) @ self.root.T
-        if np.isinf(self.freedom):
-            return found
-        return found * np.sqrt(self.freedom / rng.chisquare(self.freedom, (count, 1)))
+    def draw(self, rng: np.random.Generator, count: int, unit: Array | None = None) -> Array:
+        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom.
+
+        Independent numbers of mean zero and variance one may be given for normal ones.
+        """
+        unit = rng.standard_normal((count, len(self.keys))) if unit is None else unit
+        found = unit @ self.root.T
+        for freedom in {*self.freedoms.tolist()} - {np.inf}:
+            found[:, self.freedoms == freedom] *= np.sqrt(
+                freedom / rng.chisquare(freedom, (count, 1))
+            )
+        return found
 
     def through(self, ask: Callable[[Array], Array]) -> list[float | None]:
         """Give U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
@@ -101,9 +136,9 @@ class Doubt:
         present = ask(np.zeros(len(self.keys)))
         if not self.is_known:
             return [None] * len(present)
-        steps = np.array([(ask(way), ask(-way)) for way in self.root.T]) - present
-        variance = np.sum(steps**2, axis=(0, 1)) / 2.0 if steps.size else np.zeros(len(present))
-        return (self.factor * _root(variance)).tolist()
+        steps = [(ask(way), ask(-way)) for way in (self.root * self.factors[:, None]).T]
+        variance = np.sum((np.array(steps).reshape(-1, len(present)) - present) ** 2, axis=0) / 2.0
+        return _root(variance).tolist()
 
     def remarks(self) -> Iterator[str]:
         """Say what is not stated, and what the data did not determine."""
@@ -127,21 +162,44 @@ def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
     joint, alone = scene.covariance, scene.uncertainty
     if joint is None and not alone:
         return None
-    together, axes = () if joint is None else joint.keys, loop_axes(scene.model, loop)
+    axes, together = loop_axes(scene.model, loop), () if joint is None else joint.keys
+    first = {key: scene.errors.functions[key] for key in together if key in scene.errors}
+    second: dict[str, ErrorFunction] = {}
+    for key, curve in alone.items():
+        first[key], *rest = _modes(key, curve)
+        second |= dict.fromkeys((key,), *rest) if rest else {}
     keys = tuple(key for key in (*together, *alone) if parameter(key).axis in axes)
-    curves = {key: scene.errors.functions[key] for key in together if key in scene.errors}
-    errors = ErrorSet({key: one for key, one in {**curves, **alone}.items() if key in keys})
-    covariance = np.diag([alone[key].amplitude ** 2 if key in alone else 0.0 for key in keys])
+    more = tuple(key for key in second if key in keys)
+    layers = (ErrorSet(first), keys), (ErrorSet(second), more)
+    width = [first[key].amplitude if key in alone else 0.0 for key in keys]
+    covariance = np.diag([one**2 for one in (*width, *(second[key].amplitude for key in more))])
+    freedoms = np.full(len(covariance), np.inf)
     if joint is not None:
         own = [key for key in keys if key in together]
         rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
         covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
-    open_keys = () if joint is None else joint.untold
-    untold = tuple(key for key in open_keys if parameter(key).axis in axes)
+        freedoms[rows] = joint.freedom
+    known = joint or Covariance((), ())
+    untold = tuple(key for key in known.untold if parameter(key).axis in axes)
     acting = (key for key in scene.errors if parameter(key).axis in axes and key not in untold)
     unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
-    freedom, lack = (np.inf, 0.0) if joint is None else (joint.freedom, joint.lack_of_fit)
-    return Doubt(keys, errors, covariance, (*unknown, *untold), freedom, untold, lack)
+    every = *unknown, *untold
+    return Doubt(layers, covariance, freedoms, every, untold, known.lack_of_fit)
+
+
+def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
+    """Give what an error varies by whose points along its axis are as sure as a curve says.
+
+    u · cos φ and u · sin φ, φ from 0 at one end to 90° at the other: near points vary together, the
+    ends by themselves, so that widths and differences along the axis are not sure either.
+    """
+    low, high = curve.span
+    if parameter(key).is_constant or low == high:
+        return (curve,)
+    at = np.unique([*curve.kinks, *np.linspace(low, high, SAMPLES)])
+    phase = 0.5 * np.pi * np.clip((at - low) / (high - low), 0.0, 1.0)
+    parts = (curve.evaluate(at) * way for way in (np.cos(phase), np.sin(phase)))
+    return tuple(Table(curve.span, tuple(zip(at.tolist(), u.tolist(), strict=True))) for u in parts)
 
 
 def _root(variance: Array) -> Array:
@@ -154,7 +212,7 @@ class FieldDoubt:
 
     doubt: Doubt
     response: Array  # [K, ..., 3], of the position errors to what is not sure
-    covariance_um2: Array  # [..., 3, 3], of the position errors
+    expanded_um2: Array  # [..., 3, 3]: U95 along a unit vector v is the root of v · this · v
     error_um: Array  # [..., 3], position errors
     shares: Array | None = None  # of the points in statistics, their sum is 1; None for equal ones
     turning: Array | None = None  # [K, ..., 3], response of the orientation errors
@@ -163,10 +221,20 @@ class FieldDoubt:
     def norm_um(self) -> Array:
         return np.linalg.norm(self.error_um, axis=-1)
 
+    @cached_property
+    def covariance_um2(self) -> Array:
+        """Covariance of the position errors, [..., 3, 3]."""
+        return _carry(self.doubt.covariance, self.response)
+
     @property
     def u_um(self) -> Array:
         """Standard uncertainty of the components of position errors, [..., 3]."""
         return _root(np.diagonal(self.covariance_um2, axis1=-2, axis2=-1))
+
+    @property
+    def u_norm_um(self) -> Array:
+        """Standard uncertainty of |E|, [...]."""
+        return self._along(self.covariance_um2)
 
     @property
     def u_urad(self) -> Array:
@@ -174,36 +242,76 @@ class FieldDoubt:
         turning = np.zeros_like(self.response) if self.turning is None else self.turning
         return _root(np.sum(turning * np.tensordot(self.doubt.covariance, turning, 1), axis=0))
 
+    @property
+    def u95_um(self) -> Array:
+        """U95 of the components of position errors, [..., 3]."""
+        return _root(np.diagonal(self.expanded_um2, axis1=-2, axis2=-1))
+
+    @cached_property
+    def u95_norm_um(self) -> Array:
+        """U95 of |E|, [...]; where that is zero, of the vector."""
+        return self._along(self.expanded_um2)
+
     @cached_property
     def direction(self) -> Array:
         """Unit vectors along the position errors, [..., 3]; zero where there is none."""
         length = self.norm_um[..., None]
         return self.error_um / np.where(length > 0.0, length, 1.0)
 
-    @cached_property
-    def u_norm_um(self) -> Array:
-        """Standard uncertainty of |E|, [...]; where that is zero, of the vector."""
+    def _along(self, square: Array) -> Array:
         way = self.direction
-        turned = np.einsum("...ij,...i->...j", self.covariance_um2, way)
+        turned = np.einsum("...ij,...i->...j", square, way)
         variance = np.einsum("...j,...j->...", turned, way)
         if (none := self.norm_um == 0.0).any():
-            traces = np.trace(self.covariance_um2, axis1=-2, axis2=-1)
-            variance = np.where(none, traces, variance)
+            variance = np.where(none, np.trace(square, axis1=-2, axis2=-1), variance)
         return _root(variance)
 
     def u95_at(self, point: int) -> float | None:
         """Give U95 of |E| at a point by its number; None where it is unknown."""
-        return self.doubt.factor * self.u_norm_um.item(point) if self.doubt.is_known else None
+        return self.u95_norm_um.item(point) if self.doubt.is_known else None
 
     def u95(self, gradient: Array) -> float:
         """Give U95 of a number by its growth per unit of each amplitude, [K]."""
-        return self.doubt.factor * float(_root(gradient @ self.doubt.covariance @ gradient))
+        return float(_root(gradient @ self.doubt.expanded @ gradient))
+
+    def parts_of(self, gradient: Array) -> dict[str, float]:
+        """Split the variance of a number into shares of errors, the largest first.
+
+        They add up to one; a share is below zero where a correlation makes the variance smaller.
+        """
+        parts = gradient * (self.doubt.covariance @ gradient)
+        found = dict.fromkeys(self.doubt.keys, 0.0)
+        for key, part in zip(self.doubt.keys, (parts / (parts.sum() or 1.0)).tolist(), strict=True):
+            found[key] += part
+        return dict(sorted(found.items(), key=lambda one: -abs(one[1])))
+
+    def keeps(self, limit_um: float) -> Array:
+        """Give the probability that |E| is within a limit at each point, [...].
+
+        |E|² is a quadratic form; a gamma distribution of its mean and variance stands for it.
+        """
+        from scipy.special import gammainc
+
+        square = self.norm_um**2
+        spread = np.trace(self.covariance_um2, axis1=-2, axis2=-1)
+        pairs = np.sum(self.covariance_um2**2, axis=(-2, -1))
+        mean, variance = square + spread, 2.0 * pairs + 4.0 * square * self.u_norm_um**2
+        per = mean / np.maximum(variance, 1e-300)
+        sharp = (self.norm_um <= limit_um).astype(float)
+        return np.where(variance > 1e-12 * mean**2, gammainc(mean * per, limit_um**2 * per), sharp)
 
     def statistics(self) -> dict[str, float | None]:
-        """Give U95 of mean, RMS, P95 and max of |E| by their keys; None where it is unknown."""
+        """Give U95 of mean, RMS, P95 and max of |E| by their keys; None where it is unknown.
+
+        Points without an error count by U95 of their vector.
+        """
         if not self.doubt.is_known:
             return dict.fromkeys(NAMES)
-        return dict(zip(NAMES, map(self.u95, self.gradients), strict=True))
+        u95 = [self.u95(gradient) for gradient in self.gradients]
+        if (none := self.norm_um.reshape(-1) == 0.0).any():
+            more = self.counts[:, none] @ self.u95_norm_um.reshape(-1)[none]
+            u95 = np.add(u95, more).tolist()
+        return dict(zip(NAMES, u95, strict=True))
 
     def said_of(self, numbers: S) -> S:
         """Say U95 beside statistics of the field."""
@@ -220,19 +328,28 @@ class FieldDoubt:
         return combine(self.doubt, linear(self.response), linear(self.error_um), self.shares)
 
     @cached_property
-    def gradients(self) -> Array:
-        """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
+    def counts(self) -> Array:
+        """How much |E| of each point counts in mean, RMS, P95 and max, [4, N]."""
         norm, weights = self.norm_um.reshape(-1), self.weights
         order = np.argsort(norm)
         place = np.cumsum(weights[order])
         near, largest = np.zeros((2, norm.size))
         chosen = order[np.abs(place - P95) <= max(NEAR, 1.5 / norm.size)]
         near[chosen] = weights[chosen] / max(weights[chosen].sum(), 1e-300)
-        largest[int(np.argmax(norm))] = 1.0
+        largest[np.argmax(norm if norm.any() else self.u95_norm_um)] = 1.0
         rms = float(np.sqrt(weights @ norm**2))
-        shares = np.stack([weights, weights * norm / (rms or 1.0), near, largest])
-        ways = shares[:, :, None] * self.direction.reshape(-1, 3)
-        return ways.reshape(4, -1) @ self.response.reshape(len(self.doubt.keys), -1).T
+        return np.stack([weights, weights * norm / rms if rms else weights, near, largest])
+
+    @cached_property
+    def gradients(self) -> Array:
+        """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
+        response, found = self.response.reshape(len(self.doubt.keys), -1, 3), list[Array]()
+        way = self.direction.reshape(-1, 3)
+        for count in self.counts:
+            few = np.flatnonzero(count) if not count.all() else slice(None)  # tell P95 and max
+            gains = response[:, few].reshape(len(response), -1)
+            found.append(gains @ (count[few, None] * way[few]).reshape(-1))
+        return np.stack(found)
 
     def falls(self, after: "FieldDoubt", name: str) -> float | None:
         """Give the probability that RMS or max of |E| is smaller with other errors of the points.
@@ -247,13 +364,12 @@ class FieldDoubt:
             squares[index] = square.max() if name == "max_um" else self.weights @ square
             ways.append(2.0 * squares[index] ** 0.5 * one.gradients[[*NAMES].index(name)])
         way, fall = ways[1] - ways[0], float(squares[0] - squares[1])
-        u = _root(way @ self.doubt.covariance @ way)
-        return float(self.doubt.within(fall, u, 0.0, np.inf))
+        return float(self.doubt.within(fall, self.u95(way), 0.0, np.inf))
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
         """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""
         rng, points = np.random.default_rng(seed), self.norm_um.size
-        gains = np.moveaxis(self.response.reshape(len(self.doubt.keys), points, 3), -1, 0)
+        gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
         present = self.error_um.reshape(points, 3).T
         for start in range(0, count, step := max(1, MOST_DRAWN // points)):
             change = self.doubt.draw(rng, min(step, count - start))
@@ -272,18 +388,20 @@ def field_doubt(
     """Say how sure a field of a scene is; None where the scene says nothing of that."""
     if (doubt := find_doubt(scene, view.loop)) is None:
         return None
-    basis = build_basis(scene.model, doubt.errors, doubt.keys, at, view, point_mm)
-    found = combine(doubt, basis.position, error_um, shares)
-    return replace(found, turning=basis.orientation)
+    basis = doubt.respond(scene.model, at, view, point_mm)
+    return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
 
 
 def combine(
     doubt: Doubt, response: Array, error_um: Array, shares: Array | None = None
 ) -> FieldDoubt:
     """Carry how sure errors are to points, by the response of these, [K, ..., 3]."""
-    turned = (doubt.covariance @ response.reshape(len(doubt.keys), -1)).reshape(response.shape)
-    covariance = np.einsum("k...i,k...j->...ij", response, turned)
-    return FieldDoubt(doubt, response, covariance, error_um, shares)
+    return FieldDoubt(doubt, response, _carry(doubt.expanded, response), error_um, shares)
+
+
+def _carry(covariance: Array, response: Array) -> Array:
+    turned = np.tensordot(covariance, response, 1)
+    return np.einsum("k...i,k...j->...ij", response, turned)
 
 
 def volume_doubt(scene: Scene, view: View, nodes: int = DEFAULT_NODES) -> FieldDoubt | None:

@@ -16,6 +16,7 @@ from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_co
 from warpspace.analysis.cases import DEFAULT_NODES, Case, Over, Plan, both_orders
 from warpspace.analysis.description import Result, Watch, counting, plain
 from warpspace.analysis.distribution import Distribution
+from warpspace.analysis.doubt import find_doubt
 from warpspace.analysis.montecarlo import MonteCarlo, Progress, Take, montecarlo_each
 from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.sampled import SampledMachines
@@ -366,7 +367,9 @@ class MachinesResult(Result):
             if not found.exact_quantiles:
                 yield "  quantiles to 0.002 % of their value"
         else:
-            yield f"  {count} errors with an uncertainty"
+            yield f"  {len({*draws.keys})} errors with an uncertainty"
+            doubt = find_doubt(scene, self.asked.loop)
+            yield from (f"  {words}" for words in (doubt.remarks() if doubt else ()))
         yield sampled_histogram(found, scene.title, told, printed)
 
     def _words(self, found: MonteCarlo) -> str:

@@ -11,7 +11,7 @@ from warpspace.analysis.distribution import SIGMAS, Distribution, Draws
 from warpspace.analysis.doubt import Doubt, find_doubt
 from warpspace.analysis.statistics import Statistics, statistics, volume_statistics
 from warpspace.exceptions import SceneError
-from warpspace.field.evaluate import ErrorField, amplitudes_of, build_basis, evaluate_first_order
+from warpspace.field.evaluate import ErrorField, amplitudes_of, evaluate_first_order
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import PARAMETERS, parameter
@@ -126,20 +126,19 @@ class UncertainCase(Case):
     errors: ErrorSet = dataclass_field(kw_only=True)  # as measured
 
     def machines(self, rng: np.random.Generator, count: int) -> Array:
-        """Draw how many standard uncertainties each error is off, and one last, [count, K + 1]."""
-        draws = self.draws
-        size = np.full(len(draws.keys), SIGMAS_OF[Distribution(draws.distribution)])
-        unit = Draws(draws.keys, np.zeros(len(draws.keys)), size, draws.distribution)
-        return np.column_stack([unit.draw(rng, count), np.ones(count)])
+        """Draw by how much the errors are off, and one last, [count, K + 1]."""
+        keys, law = self.doubt.keys, Distribution(self.draws.distribution)
+        unit = Draws(keys, np.zeros(len(keys)), np.full(len(keys), SIGMAS_OF[law]), law)
+        found = self.doubt.draw(rng, count, unit.draw(rng, count))
+        return np.column_stack([found, np.ones(count)])
 
     def responses(self, places: Places) -> Array:
-        """Give responses to a standard uncertainty each, the measured error last, [3, K + 1, N]."""
+        """Give responses to what is off, the measured error last, [3, K + 1, N]."""
         model, view, doubt = self.model, self.view, self.doubt
         at, point = places.coordinates, places.point_mm
-        basis = build_basis(model, doubt.errors, doubt.keys, at, view, point)
-        parts = np.tensordot(doubt.root.T, basis.position.reshape(len(doubt.keys), -1, 3), 1)
-        measured = evaluate_first_order(model, self.errors, at, view, point)
-        both = np.concatenate([parts, measured.error_um.reshape(1, -1, 3)])
+        parts = doubt.respond(model, at, view, point).position
+        measured = evaluate_first_order(model, self.errors, at, view, point).error_um
+        both = np.concatenate([parts, measured[None]]).reshape(len(doubt.keys) + 1, -1, 3)
         return np.ascontiguousarray(np.moveaxis(both, -1, 0))
 
 

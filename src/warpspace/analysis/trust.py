@@ -19,6 +19,7 @@ from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
 from warpspace.units import Array
 
+MOSTLY = 50.0  # percent of the volume
 MOST_SHARES = 10  # errors that the table of the largest shares has
 UNSTATED = "the scene does not state how sure its errors are; expected [uncertainty]"
 
@@ -65,7 +66,7 @@ class Trust(Analysis):
         )
         if found is None or not found.doubt.is_known:
             return result
-        above = found.norm_um > found.doubt.factor * found.u_norm_um
+        above = found.norm_um > found.u95_norm_um
         significant = 100.0 * float(grid.weights[above].sum())
         result = replace(result, significant_percent=significant, shares=_shares(found))
         if limit is None and not self.verify:
@@ -99,13 +100,14 @@ def _spread(drawn: Array) -> Mapping[str, float]:
 
 def _shares(found: FieldDoubt) -> list[Mapping[str, Any]]:
     """Say what errors add to the variances of largest and mean |E|, the largest share first."""
-    doubt, (mean, _, _, largest) = found.doubt, found.gradients
-    parts = np.array([way * (doubt.covariance @ way) for way in (largest, mean)])
-    percent = 100.0 * parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
-    names = "u", "percent_of_max", "percent_of_mean"
-    columns = np.vstack([np.diagonal(doubt.covariance) ** 0.5, percent]).T.tolist()
-    rows = sorted(zip(doubt.keys, columns, strict=True), key=lambda row: -abs(row[1][1]))
-    return [{"key": key, **dict(zip(names, three, strict=True))} for key, three in rows]
+    mean, _, _, largest = found.gradients
+    of_mean, doubt = found.parts_of(mean), found.doubt
+    u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))
+    return [
+        {"key": key, "u": float(u[key]), "percent_of_max": 100.0 * part,
+         "percent_of_mean": 100.0 * of_mean[key]}
+        for key, part in found.parts_of(largest).items()
+    ]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,7 +145,7 @@ class TrustResult(Result):
         rows: list[tuple[Any, ...]] = []
         for name, words in NAMES.items():
             u95, more = self.statistics.sure.get(f"u95_{name}"), [*drawn.get(name, {}).values()]
-            more += [100.0 * (more[1] / u95 - 1.0) if u95 else 0.0] if more else []
+            more += [100.0 * (more[1] / u95 - 1.0) if u95 else None] if more else []
             rows.append((words, getattr(self.statistics, name), plus_minus(u95), u95, *more))
         yield Table(columns, rows)
         yield from (f"  {words}" for words in self.remarks)
@@ -155,6 +157,8 @@ class TrustResult(Result):
             )
         if self.significant_percent is not None:
             yield f"  |E| is above its own U95 in {self.significant_percent:.1f} % of the volume"
+            if self.significant_percent < MOSTLY:
+                yield "  below it the first order is not enough: --verify says how much more it is"
         if self.never_measured_percent:
             yield f"  {self.never_measured_percent:.1f} % of the volume was never measured"
         numbers = Column("u", ".3g"), *number_columns(("of max", "of mean"), ".1f", "%")

@@ -185,10 +185,14 @@ class BenchResult(Result):
     @cached_property
     def u95(self) -> dict[str, float | None]:
         """Give U95 of what the model comes to; empty where a scene does not say how sure it is."""
-        run, doubt = self.model, find_doubt(self.scene, Loop.RELATIVE)
+        run, scene, doubt = self.model, self.scene, find_doubt(self.scene, Loop.RELATIVE)
         if doubt is None:
             return {}
-        gains = respond(replace(self.scene, errors=doubt.errors), run.plan, doubt.keys).matrix
+        each = (
+            respond(replace(scene, errors=errors), run.plan, keys).matrix
+            for errors, keys in doubt.layers
+        )
+        gains = np.hstack([*each])
 
         def ask(change: Array) -> Array:
             found = self.test.evaluate(run.plan, run.readings + gains @ change)

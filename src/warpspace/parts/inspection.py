@@ -354,7 +354,7 @@ def _numbers(
         left_out, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
         share = float(beyond <= 0.0)
         if doubt is not None:
-            share = None if u95 is None else float(doubt.within(placed, u95 / doubt.factor, *band))
+            share = None if u95 is None else float(doubt.within(placed, u95, *band))
             found["probability"] = share
         verdict = "kept" if (share or 0.0) >= SURE else "missed"
         if share is None or 1.0 - SURE < share < SURE:

@@ -244,7 +244,9 @@ def made_doubt(scene: Scene, made: Made) -> FieldDoubt | None:
     """Say how sure errors of points are; None where a scene does not say."""
     if (doubt := find_doubt(scene, Loop.RELATIVE)) is None:
         return None
-    basis = point_basis(replace(scene, errors=doubt.errors), made, doubt.keys)
+    point = transforms.apply(branch_pose(scene.model, "workpiece", made.coordinates), made.point_mm)
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    basis = doubt.respond(scene.model, made.coordinates, view, point)
     return combine(doubt, basis.position, made.error_um)
 
 

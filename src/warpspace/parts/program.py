@@ -28,7 +28,7 @@ from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Statistics
 from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import build_basis, evaluate_first_order
+from warpspace.field.evaluate import evaluate_first_order
 from warpspace.formats.source import MAX_LINES, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
@@ -128,8 +128,7 @@ def _path_doubt(read: control.ReadProgram, path: ToolPath) -> FieldDoubt | None:
     for one in np.unique(length):
         here = {name: at[length == one] for name, at in path.coordinates.items()}
         model = control.with_length(scene.model, one)
-        basis = build_basis(model, doubt.errors, doubt.keys, here, view)
-        response[:, length == one] = basis.position
+        response[:, length == one] = doubt.respond(model, here, view).position
     return combine(doubt, response, path.error_um, path.shares)
 
 

@@ -169,10 +169,9 @@ class Picture:
         found = self.uncertainty
         if found is None or not found.doubt.is_known:
             return None
-        of = found.u_norm_um
-        if self.component != "norm":
-            of = component_values(found.u_um, self.component)
-        return found.doubt.factor * of
+        if self.component == "norm":
+            return found.u95_norm_um
+        return component_values(found.u95_um, self.component)
 
     @cached_property
     def faded(self) -> NDArray[np.bool_] | None:

@@ -9,6 +9,7 @@ import pytest
 from warpspace import load_scene
 from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt, volume_doubt
 from warpspace.analysis.statistics import volume_statistics
+from warpspace.bench.base import find_test, run_test
 from warpspace.exceptions import SceneError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
@@ -62,10 +63,25 @@ def test_where_there_is_no_error_the_vector_counts_as_a_whole():
     assert float(found.u_norm_um) == pytest.approx(math.sqrt(0.4**2 + 0.3**2 + 0.2**2))
 
 
-def test_with_a_reference_one_error_goes_the_same_way_at_both_points():
+def test_ends_of_an_axis_are_not_sure_by_themselves_near_points_together():
     held = SCENE + "[view]\nreference = { X = -100, Y = 0, Z = 0 }\n"
-    found = sure(parse_scene(held, "s"), at={"X": [-100.0, 100.0]})
-    np.testing.assert_allclose(found.u_um, [[0, 0, 0], [0, 0.2, 0]], atol=1e-12)
+    found = sure(parse_scene(held, "s"), at={"X": [-100.0, 99.0, 100.0]})
+    # a difference of the ends: both add up, of x √2 · 0.5, of y √(0.1² + 0.3²)
+    ends = [math.hypot(0.5, 0.5), math.hypot(0.1, 0.3), 0.0]
+    np.testing.assert_allclose(found.u_um[[0, 2]], [[0, 0, 0], ends], atol=1e-12)
+    np.testing.assert_allclose(found.u_um[1], found.u_um[2], rtol=0.01, atol=1e-12)
+    # along the axis they vary by u · cos φ and u · sin φ, so that u of a mean is (2 / π) · √2 · u
+    alone = HEAD + "[errors]\nEXX = 5\n[uncertainty]\nEXX = 0.4\n"
+    mean = volume_doubt(parse_scene(alone, "s"), parse_scene(alone, "s").view(), 21)
+    assert mean.statistics()["mean_um"] == pytest.approx(2 * 0.4 * math.sqrt(8) / math.pi, rel=2e-3)
+    assert mean.statistics()["max_um"] == pytest.approx(2 * 0.4)
+
+
+def test_a_width_is_not_surer_than_its_points():
+    text = HEAD + "[errors]\nEXX = { ramp = 10 }\n[uncertainty]\nEXX = 0.5\n"
+    found = run_test(parse_scene(text, "s"), find_test("positioning")(axis="X"))
+    by_ends = 2 * math.hypot(0.5, 0.5)
+    assert found.u95["M_um"] == pytest.approx(by_ends, rel=1e-3)
 
 
 TWO = (

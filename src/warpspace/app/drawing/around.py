@@ -210,13 +210,13 @@ def _uncertainty(picture: LivePicture) -> Shapes:
         return shapes
     chosen, picked = corners(picture.shape), picture.state.picked
     at = [*picture.drawn_mm.reshape(-1, 3)[chosen]]
-    covariances = [*found.covariance_um2.reshape(-1, 3, 3)[chosen]]
+    covariances = [*found.expanded_um2.reshape(-1, 3, 3)[chosen]]
     if picked is not None:
         asked = answer(picture.drawn_state, picked, picture.exaggeration)
         if asked.uncertainty is not None:
             at.append(asked.drawn_mm)
-            covariances.append(asked.uncertainty.covariance_um2)
-    factor = found.doubt.factor * picture.exaggeration * MM_PER_UM
+            covariances.append(asked.uncertainty.expanded_um2)
+    factor = picture.exaggeration * MM_PER_UM
     points, triangles = ellipsoids(np.stack(at), factor**2 * np.stack(covariances))
     shapes["/uncertainty/ellipsoids"] = mesh(points, triangles, ACCENT, opacity=SEEN_THROUGH)
     return shapes

@@ -147,11 +147,8 @@ def _uncertainty(found: Answer) -> Markup:
     if sure is None or not sure.doubt.is_known:
         words = [] if sure is None else sure.doubt.remarks()
         return join(tag("p", said, class_="ws-tiny") for said in words)
-    along = sure.response @ sure.direction
-    parts = along * (sure.doubt.covariance @ along)
-    shares = 100.0 * parts / (float(parts.sum()) or 1.0)
-    order = np.argsort(-np.abs(shares))
-    named = [(sure.doubt.keys[k], f"{number(float(shares[k]), 0)} %") for k in order]
+    parts = sure.parts_of(sure.response @ sure.direction)
+    named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]
     named = [(key, share) for key, share in named if share != "0 %"]
     said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
     words = f"U95{length_words(sure)} µm, share of its variance: {said}"

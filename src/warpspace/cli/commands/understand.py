@@ -100,6 +100,7 @@ def field(
         where = None if nodes is None else nodes.point_mm
         spread = field_doubt(loaded, result.error_um, axes, view, where) if shown else None
         over = spread if points else volume_doubt(loaded, view, max(result.norm_um.shape))
+        known = spread if spread and spread.doubt.is_known else None
         said = {} if exact else options.say_second_order(second_order(loaded, loop, at=places))
         even = statistics(result, axes)
         summary = even if nodes is None else volume_statistics(result, nodes)
@@ -112,7 +113,7 @@ def field(
         about = {**field_remarks(loaded, view, exact=exact), "frame": frame}
         with progress("writing", silent=as_json):
             for path in files:
-                write_field(FieldRecord(axes, result, about, spread), path, overwrite=force)
+                write_field(FieldRecord(axes, result, about, known), path, overwrite=force)
     if as_json:
         found: dict[str, object] = {"loop": loop, "frame": frame}
         found["statistics"] = plain(summary)
@@ -124,14 +125,15 @@ def field(
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(options.spell_json({**size, **found}))
             return
-        _print_json(axes, result, found, spread, standard=uncertain)
+        found |= {"unknown": over.doubt.unknown} if over and over.doubt.unknown else {}
+        _print_json(axes, result, found, known, loaded.limit_um, standard=uncertain)
         return
     told = (*direction_words(loaded), *placed_words(view))
     words = (f"{loop} loop", *told, "exact" if exact else "first order")
     print_text(" · ".join((loaded.title, *words)))
     if points:
         units = [loaded.machine.axes[name].unit for name in axes]
-        _list_points(axes, result, units, spread if spread and spread.doubt.is_known else None)
+        _list_points(axes, result, units, known)
     volume = "" if nodes is None else ", over the volume"
     print_text(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
@@ -177,6 +179,7 @@ def _print_json(
     result: "ErrorField",
     found: "Mapping[str, object]",
     spread: "FieldDoubt | None",
+    limit_um: float | None,
     *,
     standard: bool,
 ) -> None:
@@ -197,10 +200,12 @@ def _print_json(
             "uncertainty_norm_um": spread.u_norm_um,
             "uncertainty_urad": spread.u_urad,
         }
-    if spread is not None and spread.doubt.is_known and result.norm_um.ndim == 1:
+    if spread is not None and limit_um is not None:
+        columns["probability"] = spread.keeps(limit_um)
+    if spread is not None and result.norm_um.ndim == 1:
         columns |= {
-            "u95_um": spread.doubt.factor * spread.u_um,
-            "u95_norm_um": spread.doubt.factor * spread.u_norm_um,
+            "u95_um": spread.u95_um,
+            "u95_norm_um": spread.u95_norm_um,
             "covariance_um2": spread.covariance_um2,
         }
     shape, size = result.norm_um.shape, result.norm_um.size
