@@ -23,7 +23,15 @@ from warpspace.calibration.instruments import (
 from warpspace.calibration.kinds import in_other_frame
 from warpspace.calibration.next_best import next_best, observability, separating, u95_at
 from warpspace.calibration.readings import Readings, read_readings
-from warpspace.calibration.results import Calibration, Combination, Found, Residuals, Target
+from warpspace.calibration.results import (
+    TARGETS,
+    Calibration,
+    Combination,
+    Found,
+    Residuals,
+    Target,
+    target_words,
+)
 from warpspace.calibration.solve import (
     MAD,
     Rank,
@@ -61,10 +69,11 @@ Budget: TypeAlias = Annotated[Instrument, Grammar("NAME|FILE.toml", load_instrum
 
 
 def _target(text: str, scene: Scene) -> Target:
-    if text in ("map", "corner"):
+    if text in TARGETS:
         return text
     if "=" not in text:
-        raise ValueError("expected map, corner, or axis positions such as X=0,Y=-225")
+        expected = f"expected {', '.join(TARGETS)}, or axis positions such as X=0,Y=-225"
+        raise ValueError(expected)
     return PLACE.read(text, scene)
 
 
@@ -120,9 +129,10 @@ class Calibrate(Analysis):
         low=1,
         high=MOST_NEXT,
     )
-    target: Annotated[Target, Grammar("map|corner|X=..,Y=..", _target)] = option(
+    target: Annotated[Target, Grammar("map|corner|part|verdict|X=..,Y=..", _target)] = option(
         "map",
-        "What they are to make sure: the map as a whole, its least sure node, or a point",
+        "What they are to make sure: the map as a whole, its least sure node, the part of SCENE,"
+        " the verdicts on its tolerances, or a point",
         flag="--for",
     )
     instrument: Budget = option(
@@ -165,7 +175,10 @@ class Calibrate(Analysis):
         weighed, asked = [one.readings for one in found.fitted], (self.target, self.instrument)
         steps = next_best(scene, weighed, found, count, None, watch, *asked)
         apart = separating(scene, sets, found, watch=watch)
-        return replace(found, apart=apart, steps=steps, target=self.target)
+        none = f"no {'further ' if steps else ''}measurement takes 1 % from U95"
+        notes = (f"{none} {target_words(self.target)}",) if len(steps) < count else ()
+        notes = (*found.notes, *notes)
+        return replace(found, apart=apart, steps=steps, target=self.target, notes=notes)
 
 
 def calibrate(

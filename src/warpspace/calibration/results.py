@@ -29,7 +29,13 @@ from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, UM_PER_MM, Array
 
 Target: TypeAlias = str | tuple[tuple[str, float], ...]
-"""What is to be made sure: the map, its least sure corner, or axis positions of a point."""
+"""What is to be made sure: one of those below, or axis positions of a point."""
+TARGETS = {
+    "map": "of the position error, RMS over the volume",
+    "corner": "of the position error, at the least sure node",
+    "part": "of the vertices of the part, placed, RMS",
+    "verdict": "of the least sure measure of the part that has a tolerance, µm or µrad",
+}
 MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their uncertainty
 
 
@@ -299,9 +305,7 @@ class Calibration(Result):
             ]
             words = "Next measurements, each for the greatest gain per minute (typical times):"
             yield Table(columns, rows, words)
-            where = {"map": "RMS over the volume", "corner": "at the least sure node"}
-            place = place_words(dict(self.target)) if not isinstance(self.target, str) else ""
-            yield f"  U95 of the position error, {where.get(str(self.target), f'at {place}')}"
+            yield f"  U95 {target_words(self.target)}"
         yield from self._charts()
 
     def _errors(self) -> Iterator[Block]:
@@ -399,6 +403,12 @@ class Calibration(Result):
                 yield Found(one.key, before, total.value, width, interval, one.told)
             elif one.interval_95 is not None:
                 yield one
+
+
+def target_words(target: Target) -> str:
+    if not isinstance(target, str):
+        return f"of the position error, at {place_words(dict(target))}"
+    return TARGETS[target]
 
 
 def _circle_words(circle: Circle) -> str:
