@@ -297,7 +297,9 @@ def _fit(
     is_scaled = stack.has_uncertainties or solved.scale is not None
     whole = covariance_of(solved, solved.weighted.shape[1]) * (1.0 if is_scaled else sigma**2)
     scattered = whole[: len(free), : len(free)]
-    shared = _shared(instrument, stack, solved, len(free))
+    moved = _moved(instrument, stack, solved)
+    shared = np.array([one @ one.T for one in (row[: len(free)] for row in moved)])
+    shared = shared.reshape(-1, len(free), len(free))
     covariance = scattered + shared.sum(axis=0)
     own = float(max(freedom, 1))
     if stack.has_uncertainties:
@@ -339,7 +341,7 @@ def _fit(
     )
     outliers = _outliers(stack, after)
     held, coverage, held_notes = _predict(
-        stack, terms, part, predict, begin, solved, whole, (sigma, own), robust=request.robust
+        stack, terms, part, predict, begin, solved, whole, (sigma, own), request, moved
     )
     return Calibration(
         scene=fitted_scene,
@@ -391,13 +393,12 @@ def _weighed(
     return weighed, (f"readings without u_um are taken as ± {UM_PER_MM * width:.3g} µm: {why}",)
 
 
-def _shared(instrument: Instrument, stack: Stack, solved: Solved, count: int) -> Array:
-    """Give the covariance that contributions bring which readings share, [c, K, K]."""
+def _moved(instrument: Instrument, stack: Stack, solved: Solved) -> list[Array]:
+    """Give what one u of what readings share moves: parameters and set-ups, [n, c] each."""
     weights = np.sqrt(solved.trust) * np.concatenate(stack.weights())[:, None]
-    answer = covariance_of(solved, solved.weighted.shape[1])[:count] @ solved.weighted.T
+    answer = covariance_of(solved, solved.weighted.shape[1]) @ solved.weighted.T
     answer = answer[:, : len(weights)]
-    moved = [answer @ (weights * common_mode(stack, one)) for one in instrument.shared]
-    return np.array([one @ one.T for one in moved]).reshape(-1, count, count)
+    return [-answer @ (weights * common_mode(stack, one)) for one in instrument.shared]
 
 
 def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
@@ -532,13 +533,14 @@ def _predict(
     solved: Solved,
     covariance: Array,
     scatter: tuple[float, float],
-    *,
-    robust: bool,
+    request: Calibrate,
+    moved: Sequence[Array],
 ) -> tuple[tuple[Residuals, ...], float | None, tuple[str, ...]]:
     """Predict readings that were not fitted; set-ups that were not fitted are placed by them.
 
     Beside them the share of components inside the 95 % intervals stated for them: of what readings
-    scatter (mm, degrees of freedom) and of the covariance of all that was fitted.
+    scatter (mm, degrees of freedom), of the covariance of all that was fitted, and of what the
+    instrument, one and the same, adds to all readings: less what the fit has taken of that.
     """
     if not predict:
         return (), None, ()
@@ -548,9 +550,9 @@ def _predict(
     new = [name for name in held.unknowns if name not in after]
     notes: tuple[str, ...] = ()
     if new:
-        own_before = solve(held, terms.only(()), robust=robust).unknown
+        own_before = solve(held, terms.only(()), robust=request.robust).unknown
         fixed = replace(part.only(()), errors=part.errors_with(solved.amplitudes))
-        own_after = solve(held, fixed, robust=robust).unknown
+        own_after = solve(held, fixed, robust=request.robust).unknown
         before |= {k: v for k, v in named(held.unknowns, own_before).items() if k in new}
         after |= {k: v for k, v in named(held.unknowns, own_after).items() if k in new}
         notes = (f"predicted readings place their own set-up: {', '.join(new)}",)
@@ -571,6 +573,9 @@ def _predict(
     placed = orthonormal(weights * by_unknown[:, own])  # what placing its own set-up takes away
     slopes = without(weights * np.hstack([by_parameter, by_unknown[:, ~own]]), placed)
     variance = np.sum((slopes @ covariance[np.ix_(chosen, chosen)]) * slopes, axis=1)
+    for one, taken in zip(request.instrument.shared, moved, strict=True):
+        added = without(weights * common_mode(held, one), placed) - slopes @ taken[chosen]
+        variance += np.sum(added**2, axis=1)
     width = t.ppf(0.975, scatter[1]) * np.sqrt(variance + 1.0 - np.sum(placed**2, axis=1))
     misses = weights[:, 0] * np.concatenate([row.ravel() for row in rows_after])
     return found, float(np.mean(np.abs(misses) <= width)), notes
