@@ -25,7 +25,7 @@ from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.files import check_file, parse_toml, read_text
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
-from warpspace.scene.save import Notation, read_errors
+from warpspace.scene.save import Notation, read_errors, turn_covariance
 from warpspace.scene.schema import Problems
 
 
@@ -125,6 +125,11 @@ def parse_scene(
     reference = _reference(view, workspace, problems)
     review = _review(raw.get("notes", []), machine, problems)
     orders, lines = _conventions(convention or {}, machine, problems)
+    if lines and (uncertainty or covariance):
+        expected = "expected uncertainties and errors of the origins of the frames"
+        problems.add(
+            "convention.measuring_line_mm", f"would move what [uncertainty] is of; {expected}"
+        )
     if problems.lines:
         raise SceneError(source, problems.lines)
     model = Model(
@@ -148,7 +153,7 @@ def parse_scene(
         description=description,
         notes=(*scene_notes(machine, workspace, errors), *machines.body_notes(machine)),
         uncertainty=uncertainty,
-        covariance=covariance,
+        covariance=turn_covariance(machine, covariance, convention["squareness"]),
         measured=measured,
         review=review,
         part=PartSource(**part, folder=str(folder or "")),

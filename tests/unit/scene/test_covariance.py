@@ -12,7 +12,7 @@ from warpspace.analysis.doubt import find_doubt
 from warpspace.exceptions import SceneError
 from warpspace.machine.errors import Covariance
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.save import Notation, scene_to_toml
 
 SCENE = """[machine]
 chain = "wFXYZt"
@@ -59,6 +59,20 @@ def test_what_is_left_open_is_unknown_also_where_its_value_is_zero():
     assert "not stated" not in said
     known = find_doubt(parse_scene(SCENE, "s"))
     assert (known.is_known, [*known.remarks()]) == (True, [])
+
+
+def test_a_covariance_is_written_in_the_sign_of_its_squareness():
+    """A turn of Y about z opens the angle to X, a turn of Z about y closes it: right-hand rule."""
+    scene = parse_scene(SCENE.replace("EA0Z", "EB0Z"), "s")
+    text = scene_to_toml(scene, Notation("over_90"))
+    assert "matrix = [[4.0], [-3.0, 9.0]]" in text
+    assert "EB0Z = 30.0" in text
+    assert parse_scene(text, "s").covariance == scene.covariance
+    moved = SCENE + "[convention]\nmeasuring_line_mm = { X = [0, 0, 100] }\n"
+    with pytest.raises(
+        SceneError, match=r"measuring_line_mm: would move what \[uncertainty\] is of"
+    ):
+        parse_scene(moved, "s")
 
 
 def test_errors_that_are_found_anew_leave_the_others():
