@@ -320,24 +320,17 @@ def _fit(
                 " Are units, kind of readings and machine right?"
             )
     lack, lack_notes = _lack_of_fit(stack, after, sigma, freedom)
-    even, least = (covariance + covariance.T) / 2.0, float(degrees.min(initial=np.inf))
+    rows = tuple(map(tuple, ((covariance + covariance.T) / 2.0).tolist()))
+    least, missed = float(degrees.min(initial=np.inf)), (lack or 0.0) if lack_notes else 0.0
+    told_together = Covariance(part.keys, rows, least, lack_of_fit=missed)
+    ways = () if request.priors else rank.open_ways
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
     fitted_scene = replace(
         scene,
         title=title,
         errors=errors,
         uncertainty={key: one for key, one in scene.uncertainty.items() if key not in part.keys},
-        covariance=_covariance(
-            scene,
-            terms,
-            () if request.priors else rank.open_ways,
-            Covariance(
-                part.keys,
-                tuple(map(tuple, even.tolist())),
-                least,
-                lack_of_fit=lack if lack and lack_notes else 0.0,
-            ).reaching(stack.positions),
-        ),
+        covariance=_covariance(scene, terms, ways, told_together.reaching(stack.positions)),
     )
     outliers = _outliers(stack, after)
     held, coverage, held_notes = _predict(
@@ -351,7 +344,6 @@ def _fit(
         rank=rank,
         slopes=terms.slopes,
         fit=part.keys,
-        correlation=_correlation(covariance),
         covariance=covariance,
         unknowns=named(stack.unknowns, solved.unknown),
         fitted=tuple(
@@ -457,23 +449,12 @@ def _covariance(
     found = found.without(left)
     if not (keys := (*found.keys, *known.keys)) and not left:
         return None
-    matrix = np.zeros((len(keys),) * 2)
-    cut = len(found.keys)
+    matrix, cut = np.zeros((len(keys),) * 2), len(found.keys)
     matrix[:cut, :cut], matrix[cut:, cut:] = found.matrix, known.matrix
-    return Covariance(
-        keys,
-        tuple(map(tuple, matrix.tolist())),
-        min(found.freedom, known.freedom),
-        known.reaching(found.reach).reach,
-        tuple(dict.fromkeys(left)),
-        max(found.lack_of_fit, known.lack_of_fit),
-    )
-
-
-def _correlation(covariance: Array) -> Array:
-    width = np.sqrt(np.diag(covariance))
-    width = np.where(width > 0.0, width, 1.0)
-    return covariance / np.outer(width, width)
+    rows, freedom = tuple(map(tuple, matrix.tolist())), min(found.freedom, known.freedom)
+    lack = max(found.lack_of_fit, known.lack_of_fit)
+    whole = Covariance(keys, rows, freedom, known.reach, tuple(dict.fromkeys(left)), lack)
+    return whole.reaching(found.reach)
 
 
 def _found(

@@ -36,6 +36,10 @@ TARGETS = {
     "part": "of the vertices of the part, placed, RMS",
     "verdict": "of the least sure measure of the part that has a tolerance, µm or µrad",
 }
+NUMBERS = (
+    "rms_before_mm", "rms_after_mm", "rms_predicted_before_mm", "rms_predicted_after_mm",
+    "predicted_coverage_95", "sigma_mm",
+)  # fmt: skip
 MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their uncertainty
 
 
@@ -178,8 +182,7 @@ class Calibration(Result):
     combinations: tuple[Combination, ...]  # what is told of the parameters that are told in part
     rank: Rank
     slopes: frozenset[str]  # parameters of which a slope was looked for
-    fit: tuple[str, ...]  # (k,); parameters of `correlation`
-    correlation: Array  # [k, k]
+    fit: tuple[str, ...]  # (k,); parameters of `covariance`
     covariance: Array  # [k, k], µm and µrad
     unknowns: Mapping[str, float]  # mm; what the set-up left unknown, as found
     fitted: tuple[Residuals, ...]
@@ -212,6 +215,13 @@ class Calibration(Result):
         """Circles about rotary axes, through the readings that were fitted."""
         return [circle for group in self.fitted for circle in group.readings.circles]
 
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the parameters that were fitted, [k, k]."""
+        width = np.sqrt(np.diag(self.covariance))
+        width = np.where(width > 0.0, width, 1.0)
+        return self.covariance / np.outer(width, width)
+
     def changes(self) -> tuple[Change, ...]:
         return (Change("with the errors found", self.scene),)
 
@@ -228,12 +238,7 @@ class Calibration(Result):
             "separated_by": [
                 {"keys": list(group), "measurement": told} for group, told in self.apart.items()
             ],
-            "rms_before_mm": self.rms_before_mm,
-            "rms_after_mm": self.rms_after_mm,
-            "rms_predicted_before_mm": self.rms_predicted_before_mm,
-            "rms_predicted_after_mm": self.rms_predicted_after_mm,
-            "predicted_coverage_95": self.predicted_coverage_95,
-            "sigma_mm": self.sigma_mm,
+            **{name: getattr(self, name) for name in NUMBERS},
             "degrees_of_freedom": self.freedom,
             "set_up_mm": dict(self.unknowns),
             "correlation": {"keys": list(self.fit), "matrix": self.correlation.tolist()},

@@ -2,6 +2,7 @@
 
 import zlib
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -282,18 +283,17 @@ def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
 def read_npz(path: Path, where: str, problems: Problems) -> dict[str, object] | None:
     """Read the arrays of a file of numpy as lists; note what is wrong with it."""
     check_file(path, limits.MAX_SCENE_BYTES, str(path))
-    try:
+    damaged = BadZipFile, zlib.error, OSError, ValueError, EOFError, RuntimeError
+    with suppress(*damaged, MemoryError, AttributeError):
         with ZipFile(path) as packed:  # what it holds may be larger by far
             size = sum(entry.file_size for entry in packed.infolist())
         if size <= limits.MAX_SCENE_BYTES:
             with np.load(path, allow_pickle=False) as arrays:
                 return {name: arrays[name].tolist() for name in arrays.files}
-    except (BadZipFile, zlib.error, OSError, ValueError, EOFError, RuntimeError, MemoryError,
-            AttributeError):  # fmt: skip
-        size = 0
-    most = f" of at most {limits.MAX_SCENE_BYTES:,} bytes" if size else ""
-    expected = f"expected a file of numpy{most} with the arrays keys and matrix"
-    problems.add(where, expected, path.name)
+    most = f"of at most {limits.MAX_SCENE_BYTES:,} bytes"
+    problems.add(
+        where, f"expected a file of numpy {most} with the arrays keys and matrix", path.name
+    )
     return None
 
 
