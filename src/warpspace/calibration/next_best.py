@@ -166,7 +166,7 @@ def minutes(readings: Readings) -> float:
 NODES = 5  # nodes per axis of the map whose uncertainty counts
 WIDE = 1000.0  # standard uncertainty in µm or µrad of a parameter of which nothing is known
 LEAST_NOISE_MM = 1e-4
-LEAST_GAIN = 0.01  # share of U95 that a measurement has to take away
+LEAST_GAIN = 0.01  # share of U95 that a measurement has to take away, unless it is asked about
 
 
 def next_best(
@@ -209,12 +209,13 @@ def next_best(
     for _ in range(count):
         watch()
         before, map_before = told(covariance), over_map(covariance)
-        gains = [(one, _covariance(known + row), row) for one, row in rows]
-        best, covariance, row = max(
-            gains, key=lambda gain: (before - told(gain[1])) / minutes(gain[0].readings)
-        )
-        if before - told(covariance) < LEAST_GAIN * before:
+        least = -np.inf if choice else LEAST_GAIN * before
+        after = [(one, _covariance(known + row), row) for one, row in rows]
+        gains = [(before - told(one[1]), *one) for one in after]
+        useful = [gain for gain in gains if gain[0] >= least]
+        if not useful:
             break
+        _, best, covariance, row = max(useful, key=lambda gain: gain[0] / minutes(gain[1].readings))
         ends = before, told(covariance), map_before / FACTOR, over_map(covariance) / FACTOR
         steps.append(Step(best, minutes(best.readings), *ends, covariance))
         known = known + row
