@@ -22,7 +22,7 @@ from warpspace.field.evaluate import ErrorBasis, View, build_basis
 from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import ErrorFunction, ErrorSet, Table
+from warpspace.machine.errors import Covariance, ErrorFunction, ErrorSet, Table
 from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
@@ -53,6 +53,8 @@ class Doubt:
     covariance: Array  # [K, K], µm and µrad; of the amplitudes, one layer behind the other
     freedoms: Array  # [K], degrees of freedom
     unknown: tuple[str, ...]  # errors of which nobody says how sure they are
+    untold: tuple[str, ...] = ()  # of the unknown: what a calibration left open
+    lack_of_fit: float = 0.0  # that it saw
 
     @cached_property
     def keys(self) -> tuple[str, ...]:
@@ -88,7 +90,7 @@ class Doubt:
 
     @property
     def is_known(self) -> bool:
-        return not self.unknown
+        return not (self.unknown or self.untold)
 
     @cached_property
     def root(self) -> Array:
@@ -139,11 +141,19 @@ class Doubt:
         return _root(variance).tolist()
 
     def remarks(self) -> Iterator[str]:
-        """Say what is not stated."""
-        if self.unknown:
+        """Say what is not stated, and what the data did not determine."""
+        if unstated := [key for key in self.unknown if key not in self.untold]:
             yield (
-                f"uncertainty not stated of {', '.join(self.unknown)}: it is unknown wherever they"
+                f"uncertainty not stated of {', '.join(unstated)}: it is unknown wherever they"
                 " act, not zero"
+            )
+        if self.untold:
+            names = ", ".join(self.untold)
+            yield f"the readings did not determine {names}: unknown wherever they act"
+        if self.lack_of_fit:
+            yield (
+                f"the calibration missed something: its residuals were {self.lack_of_fit:.1f} times"
+                " what its readings scatter; U95 does not contain that"
             )
 
 
@@ -169,9 +179,12 @@ def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
         rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
         covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
         freedoms[rows] = joint.freedom
-    acting = (key for key in scene.errors if parameter(key).axis in axes)
+    known = joint or Covariance((), ())
+    untold = tuple(key for key in known.untold if parameter(key).axis in axes)
+    acting = (key for key in scene.errors if parameter(key).axis in axes and key not in untold)
     unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
-    return Doubt(layers, covariance, freedoms, unknown)
+    every = *unknown, *untold
+    return Doubt(layers, covariance, freedoms, every, untold, known.lack_of_fit)
 
 
 def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:

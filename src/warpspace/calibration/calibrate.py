@@ -1,6 +1,6 @@
 """Calibration: least squares of the errors of a machine to readings, and what is left."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +23,15 @@ from warpspace.calibration.instruments import (
 from warpspace.calibration.kinds import in_other_frame
 from warpspace.calibration.next_best import next_best, observability, separating, u95_at
 from warpspace.calibration.readings import Readings, read_readings
-from warpspace.calibration.results import Calibration, Combination, Found, Residuals, Target
+from warpspace.calibration.results import (
+    TARGETS,
+    Calibration,
+    Combination,
+    Found,
+    Residuals,
+    Target,
+    target_words,
+)
 from warpspace.calibration.solve import (
     MAD,
     Rank,
@@ -44,8 +52,10 @@ from warpspace.calibration.solve import (
     without,
 )
 from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import build_basis
+from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Covariance
-from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_SPAN
+from warpspace.machine.limits import MAX_ERROR, MAX_TEXT
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, UM_PER_MM, Array
 
@@ -53,14 +63,17 @@ LEFT = "what a fit leaves"
 CALIBRATED = ", calibrated"  # behind the title of a calibrated scene
 OUTLIER = 4.0  # robust standard deviations beyond which a reading is named
 MOST_NEXT = 10
+POSES = 60  # at which it is seen whether errors act
+ACTS = 0.01  # share of the effect of one error, below which together they do nothing
 Budget: TypeAlias = Annotated[Instrument, Grammar("NAME|FILE.toml", load_instrument, is_file=True)]
 
 
 def _target(text: str, scene: Scene) -> Target:
-    if text in ("map", "corner"):
+    if text in TARGETS:
         return text
     if "=" not in text:
-        raise ValueError("expected map, corner, or axis positions such as X=0,Y=-225")
+        expected = f"expected {', '.join(TARGETS)}, or axis positions such as X=0,Y=-225"
+        raise ValueError(expected)
     return PLACE.read(text, scene)
 
 
@@ -116,9 +129,10 @@ class Calibrate(Analysis):
         low=1,
         high=MOST_NEXT,
     )
-    target: Annotated[Target, Grammar("map|corner|X=..,Y=..", _target)] = option(
+    target: Annotated[Target, Grammar("map|corner|part|verdict|X=..,Y=..", _target)] = option(
         "map",
-        "What they are to make sure: the map as a whole, its least sure node, or a point",
+        "What they are to make sure: the map as a whole, its least sure node, the part of SCENE,"
+        " the verdicts on its tolerances, or a point",
         flag="--for",
     )
     instrument: Budget = option(
@@ -161,7 +175,10 @@ class Calibrate(Analysis):
         weighed, asked = [one.readings for one in found.fitted], (self.target, self.instrument)
         steps = next_best(scene, weighed, found, count, None, watch, *asked)
         apart = separating(scene, sets, found, watch=watch)
-        return replace(found, apart=apart, steps=steps, target=self.target)
+        none = f"no {'further ' if steps else ''}measurement takes 1 % from U95"
+        notes = (f"{none} {target_words(self.target)}",) if len(steps) < count else ()
+        notes = (*found.notes, *notes)
+        return replace(found, apart=apart, steps=steps, target=self.target, notes=notes)
 
 
 def calibrate(
@@ -280,7 +297,9 @@ def _fit(
     is_scaled = stack.has_uncertainties or solved.scale is not None
     whole = covariance_of(solved, solved.weighted.shape[1]) * (1.0 if is_scaled else sigma**2)
     scattered = whole[: len(free), : len(free)]
-    shared = _shared(instrument, stack, solved, len(free))
+    moved = _moved(instrument, stack, solved)
+    shared = np.array([one @ one.T for one in (row[: len(free)] for row in moved)])
+    shared = shared.reshape(-1, len(free), len(free))
     covariance = scattered + shared.sum(axis=0)
     own = float(max(freedom, 1))
     if stack.has_uncertainties:
@@ -288,7 +307,8 @@ def _fit(
     variances = np.diagonal(np.stack([scattered, *shared]), axis1=1, axis2=2)
     degrees = effective_freedom(variances, [own, *(one.freedom for one in instrument.shared)])
     told = u95_at(scene, part, "map")
-    shares = [(told(one) / told(covariance)) ** 2 for one in (scattered * is_assumed, *shared)]
+    whole_map = told(covariance) or 1.0  # nothing acts there
+    shares = [(told(one) / whole_map) ** 2 for one in (scattered * is_assumed, *shared)]
     parameters, combinations = _found(
         terms, part, rank, solved, covariance, degrees, has_prior=prior is not None
     )
@@ -299,19 +319,23 @@ def _fit(
                 f"{row.key} comes out as {value:.4g} {row.unit}; expected at most ±{MAX_ERROR:g}."
                 " Are units, kind of readings and machine right?"
             )
+    lack, lack_notes = _lack_of_fit(stack, after, sigma, freedom)
+    rows = tuple(map(tuple, ((covariance + covariance.T) / 2.0).tolist()))
+    least, missed = float(degrees.min(initial=np.inf)), (lack or 0.0) if lack_notes else 0.0
+    told_together = Covariance(part.keys, rows, least, lack_of_fit=missed)
+    ways = () if request.priors else rank.open_ways
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
     fitted_scene = replace(
         scene,
         title=title,
         errors=errors,
         uncertainty={key: one for key, one in scene.uncertainty.items() if key not in part.keys},
-        covariance=_covariance(scene, part.keys, covariance, degrees.min(initial=np.inf), stack),
+        covariance=_covariance(scene, terms, ways, told_together.reaching(stack.positions)),
     )
     outliers = _outliers(stack, after)
     held, coverage, held_notes = _predict(
-        stack, terms, part, predict, begin, solved, whole, (sigma, own), robust=request.robust
+        stack, terms, part, predict, begin, solved, whole, (sigma, own), request, moved
     )
-    lack, lack_notes = _lack_of_fit(stack, after, sigma, freedom)
     return Calibration(
         scene=fitted_scene,
         title=scene.title,
@@ -320,7 +344,6 @@ def _fit(
         rank=rank,
         slopes=terms.slopes,
         fit=part.keys,
-        correlation=_correlation(covariance),
         covariance=covariance,
         unknowns=named(stack.unknowns, solved.unknown),
         fitted=tuple(
@@ -362,13 +385,12 @@ def _weighed(
     return weighed, (f"readings without u_um are taken as ± {UM_PER_MM * width:.3g} µm: {why}",)
 
 
-def _shared(instrument: Instrument, stack: Stack, solved: Solved, count: int) -> Array:
-    """Give the covariance that contributions bring which readings share, [c, K, K]."""
+def _moved(instrument: Instrument, stack: Stack, solved: Solved) -> list[Array]:
+    """Give what one u of what readings share moves: parameters and set-ups, [n, c] each."""
     weights = np.sqrt(solved.trust) * np.concatenate(stack.weights())[:, None]
-    answer = covariance_of(solved, solved.weighted.shape[1])[:count] @ solved.weighted.T
+    answer = covariance_of(solved, solved.weighted.shape[1]) @ solved.weighted.T
     answer = answer[:, : len(weights)]
-    moved = [answer @ (weights * common_mode(stack, one)) for one in instrument.shared]
-    return np.array([one @ one.T for one in moved]).reshape(-1, count, count)
+    return [-answer @ (weights * common_mode(stack, one)) for one in instrument.shared]
 
 
 def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
@@ -405,32 +427,34 @@ def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _covariance(
-    scene: Scene, keys: tuple[str, ...], found: Array, freedom: float, stack: Stack
+    scene: Scene, terms: Terms, ways: Sequence[Mapping[str, float]], found: Covariance
 ) -> Covariance | None:
-    """Join what was found with what the scene knew of other errors."""
-    kept = [key for key in scene.covariance.keys if key not in keys] if scene.covariance else []
-    if not (keys or kept):
+    """Join what was found with what the scene knew of other errors, and say what is left open.
+
+    A way is a sum of errors that does not show in the readings. Where it moves no point either,
+    in the working volume and at the poses of the readings, nothing is lost by holding one of them.
+    """
+    known = (scene.covariance or Covariance((), ())).without(found.keys)
+    stated = {*scene.uncertainty} - {*found.keys} | {*known.keys}
+    ends, draw = found.reaching(scene.workspace.ranges).reach, np.random.default_rng(0)
+    poses = {axis: draw.uniform(*ends[axis], POSES) for axis in ends}
+    untold: dict[str, float] = {}
+    for loop in (Loop.TOOL, Loop.RELATIVE) if ways else ():
+        basis = build_basis(scene.model, terms.errors, terms.keys, poses, scene.view(loop))
+        for way in ways:
+            parts = [share * basis.position[terms.keys.index(key)] for key, share in way.items()]
+            if np.abs(sum(parts)).max() > ACTS * max(np.abs(part).max() for part in parts):
+                untold |= way
+    left = tuple(key for key in (*untold, *known.untold) if key not in stated)
+    found = found.without(left)
+    if not (keys := (*found.keys, *known.keys)) and not left:
         return None
-    matrix = np.zeros((len(keys) + len(kept),) * 2)
-    matrix[: len(keys), : len(keys)] = found
-    reach = dict.fromkeys(scene.machine.axes, (np.inf, -np.inf))
-    if scene.covariance:
-        places = [scene.covariance.keys.index(key) for key in kept]
-        matrix[len(keys) :, len(keys) :] = scene.covariance.matrix[np.ix_(places, places)]
-        reach |= scene.covariance.reach
-    for one in stack.sets:
-        for axis, at in one.coordinates.items():
-            low, high = reach[axis]
-            reach[axis] = min(low, float(np.min(at))), max(high, float(np.max(at)))
-    moved = {axis: ends for axis, ends in reach.items() if ends[1] - ends[0] >= MIN_SPAN}
-    rows = tuple(map(tuple, ((matrix + matrix.T) / 2.0).tolist()))
-    return Covariance((*keys, *kept), rows, freedom, moved)
-
-
-def _correlation(covariance: Array) -> Array:
-    width = np.sqrt(np.diag(covariance))
-    width = np.where(width > 0.0, width, 1.0)
-    return covariance / np.outer(width, width)
+    matrix, cut = np.zeros((len(keys),) * 2), len(found.keys)
+    matrix[:cut, :cut], matrix[cut:, cut:] = found.matrix, known.matrix
+    rows, freedom = tuple(map(tuple, matrix.tolist())), min(found.freedom, known.freedom)
+    lack = max(found.lack_of_fit, known.lack_of_fit)
+    whole = Covariance(keys, rows, freedom, known.reach, tuple(dict.fromkeys(left)), lack)
+    return whole.reaching(found.reach)
 
 
 def _found(
@@ -490,13 +514,14 @@ def _predict(
     solved: Solved,
     covariance: Array,
     scatter: tuple[float, float],
-    *,
-    robust: bool,
+    request: Calibrate,
+    moved: Sequence[Array],
 ) -> tuple[tuple[Residuals, ...], float | None, tuple[str, ...]]:
     """Predict readings that were not fitted; set-ups that were not fitted are placed by them.
 
     Beside them the share of components inside the 95 % intervals stated for them: of what readings
-    scatter (mm, degrees of freedom) and of the covariance of all that was fitted.
+    scatter (mm, degrees of freedom), of the covariance of all that was fitted, and of what the
+    instrument, one and the same, adds to all readings: less what the fit has taken of that.
     """
     if not predict:
         return (), None, ()
@@ -506,9 +531,9 @@ def _predict(
     new = [name for name in held.unknowns if name not in after]
     notes: tuple[str, ...] = ()
     if new:
-        own_before = solve(held, terms.only(()), robust=robust).unknown
+        own_before = solve(held, terms.only(()), robust=request.robust).unknown
         fixed = replace(part.only(()), errors=part.errors_with(solved.amplitudes))
-        own_after = solve(held, fixed, robust=robust).unknown
+        own_after = solve(held, fixed, robust=request.robust).unknown
         before |= {k: v for k, v in named(held.unknowns, own_before).items() if k in new}
         after |= {k: v for k, v in named(held.unknowns, own_after).items() if k in new}
         notes = (f"predicted readings place their own set-up: {', '.join(new)}",)
@@ -529,6 +554,9 @@ def _predict(
     placed = orthonormal(weights * by_unknown[:, own])  # what placing its own set-up takes away
     slopes = without(weights * np.hstack([by_parameter, by_unknown[:, ~own]]), placed)
     variance = np.sum((slopes @ covariance[np.ix_(chosen, chosen)]) * slopes, axis=1)
+    for one, taken in zip(request.instrument.shared, moved, strict=True):
+        added = without(weights * common_mode(held, one), placed) - slopes @ taken[chosen]
+        variance += np.sum(added**2, axis=1)
     width = t.ppf(0.975, scatter[1]) * np.sqrt(variance + 1.0 - np.sum(placed**2, axis=1))
     misses = weights[:, 0] * np.concatenate([row.ravel() for row in rows_after])
     return found, float(np.mean(np.abs(misses) <= width)), notes

@@ -106,7 +106,7 @@ def load_instrument(name: str, _scene: object = None) -> Instrument:
 
 def _levers_mm(stack: Stack, one: Readings) -> Array:
     """Give what readings take of a scale: distances from the mean point as they are sensed."""
-    if one.kind == "lengths":
+    if one.kind in {"lengths", "positions"}:  # in the frame of the instrument
         return one.observed_mm - one.observed_mm.mean(axis=0)
     if (plan := one.plan) is None:
         return one.nominal_mm - one.nominal_mm.mean(axis=0)
@@ -126,24 +126,31 @@ def common_mode(stack: Stack, one: Contribution) -> Array:
     return one.at(0.0) * MM_PER_UM * np.vstack(shifts)
 
 
-def share_out(instrument: Instrument, stack: Stack, shares: Sequence[float]) -> dict[str, object]:
+BUDGET = (
+    Column("contribution", key="name", leads=True, wraps=True), Column("type", key="type"),
+    Column(key="distribution", shows=False), Column("acts", key="acts"),
+    Column("u", ".3g", key="u"), Column("unit", key="unit"), Column("c", ".3g", key="c"),
+    Column("c·u", ".3g", key="u_um"), Column("share", ".0%", key="share"),
+    Column("map", ".0%", key="share_of_map"), Column(key="degrees_of_freedom", shows=False),
+    Column(key="source", shows=False),
+)  # fmt: skip
+
+
+def share_out(instrument: Instrument, stack: Stack, shares: Sequence[float]) -> dict[str, Any]:
     """Say what an instrument brings; shares of the map: of scatter, and of each that is shared."""
     levers = [np.linalg.norm(_levers_mm(stack, one), axis=-1) for one in stack.sets]
     length = round(float(np.sqrt(np.mean(np.concatenate(levers) ** 2))), 6)
     width, freedom = instrument.budget(length)
     each, (scatter, *common) = max(instrument.scatter[0], 1e-300), shares
-    rows = [
-        {
-            "name": one.name, "type": one.type, "distribution": one.distribution,
-            "acts": one.acts, "u": one.value / schema.DIVISORS[one.distribution],
-            "unit": one.unit, "c": one.sensitivity, "u_um": one.at(length),
-            "share": (one.at(length) / width) ** 2,
-            "share_of_map": scatter * (one.at(length) / each) ** 2
-            if one.acts == "each" else common[instrument.shared.index(one)],
-            "degrees_of_freedom": _finite(one.freedom), "source": one.source,
-        }
-        for one in instrument.contributions
-    ]  # fmt: skip
+    rows: list[dict[str, Any]] = []
+    for one in instrument.contributions:
+        own, u = one.at(length), one.value / schema.DIVISORS[one.distribution]
+        of_map = scatter * (own / each) ** 2 if one.acts == "each" else common.pop(0)
+        row = (
+            one.name, one.type, one.distribution, one.acts, u, one.unit, one.sensitivity, own,
+            (own / width) ** 2, of_map, _finite(one.freedom), one.source,
+        )  # fmt: skip
+        rows.append({column.key: value for column, value in zip(BUDGET, row, strict=True)})
     return {
         "name": instrument.name, "title": instrument.title, "length_mm": length, "u_um": width,
         "degrees_of_freedom": _finite(freedom), "contributions": rows,
@@ -155,15 +162,9 @@ def _finite(number: float) -> float | None:
 
 
 def budget_blocks(told: Mapping[str, Any]) -> Iterator[str | Table]:
-    columns = (
-        Column("contribution", leads=True, wraps=True), Column("type"), Column("acts"),
-        Column("u", ".3g"), Column("unit"), Column("c", ".3g"), Column("c·u", ".3g"),
-        Column("share", ".0%"), Column("map", ".0%"),
-    )  # fmt: skip
-    keys = "name", "type", "acts", "u", "unit", "c", "u_um", "share", "share_of_map"
-    rows = [tuple(one[key] for key in keys) for one in told["contributions"]]
     title = f"{told['title']}: uncertainty of a reading {told['length_mm']:.0f} mm"
-    yield Table(columns, rows, f"{title} from the mean point (c·u in µm):")
+    rows = [[*one.values()] for one in told["contributions"]]
+    yield Table(BUDGET, rows, f"{title} from the mean point (c·u in µm):")
     freedom = told["degrees_of_freedom"] or np.inf
     yield (
         f"  together {told['u_um']:.2f} µm, {freedom:.0f} effective degrees of freedom;"

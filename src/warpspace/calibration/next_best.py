@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.axes import default_keys, is_linear, parameter
 from warpspace.machine.errors import ErrorSet
+from warpspace.machine.limits import MAX_SCENE_BYTES
+from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, grid_basis
 from warpspace.units import UM_PER_MM, Array
 
@@ -163,6 +166,7 @@ def minutes(readings: Readings) -> float:
 NODES = 5  # nodes per axis of the map whose uncertainty counts
 WIDE = 1000.0  # standard uncertainty in µm or µrad of a parameter of which nothing is known
 LEAST_NOISE_MM = 1e-4
+LEAST_GAIN = 0.01  # share of U95 that a measurement has to take away, unless it is asked about
 
 
 def next_best(
@@ -205,10 +209,13 @@ def next_best(
     for _ in range(count):
         watch()
         before, map_before = told(covariance), over_map(covariance)
-        gains = [(one, _covariance(known + row), row) for one, row in rows]
-        best, covariance, row = max(
-            gains, key=lambda gain: (before - told(gain[1])) / minutes(gain[0].readings)
-        )
+        least = -np.inf if choice else LEAST_GAIN * before
+        after = [(one, _covariance(known + row), row) for one, row in rows]
+        gains = [(before - told(one[1]), *one) for one in after]
+        useful = [gain for gain in gains if gain[0] >= least]
+        if not useful:
+            break
+        _, best, covariance, row = max(useful, key=lambda gain: gain[0] / minutes(gain[1].readings))
         ends = before, told(covariance), map_before / FACTOR, over_map(covariance) / FACTOR
         steps.append(Step(best, minutes(best.readings), *ends, covariance))
         known = known + row
@@ -278,8 +285,12 @@ FACTOR = coverage_factor(np.inf)
 def u95_at(scene: Scene, terms: solve.Terms, target: Target) -> Callable[[Array], float]:
     """Give what tells U95 of a position error, µm, by the covariance of the parameters.
 
-    Of the map the root mean square over the volume, of its corners the largest at a node.
+    Of the map the root mean square over the volume, of its corners the largest at a node; of the
+    scene's part the root mean square over its vertices, placed, or the largest at a measure with a
+    tolerance, µm or µrad.
     """
+    if target in ("part", "verdict"):
+        return _u95_of_part(scene, terms, str(target))
     if isinstance(target, str):
         grid = build_grid(scene.model, scene.workspace, NODES)
         basis = grid_basis(replace(scene, errors=terms.errors), grid, keys=terms.keys)
@@ -296,6 +307,27 @@ def u95_at(scene: Scene, terms: solve.Terms, target: Target) -> Callable[[Array]
         return FACTOR * float(np.sqrt(max(whole, 0.0)))
 
     return told
+
+
+def _u95_of_part(scene: Scene, terms: solve.Terms, target: str) -> Callable[[Array], float]:
+    from warpspace.parts.inspection import measure_changes
+    from warpspace.parts.part import fit_out, load_part, make_points, place_part, point_basis
+
+    if (file := scene.part.path("file")) is None:
+        raise OptionError(f"{{target}} {target}: expected a scene whose [part] has a file")
+    mesh = load_part(file, scene.part.unit or None)
+    made = make_points(scene, place_part(mesh, scene).vertices_mm)
+    gains = point_basis(replace(scene, errors=terms.errors), made, terms.keys).position
+    features, count = scene.part.path("features"), len(made.point_mm)
+    if target == "part":
+        gains = fit_out(made.point_mm, gains).reshape(len(terms.keys), -1) / np.sqrt(count)
+        return lambda found: FACTOR * float(np.sqrt(np.sum(gains * (found @ gains))))
+    if features is not None:
+        told = features, read_text(Path(features), MAX_SCENE_BYTES)
+        gains = measure_changes(mesh, made, gains, told)
+    if features is None or not gains.size:
+        raise OptionError("{target} verdict: expected a scene whose [part] has tolerances")
+    return lambda found: FACTOR * float(np.sqrt(np.sum(gains * (found @ gains), axis=0).max()))
 
 
 def observability(

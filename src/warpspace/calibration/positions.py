@@ -131,26 +131,16 @@ def _first_fit(scene: Scene, readings: Readings) -> tuple[float, ...]:
     turn, tip = pose[:, :3, :3], np.array(scene.model.tool_point_mm)
     sessions = np.array(readings.session)
     members = [sessions == name for name in dict.fromkeys(readings.session)]
-    back, placed = np.empty_like(readings.observed_mm), list[tuple[Array, Array]]()
+    back, known = np.empty_like(readings.observed_mm), list[Array]()
     for _ in range(ROUNDS):
-        here = transforms.apply(pose, tip)
-        placed = [_laid_onto(here[one], readings.observed_mm[one]) for one in members]
-        for one, (rotation, place) in zip(members, placed, strict=True):
-            back[one] = (readings.observed_mm[one] - place) @ rotation
+        here, known = transforms.apply(pose, tip), []
+        for one in members:
+            read, middle = readings.observed_mm[one], here[one].mean(axis=0)
+            laid = Rotation.align_vectors(read - read.mean(axis=0), here[one] - middle)[0]
+            place = read.mean(axis=0) - laid.apply(middle)
+            back[one] = laid.inv().apply(read - place)
+            known += [place, 1e3 * laid.as_rotvec()]
         rest = back - pose[:, :3, 3]
         tip, *_ = np.linalg.lstsq(turn.reshape(-1, 3), rest.ravel(), rcond=None)
-    known = [
-        part
-        for rotation, place in placed
-        for part in (place, 1e3 * Rotation.from_matrix(rotation).as_rotvec())
-    ]
     offset = tip - np.array(scene.model.tool_point_mm)
     return tuple(float(value) for value in np.concatenate([*known, offset]))
-
-
-def _laid_onto(points_mm: Array, target_mm: Array) -> tuple[Array, Array]:
-    """Give the rotation and the shift that lay points best onto others."""
-    middle, aim = points_mm.mean(axis=0), target_mm.mean(axis=0)
-    left, _, right = np.linalg.svd((target_mm - aim).T @ (points_mm - middle))
-    rotation = (left * [1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    return rotation, aim - rotation @ middle

@@ -29,7 +29,17 @@ from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, UM_PER_MM, Array
 
 Target: TypeAlias = str | tuple[tuple[str, float], ...]
-"""What is to be made sure: the map, its least sure corner, or axis positions of a point."""
+"""What is to be made sure: one of those below, or axis positions of a point."""
+TARGETS = {
+    "map": "of the position error, RMS over the volume",
+    "corner": "of the position error, at the least sure node",
+    "part": "of the vertices of the part, placed, RMS",
+    "verdict": "of the least sure measure of the part that has a tolerance, µm or µrad",
+}
+NUMBERS = (
+    "rms_before_mm", "rms_after_mm", "rms_predicted_before_mm", "rms_predicted_after_mm",
+    "predicted_coverage_95", "sigma_mm",
+)  # fmt: skip
 MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their uncertainty
 
 
@@ -172,8 +182,7 @@ class Calibration(Result):
     combinations: tuple[Combination, ...]  # what is told of the parameters that are told in part
     rank: Rank
     slopes: frozenset[str]  # parameters of which a slope was looked for
-    fit: tuple[str, ...]  # (k,); parameters of `correlation`
-    correlation: Array  # [k, k]
+    fit: tuple[str, ...]  # (k,); parameters of `covariance`
     covariance: Array  # [k, k], µm and µrad
     unknowns: Mapping[str, float]  # mm; what the set-up left unknown, as found
     fitted: tuple[Residuals, ...]
@@ -206,6 +215,13 @@ class Calibration(Result):
         """Circles about rotary axes, through the readings that were fitted."""
         return [circle for group in self.fitted for circle in group.readings.circles]
 
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the parameters that were fitted, [k, k]."""
+        width = np.sqrt(np.diag(self.covariance))
+        width = np.where(width > 0.0, width, 1.0)
+        return self.covariance / np.outer(width, width)
+
     def changes(self) -> tuple[Change, ...]:
         return (Change("with the errors found", self.scene),)
 
@@ -222,12 +238,7 @@ class Calibration(Result):
             "separated_by": [
                 {"keys": list(group), "measurement": told} for group, told in self.apart.items()
             ],
-            "rms_before_mm": self.rms_before_mm,
-            "rms_after_mm": self.rms_after_mm,
-            "rms_predicted_before_mm": self.rms_predicted_before_mm,
-            "rms_predicted_after_mm": self.rms_predicted_after_mm,
-            "predicted_coverage_95": self.predicted_coverage_95,
-            "sigma_mm": self.sigma_mm,
+            **{name: getattr(self, name) for name in NUMBERS},
             "degrees_of_freedom": self.freedom,
             "set_up_mm": dict(self.unknowns),
             "correlation": {"keys": list(self.fit), "matrix": self.correlation.tolist()},
@@ -299,9 +310,7 @@ class Calibration(Result):
             ]
             words = "Next measurements, each for the greatest gain per minute (typical times):"
             yield Table(columns, rows, words)
-            where = {"map": "RMS over the volume", "corner": "at the least sure node"}
-            place = place_words(dict(self.target)) if not isinstance(self.target, str) else ""
-            yield f"  U95 of the position error, {where.get(str(self.target), f'at {place}')}"
+            yield f"  U95 {target_words(self.target)}"
         yield from self._charts()
 
     def _errors(self) -> Iterator[Block]:
@@ -399,6 +408,12 @@ class Calibration(Result):
                 yield Found(one.key, before, total.value, width, interval, one.told)
             elif one.interval_95 is not None:
                 yield one
+
+
+def target_words(target: Target) -> str:
+    if not isinstance(target, str):
+        return f"of the position error, at {place_words(dict(target))}"
+    return TARGETS[target]
 
 
 def _circle_words(circle: Circle) -> str:

@@ -1,7 +1,7 @@
 """Weighted least squares of errors and unknown set-ups to readings, and what data can tell."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,14 +24,26 @@ class Rank:
     rank: int  # independent combinations of the parameters that the readings show
     kept: tuple[str, ...]  # parameters that are determined once those left out are held
     unseen: tuple[str, ...]  # parameters without any effect on the readings, whatever the set-up
-    # groups: the first of each group looks like a combination of the others (and of what the set-up
-    # leaves unknown). A group of one looks like the set-up alone.
-    confounded: tuple[tuple[str, ...], ...]
-    # by the first of each group: how much of each of the others looks like a unit of it
-    alike: Mapping[str, Mapping[str, float]] = field(default_factory=dict[str, Mapping[str, float]])
+    # by each parameter that looks like others (and what the set-up leaves unknown; it alone where
+    # there are none): how much of each of these looks like a unit of it
+    alike: Mapping[str, Mapping[str, float]]
+
+    @property
+    def confounded(self) -> tuple[tuple[str, ...], ...]:
+        """Groups whose first parameter looks like a combination of the others."""
+        return tuple((key, *others) for key, others in self.alike.items())
 
     def is_identifiable(self, key: str) -> bool:
         return key in self.kept and not any(key in group for group in self.confounded)
+
+    @property
+    def open_ways(self) -> list[dict[str, float]]:
+        """Sums of parameters that do not show in the readings."""
+        alike = [
+            {first: 1.0, **{key: -share for key, share in row.items()}}
+            for first, row in self.alike.items()
+        ]
+        return [*({key: 1.0} for key in self.unseen), *alike]
 
     def told_with(self, key: str) -> dict[str, float]:
         """Give the sum of parameters that the readings tell where they tell one of them in part."""
@@ -75,8 +87,7 @@ def find_rank(
                 for one, share in zip(kept, shares, strict=True)
                 if abs(share) > SHARE
             }
-    groups = tuple((key, *others) for key, others in alike.items())
-    return Rank(len(kept), tuple(keys[at] for at in kept), tuple(unseen), groups, alike)
+    return Rank(len(kept), tuple(keys[at] for at in kept), tuple(unseen), alike)
 
 
 def orthonormal(columns: Array) -> Array:
@@ -273,6 +284,12 @@ class Stack:
             else np.repeat(1.0 / one.sigma_mm, one.observed_mm.shape[1])
             for one in self.sets
         ]
+
+    @property
+    def positions(self) -> dict[str, Array]:
+        """Positions of all axes at all readings, [n], mm or degrees."""
+        each = [one.coordinates for one in self.sets]
+        return {axis: np.concatenate([at[axis] for at in each]) for axis in each[0]}
 
     @property
     def blind(self) -> float:

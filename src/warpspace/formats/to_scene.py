@@ -14,7 +14,7 @@ from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Constant, Directional
 from warpspace.machine.curves.table import Table, TwoArguments
-from warpspace.machine.errors import ErrorSet, Measurement, Run
+from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run
 from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN
 from warpspace.scene.curves import CurveReader
 from warpspace.scene.files import radian_notes
@@ -81,9 +81,13 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     model, said = _convention(found, base)
     said_by = [*reading.found.assumed, *notes, *said, *found.notes]
     description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
+    covariance = base.covariance and base.covariance.without(curves)
+    if uncertainty:
+        covariance = (covariance or Covariance((), ())).reaching(_ranges(found))
     scene = replace(
         base,
         model=model,
+        covariance=covariance,
         errors=ErrorSet({**base.errors.functions, **curves}),
         uncertainty={**_without(base.uncertainty, curves), **uncertainty},
         measured={**_without(base.measured, curves), **measured},

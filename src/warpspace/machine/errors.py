@@ -1,16 +1,17 @@
 """The errors of a machine: the curve of every parameter, tolerances, and what was measured."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.curves.simple import NOTHING, Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments
+from warpspace.machine.limits import MIN_SPAN
 from warpspace.units import Array
 
 __all__ = [
@@ -98,16 +99,34 @@ class Covariance:
     freedom: float = np.inf  # degrees of freedom of what it was found from
     # positions between which axes stood, mm or degrees; beyond them nothing was measured
     reach: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    untold: tuple[str, ...] = ()  # other errors, which the data left open although they act
+    lack_of_fit: float = 0.0  # how many times as far residuals scattered as readings; 0: not seen
 
     @property
     def matrix(self) -> Array:
         return np.array(self.rows, dtype=float).reshape(len(self.keys), len(self.keys))
 
+    def without(self, keys: Collection[str]) -> "Covariance":
+        """Give what is left where some errors are found anew."""
+        kept = [at for at, key in enumerate(self.keys) if key not in keys]
+        rows = tuple(tuple(self.rows[a][b] for b in kept) for a in kept)
+        untold = tuple(key for key in self.untold if key not in keys)
+        return replace(self, keys=tuple(self.keys[at] for at in kept), rows=rows, untold=untold)
+
+    def reaching(self, places: Mapping[str, ArrayLike]) -> "Covariance":
+        """Count positions where axes stood as measured, mm or degrees."""
+        reach = dict(self.reach)
+        for axis, at in places.items():
+            every = np.append(at, reach.get(axis, ()))
+            low, high = float(every.min()), float(every.max())
+            reach[axis] = low, high if high - low >= MIN_SPAN else low
+        return replace(self, reach=reach)
+
     def outside(self, at: Mapping[str, Array], shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Tell where axes stand outside what was reached, of a shape."""
         found = np.zeros(shape, dtype=bool)
         for axis, (low, high) in self.reach.items():
-            found |= (at[axis] < low) | (at[axis] > high)
+            found |= (at[axis] < low - MIN_SPAN) | (at[axis] > high + MIN_SPAN)
         return found
 
 

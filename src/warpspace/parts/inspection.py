@@ -335,6 +335,31 @@ def inspect(
     return tuple(results)
 
 
+def measure_changes(
+    mesh: PartMesh, made: Made, moves_um: Array, tolerances: tuple[str, str]
+) -> Array:
+    """Give what moves of vertices, [K, n, 3], µm, change of measures with a tolerance, [K, m].
+
+    Placed, µm or µrad; the moves are in the workpiece frame.
+    """
+    from scipy.spatial.transform import Rotation
+
+    known, points = find_features(mesh), mesh.vertices_mm
+    wanted = _read(*tolerances, [one.shape for one in known.values()], [*known])
+    arms = (at - at.mean(axis=0) for at in (made.point_mm, points))
+    turn = Rotation.align_vectors(*arms)[0].as_matrix()  # from the part to the workpiece
+    placed = fit_out(points, np.array([made.error_um, *moves_um]) @ turn)
+    here, steps = placed[0], NUDGE * placed[1:]
+    ends = [[one.follow(here + sign * steps) for one in known.values()] for sign in (-1.0, 1.0)]
+    columns = [np.zeros((len(moves_um), 0))]
+    for (kind, of), band in wanted.items():
+        if band:
+            low, high = (KINDS[kind].take(*(motions[at] for at in of)) for motions in ends)
+            unit = URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM
+            columns.append((high - low)[:, None] * unit / (2.0 * NUDGE))
+    return np.hstack(columns)
+
+
 def _numbers(
     kind: Kind,
     values: Array,

@@ -1,6 +1,8 @@
 """Finding scenes and reading them: bundled by name, or any file by path, each in one pass."""
 
+import zlib
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -24,7 +26,7 @@ from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.files import check_file, parse_toml, read_text
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
-from warpspace.scene.save import Notation, read_errors
+from warpspace.scene.save import Notation, read_errors, turn_covariance
 from warpspace.scene.schema import Problems
 
 
@@ -124,6 +126,11 @@ def parse_scene(
     reference = _reference(view, workspace, problems)
     review = _review(raw.get("notes", []), machine, problems)
     orders, lines = _conventions(convention or {}, machine, problems)
+    if lines and (uncertainty or covariance):
+        expected = "expected uncertainties and errors of the origins of the frames"
+        problems.add(
+            "convention.measuring_line_mm", f"would move what [uncertainty] is of; {expected}"
+        )
     if problems.lines:
         raise SceneError(source, problems.lines)
     model = Model(
@@ -147,7 +154,7 @@ def parse_scene(
         description=description,
         notes=(*scene_notes(machine, workspace, errors), *machines.body_notes(machine)),
         uncertainty=uncertainty,
-        covariance=covariance,
+        covariance=turn_covariance(machine, covariance, convention["squareness"]),
         measured=measured,
         review=review,
         part=PartSource(**part, folder=str(folder or "")),
@@ -276,17 +283,17 @@ def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
 def read_npz(path: Path, where: str, problems: Problems) -> dict[str, object] | None:
     """Read the arrays of a file of numpy as lists; note what is wrong with it."""
     check_file(path, limits.MAX_SCENE_BYTES, str(path))
-    try:
+    damaged = BadZipFile, zlib.error, OSError, ValueError, EOFError, RuntimeError
+    with suppress(*damaged, MemoryError, AttributeError):
         with ZipFile(path) as packed:  # what it holds may be larger by far
             size = sum(entry.file_size for entry in packed.infolist())
         if size <= limits.MAX_SCENE_BYTES:
             with np.load(path, allow_pickle=False) as arrays:
                 return {name: arrays[name].tolist() for name in arrays.files}
-    except (BadZipFile, OSError, ValueError, EOFError):
-        size = 0
-    most = f" of at most {limits.MAX_SCENE_BYTES:,} bytes" if size else ""
-    expected = f"expected a file of numpy{most} with the arrays keys and matrix"
-    problems.add(where, expected, path.name)
+    most = f"of at most {limits.MAX_SCENE_BYTES:,} bytes"
+    problems.add(
+        where, f"expected a file of numpy {most} with the arrays keys and matrix", path.name
+    )
     return None
 
 
@@ -314,16 +321,20 @@ class _Document:
                 problems.add(f"{section}.{key}", f"the machine {machine.chain} has no axis {axis}")
             else:
                 known[key] = value
-            if key in self.refused:
-                reference = PARAMETERS[key].axis
-                usual = [name for name in machine.parameter_keys if PARAMETERS[name].is_constant]
-                problems.add(
-                    f"{section}.{key}",
-                    f"is zero by definition of the frame, {reference} being the reference axis"
-                    f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
-                    value,
-                )
+            self.check_free(f"{section}.{key}", key, value)
         return known
+
+    def check_free(self, where: str, key: str, value: object) -> None:
+        """Refuse an error that is zero by definition of the frame."""
+        if key in self.refused:
+            reference = PARAMETERS[key].axis
+            usual = [name for name in self.machine.parameter_keys if PARAMETERS[name].is_constant]
+            self.problems.add(
+                where,
+                f"is zero by definition of the frame, {reference} being the reference axis"
+                f'{near_miss(key, usual)} ([convention] reference_axis = "free" allows it)',
+                value,
+            )
 
     def curves(self, key: str) -> CurveReader:
         """Give the reader of an error's curves, which run over `Scene.axis_span`."""
@@ -378,10 +389,9 @@ class _Document:
                 self.problems.add(where, expected, raw)
                 continue
             values = [curve.value] if isinstance(curve, Constant) else [v for _, v in curve.points]
-            if min(values) < 0.0:
-                self.problems.add(where, "a standard uncertainty is not negative", min(values))
-            elif not any(values):
-                self.problems.add(where, "expected it above 0; leave out what is not known", 0.0)
+            if min(values) <= 0.0:
+                expected = "expected it above 0 everywhere; leave out what is not known"
+                self.problems.add(where, expected, min(values))
             found[key] = curve
         return found
 
@@ -399,31 +409,44 @@ class _Document:
         found: dict[str, Any] | None = problems.read(schema.COVARIANCE, where, raw)
         if found is None:
             return None
-        keys, rows = found["keys"], found["matrix"]
-        problems.only(f"{where}.keys", keys, self.machine.allowed_keys, "error parameter")
+        keys, rows, count = found["keys"], found["matrix"], len(found["keys"])
+        every = *keys, *found["untold"]
+        problems.only(f"{where}.keys", every, self.machine.allowed_keys, "error parameter")
         problems.only(f"{where}.reach", found["reach"], self.machine.axes, OF_MACHINE)
-        if twice := [key for at, key in enumerate(keys) if key in keys[:at] or key in alone]:
-            expected = "expected each error once, here or as uncertainty.KEY"
-            problems.add(f"{where}.keys", expected, twice[0])
-        lengths, count = [*map(len, rows)], len(keys)
-        if lengths not in ([count] * count, [*range(1, count + 1)]):
-            expected = f"expected {count} rows of {count} numbers, or of 1 to {count}"
-            problems.add(f"{where}.matrix", expected)
+        for at, key in enumerate(every):
+            self.check_free(f"{where}.keys", key, key)
+            if key in every[:at] or key in alone:
+                expected = "expected each error once, here or as uncertainty.KEY"
+                problems.add(f"{where}.keys", expected, key)
+        lengths, where = [*map(len, rows)], f"{where}.matrix"
+        is_whole = lengths == [count] * count
+        if not is_whole and lengths != [*range(1, count + 1)]:
+            problems.add(where, f"expected {count} rows of {count} numbers, or of 1 to {count}")
             return None
         half = np.zeros((count, count))
         for at, row in enumerate(rows):
             half[at, : len(row)] = row
         matrix = np.tril(half) + np.tril(half, -1).T
-        width = np.sqrt(np.abs(np.diag(matrix)))
-        if len(rows[0]) == count and np.abs(half - matrix).max() > ROUNDED * np.abs(half).max():
-            problems.add(f"{where}.matrix", "is not symmetric; expected numbers mirrored")
-        if not width.all() or np.linalg.eigvalsh(matrix / np.outer(width, width))[0] < -ROUNDED:
-            expected = "is no covariance; expected a positive matrix, its diagonal above 0"
-            problems.add(f"{where}.matrix", expected)
+        if (none := np.flatnonzero(np.diag(matrix) <= 0.0)).size:
+            at = int(none[0])
+            expected = (
+                f"is no square of an uncertainty of {keys[at]}; expected its diagonal above 0"
+            )
+            problems.add(f"{where}[{at}][{at}]", expected, float(half[at, at]))
+            return None
+        scale = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)))
+        for a, b in np.argwhere(np.abs(half - matrix) > ROUNDED * scale) if is_whole else ():
+            other = f"is not symmetric; expected {float(half[b, a])!r} as in [{b}][{a}]"
+            problems.add(f"{where}[{a}][{b}]", other, float(half[a, b]))
+        values, ways = np.linalg.eigh(matrix / scale)
+        if values.min(initial=0.0) < -ROUNDED:
+            at = int(np.argmax(np.abs(ways[:, 0])))
+            expected = f"is no covariance of {keys[at]} and others; expected a positive matrix"
+            problems.add(f"{where}[{at}]", expected, rows[at])
         if len(problems.lines) > before:
             return None
-        spelled = tuple(map(tuple, matrix.tolist()))
-        return Covariance(keys, spelled, found["freedom"], found["reach"])
+        del found["matrix"]
+        return Covariance(**found, rows=tuple(map(tuple, matrix.tolist())))
 
     def measurements(self) -> dict[str, Measurement]:
         found: dict[str, Measurement] = {}

@@ -6,6 +6,7 @@ from datetime import datetime
 from math import isinf
 from typing import cast
 
+import numpy as np
 import tomli_w
 
 from warpspace.exceptions import OptionError, SceneError
@@ -15,7 +16,7 @@ from warpspace.kinematics.model import Model
 from warpspace.machine.axes import PARAMETERS, Parameter, TravelDirection, parameter
 from warpspace.machine.curves.curve import Span
 from warpspace.machine.description import ORIGIN, BodySource, Machine, Vector, default_travel
-from warpspace.machine.errors import Covariance, ErrorSet
+from warpspace.machine.errors import Constant, Covariance, ErrorSet
 from warpspace.machine.limits import MIN_NUMBER
 from warpspace.scene.files import spell_key
 from warpspace.scene.machines import load_machine, machine_names
@@ -88,6 +89,18 @@ def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
     return convert_squareness(scene.machine, errors, notation.squareness)
 
 
+def turn_covariance(
+    machine: Machine, found: Covariance | None, sign: SquarenessSign | str
+) -> Covariance | None:
+    """Write a covariance with another sign of squareness, or read it; both are the same step."""
+    if found is None:
+        return None
+    ones = ErrorSet({key: Constant((0.0, 1.0), 1.0) for key in found.keys})
+    turned = convert_squareness(machine, ones, sign)
+    way = [turned.amplitude(key) for key in found.keys]
+    return replace(found, rows=tuple(map(tuple, (found.matrix * np.outer(way, way)).tolist())))
+
+
 _WRAP = 8  # entries of a list that stand on one line
 
 
@@ -119,11 +132,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         convention["direction"] = str(scene.model.direction)
     convention |= notation.to_toml()
     parts.append(spell_section("convention", convention))
-    ranges = {
-        axis: low if low == high else [low, high]
-        for axis, (low, high) in scene.workspace.ranges.items()
-    }
-    parts.append(spell_section("workspace", ranges))
+    parts.append(spell_section("workspace", _ranges(scene.workspace.ranges)))
     points = {
         "tool": scene.model.tool_point_mm,
         "workpiece": scene.model.workpiece_point_mm,
@@ -135,10 +144,9 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
         for key, function in scene.errors.functions.items()
     }
     parts += [spell_section("errors", functions, PARAMETERS), _tolerances_section(scene)]
+    joint = turn_covariance(scene.machine, scene.covariance, notation.squareness)
     uncertain = {key: function.to_toml() for key, function in scene.uncertainty.items()}
-    parts.append(
-        spell_section("uncertainty", uncertain | _covariance(scene.covariance), PARAMETERS)
-    )
+    parts.append(spell_section("uncertainty", uncertain | _covariance(joint), PARAMETERS))
     for key, measurement in scene.measured.items():
         runs = [asdict(run) for run in measurement.runs]
         parts.append(spell_section(f"measured.{key}", {"runs": runs}))
@@ -164,7 +172,12 @@ def _covariance(found: Covariance | None) -> dict[str, object]:
         "matrix": [row[: at + 1] for at, row in enumerate(found.rows)],
     }
     values |= {} if isinf(found.freedom) else {"freedom": found.freedom}
-    return {"covariance": values | ({"reach": found.reach} if found.reach else {})}
+    rest = {"reach": _ranges(found.reach), "untold": found.untold, "lack_of_fit": found.lack_of_fit}
+    return {"covariance": values | {name: value for name, value in rest.items() if value}}
+
+
+def _ranges(found: Mapping[str, Span]) -> dict[str, object]:
+    return {axis: low if low == high else [low, high] for axis, (low, high) in found.items()}
 
 
 def spell_note(note: Note) -> str:

@@ -273,6 +273,16 @@ _RANGE = Section(
 _WIDTH = _number(*_HALF_WIDTH, "a half width or { centre = , half_width = }")
 _PLACE = _number(*LIMIT, expected="a number or [lower, upper]")
 _READING = _numbers("[position, value]", limits.MAX_LENGTH_MM, limits.MAX_ERROR)
+
+
+def workspace_range(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
+    """Read the range of an axis in the working volume; equal ends where it stands still."""
+    if isinstance(value, list | tuple):
+        return _span(reader, value, path)
+    at = _PLACE(reader, value, path)
+    return at, at
+
+
 _RUN = Section(
     {
         "direction": (_choice(lambda: RUN_DIRECTIONS, "{} or {} (not known)"), UNKNOWN),
@@ -285,16 +295,20 @@ CSV_RUNS = Section(
     {"csv": (_text(MAX_FILE_NAME, 1), MISSING), "column": (_text(MAX_COLUMN_NAME, 1), MISSING)}
 )
 _PRODUCT = _number(-(limits.MAX_ERROR**2), limits.MAX_ERROR**2)
+_KEYS = _list(_text(8, 1), limits.MAX_COVARIANCE)
 COVARIANCE = Section(
     {
-        "keys": (_list(_text(8, 1), limits.MAX_COVARIANCE, 1), MISSING),
+        "keys": (_KEYS, MISSING),
         "matrix": (
-            _list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE, 1), MISSING,
+            _list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE),
+            MISSING,
         ),
         "freedom": (_number(1.0, 1e9), math.inf),
-        "reach": (_by_name(_span), {}),
+        "reach": (_by_name(workspace_range), {}),
+        "untold": (_KEYS, ()),
+        "lack_of_fit": (_number(0.0, 1e9), 0.0),
     }
-)  # fmt: skip
+)
 ACTS = "each", "all", "scale"  # what a contribution acts on
 DIVISORS = {"normal": 1.0, "rectangular": 3**0.5, "triangular": 6**0.5, "u-shaped": 2**0.5}
 _CONTRIBUTION = Section(
@@ -374,11 +388,3 @@ def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:
     if isinstance(value, dict):
         return _RANGE(reader, value, path)
     return Tolerance(0.0, _WIDTH(reader, value, path))
-
-
-def workspace_range(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
-    """Read the range of an axis in the working volume; equal ends where it stands still."""
-    if isinstance(value, list | tuple):
-        return _span(reader, value, path)
-    at = _PLACE(reader, value, path)
-    return at, at

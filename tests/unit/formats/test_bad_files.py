@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from bench_scenes import scene_with
+from warpspace.analysis.doubt import find_doubt
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.readings import parse_readings
 from warpspace.exceptions import SceneError
@@ -14,7 +15,8 @@ from warpspace.formats import source
 from warpspace.formats.registry import ReadOptions, find_format, open_upload, read_errors
 from warpspace.formats.source import MAX_BYTES, source_of_bytes, source_of_text
 from warpspace.formats.to_scene import into_scene
-from warpspace.scene.library import load_scene
+from warpspace.kinematics.model import Loop
+from warpspace.scene.library import load_scene, parse_scene
 
 GOOD = "X [mm],EXX [um],EAX [urad]\n-100,1,2\n0,0,0\n100,-1.5,3\n"
 MACHINE = load_scene("dvf5000_nominal").machine
@@ -183,3 +185,38 @@ def test_lengths_that_do_not_close_are_told():
     found = read_errors([source_of_text(text, "a.cfg")], ReadOptions()).found
     said = " | ".join((*found.assumed, *found.notes))
     assert "close only with a side AB of 87.73 mm, -12.3 % from AD" in said
+
+
+@pytest.mark.parametrize("u", ["", ",u(EXX) [um]"])
+def test_errors_that_are_imported_leave_the_covariance_of_others(u):
+    base = parse_scene(
+        """machine = "dvf5000"
+[errors]
+EXX = 5
+EC0Y = 20
+[uncertainty.covariance]
+keys = ["EXX", "EC0Y"]
+matrix = [[4.0], [3.0, 9.0]]
+reach = { X = [-10, 20], Y = 7 }
+""",
+        "base",
+    )
+    cells = ",0.5" if u else ""
+    text = f"X [mm],EXX [um]{u}\n-100,1{cells}\n100,3{cells}\n"
+    reading = read_errors([source_of_text(text, "x.csv")], ReadOptions())
+    scene = into_scene(reading, base, "", "x.csv").scene
+    assert (scene.covariance.keys, scene.covariance.rows) == (("EC0Y",), ((9.0,),))
+    assert set(scene.uncertainty) == ({"EXX"} if u else set())
+    assert find_doubt(scene, Loop.RELATIVE).unknown == (() if u else ("EXX",))
+    assert scene.covariance.reach["X"] == ((-100.0, 100.0) if u else (-10.0, 20.0))
+    alone = into_scene(reading, None, "", "x.csv").scene
+    assert (alone.covariance.reach if u else alone.covariance) == (
+        {"X": (-100.0, 100.0)} if u else None
+    )
+
+
+def test_an_uncertainty_of_zero_is_refused_with_its_line():
+    with pytest.raises(SceneError, match=r"line 2: u\(EXX\) '0'; .*above 0"):
+        read_errors(
+            [source_of_text("X [mm],EXX [um],u(EXX) [um]\n-9,1,0\n9,1,1\n", "x.csv")], ReadOptions()
+        )

@@ -147,9 +147,8 @@ class _Column:
         value = self.factor * table.number(cell, at.line, self.name)
         if self.role == POSITION:
             return at.checked_position(value, self.name)
-        if self.role == UNCERTAINTY and value < 0.0:
-            expected = "a standard uncertainty, which is not negative"
-            at.refuse(f"u({self.name}) {shown(cell)}", expected)
+        if self.role == UNCERTAINTY and value <= 0.0:
+            at.refuse(f"u({self.name}) {shown(cell)}", "a standard uncertainty above 0")
         return at.checked_error(value, self.name)
 
 
