@@ -15,7 +15,7 @@ from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.evaluation.budget import pick_line
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.in_box import clamped_scene, moved_place, part_in_box
+from warpspace.app.evaluation.in_box import moved_place, part_in_box
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
@@ -50,7 +50,7 @@ def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> No
     state = put(state, "amplitudes.EXX", "12")
     found = LIVE.evaluate(state).part
     assert found is not None
-    scene = clamped_scene(replace(state, scene=state.active_scene()))
+    scene = replace(state, scene=state.active_scene()).standing
     made = make_points(scene, place_part(MESH, scene, state.part.place).vertices_mm)
     back = np.linalg.inv(found.pose)
     np.testing.assert_allclose(found.error_um @ back[:3, :3].T, made.error_um, atol=1e-4)

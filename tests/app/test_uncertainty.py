@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from viser.transforms import SO3
 
 from warpspace.app.documents.legend import (
     faded_words,
@@ -13,9 +14,10 @@ from warpspace.app.documents.legend import (
     numbers_words,
     subject_words,
 )
-from warpspace.app.drawing.around import around, ellipsoids
+from warpspace.app.drawing.around import around
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import point_labels
+from warpspace.app.drawing.shapes import SCENE_PER_MM, ellipsoid
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
@@ -103,7 +105,7 @@ def test_what_is_not_stated_is_unknown_and_what_a_scene_says_nothing_of_is_not_s
     unknown = LIVE.evaluate(moved.with_amplitude("EYY", 1.0))
     assert "max 13.5 ± ? µm" in numbers_words(unknown)
     assert (unknown.quantity, unknown.faded) == ("position", None)
-    assert "/uncertainty/ellipsoids" not in around(unknown)
+    assert "/uncertainty/ellipsoid0" not in around(unknown)
     silent = LIVE.evaluate(state_of(SCENE.partition("[uncertainty")[0], look__significant="1"))
     assert "±" not in numbers_words(silent)
     assert silent.faded is None
@@ -126,16 +128,25 @@ def test_colours_fade_where_the_error_is_within_its_uncertainty():
     assert all(one.faded is not None and one.faded.shape == one.shape for one in cut.slices)
 
 
+def drawn_mm(shape, ways):
+    """Give where directions of a ball, [n, 3], are once it is scaled, turned and moved, mm."""
+    ball = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
+    told = shape.follows
+    points = SO3(told["wxyz"]).apply(ball * told["scale"]) + told["position"]
+    return points / SCENE_PER_MM
+
+
 def test_ellipsoids_reach_along_each_direction_as_far_as_u95():
     square = np.array([[4.0, 1.0, 0.0], [1.0, 9.0, 0.5], [0.0, 0.5, 1.0]])
-    points, triangles = ellipsoids(np.zeros((1, 3)), square[None])
+    way = np.random.default_rng(0).standard_normal((20_000, 3))
+    points = drawn_mm(ellipsoid(np.zeros(3), square, (0, 0, 0), 0.5), way)
     np.testing.assert_allclose(np.einsum("ni,ij,nj->n", points, np.linalg.inv(square), points), 1.0)
-    assert triangles.max() == len(points) - 1
     picked = replace(state_of(look__ellipsoids="1"), picked=Picked({"X": 0.0, "Y": 0.0, "Z": 0.0}))
     picture = LIVE.evaluate(picked)
-    shape = around(picture)["/uncertainty/ellipsoids"]
-    one = shape.follows["vertices"].reshape(9, -1, 3)
-    assert np.ptp(one[0], axis=0)[0] == pytest.approx(2 * 4.0e-3 * picture.exaggeration, rel=1e-2)
+    shapes = [one for name, one in around(picture).items() if "ellipsoid" in name]
+    assert len(shapes) == 9
+    one = drawn_mm(shapes[0], way)
+    assert np.ptp(one, axis=0)[0] == pytest.approx(2 * 4.0e-3 * picture.exaggeration, rel=1e-2)
 
 
 def test_what_was_never_measured_is_said_and_dotted():

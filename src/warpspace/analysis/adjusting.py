@@ -20,7 +20,6 @@ SILENT = 1e-12  # µm per µm or µrad: a response below it everywhere is none
 CLOSE_UM = 1e-4  # the largest error is found to within this of the least there can be, µm
 NODES_AT_ONCE = 40  # worst nodes for which planes are added in one step
 MOST_STEPS = 300
-NO_FALL = 1e-14  # share of the largest slope there can be that is none
 
 
 @dataclass(frozen=True)
@@ -167,26 +166,9 @@ def _least_squares(matrix: Array, goal: Array, low: Array, high: Array) -> Array
     change: Array = np.asarray(np.linalg.lstsq(matrix, goal)[0], dtype=float)
     if np.all((change >= low) & (change <= high)):
         return change
-    change = np.clip(change, low, high)
-    free = (change > low) & (change < high)
-    for _ in range(MOST_STEPS):
-        held = goal - matrix[:, ~free] @ change[~free]
-        step = np.zeros_like(change)
-        step[free] = np.linalg.lstsq(matrix[:, free], held)[0] - change[free]
-        room = np.where(step > 0.0, high, low) - change
-        shares = np.divide(room, step, out=np.ones_like(step), where=np.abs(step) > np.abs(room))
-        nearest = int(np.argmin(shares))
-        change = np.clip(change + shares[nearest] * step, low, high)
-        if shares[nearest] < 1.0:  # the first to meet its bound stays there
-            change[nearest] = high[nearest] if step[nearest] > 0.0 else low[nearest]
-            free[nearest] = False
-            continue
-        fall = matrix.T @ (goal - matrix @ change)
-        fall = np.where(free, 0.0, np.where(change == low, fall, -fall))
-        if fall.max() <= NO_FALL * np.linalg.norm(goal) * np.linalg.norm(matrix):
-            break
-        free[int(np.argmax(fall))] = True
-    return change
+    from scipy.optimize import lsq_linear
+
+    return lsq_linear(matrix, goal, (low, high), "bvls", tol=1e-14, max_iter=MOST_STEPS).x
 
 
 def least_max(

@@ -8,6 +8,7 @@ one interval of t, and the widest t of a sample is found by sorting the ends of 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -228,14 +229,10 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
         return float(special.ndtr(distance).mean()), (slope * half)[task.free]
 
     level, _ = within(np.zeros(len(first)))
-    latest: dict[bytes, tuple[float, Array]] = {}
 
-    def remembered(log_scale: Array) -> tuple[float, Array]:
-        key = log_scale.tobytes()
-        if key not in latest:
-            latest.clear()
-            latest[key] = within(log_scale)
-        return latest[key]
+    @lru_cache(maxsize=1)
+    def remembered(log_scale: bytes) -> tuple[float, Array]:
+        return within(np.frombuffer(log_scale))
 
     found = optimize.minimize(
         lambda x: float(np.sum(share * np.exp(-x))),
@@ -247,8 +244,8 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
         ],
         constraints={
             "type": "ineq",
-            "fun": lambda x: remembered(x)[0] - level,
-            "jac": lambda x: remembered(x)[1],
+            "fun": lambda x: remembered(x.tobytes())[0] - level,
+            "jac": lambda x: remembered(x.tobytes())[1],
         },
         callback=lambda _: step(),
         options={"maxiter": MOST_STEPS, "ftol": ENOUGH},

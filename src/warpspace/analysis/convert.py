@@ -209,9 +209,9 @@ def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
     position, tilt = 0.0, 0.0
     for loop in loops:
         here, there = (evaluate(scene, at=at, loop=loop, exact=True) for scene in (one, other))
-        position = max(position, float(np.abs(here.error_um - there.error_um).max()))
-        difference = here.orientation_urad - there.orientation_urad
-        tilt = max(tilt, float(np.abs(difference).max()))
+        change = here - there
+        position = max(position, float(np.abs(change.error_um).max()))
+        tilt = max(tilt, float(np.abs(change.orientation_urad).max()))
     return position, tilt
 
 

@@ -175,9 +175,15 @@ def run_in_order(
         for task in tasks:
             if len(pending) >= in_flight:
                 yield _oldest(pending)
-            pending.append((task, _submit(executor, function, task)))
+            pending.append((task, executor.submit(function, *task)))
         while pending:
             yield _oldest(pending)
+    except (BrokenExecutor, CancelledError) as error:
+        raise WorkersLostError(
+            f"the workers are lost ({type(error).__name__}): a process was ended, ran out of"
+            " memory, or the cluster was closed; run again, with fewer --workers where memory is"
+            " short"
+        ) from error
     finally:
         for _, future in pending:
             future.cancel()
@@ -195,32 +201,11 @@ def threads(workers: int) -> Generator[Executor | None]:
         executor.shutdown(wait=False, cancel_futures=True)
 
 
-def _submit(
-    executor: Executor,
-    function: Callable[[Unpack[Given]], Result],
-    task: tuple[*Given],
-) -> "Future[Result]":
-    try:
-        return executor.submit(function, *task)
-    except BrokenExecutor as error:
-        raise _lost(error) from error
-
-
 def _oldest(
     pending: "deque[tuple[tuple[*Given], Future[Result]]]",
 ) -> tuple[tuple[*Given], Result]:
     """Wait for the oldest task; it stays in the row until it is done, so that it can be stopped."""
     task, future = pending[0]
-    try:
-        result = future.result()
-    except (BrokenExecutor, CancelledError) as error:
-        raise _lost(error) from error
+    result = future.result()
     pending.popleft()
     return task, result
-
-
-def _lost(error: BaseException) -> WorkersLostError:
-    return WorkersLostError(
-        f"the workers are lost ({type(error).__name__}): a process was ended, ran out of memory, or"
-        " the cluster was closed; run again, with fewer --workers where memory is short"
-    )

@@ -188,13 +188,13 @@ def _build(name: str, default: Any, hint: Any, said: Mapping[str, Any]) -> Optio
     plain = name
     for ending in UNIT_ENDINGS:
         plain = plain.removesuffix(ending)
+    called: dict[str, Any] = {
+        "flag": said["flag"] or "--" + plain.replace("_", "-"),
+        "label": said["label"] or plain.replace("_", " ").capitalize(),
+    }
     return Option(
-        name=name, about=said["about"], default=default,
-        kind=base if base in (bool, int, float, str) else None, choices=choices, grammar=grammar,
-        enum=enum, unit=said["unit"], low=said["low"], high=said["high"], unset=said["unset"],
-        needs=said["needs"], flag=said["flag"] or "--" + plain.replace("_", "-"),
-        former=said["former"], label=said["label"] or plain.replace("_", " ").capitalize(),
-        words=said["words"], required=said["required"], positional=said["positional"],
+        name=name, default=default, kind=base if base in (bool, int, float, str) else None,
+        choices=choices, grammar=grammar, enum=enum, **{**said, **called},
     )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as attribute
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table,
 from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
 from warpspace.analysis.doubt import FieldDoubt, field_doubt, find_doubt, plus_minus, u95_lines
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
-from warpspace.analysis.statistics import Numbers, Statistics, Summary, volume_statistics
+from warpspace.analysis.statistics import Numbers, Summary, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
@@ -138,7 +138,7 @@ class Repair(Analysis):
             for change in found.changes()
         ]
         sets = [
-            replace(one, exact=Summary(**_four(numbers)))
+            replace(one, exact=Summary(*numbers.four))
             for one, numbers in zip(found.repairs, exact, strict=True)
         ]
         left_out = second_order(scene, self.seen_loop)
@@ -240,10 +240,7 @@ class RepairResult(Result):
             *number_columns(("mean", "RMS", "P95", "max"), unit="µm"),
             Column("adjust", wraps=True),
         )
-        rows = [
-            (len(one.adjust), *(getattr(one, name) for name in FOUR), self._adjustments(one))
-            for one in self.repairs
-        ]
+        rows = [(len(one.adjust), *one.four, self._adjustments(one)) for one in self.repairs]
         yield Table(columns, rows, title="Best sets of adjustments:")
         if len(set(self.adjustable.values())) == 1:
             said = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
@@ -342,7 +339,7 @@ def find_repairs(
         values = amplitudes[list(found.indices)] + found.change
         adjust = {basis.keys[i]: float(v) for i, v in zip(found.indices, values, strict=True)}
         numbers = volume.statistics(volume.changed(found.indices, values))
-        sets.append(AdjustedSet(adjust=adjust, proven=proven, exact=None, **_four(numbers)))
+        sets.append(AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=None))
         watch(len(sets) / (count + 1))
     errors = [_effect(search, index) for index in volume.acting if amplitudes[index] != 0.0]
     wanted = f"{asked.objective}_um"
@@ -350,7 +347,7 @@ def find_repairs(
     return RepairResult(
         asked=asked,
         scene=scene,
-        before=Summary(**_four(volume.statistics(amplitudes))),
+        before=Summary(*volume.statistics(amplitudes).four),
         errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
         repairs=tuple(sets),
         adjustable={key: asked.limit_of(key) for key in keys},
@@ -414,18 +411,14 @@ def _effect(search: Search, index: int) -> Effect:
     found = search.least(indices)
     best = np.array([present]) + (np.zeros(1) if found is None else found.change)
     out, then = (
-        _four(volume.statistics(volume.changed(indices, values))) for values in (np.zeros(1), best)
+        volume.statistics(volume.changed(indices, values)).four for values in (np.zeros(1), best)
     )
     return Effect(
         key=volume.basis.keys[index],
         present=present,
-        left_out=Summary(**out),
-        best=Best(value=float(best[0]), **then),
+        left_out=Summary(*out),
+        best=Best(*then, value=float(best[0])),
     )
-
-
-def _four(found: Statistics) -> dict[str, Any]:
-    return {name: getattr(found, name) for name in FOUR}
 
 
 def _values(one: AdjustedSet) -> str:

@@ -32,6 +32,10 @@ class Summary:
     def three(self) -> tuple[float, float, float]:
         return self.mean_um, self.rms_um, self.max_um
 
+    @property
+    def four(self) -> tuple[float, float, float, float]:
+        return self.mean_um, self.rms_um, self.p95_um, self.max_um
+
 
 @dataclass(frozen=True, slots=True)
 class Statistics(Summary):

@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from warpspace.field.grid import (
+    NODES,
     Grid,
     Workspace,
     build_grid,
     cell_values,
     cut,
     cut_all,
-    is_small,
     pieces,
 )
 from warpspace.kinematics import chain, transforms
@@ -59,6 +59,18 @@ class ErrorField:
         squared += y * y  # in place: a volume of points is larger than what a processor keeps near
         squared += z * z
         return np.sqrt(squared)
+
+    @property
+    def tilts(self) -> "ErrorField":
+        """The same with the orientation error in place of the position error, µrad for µm."""
+        return replace(self, error_um=self.orientation_urad)
+
+    def __sub__(self, other: "ErrorField") -> "ErrorField":
+        """Give by how much errors of the same points differ."""
+        error, orientation = self.error_um, self.orientation_urad
+        return ErrorField(
+            self.nominal_mm, error - other.error_um, orientation - other.orientation_urad
+        )
 
     @cached_property
     def cells_um(self) -> Array:
@@ -328,11 +340,7 @@ def _evaluate(
             evaluate_exact(replace(model, direction=way), errors, coordinates, view, point_mm)
             for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
-        return ErrorField(
-            there.nominal_mm,
-            there.error_um - back.error_um,
-            there.orientation_urad - back.orientation_urad,
-        )
+        return there - back
     point = chain.nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
     error, orientation = np.empty(shape), np.empty(shape)
@@ -349,7 +357,8 @@ def _evaluate(
         return chain.build_links(model, at, error_values(model, errors, at), exact=exact)
 
     # A grid has few positions of each axis: what depends on these alone is worked out once.
-    links = steps(coordinates) if is_small(coordinates.values()) else None
+    few = all(positions.size <= NODES for positions in coordinates.values())
+    links = steps(coordinates) if few else None
     for piece in pieces(shape[:-1]):
         at = {name: cut(values, piece) for name, values in coordinates.items()}
         here = steps(at) if links is None else cut_all(links, piece)

@@ -1,6 +1,6 @@
 """The working volume and the grid of axis positions laid over it."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from math import prod
@@ -38,10 +38,6 @@ def pieces(shape: tuple[int, ...]) -> Iterator[Piece]:
     step = max(1, NODES // max(prod(rest), 1))
     for start in range(0, first, step):
         yield (slice(start, start + step), *(slice(None) for _ in rest))
-
-
-def is_small(arrays: Iterable[Array]) -> bool:
-    return all(array.size <= NODES for array in arrays)
 
 
 def cut(array: Array, piece: Piece) -> Array:
@@ -146,13 +142,8 @@ class Grid:
     @cached_property
     def weights(self) -> Array:
         """Share of the volume that belongs to each node, [nx, ny, nz], trapezoidal; sums to 1."""
-        weights = np.ones(())
-        for nodes in self.shape:
-            along = np.ones(nodes)
-            if nodes > 1:
-                along[[0, -1]] = 0.5
-            weights = weights[..., None] * (along / along.sum())
-        return weights
+        x, y, z = map(shares, self.shape)
+        return x[:, None, None] * y[:, None] * z
 
     @cached_property
     def extent_mm(self) -> Array:
@@ -163,6 +154,14 @@ class Grid:
     def longest_edge_mm(self) -> float:
         """Longest edge of the nominal volume, mm."""
         return float(self.extent_mm.max())
+
+
+def shares(count: int) -> Array:
+    """Give the share of an axis that belongs to each of its points, trapezoidal, [n]."""
+    found = np.ones(count)
+    if count > 1:
+        found[[0, -1]] = 0.5
+    return found / found.sum()
 
 
 def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:

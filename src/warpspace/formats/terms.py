@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpspace.formats import measured
 from warpspace.formats.source import DEG_TO_URAD, Source
@@ -156,23 +155,12 @@ def interpolate(position: Array, at: Sequence[float], values: Sequence[float], e
 def trilinear(
     points: Sequence[Array], positions: Sequence[Sequence[float]], values: Array
 ) -> Array:
-    """Interpolate in a grid of three axes: the documented sum over the eight corners of a cell."""
-    cells: list[NDArray[np.intp]] = []
-    shares: list[Array] = []
-    for point, along in zip(points, positions, strict=True):
-        places = np.asarray(along, dtype=float)
-        cell = np.clip(np.searchsorted(places, point, side="right") - 1, 0, len(places) - 2)
-        share = (point - places[cell]) / (places[cell + 1] - places[cell])
-        cells.append(cell)
-        shares.append(np.clip(share, 0.0, 1.0))
-    total = np.zeros((*np.shape(points[0]), values.shape[-1]))
-    for corner in np.ndindex(2, 2, 2):
-        weight = np.ones(np.shape(points[0]))
-        for share, up in zip(shares, corner, strict=True):
-            weight = weight * (share if up else 1.0 - share)
-        i, j, k = (cell + up for cell, up in zip(cells, corner, strict=True))
-        total += weight[..., None] * values[i, j, k]
-    return total
+    """Interpolate in a grid of three axes; beyond it its border is held."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    both = zip(points, positions, strict=True)
+    held = np.stack([np.clip(point, along[0], along[-1]) for point, along in both], axis=-1)
+    return RegularGridInterpolator(tuple(map(np.array, positions)), values)(held)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,7 +147,7 @@ def thicken(points_mm: Array, thickness_mm: float) -> Array:
     return thick
 
 
-def spread(values: Array) -> Array:
+def spread(values: NDArray[Any]) -> NDArray[Any]:
     """Repeat what is known at the nodes of a line or a point, [nx, ny, nz, ...], as `thicken`."""
     for axis in range(3):
         if values.shape[axis] == 1:
@@ -156,11 +157,7 @@ def spread(values: Array) -> Array:
 
 def spread_nodes(shape: Shape) -> NDArray[np.intp]:
     """Give the flat index of the grid node that each node of a thickened grid belongs to, [M]."""
-    numbers = np.arange(np.prod(shape), dtype=np.intp).reshape(shape)
-    for axis in range(3):
-        if shape[axis] == 1:
-            numbers = np.repeat(numbers, 2, axis=axis)
-    return numbers.reshape(-1)
+    return spread(np.arange(np.prod(shape), dtype=np.intp).reshape(shape)).reshape(-1)
 
 
 TARGET_FRACTION = 0.1

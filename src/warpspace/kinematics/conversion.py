@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import StrEnum
-from itertools import pairwise
 
 import numpy as np
 
@@ -169,35 +168,21 @@ def fit_line(position: Array, value: Array, line: ReferenceLine | str) -> tuple[
 
 
 def _narrowest(x: Array, y: Array) -> float:
-    edges = sorted({*_hull_slopes(x, y), *_hull_slopes(x, -y, -1.0)})
+    """Give the slope of the narrowest band: one of its sides lies along the convex hull."""
+    from scipy.spatial import ConvexHull
 
-    def height(number: int) -> float:
-        return float(np.ptp(y - edges[number] * x))
-
-    low, high = 0, len(edges) - 1  # the height is a convex function of the slope
-    while low < high:
-        middle = (low + high) // 2
-        if height(middle) <= height(middle + 1):
-            high = middle
-        else:
-            low = middle + 1
-    return edges[low]
-
-
-def _hull_slopes(x: Array, y: Array, sign: float = 1.0) -> list[float]:
-    hull: list[tuple[float, float]] = []
-    for px, py in zip(x.tolist(), y.tolist(), strict=True):
-        if hull and hull[-1][0] == px:
-            if hull[-1][1] <= py:
-                continue
-            hull.pop()
-        while len(hull) > 1:
-            (ax, ay), (bx, by) = hull[-2:]
-            if (by - ay) * (px - ax) < (py - ay) * (bx - ax):
-                break
-            hull.pop()
-        hull.append((px, py))
-    return [sign * (by - ay) / (bx - ax) for (ax, ay), (bx, by) in pairwise(hull)]
+    x, y = x - x[0], y - y[0]
+    slope = float(y[-1] / x[-1])
+    rest = y - slope * x
+    length, height = x[-1], np.ptp(rest)
+    if len(x) < 3 or not height:
+        return slope
+    points = np.stack([x / length, rest / height])  # a flat hull would not be found
+    hull = points[:, ConvexHull(points.T).vertices]
+    run, rise = np.roll(hull, -1, axis=1) - hull
+    slopes = rise[run != 0.0] / run[run != 0.0]
+    bands = np.ptp(hull[1] - slopes[:, None] * hull[0], axis=1)
+    return slope + float(slopes[np.argmin(bands)] * height / length)
 
 
 def convert_reference_line(

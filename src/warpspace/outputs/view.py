@@ -23,26 +23,17 @@ HEAD, PANEL = 190.0, 330.0  # room above and beside the pixels, px of a 1600 × 
 
 
 def draw_view(
-    pixels: NDArray[np.uint8],
+    pixels: NDArray[np.uint8],  # [height, width, 3 or 4]
     title: str,
     facts: Sequence[str],
     scale: ColourScale,
     marks: Mapping[str, float],
     rows: Sequence[Row],
-    bars: tuple[float, float] | None,
-    words: Sequence[tuple[str, Array]],
+    bars: tuple[float, float] | None,  # px of a millimetre, display factor; None for no scale bars
+    words: Sequence[tuple[str, Array]],  # each beside a point, [2], px from the left bottom
     dark: bool,
 ) -> bytes:
-    """Draw it as a PNG.
-
-    Parameters
-    ----------
-    pixels : ndarray of uint8, [height, width, 3 or 4]
-    bars : tuple of float, optional
-        Pixels of a millimetre, and the display factor; None for no scale bars.
-    words : sequence of (str, ndarray)
-        What is written, and beside which point, [2], px from the left bottom of the pixels.
-    """
+    """Draw it as a PNG."""
     height, width = pixels.shape[:2]
     unit = factor(width, height)
     canvas = Canvas(

@@ -18,7 +18,6 @@ from warpspace.picture.model import (
     ScenePicture,
     choose_exaggeration,
     same_nodes,
-    subtract_fields,
     subtract_traces,
 )
 from warpspace.picture.traces import TraceLines
@@ -132,7 +131,7 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
     return DifferencePicture(
         view=a.view,
         grid=a.grid,
-        field=subtract_fields(b.field, a.field),
+        field=b.field - a.field,
         exaggeration=a.exaggeration,
         component=a.component,
         quantity=a.quantity,

@@ -230,23 +230,14 @@ def same_nodes(one_mm: Array, other_mm: Array) -> bool:
     )
 
 
-def subtract_fields(one: ErrorField, other: ErrorField) -> ErrorField:
-    """Subtract the errors of a field from those of another over the same points, one − other."""
-    return ErrorField(
-        one.nominal_mm,
-        one.error_um - other.error_um,
-        one.orientation_urad - other.orientation_urad,
-    )
-
-
 def subtract_pictures(one: P, other: Picture) -> P:
     if not same_nodes(one.grid.nominal_mm, other.grid.nominal_mm):
         raise OptionError("the working volumes are not the same: there is no difference")
-    field = subtract_fields(one.field, other.field)
     quantity = "position" if one.quantity == "uncertainty" else one.quantity
     return replace(
-        one, field=field, quantity=quantity, uncertainty=None, colours=None, is_difference=True
-    )
+        one, field=one.field - other.field, quantity=quantity, uncertainty=None, colours=None,
+        is_difference=True,
+    )  # fmt: skip
 
 
 def subtract_traces(

@@ -1,7 +1,7 @@
 """From the raw value of an error in a scene file to its curve; each kind of curve reads its own."""
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -39,10 +39,8 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
     if isinstance(first, TwoArguments) or isinstance(second, TwoArguments):
         return _surface(first, second, weights)
     match first, second:
-        case Constant(), Constant():
-            return Constant(span, weights[0] * first.value + weights[1] * second.value)
-        case Ramp(), Ramp() if first.span == second.span:
-            return Ramp(span, weights[0] * first.value + weights[1] * second.value)
+        case (Constant(), Constant()) | (Ramp(), Ramp()) if first.span == second.span:
+            return replace(first, value=weights[0] * first.value + weights[1] * second.value)
         case ((Constant() | Ramp() | Poly()), (Constant() | Ramp() | Poly())):
             parts = [
                 weight * np.array(_coefficients(curve))

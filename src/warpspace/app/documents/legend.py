@@ -15,7 +15,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.table import table_words
-from warpspace.field.evaluate import ErrorField, placed_words, second_order_words
+from warpspace.field.evaluate import placed_words, second_order_words
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.picture import words
 from warpspace.picture.comparison import conditions_of_both
@@ -64,8 +64,7 @@ def marked(picture: LivePicture) -> dict[str, float]:
         mean = volume_mean(values, picture.grid)
         return {"min": float(values.min()), "mean": mean, "max": float(values.max())}
     if picture.tilts:  # summarised as the length of the position error is
-        tilt = field.orientation_urad
-        field = ErrorField(field.nominal_mm, tilt, tilt)
+        field = field.tilts
     norm = field.norm_um
     marks = {"mean": volume_mean(norm, picture.grid), "P95": share_within(field, P95),
              "max": float(norm.max())}  # fmt: skip

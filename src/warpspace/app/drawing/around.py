@@ -15,8 +15,8 @@ from warpspace.app.drawing.shapes import (
     ball,
     dashes,
     dots,
+    ellipsoid,
     lines,
-    mesh,
     polylines,
 )
 from warpspace.app.evaluation.budget import answer, measured
@@ -24,7 +24,7 @@ from warpspace.app.evaluation.in_box import AT_LINE
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
 from warpspace.formats.source import MAX_LINES
-from warpspace.geometry.surfaces import Index, corners, round_down, triangulate
+from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.mesh import outline_pieces
 from warpspace.units import MM_PER_UM, Array
 
@@ -217,25 +217,10 @@ def _uncertainty(picture: LivePicture) -> Shapes:
             at.append(asked.drawn_mm)
             covariances.append(asked.uncertainty.expanded_um2)
     factor = picture.exaggeration * MM_PER_UM
-    points, triangles = ellipsoids(np.stack(at), factor**2 * np.stack(covariances))
-    shapes["/uncertainty/ellipsoids"] = mesh(points, triangles, ACCENT, opacity=SEEN_THROUGH)
+    for number, (middle, square) in enumerate(zip(at, covariances, strict=True)):
+        body = ellipsoid(middle, factor**2 * square, ACCENT, SEEN_THROUGH)
+        shapes[f"/uncertainty/ellipsoid{number}"] = body
     return shapes
-
-
-def ellipsoids(middle: Array, square: Array) -> tuple[Array, Index]:
-    """Give vertices, [n · m, 3], and triangles of ellipsoids about points, [n, 3].
-
-    Their extent along a unit vector v is the root of v · square · v; squares are [n, 3, 3].
-    """
-    around, up = np.meshgrid(np.linspace(0, 2 * np.pi, 25), np.linspace(-np.pi / 2, np.pi / 2, 13))
-    ball = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1)
-    ball = ball.reshape(-1, 3)
-    values, vectors = np.linalg.eigh(square)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-    points = middle[:, None] + ball @ np.swapaxes(root, -1, -2)
-    triangles = triangulate([np.arange(len(ball)).reshape(around.shape)]).triangles
-    each = triangles + len(ball) * np.arange(len(middle))[:, None, None]
-    return points.reshape(-1, 3), each.reshape(-1, 3)
 
 
 def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:

@@ -142,16 +142,11 @@ def _worst(picture: LivePicture) -> Iterator[Label]:
     worst = picture.worst_node
     value = float(picture.values.flat[worst])
     if picture.state.look.worst and value != 0.0:
-        sure = _plus_minus(picture, worst) if picture.quantity == "position" else ""
+        sure = ""
+        if picture.uncertainty is not None and picture.quantity == "position":
+            sure = u95_behind(None if picture.u95_um is None else picture.u95_um.item(worst))
         text = f"max {_spell(value, picture.scale.unit, sure)}"
         yield Label(text, picture.drawn_mm.reshape(-1, 3)[worst], "worst")
-
-
-def _plus_minus(picture: LivePicture, node: int) -> str:
-    """Say U95 of what is coloured of the position error at a node; empty where none is stated."""
-    if picture.uncertainty is None:
-        return ""
-    return u95_behind(None if picture.u95_um is None else float(picture.u95_um.flat[node]))
 
 
 def _corners(picture: LivePicture) -> Iterator[Label]:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi
+from viser.transforms import SO3
 
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.colours import Rgb, line_colour
@@ -101,6 +102,16 @@ def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> Shape:
     """Give the marker of a point, [3]."""
     stays = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
     return Shape("add_icosphere", stays, {"position": at_mm * SCENE_PER_MM, "color": rgb})
+
+
+def ellipsoid(at_mm: Array, square_mm2: Array, rgb: Rgb, opacity: float) -> Shape:
+    """Give one about a point; along a unit vector v it extends by the root of v · square · v."""
+    values, axes = np.linalg.eigh(square_mm2)
+    axes[:, 0] *= np.linalg.det(axes)  # right-handed
+    scale = SCENE_PER_MM * np.sqrt(np.maximum(values, 0.0))
+    follows = {"position": at_mm * SCENE_PER_MM, "wxyz": SO3.from_matrix(axes).wxyz, "color": rgb}
+    stays = {"opacity": opacity, "cast_shadow": False, "receive_shadow": False}
+    return Shape("add_icosphere", stays, {**follows, "scale": tuple(scale.tolist())})
 
 
 def dots(at_mm: Array, size_mm: float, rgb: Rgb) -> Shape | None:

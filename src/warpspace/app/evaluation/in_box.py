@@ -76,17 +76,11 @@ def _in_box(
     key = Identity(state.scene), tuple(state.positions.items()), state.placed, own
     try:
         found: InBox[T] = _KEPT.get(
-            key, lambda: build(clamped_scene(state)), lambda found: found.response.nbytes
+            key, lambda: build(state.standing), lambda found: found.response.nbytes
         )
         return found.with_errors(state)
     except WarpspaceError:  # its section says it
         return None
-
-
-def clamped_scene(state: AppState) -> Scene:
-    """Give the scene that a part is clamped in: with the rotary axes where they stand."""
-    workspace = state.scene.workspace.moved(state.positions)
-    return replace(state.scene, workspace=workspace, placed=state.placed)
 
 
 def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> InBox[T]:

@@ -425,11 +425,15 @@ class AppState:
         """Give the scene as it is drawn: what is excluded is left out."""
         return replace(self, amplitudes=self.active).resulting_scene()
 
+    @property
+    def standing(self) -> Scene:
+        """The scene with its rotary axes where they stand, the workpiece placed or not."""
+        workspace = self.scene.workspace.moved(self.positions)
+        return replace(self.scene, placed=self.placed, workspace=workspace)
+
     def view(self, loop: Loop | None = None) -> View:
         """Give the view through a loop, the present one by default, at the present positions."""
-        workspace = self.scene.workspace.moved(self.positions)
-        scene = replace(self.scene, placed=self.placed, workspace=workspace)
-        return scene.view(loop or self.loop)
+        return self.standing.view(loop or self.loop)
 
     def noted(self, *notes: str) -> "AppState":
         """Say what could not be taken as it was given; an empty note is none."""

@@ -52,13 +52,7 @@ def option_values(state: AppState, name: str) -> dict[str, str]:
 def read_form(
     kind: type[A], options: Sequence[Option], values: Mapping[str, str], scene: Scene
 ) -> A:
-    """Build an analysis from what was typed.
-
-    Raises
-    ------
-    OptionError
-        If a value means nothing; it names the option as ``{name}``.
-    """
+    """Build an analysis from what was typed; an `OptionError` names an option as ``{name}``."""
     given: dict[str, Any] = {}
     for one in options:
         text = values.get(one.name)

@@ -15,7 +15,7 @@ from warpspace.app.browser import html
 from warpspace.app.browser.html import EMPTY, button, join, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.files import IN_BOX, upload_text
-from warpspace.app.evaluation.in_box import AT_LINE, clamped_scene, moved_place, part_in_box
+from warpspace.app.evaluation.in_box import AT_LINE, moved_place, part_in_box
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
@@ -138,7 +138,7 @@ class PartPart(InBoxPart):
         self._sent, state = (name, content), self.context.state
         mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
         kept = state.part.place if name == state.part.name else None
-        place = np.round(place_part(mesh, clamped_scene(state), kept).place, 3)
+        place = np.round(place_part(mesh, state.standing, kept).place, 3)
         self.show(mesh, name, place=tuple(place.tolist()))
 
 

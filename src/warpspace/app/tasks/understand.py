@@ -8,6 +8,7 @@ from markupsafe import Markup
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.contributions import Contribution
 from warpspace.analysis.doubt import NAMES
+from warpspace.analysis.statistics import volume_statistics
 from warpspace.app.browser.html import (
     EMPTY,
     button,
@@ -234,19 +235,16 @@ class VolumePart(Section):
 
     def body(self, picture: LivePicture) -> Markup:
         found, state = picture.statistics, picture.drawn_state
-        numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um,
-                   "max": found.max_um}  # fmt: skip
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
         sure = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
         lines = [(name, f"{number(value, 2)}{sure.get(name, '')} µm")
-                 for name, value in numbers.items()]  # fmt: skip
+                 for name, value in zip(NAMES.values(), found.four, strict=True)]  # fmt: skip
         if not picture.is_difference:
             # the picture has it only where it is coloured
             errors = evaluate_grid(state.active_scene(), picture.grid, picture.view)
-            tilt = np.linalg.norm(errors.orientation_urad, axis=-1).reshape(picture.shape)
-            mean = float(np.sum(picture.grid.weights * tilt))
-            lines += [("tilt, mean", f"{number(mean)} µrad"),
-                      ("tilt, max", f"{number(float(tilt.max()))} µrad")]  # fmt: skip
+            tilt = volume_statistics(errors.tilts, picture.grid)
+            lines += [("tilt, mean", f"{number(tilt.mean_um)} µrad"),
+                      ("tilt, max", f"{number(tilt.max_um)} µrad")]  # fmt: skip
         size = " × ".join(number(float(edge), 0) for edge in picture.grid.extent_mm)
         lines += [
             ("nodes", spell_count(picture.field.norm_um.size)),

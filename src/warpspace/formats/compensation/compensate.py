@@ -26,7 +26,7 @@ from warpspace.formats.registry import SIGNS, Files, Format, find_format
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
 from warpspace.scene.files import parse_whole
-from warpspace.scene.model import Scene, placed_in
+from warpspace.scene.model import Scene, in_direction, placed_in
 from warpspace.units import Array
 
 NODES = 28  # nodes per axis that what is left is evaluated at: between the points of usual tables
@@ -258,7 +258,7 @@ class Compensation(BeforeAfter, Result):
             *number_columns(("mean tilt", "max tilt"), ".2f", "µrad"),
         )
         rows = [
-            (f"{word} {way}".rstrip(), *_four(numbers), *one.tilt_urad(field))
+            (f"{word} {way}".rstrip(), *numbers.four, *one.tilt_urad(field))
             for way, one in {"": self, **self.directions}.items()
             for word, numbers, field in (
                 ("before", one.before_statistics, one.before),
@@ -273,10 +273,6 @@ class Compensation(BeforeAfter, Result):
         yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_words}"
         yield from (f"  assumed: {text}" for text in self.assumed)
         yield from (f"  {text}" for text in self.notes)
-
-
-def _four(found: Statistics) -> tuple[float, float, float, float]:
-    return found.mean_um, found.rms_um, found.p95_um, found.max_um
 
 
 def spell_points(kind: Format, points: Mapping[str, int]) -> str:
@@ -323,7 +319,7 @@ def compensate(
     if sign and (sign not in SIGNS or kind.tables is None):
         raise OptionError(f"{{sign}} {sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
-        scene = replace(scene, model=replace(scene.model, direction=TravelDirection.MEAN))
+        scene = in_direction(scene, TravelDirection.MEAN)
     scene = placed_for([kind], scene, loop)
     corrector = build_corrector(scene, loop, orientation=asked.orientation)
     points = table_points(kind, scene, asked.points)
@@ -431,14 +427,14 @@ class Sweep(Result):
         return {"before": plain(self.before), "sweep": steps, "left_out": list(self.left_out)}
 
     def blocks(self) -> Iterator[Block]:
-        mean, rms, p95, largest = (f"{number:.3f}" for number in _four(self.before))
+        mean, rms, p95, largest = (f"{number:.3f}" for number in self.before.four)
         yield f"{self.title} · before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
         columns = (
             Column("format", leads=True), Column("points", "d"), Column("pitch", ".4g"),
             Column("numbers", "d"), *number_columns(("mean", "RMS", "P95", "max"), ".3f", "µm"),
         )  # fmt: skip
         rows = [
-            (one.format, one.points or None, one.pitch or None, one.numbers, *_four(one.after))
+            (one.format, one.points or None, one.pitch or None, one.numbers, *one.after.four)
             for one in self.steps
         ]
         yield Table(columns, rows)

@@ -16,7 +16,7 @@ from warpspace.formats.terms import Tables
 from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
 from warpspace.machine.errors import ErrorSet
-from warpspace.scene.model import Scene
+from warpspace.scene.model import Scene, in_direction
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
@@ -48,14 +48,7 @@ class Corrected:
             np.broadcast_to(position, shape) * UM_PER_MM,
             np.broadcast_to(orientation, shape) * URAD_PER_RAD,
         )
-        if self.less is None:
-            return found
-        back = self.less.field(errors)
-        return replace(
-            found,
-            error_um=found.error_um - back.error_um,
-            orientation_urad=found.orientation_urad - back.orientation_urad,
-        )
+        return found if self.less is None else found - self.less.field(errors)
 
     @property
     def nbytes(self) -> int:
@@ -101,7 +94,7 @@ class Controller:
         way = TravelDirection(scene.model.direction)
         if way is TravelDirection.DIFFERENCE:
             there, back = (
-                self.at(coordinates, nominal_mm, toward(scene, one), loop, point_mm)
+                self.at(coordinates, nominal_mm, in_direction(scene, one), loop, point_mm)
                 for one in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
             )
             return replace(there, less=back)
@@ -133,10 +126,6 @@ class Controller:
     def without(self) -> "Controller":
         """Give the same controller with an empty table: it leaves the machine as it is."""
         return replace(self, tables=Tables(()))
-
-
-def toward(scene: Scene, direction: str) -> Scene:
-    return replace(scene, model=replace(scene.model, direction=direction))
 
 
 def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | None:
@@ -231,12 +220,13 @@ class BeforeAfter:
 
     def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
         """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""
-        tilt = np.linalg.norm(field.orientation_urad, axis=-1)
-        return float(np.sum(self.grid.weights * tilt)), float(tilt.max())
+        found = volume_statistics(field.tilts, self.grid)
+        return found.mean_um, found.max_um
 
 
 def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
-    at, nominal, scene = grid.coordinates, grid.nominal_mm, toward(controller.scene, direction)
+    at, nominal, scene = grid.coordinates, grid.nominal_mm, controller.scene
+    scene = in_direction(scene, direction)
     before = controller.without().field(at, nominal, scene)
     view = scene.view(controller.loop)
     sure = field_doubt(scene, before.error_um, at, view, grid.point_mm, grid.weights)
@@ -247,7 +237,7 @@ def reversal_notes(
     there: BeforeAfter, back: BeforeAfter, errors: ErrorSet, direction: str
 ) -> tuple[str, ...]:
     before, after = (
-        float(np.linalg.norm(one.error_um - other.error_um, axis=-1).max())
+        float((one - other).norm_um.max())
         for one, other in ((there.before, back.before), (there.after, back.after))
     )
     if after <= max(LEAST_UM, HELD * before):

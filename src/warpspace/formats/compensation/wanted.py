@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, evaluate_exact, placement_effect
+from warpspace.field.grid import shares
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point, tool_axis
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
@@ -322,10 +323,3 @@ class Wanted:
                 solved = np.linalg.lstsq(matrix, needed[target].ravel() * root, rcond=None)[0]
                 found |= {(target, axis): float(v) for axis, v in zip(sources, solved, strict=True)}
         return found
-
-
-def shares(count: int) -> Array:
-    """Give the share of an axis that belongs to each of its points, trapezoidal, [n]."""
-    found = np.ones(count)
-    found[[0, -1]] = 0.5
-    return found / found.sum()

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
 
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves import curve
@@ -158,13 +159,7 @@ def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
 def _power_matrix() -> Array:
     rows = np.zeros((DEGREE + 1, DEGREE + 1))
     for k in range(DEGREE + 1):
-        plain = np.polynomial.chebyshev.cheb2poly(np.eye(DEGREE + 1)[k])
-        shifted = np.zeros(1)
-        for power, c in enumerate(plain):
-            shifted = np.polynomial.polynomial.polyadd(
-                shifted, c * np.polynomial.polynomial.polypow([-1.0, 2.0], power)
-            )
-        rows[: len(shifted), k] = shifted
+        rows[: k + 1, k] = Chebyshev.basis(k, domain=[0.0, 1.0]).convert(kind=Polynomial).coef
     return rows
 
 
@@ -178,11 +173,7 @@ def _simplest(span: curve.Span, at: Array, coefficients: Array) -> curve.ErrorFu
     if degree == 0 and np.ptp(kept[:, 0]) <= SMALL:
         return Constant(span, float(kept[:, 0].mean()))
     if len(kept) == 1:
-        shifted = np.zeros(1)
-        for power, c in enumerate(kept[0, : degree + 1]):
-            shifted = np.polynomial.polynomial.polyadd(
-                shifted, c * np.polynomial.polynomial.polypow([-at[0], 1.0], power)
-            )
-        return Poly(span, tuple(float(c) for c in shifted))
+        shifted = Polynomial(kept[0, : degree + 1])(Polynomial([-at[0], 1.0]))
+        return Poly(span, tuple(shifted.coef.tolist()))
     rows = tuple(tuple(float(c) for c in row[: degree + 1]) for row in kept)
     return Pieces(span, tuple(at[:-1].tolist()), float(at[-1]), rows)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import ListedColormap
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -150,6 +149,8 @@ def render_bodies(bodies: Sequence[Body], projection: Projection) -> Raster | No
     """Draw bodies; none where there are none."""
     if not bodies:
         return None
+    from scipy.ndimage import maximum_filter
+
     points = np.concatenate([body.vertices_mm for body in bodies])
     spots = projection.project(points)
     left, bottom = (np.floor(spots.min(axis=0)) - MARGIN_PX).astype(int)
@@ -160,16 +161,8 @@ def render_bodies(bodies: Sequence[Body], projection: Projection) -> Raster | No
     step = SUPERSAMPLING if small else 1
     middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
     rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
-    return Raster(
-        rgba, depth, _farthest(depth, step), (float(left), float(bottom), float(right), float(top))
-    )
-
-
-def _farthest(depth_mm: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
-    padded = np.pad(depth_mm, reach, mode="edge")
-    for axis in (0, 1):
-        padded = sliding_window_view(padded, 2 * reach + 1, axis).transpose(2, 0, 1).max(axis=0)
-    return padded
+    farthest = np.asarray(maximum_filter(depth, 2 * step + 1, mode="nearest"), np.float32)
+    return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
 
 
 def _draw(

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 
+from warpspace.analysis.statistics import statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import PLANES, build_slice, slice_ranges
@@ -234,9 +235,10 @@ class Needles:
 def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     picture = evaluate_for(settings, scenes[0], quantity="orientation")
     values, scale, view = picture.values, picture.scale, settings.view
-    tilt = np.linalg.norm(picture.field.orientation_urad, axis=-1)
+    drawn = replace(picture.field.tilts, nominal_mm=picture.grid.nominal_mm)
+    found = statistics(drawn, picture.grid.coordinates)
     given, nodes = settings.exaggeration, picture.grid.nominal_mm.reshape(-1, 3)
-    factor = _lean_factor(float(tilt.max())) if given is None or given == "auto" else given
+    factor = _lean_factor(found.max_um) if given is None or given == "auto" else given
     title = f"Orientation error of the tool axis: {picture.scene.title}"
     facts = [
         *scene_facts(picture, None),
@@ -260,17 +262,12 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
         annotate=partial(_draw_needles, needles), ghost=False,
     )  # fmt: skip
     heading = "tilt" if settings.component == "norm" else f"rotation about {settings.component}"
-    worst = int(np.argmax(tilt))
-    at = {
-        name: float(np.broadcast_to(positions, picture.grid.shape).reshape(-1)[worst])
-        for name, positions in picture.grid.coordinates.items()
-    }
     shown = math.radians(1.0) / RAD_PER_URAD / factor
     rows = [
-        ("max tilt", f"{spell(float(tilt.max()))} {MICRORADIAN}"),
-        ("mean tilt", f"{spell(float(tilt.mean()))} {MICRORADIAN}"),
-        ("P95", f"{spell(float(np.percentile(tilt, 95.0)))} {MICRORADIAN}"),
-        *_place_rows(at, nodes[worst].tolist()),
+        ("max tilt", f"{spell(found.max_um)} {MICRORADIAN}"),
+        ("mean tilt", f"{spell(found.mean_um)} {MICRORADIAN}"),
+        ("P95", f"{spell(found.p95_um)} {MICRORADIAN}"),
+        *_place_rows(found.max_at_axes, found.max_at_mm),
         ("1° of lean shown", f"{spell(shown)} {MICRORADIAN}"),
     ]
     marks = [("mean", float(values.mean())), ("max", float(values.max()))]
