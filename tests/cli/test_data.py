@@ -134,8 +134,11 @@ def test_fields_have_a_direction_and_an_uncertainty(warpspace, tmp_path):
     field = ("field", path, "--at", "X=275", "--json")
     (point,) = warpspace(*field, "--direction", "difference").json["points"]
     assert point["error_um"] == pytest.approx([0.0, 1.0, 0.0])
+    told = warpspace(*field, "--uncertainty").json  # of EC0Y nothing is stated
+    assert (told["unknown"], "uncertainty_um" in told["points"][0]) == (["EC0Y"], False)
+    path.write_text(SCENE.replace("EC0Y = 20\n", ""))
     (point,) = warpspace(*field, "--uncertainty").json["points"]
-    assert point["uncertainty_um"] == [0.0, 0.5, 0.0]
+    assert point["uncertainty_um"] == pytest.approx([0.0, 0.5, 0.0], abs=1e-12)
     run = ("montecarlo", path, "--from", "uncertainty", "--samples", "500", "--json")
     found = warpspace(*run).json
     assert (found["from"], found["distribution"]) == ("uncertainty", "normal")
