@@ -128,6 +128,20 @@ def test_colours_fade_where_the_error_is_within_its_uncertainty():
     assert all(one.faded is not None and one.faded.shape == one.shape for one in cut.slices)
 
 
+def test_pass_or_fail_fades_where_it_cannot_be_told():
+    state = state_of(look__pass_fail="1", specification__limit_um="15")
+    picture = LIVE.evaluate(state)
+    away = np.abs(picture.field.norm_um - 15.0) / (picture.u95_um / 2.0)  # 95 % is at 1.645
+    assert (away < 1.5).any()
+    assert (away > 1.8).any()
+    assert picture.faded[away < 1.5].all()
+    assert not picture.faded[away > 1.8].any()
+    percent = round(100.0 * (picture.grid.weights * picture.faded).sum())
+    said = f"grey: cannot be told with 95 %, {percent} % of the volume"
+    assert faded_words(picture) == (said,)
+    assert LIVE.evaluate(put(state, "look.pass_fail", "0")).faded is None
+
+
 def drawn_mm(shape, ways):
     """Give where directions of a ball, [n, 3], are once it is scaled, turned and moved, mm."""
     ball = ways / np.linalg.norm(ways, axis=-1, keepdims=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.contributions import budget_words
-from warpspace.analysis.doubt import Doubt, FieldDoubt, plus_minus
+from warpspace.analysis.doubt import SURE, Doubt, FieldDoubt, plus_minus
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
@@ -42,7 +42,6 @@ STEPS, STILL_MM, FAR_MM = 40, 1e-11, 1e6  # of a fit; changes of a distance that
 MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
 RIGHT_RAD = 1e-4  # nominal angles this close to 90° or 0 are right or none; datums fix no less
 NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
-SURE = 0.95  # least probability of what is said of a tolerance
 LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
 SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circles fit a sphere, too
 

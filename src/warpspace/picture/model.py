@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.concepts import Concept, expected_um, zero_field
 from warpspace.analysis.description import plain
-from warpspace.analysis.doubt import FieldDoubt, field_doubt
+from warpspace.analysis.doubt import SURE, FieldDoubt, field_doubt
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, View, placed_words, second_order_words
@@ -117,6 +117,8 @@ class Picture:
     quantity: str = "position"
     uncertainty: FieldDoubt | None = None  # of its errors; None where nothing is stated
     significant: bool = False  # whether colours fade where an error is not above its U95
+    # that colours hold |E| against; they fade where it cannot be told whether it is kept
+    limit_um: float | None = None
     # the colours where they are given, for instance shared with other pictures; None for round ends
     # that hold all values
     colours: ColourScale | None = None
@@ -175,8 +177,14 @@ class Picture:
 
     @cached_property
     def faded(self) -> NDArray[np.bool_] | None:
-        """Where the position error is not above its U95, if colours fade there, [nx, ny, nz]."""
-        if not self.significant or self.u95_um is None or self.tilts:
+        """Where colours fade: nothing is sure there, [nx, ny, nz]; None if they do not."""
+        found = self.uncertainty
+        if found is None or self.u95_um is None or self.tilts:
+            return None
+        if self.limit_um is not None:
+            kept = found.keeps(self.limit_um)
+            return (kept > 1.0 - SURE) & (kept < SURE)
+        if not self.significant:
             return None
         return np.abs(coloured_values(self.field, self.component)) <= self.u95_um
 

@@ -170,10 +170,12 @@ def _covariance(found: Covariance | None) -> dict[str, object]:
     values: dict[str, object] = {
         "keys": found.keys,
         "matrix": [row[: at + 1] for at, row in enumerate(found.rows)],
+        "freedom": 0.0 if isinf(found.freedom) else found.freedom,
+        "reach": _ranges(found.reach),
+        "untold": found.untold,
+        "lack_of_fit": found.lack_of_fit,
     }
-    values |= {} if isinf(found.freedom) else {"freedom": found.freedom}
-    rest = {"reach": _ranges(found.reach), "untold": found.untold, "lack_of_fit": found.lack_of_fit}
-    return {"covariance": values | {name: value for name, value in rest.items() if value}}
+    return {"covariance": {name: value for name, value in values.items() if value}}
 
 
 def _ranges(found: Mapping[str, Span]) -> dict[str, object]:

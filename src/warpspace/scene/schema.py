@@ -298,11 +298,8 @@ _PRODUCT = _number(-(limits.MAX_ERROR**2), limits.MAX_ERROR**2)
 _KEYS = _list(_text(8, 1), limits.MAX_COVARIANCE)
 COVARIANCE = Section(
     {
-        "keys": (_KEYS, MISSING),
-        "matrix": (
-            _list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE),
-            MISSING,
-        ),
+        "keys": (_KEYS, ()),
+        "matrix": (_list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE), ()),
         "freedom": (_number(1.0, 1e9), math.inf),
         "reach": (_by_name(workspace_range), {}),
         "untold": (_KEYS, ()),

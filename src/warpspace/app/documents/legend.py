@@ -234,7 +234,8 @@ def faded_words(picture: LivePicture) -> tuple[str, ...]:
         return ()
     percent = 100.0 * float(picture.grid.weights[picture.faded].sum())
     of = "|E|" if picture.component == "norm" else f"|E_{picture.component}|"
-    return (f"grey: {of} ≤ U95, {number(percent, 0)} % of the volume",)
+    what = f"{of} ≤ U95" if picture.limit_um is None else "cannot be told with 95 %"
+    return (f"grey: {what}, {number(percent, 0)} % of the volume",)
 
 
 def range_conditions(picture: LivePicture) -> tuple[str, ...]:

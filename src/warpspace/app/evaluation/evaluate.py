@@ -68,6 +68,8 @@ class LiveModel:
             "quantity": quantity,
             "significant": state.look.significant,
         }
+        if state.look.pass_fail and (state.component, quantity) == ("norm", "position"):
+            common["limit_um"] = state.specification.limit_um
         volume = model.Picture(**common, grid=grid, field=field, uncertainty=uncertainty)
         common["colours"] = _chosen_colours(state, volume, basis)
         return LivePicture(

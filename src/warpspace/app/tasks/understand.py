@@ -78,9 +78,10 @@ class WorstPart(Section):
             pin = button("Pin a note", "notes:pin", kind="link", hint="Pin a note here (N)")
             asked = tag("p", join((_axes(found), " ", back, " ", pin)))
         best = tag("div", "", data_piece="best")
+        limit = picture.state.specification.limit_um
         details = tag("summary", "Details") + _details(found, picture.state.lever)
         details = tag("details", details, class_="ws-details", data_key="worst.details")
-        return asked + _contributions(found) + _uncertainty(found) + best + details
+        return asked + _contributions(found) + _uncertainty(found, limit) + best + details
 
     def _answer(self, picture: LivePicture) -> Answer:
         if self._found is None or self._found[0] is not picture:
@@ -139,8 +140,8 @@ def _contributions(found: Answer) -> Markup:
     return rows(lines, "ws-rows ws-causes") + told
 
 
-def _uncertainty(found: Answer) -> Markup:
-    """Say which errors the uncertainty of |E| comes from, the largest share of its variance first.
+def _uncertainty(found: Answer, limit_um: float) -> Markup:
+    """Say what the uncertainty of |E| comes from, the largest share first, and if a limit is kept.
 
     Shares are below zero where correlations make it smaller; all of them add up to 100 %.
     """
@@ -152,7 +153,8 @@ def _uncertainty(found: Answer) -> Markup:
     named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]
     named = [(key, share) for key, share in named if share != "0 %"]
     said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
-    words = f"U95{length_words(sure)} µm, share of its variance: {said}"
+    kept = f"|E| ≤ {limit_um:g} µm with {number(100.0 * float(sure.keeps(limit_um)), 1)} %"
+    words = f"{kept}. U95{length_words(sure)} µm, share of its variance: {said}"
     rest = rows(named[FIRST:]) if len(named) > FIRST else EMPTY
     rest = rest and tag("details", tag("summary", "All shares") + rest, class_="ws-details",
                         data_key="worst.shares")  # fmt: skip
