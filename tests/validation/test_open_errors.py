@@ -44,7 +44,7 @@ def test_squareness_of_an_axis_that_stood_still_is_open_and_makes_the_map_unknow
     readings = plane([-150.0])
     found = calibrate(SCENE, [readings], Calibrate(fit=KEYS))
     known = found.scene.covariance
-    assert known.untold == ("EA0Z", "EB0Z")
+    assert known.undetermined == ("EA0Z", "EB0Z")
     assert known.keys == ("EXX", "EC0Y")
     # what is told is as sure as a straight line through the points: σ over the spread of y
     u = {one.key: one.standard_uncertainty for one in found.parameters}
@@ -58,21 +58,21 @@ def test_squareness_of_an_axis_that_stood_still_is_open_and_makes_the_map_unknow
 
 def test_what_is_measured_all_over_leaves_nothing_open():
     found = calibrate(SCENE, [plane([-200.0, 0.0])], Calibrate(fit=KEYS))
-    assert found.scene.covariance.untold == ()
+    assert found.scene.covariance.undetermined == ()
     assert find_doubt(found.scene).is_known
 
 
 def test_what_was_open_and_is_found_or_stated_is_open_no_longer():
     flat = calibrate(SCENE, [plane([-150.0])], Calibrate(fit=KEYS)).scene
     high = calibrate(flat, [plane([-200.0, 0.0])], Calibrate(fit=("EA0Z", "EB0Z"))).scene
-    assert high.covariance.untold == ()
+    assert high.covariance.undetermined == ()
     assert set(high.covariance.keys) == {"EXX", "EC0Y", "EA0Z", "EB0Z"}
     again = calibrate(high, [plane([-150.0])], Calibrate(fit=KEYS)).scene
-    assert again.covariance.untold == ()  # held where the scene says how sure it is
+    assert again.covariance.undetermined == ()  # held where the scene says how sure it is
     stated = {"EA0Z": Constant((-200.0, 0.0), 2.0), "EB0Z": Constant((-200.0, 0.0), 2.0)}
     told = replace(SCENE, uncertainty=stated)
     found = calibrate(told, [plane([-150.0])], Calibrate(fit=KEYS)).scene
-    assert found.covariance.untold == ()
+    assert found.covariance.undetermined == ()
     assert found.uncertainty == stated
 
 
@@ -80,7 +80,7 @@ def test_tolerances_as_knowledge_are_what_is_known_of_what_readings_leave_open()
     width = {"translation": 10.0, "rotation": 20.0, "squareness": 30.0}
     scene = replace(SCENE, tolerances=replace(SCENE.tolerances, default=width))
     found = calibrate(scene, [plane([-150.0])], Calibrate(fit=KEYS, priors=True))
-    assert found.scene.covariance.untold == ()
+    assert found.scene.covariance.undetermined == ()
     u = {one.key: one.standard_uncertainty for one in found.parameters}
     assert u["EA0Z"] == pytest.approx(30.0 / np.sqrt(3.0), rel=1e-6)  # uniform, GUM 4.3.7
 
@@ -95,14 +95,14 @@ def test_places_that_act_alike_wherever_axes_stand_lose_nothing_by_one_held():
     pair = Calibrate(fit=("EX0B", "EX0C"))
     found = calibrate(DVF, [readings], pair)
     assert found.rank.confounded == (("EX0C", "EX0B"),)
-    assert found.scene.covariance.untold == ()
+    assert found.scene.covariance.undetermined == ()
     (variance,) = found.scene.covariance.matrix.ravel()
     assert variance == pytest.approx((1e3 * found.sigma_mm) ** 2 / 9.0)
     # C rides on B: where B is turned they do not act alike, and nobody measured there
     ranges = {**DVF.workspace.ranges, "B": (30.0, 30.0)}
     turned = replace(DVF, workspace=replace(DVF.workspace, ranges=ranges))
     elsewhere = replace(readings, coordinates={**readings.coordinates, "B": np.zeros(9)})
-    assert calibrate(turned, [elsewhere], pair).scene.covariance.untold == ("EX0C", "EX0B")
+    assert calibrate(turned, [elsewhere], pair).scene.covariance.undetermined == ("EX0C", "EX0B")
 
 
 def test_a_model_that_misses_something_says_so_after_it_is_saved():

@@ -54,7 +54,7 @@ class Doubt:
     covariance: Array  # [K, K], µm and µrad; of the amplitudes, one layer behind the other
     freedoms: Array  # [K], degrees of freedom
     unknown: tuple[str, ...]  # errors of which nobody says how sure they are
-    untold: tuple[str, ...] = ()  # of the unknown: what a calibration left open
+    undetermined: tuple[str, ...] = ()  # of the unknown: what a calibration left open
     lack_of_fit: float = 0.0  # that it saw
 
     @cached_property
@@ -91,7 +91,7 @@ class Doubt:
 
     @property
     def is_known(self) -> bool:
-        return not (self.unknown or self.untold)
+        return not (self.unknown or self.undetermined)
 
     @cached_property
     def root(self) -> Array:
@@ -143,13 +143,13 @@ class Doubt:
 
     def remarks(self) -> Iterator[str]:
         """Say what is not stated, and what the data did not determine."""
-        if unstated := [key for key in self.unknown if key not in self.untold]:
+        if unstated := [key for key in self.unknown if key not in self.undetermined]:
             yield (
                 f"uncertainty not stated of {', '.join(unstated)}: it is unknown wherever they"
                 " act, not zero"
             )
-        if self.untold:
-            names = ", ".join(self.untold)
+        if self.undetermined:
+            names = ", ".join(self.undetermined)
             yield f"the readings did not determine {names}: unknown wherever they act"
         if self.lack_of_fit:
             yield (
@@ -181,11 +181,13 @@ def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
         covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
         freedoms[rows] = joint.freedom
     known = joint or Covariance((), ())
-    untold = tuple(key for key in known.untold if parameter(key).axis in axes)
-    acting = (key for key in scene.errors if parameter(key).axis in axes and key not in untold)
+    undetermined = tuple(key for key in known.undetermined if parameter(key).axis in axes)
+    acting = (
+        key for key in scene.errors if parameter(key).axis in axes and key not in undetermined
+    )
     unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
-    every = *unknown, *untold
-    return Doubt(layers, covariance, freedoms, every, untold, known.lack_of_fit)
+    every = *unknown, *undetermined
+    return Doubt(layers, covariance, freedoms, every, undetermined, known.lack_of_fit)
 
 
 def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:

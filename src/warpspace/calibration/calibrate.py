@@ -438,14 +438,14 @@ def _covariance(
     stated = {*scene.uncertainty} - {*found.keys} | {*known.keys}
     ends, draw = found.reaching(scene.workspace.ranges).reach, np.random.default_rng(0)
     poses = {axis: draw.uniform(*ends[axis], POSES) for axis in ends}
-    untold: dict[str, float] = {}
+    undetermined: dict[str, float] = {}
     for loop in (Loop.TOOL, Loop.RELATIVE) if ways else ():
         basis = build_basis(scene.model, terms.errors, terms.keys, poses, scene.view(loop))
         for way in ways:
             parts = [share * basis.position[terms.keys.index(key)] for key, share in way.items()]
             if np.abs(sum(parts)).max() > ACTS * max(np.abs(part).max() for part in parts):
-                untold |= way
-    left = tuple(key for key in (*untold, *known.untold) if key not in stated)
+                undetermined |= way
+    left = tuple(key for key in (*undetermined, *known.undetermined) if key not in stated)
     found = found.without(left)
     if not (keys := (*found.keys, *known.keys)) and not left:
         return None

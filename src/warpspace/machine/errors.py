@@ -99,7 +99,7 @@ class Covariance:
     freedom: float = np.inf  # degrees of freedom of what it was found from
     # positions between which axes stood, mm or degrees; beyond them nothing was measured
     reach: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
-    untold: tuple[str, ...] = ()  # other errors, which the data left open although they act
+    undetermined: tuple[str, ...] = ()  # other errors, which the data left open although they act
     lack_of_fit: float = 0.0  # how many times as far residuals scattered as readings; 0: not seen
 
     @property
@@ -110,8 +110,10 @@ class Covariance:
         """Give what is left where some errors are found anew."""
         kept = [at for at, key in enumerate(self.keys) if key not in keys]
         rows = tuple(tuple(self.rows[a][b] for b in kept) for a in kept)
-        untold = tuple(key for key in self.untold if key not in keys)
-        return replace(self, keys=tuple(self.keys[at] for at in kept), rows=rows, untold=untold)
+        undetermined = tuple(key for key in self.undetermined if key not in keys)
+        return replace(
+            self, keys=tuple(self.keys[at] for at in kept), rows=rows, undetermined=undetermined
+        )
 
     def reaching(self, places: Mapping[str, ArrayLike]) -> "Covariance":
         """Count positions where axes stood as measured, mm or degrees."""

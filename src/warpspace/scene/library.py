@@ -410,7 +410,7 @@ class _Document:
         if found is None:
             return None
         keys, rows, count = found["keys"], found["matrix"], len(found["keys"])
-        every = *keys, *found["untold"]
+        every = *keys, *found["undetermined"]
         problems.only(f"{where}.keys", every, self.machine.allowed_keys, "error parameter")
         problems.only(f"{where}.reach", found["reach"], self.machine.axes, OF_MACHINE)
         for at, key in enumerate(every):

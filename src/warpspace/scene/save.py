@@ -172,7 +172,7 @@ def _covariance(found: Covariance | None) -> dict[str, object]:
         "matrix": [row[: at + 1] for at, row in enumerate(found.rows)],
         "freedom": 0.0 if isinf(found.freedom) else found.freedom,
         "reach": _ranges(found.reach),
-        "untold": found.untold,
+        "undetermined": found.undetermined,
         "lack_of_fit": found.lack_of_fit,
     }
     return {"covariance": {name: value for name, value in values.items() if value}}

@@ -302,7 +302,7 @@ COVARIANCE = Section(
         "matrix": (_list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE), ()),
         "freedom": (_number(1.0, 1e9), math.inf),
         "reach": (_by_name(workspace_range), {}),
-        "untold": (_KEYS, ()),
+        "undetermined": (_KEYS, ()),
         "lack_of_fit": (_number(0.0, 1e9), 0.0),
     }
 )

@@ -43,7 +43,7 @@ def test_all_that_a_covariance_says_comes_back_from_its_text():
     text = scene_to_toml(scene)
     assert "Z = 5.0" in text
     assert parse_scene(text, "s").covariance == WHOLE
-    nothing = Covariance((), (), untold=("EXX",))
+    nothing = Covariance((), (), undetermined=("EXX",))
     back = parse_scene(scene_to_toml(replace(scene, covariance=nothing)), "s")
     assert back.covariance == nothing
     assert find_doubt(back).unknown == ("EC0Y", "EA0Z", "EXX")
@@ -77,7 +77,7 @@ def test_a_covariance_is_written_in_the_sign_of_its_squareness():
 
 def test_errors_that_are_found_anew_leave_the_others():
     left = WHOLE.without(("EC0Y", "EYY"))
-    assert left == replace(WHOLE, keys=("EA0Z",), rows=((9.0,),), untold=("EXX",))
+    assert left == replace(WHOLE, keys=("EA0Z",), rows=((9.0,),), undetermined=("EXX",))
 
 
 def test_an_axis_that_stood_still_was_measured_nowhere_else():
@@ -97,9 +97,9 @@ def test_an_axis_that_stood_still_was_measured_nowhere_else():
         ("[[4.0], [3.0, 9.0]]", "[[4.0], [3.0, -9.0]]", r"matrix\[1\]\[1\] = -9.0: .*EA0Z"),
         ("[[4.0], [3.0, 9.0]]", "[[4.0], [7.0, 9.0]]", r"matrix\[[01]\] = .*E[CA]0[YZ] and others"),
         ('"EC0Y", "EA0Z"]', '"EC0X", "EA0Z"]', 'keys = "EC0X": is zero by definition'),
-        ("matrix", 'untold = ["EC0X"]\nmatrix', 'keys = "EC0X": is zero by definition'),
-        ("matrix", 'untold = ["EA0Z"]\nmatrix', 'keys = "EA0Z": expected each error once'),
-        ("matrix", 'untold = ["EA0Q"]\nmatrix', "EA0Q: unknown error parameter"),
+        ("matrix", 'undetermined = ["EC0X"]\nmatrix', 'keys = "EC0X": is zero by definition'),
+        ("matrix", 'undetermined = ["EA0Z"]\nmatrix', 'keys = "EA0Z": expected each error once'),
+        ("matrix", 'undetermined = ["EA0Q"]\nmatrix', "EA0Q: unknown error parameter"),
         ("matrix", "lack_of_fit = -1\nmatrix", "lack_of_fit = -1: expected at least 0"),
         ("matrix", "reach = { X = [5, 4] }\nmatrix", r"reach.X = \[5, 4\]: expected"),
     ],
