@@ -59,7 +59,7 @@ run,direction,X [mm],EXX [um],ECX [urad]
 """
 """A file that is imported."""
 SETTLED_MS, PAUSE_MS, PATIENCE_MS = 3000, 400, 60_000
-COLOURS = 256
+COLOURS, WIDE = 256, 2000  # of a picture; pixels from which on steps of colours are not seen
 
 
 @dataclass(frozen=True)
@@ -279,7 +279,8 @@ def with_few_colours(shot: Image.Image) -> Image.Image:
     """Make a picture small; its colours stay smooth."""
     # the median cut would merge the colours of the scale, of which there are few pixels
     palette = shot.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=1)
-    return shot.quantize(COLOURS, palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
+    dither = Image.Dither.FLOYDSTEINBERG if shot.width < WIDE else Image.Dither.NONE
+    return shot.quantize(COLOURS, palette=palette, dither=dither)
 
 
 def main() -> None:

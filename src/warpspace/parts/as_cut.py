@@ -120,7 +120,6 @@ def _between(scene: Scene, part: PartMesh, made: Made) -> float:
 
 
 def _off(part: PartMesh, made: Made, *errors_um: Array) -> Iterator[Off]:
-    """Sum errors of the vertices up, [V, 3] each."""
     from trimesh import triangles
 
     spans = np.array([[np.inf, -np.inf]] * len(errors_um))

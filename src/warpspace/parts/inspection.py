@@ -396,7 +396,6 @@ def _numbers(
 
 
 def _read(source: str, text: str, shapes: Sequence[Shape], names: list[str]) -> Wanted:
-    """Read tolerances, and names of features into the list of them; refuse what does not fit."""
     problems, raw = schema.Problems(), parse_toml(text, source)
     entries: Sequence[Any] = (problems.read(schema.FEATURES, "", raw) or {}).get("features", ())
     known, wanted = {name: at for at, name in enumerate(names)}, Wanted()
@@ -427,7 +426,6 @@ def _read(source: str, text: str, shapes: Sequence[Shape], names: list[str]) -> 
 
 
 def _wrong(entry: Mapping[str, Any], shapes: Sequence[Shape]) -> str:
-    """Say why features do not have the measure of an entry; nothing where they do."""
     name, count = entry["measure"], len(shapes) - 1
     bands = entry["tolerance_um"], entry["tolerance_urad"]
     if not name:

@@ -156,7 +156,6 @@ def isoline_pieces(picture: Picture) -> Pieces:
 
 
 def _joined(parts: list[Pieces]) -> Pieces:
-    """Put pieces of line together; one without length where there are none (viser wants some)."""
     kept = [part for part in parts if len(part)]
     if not kept:
         return np.zeros((1, 2, 3), np.float32)

@@ -149,7 +149,6 @@ def machine_of(
 def _check_columns(
     section: Mapping[str, str], axes: Sequence[str], key: str, problems: Problems
 ) -> None:
-    """Refuse a name in data that two axes would answer to."""
     named = {axis: section.get(axis, axis).lower() for axis in axes}
     for axis, name in section.items():
         others = [other for other in axes if other != axis and named[other] == name.lower()]

@@ -77,8 +77,6 @@ def _span(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
 
 
 def _by_name(kind: Kind, known: Collection[str] = ()) -> Kind:
-    """Take a table of any names, or of those that are known."""
-
     def read(reader: ValueReader, value: Any, path: Path) -> dict[str, Any]:
         table = reader.dictionary(value, path)
         names = known or table
@@ -89,8 +87,6 @@ def _by_name(kind: Kind, known: Collection[str] = ()) -> Kind:
 
 
 def _text(longest: int, least: int = 0, only: str = "", words: str = "") -> Kind:
-    """Take a text; `only` is an expression that it must fit, `words` say it."""
-
     def read(reader: ValueReader, value: Any, path: Path) -> str:
         found = reader.text(value, path, longest, least)
         if only and not re.fullmatch(only, found):
@@ -101,8 +97,6 @@ def _text(longest: int, least: int = 0, only: str = "", words: str = "") -> Kind
 
 
 def _choice(names: Callable[[], Iterable[object]], words: str = "{} or {}") -> Kind:
-    """Take one of some values: spelled "a", "b" or "c", or with words for all of them."""
-
     def read(reader: ValueReader, value: Any, path: Path) -> Any:
         known = list(names())
         is_alike = isinstance(value, bool) == isinstance(known[0], bool)  # True and 1 are equal

@@ -134,7 +134,6 @@ def _usual_camera(picture: LivePicture) -> CameraMemory:
 
 
 def _export(step: Step, shapes: Shapes) -> str:
-    """Export the 3-D scene of a step as a page of its own, without a word around it."""
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
@@ -227,7 +226,6 @@ def _build_page(title: str, steps: Sequence[Step], shapes: Shapes, about: About)
 
 
 def _step_pieces(step: Step, title: str) -> tuple[Markup, Markup, Markup]:
-    """Say what a step shows: at the head of the page, beside the drawing, and below."""
     picture, errors = step.picture, _error_rows(step.picture)
     kept = "" if picture.is_difference else f" · {legend.kept_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)

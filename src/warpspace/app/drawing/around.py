@@ -105,7 +105,6 @@ def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Sha
 
 
 def _part(picture: LivePicture) -> Shapes:
-    """Draw the part as cut, its creases, those of the nominal one, and what is out of reach."""
     part, ghost, state = picture.part, colour(picture, "ghost"), picture.state
     if part is None:
         return {}
@@ -124,7 +123,6 @@ def _part(picture: LivePicture) -> Shapes:
 
 
 def _program(picture: LivePicture) -> Shapes:
-    """Draw the path of a program, nominal and actual, and the end of the line that is asked for."""
     path = picture.path
     if path is None:
         return {}

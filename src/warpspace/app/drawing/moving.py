@@ -91,7 +91,6 @@ class MovingLayer:
         self._draw_turning()
 
     def _gizmo(self, picture: LivePicture) -> Shapes:
-        """Draw arrows and arcs that move the part; lines of the nominal one go with them."""
         if picture.part is None or not picture.state.part.moved:
             return {}
         part, size = picture.part, GIZMO_SIZE * picture.size_mm * SCENE_PER_MM

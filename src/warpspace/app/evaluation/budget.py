@@ -92,7 +92,6 @@ def pick_worst(picture: LivePicture) -> Picked:
 def _on_surfaces(
     picture: LivePicture, origin: Array, unit: Array
 ) -> Iterator[tuple[Picked, float]]:
-    """Intersect the drawn surface, or the slices; give points and their distances, mm."""
     for one in picture.slices or (picture,):
         surface, points = one.topology.surface, one.drawn_mm.reshape(-1, 3)
         solid = points[surface.nodes], surface.triangles, surface.nodes
@@ -110,7 +109,6 @@ def _on_surfaces(
 
 
 def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tuple[Picked, float]]:
-    """Look for points of the drawn traces; give them and their distances, mm."""
     for lines in picture.traces:
         drawn = [number for number, line in enumerate(lines.each()) if is_moved(line)]
         dense = _denser(lines.actual_mm[drawn])

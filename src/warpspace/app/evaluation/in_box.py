@@ -84,7 +84,6 @@ def _in_box(
 
 
 def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> InBox[T]:
-    """Work out what does not depend on errors."""
     count, keys = len(made.point_mm), scene.parameter_keys
     if count > MOST_POINTS:
         raise OptionError(f"{count:,} points; expected at most {MOST_POINTS:,} in the app")

@@ -149,7 +149,6 @@ def _moved(machine: description.Machine, what: str, axis: str) -> description.Ch
 
 
 def _rearrange(raw: Tables, scene: Scene, chain: description.Chain) -> None:
-    """Give a scene another chain; the tool moves over the workpiece as before."""
     machine = scene.machine
     raw["machine"]["chain"] = str(chain)
     spanned = find_volume_axes({a: r for a, r in scene.workspace.ranges.items() if a in chain.axes})
@@ -215,7 +214,6 @@ def _read(scene: Scene, raw: Tables, like: description.Machine) -> tuple[Scene, 
 
 
 def _without(table: Tables, axes: Collection[str]) -> Tables:
-    """Leave out all that belongs to axes."""
     kept = {
         key: _without(value, axes) if isinstance(value, dict) else value
         for key, value in table.items()
@@ -241,7 +239,6 @@ def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
 
 
 def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
-    """Name what goes with axes."""
     for axis in gone:
         depend = [key for key in scene.errors if axis in scene.errors.arguments(key)]
         parts = {

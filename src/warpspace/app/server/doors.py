@@ -169,7 +169,6 @@ class Doors:
 
 
 def _words(asked: Request, *names: str) -> list[str]:
-    """Give what the query of a request says of names."""
     query = asked.path.partition("?")[2]
     return [value for key, value in parse_qsl(query, keep_blank_values=True) if key in names]
 

@@ -320,7 +320,6 @@ class Session:
             context.act(partial(self._clicked, event.ray_origin, event.ray_direction))
 
     def _clicked(self, origin: object, direction: object) -> None:
-        """Take a click on the drawing."""
         context, picture = self.context, self.context.shown
         if picture is None or context.telling is not None:
             return
@@ -333,7 +332,6 @@ class Session:
             context.post(lambda state: with_clicked(state, found[0]))
 
     def _hear(self, event: Event) -> None:
-        """Take note of what a page says of itself."""
         if event.word == "drawn" and self._around_at is not None:
             self._around_at = 0.0
         if event.word != "here" or self._is_known:

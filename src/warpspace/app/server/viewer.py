@@ -289,7 +289,6 @@ class Viewer:
             return tuple(self._sessions.values())
 
     def _warm(self) -> None:
-        """Do before the first tab what it would have to wait for."""
         surface(self._live.evaluate(self._start))
 
     async def _connect(self, client: viser.ClientHandle) -> None:

@@ -298,8 +298,6 @@ class AnalysisPart(Section):
             self._run(state)
 
     def _make(self, words: str, make: Callable[[Job], T], take: Callable[[T], None]) -> None:
-        """Make something beside the session, which then takes it."""
-
         def work(job: Job) -> None:
             made = make(job)
             if not job.is_set():
@@ -346,7 +344,6 @@ def _endings(found: Result) -> tuple[str, ...]:
 
 
 def _change_html(state: AppState, change: Change) -> Markup:
-    """Set a proposed scene beside the present one: errors, max and mean from and to."""
     now = without_table(plain_state(state))
     then = applied(now, change.scene)
     moved: list[tuple[float, str]] = []

@@ -77,7 +77,6 @@ def _is_wide(block: Block) -> bool:
 
 
 def _turned(table: Table) -> Table:
-    """Set the rows of a wide table beside each other where these are few."""
     if not _is_wide(table) or not 0 < len(table.rows) < WIDEST:
         return table
     (first, *names), *lines = zip(table.shown, *table.cells(), strict=True)

@@ -227,7 +227,6 @@ class ComparePart(Part):
 
 
 def _own_sides(state: AppState) -> dict[str, Side]:
-    """Give what can be compared beside scenes, by title."""
     chosen = state.comparison
     used = (Side(), chosen.pinned, chosen.a, chosen.b)
     return {side.title: side for side in used if side is not None}

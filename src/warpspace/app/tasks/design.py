@@ -203,7 +203,6 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
 
 
 def _sampled(state: AppState) -> Question:
-    """Give all that machines depend on before their tolerances are known."""
     wanted = state.specification
     moving = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
     return (Identity(state.scene), state.seen, wanted.over, wanted.distribution, moving)

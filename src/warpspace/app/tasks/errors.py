@@ -413,7 +413,6 @@ def _row(
 
 @lru_cache(maxsize=128)
 def _row_template(row: Parameter, span: Span, hint: str, active: bool) -> str:
-    """Write a row with the places of the numbers that change while it is dragged."""
     key, name, text = row.key, f"errors:set.{row.key}", Markup("{text}")
     hint = f"{row.name}: {hint}. Drag, or type a number.".replace("{", "{{").replace("}", "}}")
     head = fill(
@@ -452,7 +451,6 @@ def _spans(state: AppState) -> dict[str, Span]:
 
 
 def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
-    """Give the RMS effect in the volume of a unit of each error alone, µm."""
     basis = grid_basis(state.scene, picture.grid, picture.view)
     squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
     rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))

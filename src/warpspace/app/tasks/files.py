@@ -128,7 +128,6 @@ class FilesWindow(JobWindow):
     # --- what is opened --------------------------------------------------------------------------
 
     def _open(self, value: str) -> None:
-        """Open a scene or a machine, or show what a file of measured data would bring."""
         told = value.partition("\n")[2].partition("\n")[0].lower()
         if part := next((part for part, ends in files.IN_BOX.items() if told.endswith(ends)), ""):
             self.context.send(f"{part}:file", value)

@@ -258,7 +258,6 @@ def _writable() -> dict[str, str]:
 
 
 def _is_rounding(found: Compensation) -> bool:
-    """Tell whether nothing but the rounding of the file is left."""
     return found.after_statistics.max_um <= max(RESOLUTION_UM, 1000.0 * found.resolution)
 
 

@@ -137,7 +137,6 @@ def _trace(picture: LivePicture) -> Markup:
 
 
 def _numbers(name: str, motion: AxisMotion | None) -> Markup:
-    """Write a trace in two lines, since its name is long."""
     cells = ["on the axis"]
     if motion is not None:
         axis = (f"{one.once_a_turn:.2f}" for one in (motion.radial, motion.tilt))

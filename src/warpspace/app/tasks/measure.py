@@ -331,7 +331,6 @@ class CalibratePart(FilesPart):
     # --- arrows ----------------------------------------------------------------------------------
 
     def _arrow_words(self) -> str:
-        """Draw the arrows, or none, and say what is drawn."""
         picture, found, words = self.context.shown, None, ""
         shapes: Shapes = {}
         if self._answer and self.question(self.context.state) in (self._answer[0], self._applied):

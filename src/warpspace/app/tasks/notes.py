@@ -152,7 +152,6 @@ class NotesPart(Part):
 def _opened(
     state: AppState, what: str, kind: str = "note", place: str = "point", text: str = ""
 ) -> AppState:
-    """Open the list, or a form in it with what stands there at first."""
     page = replace(state.page, notes=what, note_kind=kind, note_place=place, note_text=text)
     return replace(state, page=page)
 
@@ -162,7 +161,6 @@ def _author(state: AppState) -> str:
 
 
 def _about(state: AppState, note: Note, do: str, value: str) -> AppState:
-    """Do what an event asks of one note."""
     heads, changed = (note, *note.versions), note
     match do:
         case "delete":
@@ -223,7 +221,6 @@ def _taken_back(state: AppState, note: Note) -> AppState:
 
 
 def _changed(before: AppState, after: AppState) -> dict[str, Pair]:
-    """Give from and to of each error and tolerance that differs."""
     found = {
         path.removeprefix(AMPLITUDES): (stored(before, path) or 0.0, stored(after, path))
         for path in leaves(after)
@@ -261,7 +258,6 @@ def _form(state: AppState, edited: str) -> Markup:
 
 
 def _said(one: Note | Reply) -> Markup:
-    """Give what somebody has written, a paragraph a line, and who and when it was."""
     lines = (tag("p", linked(line)) for line in one.text.splitlines() if line.strip())
     by = f"{one.author or 'somebody'}, {one.date:%d %b %Y}"
     return join((*lines, tag("small", by, class_="ws-quiet")))
@@ -288,7 +284,6 @@ def _entry(number: int, note: Note, steps: Sequence[Note]) -> Markup:
 
 
 def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
-    """Give what can be done with a note; while versions stand side by side, nothing changes it."""
     is_done, free = note.status == "done", not note.versions
     place = steps.index(note) if note.step else 0
     rows = (

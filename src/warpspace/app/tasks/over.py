@@ -159,7 +159,6 @@ def _scene(point_mm: Array) -> list[float]:
 
 @lru_cache(maxsize=32)
 def _words(labels: Identity) -> list[dict[str, Any]]:
-    """Spell labels that stay the same from picture to picture."""
     return list(map(_word, labels.thing))
 
 

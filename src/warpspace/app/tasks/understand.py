@@ -122,7 +122,6 @@ def _axes(found: Answer) -> str:
 
 
 def _contributions(found: Answer) -> Markup:
-    """Say the largest, and what all else comes to; together they are the error."""
     first, others = found.ranked[:FIRST], len(found.ranked[FIRST:])
     left = found.length_um - sum(part.along_um for part in first)
     # their names stand in the column of errors
