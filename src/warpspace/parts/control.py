@@ -10,8 +10,8 @@ and rotary axes swing the tip. **With it** (G43.4 to G49) X, Y, Z are the tip on
 point of the workpiece frame where the tip is with these words at rotary axes zero. The tip then
 runs along lines and arcs of the workpiece, rotary axes turn in proportion, linear axes follow.
 
-The path begins where straight blocks have named all linear axes that they name: nobody knows where
-these stood before.
+The path begins where straight blocks have named all linear axes, or feed one that was named before:
+nobody knows where the others stood.
 G28 goes to axis positions zero, or to the end of the travel that is nearest.
 """
 
@@ -364,6 +364,8 @@ class Control:
             self.first = len(self.rows) // self.width
         elif before == self.at:
             kind = STAND
+        elif kind == FEED:  # from here on it is cut
+            self.unnamed.clear()
         self.record(kind)
         self.switch(tcp=tcp, length_mm=self.length_mm)
 
@@ -373,6 +375,7 @@ class Control:
             self.fail(f"an arc in {names}; expected axes of {self.scene.machine.chain}")
         start = complex(*(self.at[self.index[x]] for x in names))
         self.at = [to.get(index, at) for index, at in enumerate(self.at)]
+        self.unnamed.clear()
         end = complex(*(self.at[self.index[x]] for x in names))
         sense = 1.0 if self.motion == "G3" else -1.0
         if "R" in words:  # of the longer arc where it is negative

@@ -231,6 +231,8 @@ def test_the_way_from_an_unknown_place_does_not_count(dvf: Scene):
     assert found.length_mm == pytest.approx(40.0, abs=1e-9)
     assert found.read.blocks == 3
     assert found.path.line[0] == 3
+    _, late = run(dvf, "G0 X250 Y200\nG1 X240\nG0 Z-270")  # Z is named once all is cut
+    assert np.linalg.norm(late.step_mm, axis=1).sum() == pytest.approx(20.0, abs=1e-9)
     _, plane = run(dvf, "G0 X250\nY200\nG1 X240")  # Z stands as in the scene
     assert np.linalg.norm(plane.step_mm, axis=1).sum() == pytest.approx(10.0, abs=1e-9)
 
