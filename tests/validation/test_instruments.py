@@ -318,7 +318,11 @@ def held_by_planted_machines(name, trials):
 
 @pytest.mark.parametrize(
     ("keys", "session"),
-    [(("EC0Y",), ""), (("EC0Y",), "one"), (("EC0Y", "EXX:ramp", "EYY:ramp", "EZZ:ramp"), "one")],
+    [
+        pytest.param(("EC0Y",), "", marks=pytest.mark.nightly),
+        pytest.param(("EC0Y",), "one", marks=pytest.mark.nightly),
+        (("EC0Y", "EXX:ramp", "EYY:ramp", "EZZ:ramp"), "one"),
+    ],
 )
 def test_readings_that_share_errors_with_those_fitted_lie_inside_their_intervals(
     own, keys, session

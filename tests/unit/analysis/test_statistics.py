@@ -113,7 +113,7 @@ def test_sampled_machines_scatter_by_it_around_the_errors():
 def test_over_all_points_each_machine_keeps_its_own_errors(over):
     text = (
         HEAD
-        + "[errors]\nEXX = { ramp = 50 }\n[uncertainty]\nEXX = { table = [[-100, 0], [100, 3]] }\n"
+        + "[errors]\nEXX = { ramp = 50 }\n[uncertainty]\nEXX = { table = [[-100, 0.1], [100, 3]] }\n"
     )
     result = montecarlo(
         uncertain_case(parse_scene(text, "s"), Plan(samples=5000, over=over, nodes=5))

@@ -58,9 +58,10 @@ def random_scene(seed: int) -> Scene:
     return parse_scene("\n".join(text), "random")
 
 
+@pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("tcp", ["always", "never"])
-def test_a_hundred_machines_cut_the_nominal_points(tcp: str):
-    for seed in range(100):
+def test_random_machines_cut_the_nominal_points(tcp: str, count: int):
+    for seed in range(count):
         scene = random_scene(seed)
         turn = next(axis for axis in "ABC" if axis in scene.machine.axes)
         lines = [
