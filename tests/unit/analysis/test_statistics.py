@@ -111,10 +111,8 @@ def test_sampled_machines_scatter_by_it_around_the_errors():
 
 @pytest.mark.parametrize("over", ["max", "mean"])
 def test_over_all_points_each_machine_keeps_its_own_errors(over):
-    text = (
-        HEAD
-        + "[errors]\nEXX = { ramp = 50 }\n[uncertainty]\nEXX = { table = [[-100, 0.1], [100, 3]] }\n"
-    )
+    stated = "[uncertainty]\nEXX = { table = [[-100, 0.1], [100, 3]] }\n"
+    text = HEAD + "[errors]\nEXX = { ramp = 50 }\n" + stated
     result = montecarlo(
         uncertain_case(parse_scene(text, "s"), Plan(samples=5000, over=over, nodes=5))
     )
