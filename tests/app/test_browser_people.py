@@ -149,8 +149,9 @@ def serious(tab):
     ]
 
 
-def test_a_screen_reader_finds_landmarks_headings_and_names(tab):
-    for dark in (False, True):
+@pytest.mark.parametrize("themes", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_a_screen_reader_finds_landmarks_headings_and_names(tab, themes):
+    for dark in (False, True)[:themes]:
         if dark:
             tab.press("m")
             tab.page.wait_for_selector("html.ws-dark")

@@ -80,6 +80,7 @@ def test_a_foreign_page_gets_neither_socket_nor_frame_nor_text(page):
         end_work(viewer)
 
 
+@pytest.mark.nightly
 def test_a_tab_with_the_token_lives_on(browser):
     """Its page, its websocket, a reload without the token's address, its links."""
     scene = load_scene("dvf5000_first")

@@ -321,7 +321,9 @@ def held_by_planted_machines(name, trials):
     [
         pytest.param(("EC0Y",), "", marks=pytest.mark.nightly),
         pytest.param(("EC0Y",), "one", marks=pytest.mark.nightly),
-        (("EC0Y", "EXX:ramp", "EYY:ramp", "EZZ:ramp"), "one"),
+        pytest.param(
+            ("EC0Y", "EXX:ramp", "EYY:ramp", "EZZ:ramp"), "one", marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_readings_that_share_errors_with_those_fitted_lie_inside_their_intervals(
