@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from app.frames import new_visitor
