@@ -83,7 +83,7 @@ class Part(OfPart):
         made = make_points(scene, part.vertices_mm)
         watch(0.5)
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        between = _between(scene, part, made)
+        between = 0.0 if is_large else _between(scene, part, made)
         unseen = between if between > SEEN_UM else 0.0
         fit = partial(fit_out, made.point_mm)
         cut, placed = _off(part, made, made.error_um, fit(made.error_um))
@@ -162,7 +162,7 @@ class PartResult(Off, Result):
             yield f"between its vertices {off}: expected a finer mesh"
         if (count := len(self.part.triangles)) > MAX_FEATURE_TRIANGLES:
             most = f"up to {MAX_FEATURE_TRIANGLES:,}"
-            yield f"{count:,} triangles: features, and U95, are looked for in {most}"
+            yield f"{count:,} triangles: features, U95 and errors amid edges: in {most}"
 
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.deviation.max_at_mm
