@@ -227,6 +227,8 @@ class FieldDoubt:
     @cached_property
     def covariance_um2(self) -> Array:
         """Covariance of the position errors, [..., 3, 3]."""
+        if len({*self.doubt.factors.tolist()}) == 1:  # no second product on each slider move
+            return self.expanded_um2 / self.doubt.factor**2
         return _carry(self.doubt.covariance, self.response)
 
     @property

@@ -9,8 +9,9 @@ small moves of them in first order. A measure is taken on the part as it lies in
 errors are half as large, so that the parts add up.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -248,7 +249,8 @@ KINDS: Mapping[str, Kind] = {
     "parallelism": Kind(_angle, SHAPES[:3], (1, 1), is_angle=True),
 }
 Band: TypeAlias = tuple[float, float] | None  # a tolerance, µm or µrad
-Wanted = dict[tuple[str, tuple[int, ...]], Band]  # by kind of measure and numbers of features
+Measure: TypeAlias = tuple[str, tuple[int, ...]]  # its kind, and numbers of features
+Wanted = dict[Measure, Band]
 
 
 @dataclass(frozen=True)
@@ -276,8 +278,6 @@ def inspect(
     Tolerances are the name and the text of a TOML file that names features and says what they have
     to keep; SceneError says all that is wrong with it.
     """
-    from scipy.spatial.transform import Rotation
-
     known, points = find_features(mesh), mesh.vertices_mm
     names, features, shapes = [*known], known.values(), [one.shape for one in known.values()]
     wanted: Wanted = {
@@ -290,17 +290,7 @@ def inspect(
         wanted |= _read(*tolerances, shapes, names)
     if not wanted:
         return ()
-    arms = (at - at.mean(axis=0) for at in (made.point_mm, points))
-    turn = Rotation.align_vectors(*arms)[0].as_matrix()  # from the part to the workpiece
-
-    def take(move_um: Array) -> Array:  # [F, V, 3] → [F, m], µm or µrad
-        motions = [one.follow(move_um) for one in features]
-        found = np.empty((len(move_um), len(wanted)))
-        for index, (kind, of) in enumerate(wanted):
-            taken = KINDS[kind].take(*(motions[at] for at in of))
-            found[:, index] = taken * (URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM)
-        return found
-
+    turn, take = _turn(mesh, made), partial(_take, features, wanted)
     errors = [made.error_um]
     if any(wanted.values()):
         at = made.coordinates
@@ -341,22 +331,32 @@ def measure_changes(
 
     Placed, µm or µrad; the moves are in the workpiece frame.
     """
+    known = find_features(mesh)
+    every = _read(*tolerances, [one.shape for one in known.values()], [*known])
+    wanted = [measure for measure, band in every.items() if band]
+    moved = np.array([made.error_um, *moves_um]) @ _turn(mesh, made)
+    here, *steps = fit_out(mesh.vertices_mm, moved)
+    both = (here + sign * NUDGE * np.array(steps) for sign in (-1.0, 1.0))
+    low, high = (_take(known.values(), wanted, move) for move in both)
+    return (high - low) / (2.0 * NUDGE)
+
+
+def _turn(mesh: PartMesh, made: Made) -> Array:
+    """Give the rotation from the frame of a part to the workpiece, [3, 3]."""
     from scipy.spatial.transform import Rotation
 
-    known, points = find_features(mesh), mesh.vertices_mm
-    wanted = _read(*tolerances, [one.shape for one in known.values()], [*known])
-    arms = (at - at.mean(axis=0) for at in (made.point_mm, points))
-    turn = Rotation.align_vectors(*arms)[0].as_matrix()  # from the part to the workpiece
-    placed = fit_out(points, np.array([made.error_um, *moves_um]) @ turn)
-    here, steps = placed[0], NUDGE * placed[1:]
-    ends = [[one.follow(here + sign * steps) for one in known.values()] for sign in (-1.0, 1.0)]
-    columns = [np.zeros((len(moves_um), 0))]
-    for (kind, of), band in wanted.items():
-        if band:
-            low, high = (KINDS[kind].take(*(motions[at] for at in of)) for motions in ends)
-            unit = URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM
-            columns.append((high - low)[:, None] * unit / (2.0 * NUDGE))
-    return np.hstack(columns)
+    arms = (at - at.mean(axis=0) for at in (made.point_mm, mesh.vertices_mm))
+    return Rotation.align_vectors(*arms)[0].as_matrix()
+
+
+def _take(features: Collection[Feature], wanted: Collection[Measure], move_um: Array) -> Array:
+    """Take measures, (m,), of features that follow moves, [F, V, 3]; [F, m], µm or µrad."""
+    motions = [one.follow(move_um) for one in features]
+    found = np.empty((len(move_um), len(wanted)))
+    for index, (kind, of) in enumerate(wanted):
+        taken = KINDS[kind].take(*(motions[at] for at in of))
+        found[:, index] = taken * (URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM)
+    return found
 
 
 def _numbers(
