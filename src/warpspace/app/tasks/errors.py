@@ -451,6 +451,7 @@ def _spans(state: AppState) -> dict[str, Span]:
 
 
 def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
+    """Give the RMS effect in the volume of a unit of each error alone, µm."""
     basis = grid_basis(state.scene, picture.grid, picture.view)
     squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
     rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))

@@ -178,6 +178,7 @@ def _bodies(own: dict[str, BodySource]) -> Markup:
 
 
 def _source(source: BodySource) -> str:
+    """Say where a body comes from; of a file its name alone, never its folder."""
     file = f"{source.file} · {source.unit or 'unit of its format'}"
     words = [f"shape {source.shape}" if source.shape else file]
     placed = {"offset {} mm": source.offset_mm, "turned {} °": source.rotation_deg}

@@ -284,6 +284,7 @@ def _entry(number: int, note: Note, steps: Sequence[Note]) -> Markup:
 
 
 def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
+    """Give what can be done with a note; while versions stand side by side, nothing changes it."""
     is_done, free = note.status == "done", not note.versions
     place = steps.index(note) if note.step else 0
     rows = (
