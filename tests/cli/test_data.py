@@ -1,5 +1,6 @@
 """Measured data on the command line: the commands test, calibrate and import."""
 
+import csv
 import itertools
 import re
 
@@ -134,14 +135,16 @@ def test_fields_have_a_direction_and_an_uncertainty(warpspace, tmp_path):
     field = ("field", path, "--at", "X=275", "--json")
     (point,) = warpspace(*field, "--direction", "difference").json["points"]
     assert point["error_um"] == pytest.approx([0.0, 1.0, 0.0])
-    told = warpspace(*field, "--uncertainty").json  # of EC0Y nothing is stated
-    assert (told["unknown"], "uncertainty_um" in told["points"][0]) == (["EC0Y"], False)
+    told = warpspace(*field).json  # of EC0Y nothing is stated
+    assert (told["unknown"], "u95_um" in told["points"][0]) == (["EC0Y"], False)
     path.write_text(SCENE.replace("EC0Y = 20\n", ""))
-    (point,) = warpspace(*field, "--uncertainty").json["points"]
-    assert point["uncertainty_um"] == pytest.approx([0.0, 0.5, 0.0], abs=1e-12)
-    run = ("montecarlo", path, "--from", "uncertainty", "--samples", "500", "--json")
-    found = warpspace(*run).json
-    assert (found["from"], found["distribution"]) == ("uncertainty", "normal")
+    (point,) = warpspace(*field).json["points"]
+    assert point["u95_um"] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
+    table = tmp_path / "points.csv"
+    result = warpspace("field", path, "--grid", "3", "--json", "--csv", table)
+    assert all(point["u95_norm_um"] == pytest.approx(1.0) for point in result.json["points"])
+    rows = csv.DictReader(table.read_text("utf-8").splitlines())
+    assert {float(row["u95_R_y_um"]) for row in rows} == {1.0}
     table = tmp_path / "f.csv"
     warpspace("export", str(path), "-o", str(table), "--grid", "2", "--direction", "difference")
     assert "reversal: forward − backward" in table.read_text("utf-8")

@@ -299,9 +299,9 @@ def held_by_planted_machines(name, trials):
         axes = complete_coordinates(scene.machine, CORNER, scene.workspace.positions)
         own, wanted = (evaluate(one, at=CORNER) for one in (found.scene, truth))
         sure = field_doubt(found.scene, own.error_um, axes, scene.view())
-        off, k = own.error_um - wanted.error_um, sure.doubt.factor
-        held["point"] += list(np.abs(off) <= k * sure.u_um)
-        held["norm"].append(abs(own.norm_um - wanted.norm_um) <= k * sure.u_norm_um)
+        off = own.error_um - wanted.error_um
+        held["point"] += list(np.abs(off) <= sure.u95_um)
+        held["norm"].append(abs(own.norm_um - wanted.norm_um) <= sure.u95_norm_um)
         # as likely at any distance from the true |E|, up to four standard uncertainties
         away = np.linspace(-4.0, 4.0, LIMITS + 1)[:-1] + np.random.default_rng(seed).uniform(
             0.0, 8.0 / LIMITS

@@ -11,7 +11,6 @@ from warpspace.analysis.contributions import expected_square
 from warpspace.analysis.distribution import build_draws, loop_keys
 from warpspace.analysis.machines import case_of
 from warpspace.analysis.montecarlo import montecarlo
-from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
 
 MEANS = [
@@ -61,12 +60,12 @@ def test_max_over_the_corners_is_the_max_over_the_grid():
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
-    from warpspace.analysis.cases import Over, Site, node_gains, reduce_nodes
+    from warpspace.analysis.cases import Case, Over, reduce_nodes
 
-    site = Site(scene.model, scene.workspace, Loop.TOOL)
+    case = Case(scene.model, draws, scene.workspace)
     machines = draws.draw(np.random.default_rng(0), 500)
     found = [
-        reduce_nodes(machines, node_gains(scene.model, keys, View(), find(7)), Over.MAX)
-        for find in (site.extreme, site.spread)
+        reduce_nodes(machines, case.responses(find(7)), Over.MAX)
+        for find in (case.site.extreme, case.site.spread)
     ]
     np.testing.assert_allclose(found[0], found[1], rtol=1e-12)

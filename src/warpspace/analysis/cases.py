@@ -5,7 +5,7 @@ number of the block. Whoever evaluates a block, and when, does not change its nu
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -262,14 +262,6 @@ class Plan:
         return np.random.default_rng(stream), min(BLOCK, self.samples - index * BLOCK)
 
 
-def node_gains(model: Model, keys: Sequence[str], view: View, places: Places) -> Array:
-    """Compute the gains of parameters that hold everywhere, [3, K, N], µm per µm or µrad."""
-    model = replace(model, direction=TravelDirection.MEAN)  # gains have none
-    basis = build_basis(model, ErrorSet(), keys, places.coordinates, view, places.point_mm)
-    flat = basis.position.reshape(len(keys), -1, 3)
-    return np.ascontiguousarray(np.moveaxis(flat, -1, 0))
-
-
 def reduce_nodes(
     amplitudes: Array, gains: Array, over: Over | str, weights: Array | None = None
 ) -> Array:
@@ -336,12 +328,13 @@ class Case:
             return LEAST_BLOCKS
         return max(LEAST_BLOCKS, min(self.plan.blocks // TASKS_ASKED, MOST_BLOCKS))
 
-    def machines(self, rng: np.random.Generator, count: int) -> Array:
-        return self.draws.draw(rng, count)
-
     def responses(self, places: Places) -> Array:
-        """Give what each amplitude does at places, [3, K, N], µm per unit."""
-        return node_gains(self.model, self.draws.keys, self.view, places)
+        """Compute what parameters that hold everywhere do at places, [3, K, N], µm per unit."""
+        model = replace(self.model, direction=TravelDirection.MEAN)  # gains have none
+        keys, at = self.draws.keys, places.coordinates
+        basis = build_basis(model, ErrorSet(), keys, at, self.view, places.point_mm)
+        flat = basis.position.reshape(len(keys), -1, 3)
+        return np.ascontiguousarray(np.moveaxis(flat, -1, 0))
 
     def common_places(self) -> Places:
         """Give the points that the largest, or the mean, of each machine is taken over."""
@@ -354,7 +347,7 @@ class Case:
             site = self.site
 
             def one_point_each(rng: np.random.Generator, count: int) -> Array:
-                amplitudes = self.machines(rng, count)
+                amplitudes = self.draws.draw(rng, count)
                 gains = self.responses(site.random(rng, count))
                 return np.sqrt(
                     sum((np.einsum("nk,kn->n", amplitudes, gain) ** 2) for gain in gains)
@@ -365,7 +358,7 @@ class Case:
         gains = self.responses(places)
 
         def all_points_each(rng: np.random.Generator, count: int) -> Array:
-            return reduce_nodes(self.machines(rng, count), gains, over, places.weights)
+            return reduce_nodes(self.draws.draw(rng, count), gains, over, places.weights)
 
         return all_points_each
 
@@ -375,7 +368,7 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     model = replace(case.model, direction=TravelDirection.MEAN)
     view, loop = case.view, case.view.loop
     rng, most = case.plan.block(0)
-    amplitudes = case.machines(rng, most)[:count]
+    amplitudes = case.draws.draw(rng, most)[:count]
     if case.plan.over == Over.SAMPLED:
         places = case.site.random(rng, most)
         axes = {

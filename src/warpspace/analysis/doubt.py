@@ -18,8 +18,8 @@ import numpy as np
 
 from warpspace.analysis.distribution import loop_axes
 from warpspace.analysis.statistics import P95, Summary
-from warpspace.field.evaluate import ErrorBasis, View, build_basis
-from warpspace.field.grid import DEFAULT_NODES, build_grid
+from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
+from warpspace.field.grid import DEFAULT_NODES, build_grid, cut, pieces
 from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import parameter
 from warpspace.machine.errors import Covariance, ErrorFunction, ErrorSet, Table
@@ -113,13 +113,9 @@ class Doubt:
         below, above = (t.cdf((end - value) / unit, self.freedom) for end in (low, high))
         return above - below
 
-    def draw(self, rng: np.random.Generator, count: int, unit: Array | None = None) -> Array:
-        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom.
-
-        Independent numbers of mean zero and variance one may be given for normal ones.
-        """
-        unit = rng.standard_normal((count, len(self.keys))) if unit is None else unit
-        found = unit @ self.root.T
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom."""
+        found = rng.standard_normal((count, len(self.keys))) @ self.root.T
         for freedom in {*self.freedoms.tolist()} - {np.inf}:
             found[:, self.freedoms == freedom] *= np.sqrt(
                 freedom / rng.chisquare(freedom, (count, 1))
@@ -232,20 +228,9 @@ class FieldDoubt:
         return _carry(self.doubt.covariance, self.response)
 
     @property
-    def u_um(self) -> Array:
-        """Standard uncertainty of the components of position errors, [..., 3]."""
-        return _root(np.diagonal(self.covariance_um2, axis1=-2, axis2=-1))
-
-    @property
     def u_norm_um(self) -> Array:
         """Standard uncertainty of |E|, [...]."""
         return self._along(self.covariance_um2)
-
-    @property
-    def u_urad(self) -> Array:
-        """Standard uncertainty of the components of orientation errors, [..., 3]."""
-        turning = np.zeros_like(self.response) if self.turning is None else self.turning
-        return _root(np.sum(turning * np.tensordot(self.doubt.covariance, turning, 1), axis=0))
 
     @property
     def u95_um(self) -> Array:
@@ -256,6 +241,17 @@ class FieldDoubt:
     def u95_norm_um(self) -> Array:
         """U95 of |E|, [...]; where that is zero, of the vector."""
         return self._along(self.expanded_um2)
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """U95 of position errors, of their length and of orientation errors, by name."""
+        turning = np.zeros_like(self.response) if self.turning is None else self.turning
+        square = np.sum(turning * np.tensordot(self.doubt.expanded, turning, 1), axis=0)
+        return {
+            "u95_um": self.u95_um,
+            "u95_norm_um": self.u95_norm_um,
+            "u95_orientation_urad": _root(square),
+        }
 
     @cached_property
     def direction(self) -> Array:
@@ -395,6 +391,24 @@ def field_doubt(
         return None
     basis = doubt.respond(scene.model, at, view, point_mm)
     return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
+
+
+def u95_columns(
+    scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
+) -> dict[str, Array]:
+    """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
+    shape, found = field.norm_um.shape, dict[str, Array]()
+    point_mm = None if point_mm is None else np.broadcast_to(point_mm, (*shape, 3))
+    for piece in pieces(shape):
+        here = {name: cut(np.asarray(values), piece) for name, values in at.items()}
+        point = None if point_mm is None else point_mm[piece]
+        one = field_doubt(scene, field.error_um[piece], here, view, point)
+        if one is None or not one.doubt.is_known:
+            break
+        for name, values in one.columns.items():
+            whole = found.setdefault(name, np.empty(shape + values.shape[len(shape) :]))
+            whole[piece] = values
+    return found
 
 
 def combine(

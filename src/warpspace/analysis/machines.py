@@ -1,11 +1,10 @@
-"""Machines within tolerance, or what a measured one may be: the distribution of their |E|."""
+"""Machines within tolerance: the distribution of their |E|."""
 
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from itertools import islice, product
 from math import prod
 from typing import Annotated, Any, TypeAlias
@@ -13,10 +12,8 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_columns
-from warpspace.analysis.cases import DEFAULT_NODES, Case, Over, Plan, both_orders
+from warpspace.analysis.cases import DEFAULT_NODES, Case, Over, both_orders
 from warpspace.analysis.description import Result, Watch, counting, plain
-from warpspace.analysis.distribution import Distribution
-from warpspace.analysis.doubt import find_doubt
 from warpspace.analysis.montecarlo import MonteCarlo, Progress, Take, montecarlo_each
 from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.sampled import SampledMachines
@@ -25,7 +22,7 @@ from warpspace.field.evaluate import SecondOrder, compare_orders
 from warpspace.machine.errors import TOLERANCE_CLASSES
 from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, SWEEP_CASES
 from warpspace.scene.files import parse_number, parse_whole
-from warpspace.scene.model import Scene, second_order
+from warpspace.scene.model import Scene
 
 NUMBERS = {
     "mean": "mean_um", "RMS": "rms_um", "median": "median_um", "P95": "p95_um", "P99": "p99_um",
@@ -38,13 +35,6 @@ WHAT = {
     Over.MAX: "largest |E| of each",
     Over.MEAN: "mean |E| of each",
 }
-
-
-class Source(StrEnum):
-    """What machines are drawn from."""
-
-    TOLERANCES = "tolerances"
-    UNCERTAINTY = "uncertainty"
 
 
 def read_steps(text: str, _scene: Scene) -> tuple[str, tuple[float, ...]]:
@@ -110,10 +100,6 @@ class Machines(SampledMachines):
     With --tolerance there is a row for every combination of half widths, of the same seed, so that
     rows differ by their tolerances only.
 
-    With --from uncertainty the errors of SCENE keep their curves, and each is off by one number
-    times its standard uncertainty along the axis: normal, or uniform with the same standard
-    uncertainty where --distribution says so.
-
     Quantiles are exact up to a million samples; beyond, from a histogram with steps of 0.002 %. The
     numbers of a seed are the same on any number of workers, processes or machines of a cluster.
     """
@@ -136,12 +122,6 @@ class Machines(SampledMachines):
         low=0.0,
         flag="--limit",
         former=("--spec-um", "--limit-um"),
-    )
-    source: Source = option(
-        Source.TOLERANCES,
-        "Machines within the tolerances; or what the measured machine may be: the errors of SCENE,"
-        " each off by its standard uncertainty",
-        flag="--from",
     )
     tolerance: Steps = option(
         (),
@@ -190,7 +170,7 @@ class Machines(SampledMachines):
             asked=self,
             points=tuple(kept),
             rows=tuple(rows),
-            second_order=self._left_out(kept, widest),
+            second_order=sampled_second_order((widest.scene, widest.sampled)),
         )
 
     @property
@@ -216,11 +196,6 @@ class Machines(SampledMachines):
         if (count := self.machines(scenes) // self.samples) > SWEEP_CASES:
             what = "combinations" if steps else "rows"
             raise OptionError(f"{count:,} {what}; expected at most {SWEEP_CASES:,}")
-        if self.source is Source.UNCERTAINTY and (self.clip or steps):
-            name = "clip" if self.clip else "tolerance"
-            raise OptionError(
-                f"{{{name}}} is for tolerances: an uncertainty has no limits; leave it out"
-            )
 
     def points(
         self,
@@ -243,24 +218,12 @@ class Machines(SampledMachines):
                     point = dict(zip(steps, values, strict=True))
                     chosen = with_half_widths(scene, point)
                     waiting.append((chosen, point))
-                    yield self._case(chosen, plan)
+                    yield self.case(chosen, plan)
 
         for sampled in montecarlo_each(
             cases(), workers=workers, executor=executor, progress=progress, take=take
         ):
             yield SweepPoint(*waiting.popleft(), sampled)
-
-    def _case(self, scene: Scene, plan: Plan) -> Case:
-        if self.source is Source.TOLERANCES:
-            return self.case(scene, plan)
-        from warpspace.analysis.measured import uncertain_case
-
-        return uncertain_case(scene, plan, self.loop, self.distribution or Distribution.NORMAL)
-
-    def _left_out(self, points: Sequence[SweepPoint], widest: SweepPoint) -> SecondOrder:
-        if self.source is Source.TOLERANCES:
-            return sampled_second_order((widest.scene, widest.sampled))
-        return max(second_order(point.scene, self.loop) for point in points)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -286,13 +249,12 @@ class MachinesResult(Result):
         if asked.in_rows:
             return {"tolerances": plain(dict(asked.tolerance)), "rows": [*self.rows]}
         if len(self.points) == 1:
-            source = {} if asked.source is Source.TOLERANCES else {"from": str(asked.source)}
-            return _numbers(self.points[0].sampled) | source
+            return _numbers(self.points[0].sampled)
         each = [
             {"scene": one.scene.name, "title": one.scene.title, **_numbers(one.sampled)}
             for one in self.points
         ]
-        return {"scenes": each, "from": str(asked.source)}
+        return {"scenes": each}
 
     def blocks(self) -> Iterator[Block]:
         first = self.points[0]
@@ -342,9 +304,8 @@ class MachinesResult(Result):
             f"  mean {found.mean_um:.2f}, mode {found.mode_um:.1f}, median {found.median_um:.2f},"
             f" P95 {found.p95_um:.2f}, P99 {found.p99_um:.2f}, max {found.max_um:.2f} µm"
         )
-        within = asked.source is Source.TOLERANCES
-        printed = printed_um(scene, found) if within else None
-        if within and asked.over is Over.SAMPLED:
+        printed = printed_um(scene, found)
+        if asked.over is Over.SAMPLED:
             variance, offset = expected_square(case_of(scene, found))
             yield (
                 f"  RMS  {found.rms_um:.2f} µm sampled, {math.sqrt(variance.sum() + offset):.2f} µm"
@@ -361,22 +322,15 @@ class MachinesResult(Result):
         draws = found.draws
         held = [k for k, width in zip(draws.keys, draws.half_width, strict=True) if width == 0.0]
         count = len(draws.keys) - len(held)
-        if within:
-            note = f"; held at their centre: {', '.join(held)}" if held else ""
-            yield f"  {count} parameters drawn{note}"
-            if not found.exact_quantiles:
-                yield "  quantiles to 0.002 % of their value"
-        else:
-            yield f"  {len({*draws.keys})} errors with an uncertainty"
-            doubt = find_doubt(scene, self.asked.loop)
-            yield from (f"  {words}" for words in (doubt.remarks() if doubt else ()))
+        note = f"; held at their centre: {', '.join(held)}" if held else ""
+        yield f"  {count} parameters drawn{note}"
+        if not found.exact_quantiles:
+            yield "  quantiles to 0.002 % of their value"
         yield sampled_histogram(found, scene.title, told, printed)
 
     def _words(self, found: MonteCarlo) -> str:
         asked, drawn = self.asked, str(found.draws.distribution)
-        if asked.source is Source.UNCERTAINTY:
-            drawn = f"standard uncertainties, {drawn}"
-        elif drawn == "normal":
+        if drawn == "normal":
             drawn = "normal, 3σ = half width" + (", clipped" if found.draws.clip else "")
         return (
             f"{asked.loop} loop · {asked.samples:,} machines, {WHAT[asked.over]} · {drawn} · seed"

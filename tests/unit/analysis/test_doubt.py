@@ -50,12 +50,12 @@ def test_gains_times_uncertainties_add_up_in_squares():
     found = sure(parse_scene(SCENE, "s"), at={"X": [-100.0, 0.0, 100.0]})
     # along x: 0.4 µm, and 1 µrad on an arm of 300 mm; along y the table; along z nothing at X 0 …
     x = math.hypot(0.4, 0.3)
-    np.testing.assert_allclose(found.u_um[:, 0], x)
-    np.testing.assert_allclose(found.u_um[:, 1], [0.1, 0.2, 0.3])
-    np.testing.assert_allclose(found.u_um[:, 2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.u95_um[:, 0], 2.0 * x)
+    np.testing.assert_allclose(found.u95_um[:, 1], [0.2, 0.4, 0.6])
+    np.testing.assert_allclose(found.u95_um[:, 2], 0.0, atol=1e-12)
     # … and |E| is along x
     np.testing.assert_allclose(found.u_norm_um, x)
-    np.testing.assert_allclose(found.u_urad[:, 1], 1.0)
+    np.testing.assert_allclose(found.columns["u95_orientation_urad"][:, 1], 2.0)
 
 
 def test_where_there_is_no_error_the_vector_counts_as_a_whole():
@@ -67,9 +67,9 @@ def test_ends_of_an_axis_are_not_sure_by_themselves_near_points_together():
     held = SCENE + "[view]\nreference = { X = -100, Y = 0, Z = 0 }\n"
     found = sure(parse_scene(held, "s"), at={"X": [-100.0, 99.0, 100.0]})
     # a difference of the ends: both add up, of x √2 · 0.5, of y √(0.1² + 0.3²)
-    ends = [math.hypot(0.5, 0.5), math.hypot(0.1, 0.3), 0.0]
-    np.testing.assert_allclose(found.u_um[[0, 2]], [[0, 0, 0], ends], atol=1e-12)
-    np.testing.assert_allclose(found.u_um[1], found.u_um[2], rtol=0.01, atol=1e-12)
+    ends = [2.0 * math.hypot(0.5, 0.5), 2.0 * math.hypot(0.1, 0.3), 0.0]
+    np.testing.assert_allclose(found.u95_um[[0, 2]], [[0, 0, 0], ends], atol=1e-12)
+    np.testing.assert_allclose(found.u95_um[1], found.u95_um[2], rtol=0.01, atol=1e-12)
     # along the axis they vary by u · cos φ and u · sin φ, so that u of a mean is (2 / π) · √2 · u
     alone = HEAD + "[errors]\nEXX = 5\n[uncertainty]\nEXX = 0.4\n"
     mean = volume_doubt(parse_scene(alone, "s"), parse_scene(alone, "s").view(), 21)

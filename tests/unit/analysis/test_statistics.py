@@ -1,26 +1,20 @@
-"""Statistics of a field, verdicts on measured errors, and what their uncertainties do."""
-
-import math
+"""Statistics of a field, and verdicts on measured errors."""
 
 import numpy as np
 import pytest
 
 import warpspace
-from warpspace.analysis.cases import Plan
-from warpspace.analysis.distribution import Distribution
 from warpspace.analysis.measured import (
     Check,
     check_errors,
     shear,
-    uncertain_case,
 )
-from warpspace.analysis.montecarlo import montecarlo
 from warpspace.analysis.statistics import statistics, volume_statistics
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid
 from warpspace.machine.errors import Constant, ErrorSet, ToleranceSet
-from warpspace.scene.library import load_scene, parse_scene
+from warpspace.scene.library import load_scene
 
 
 def field_of(norms):
@@ -81,39 +75,3 @@ def test_shear_of_pure_squareness_is_the_squareness():
     assert found["XY"] == pytest.approx(30.0)
     assert found["XZ"] == pytest.approx(0.0, abs=1e-9)
     assert found["YZ"] == pytest.approx(0.0, abs=1e-9)
-
-
-HEAD = """[machine]
-chain = "wFXYZt"
-[machine.offset_mm]
-t = [0, 0, -300]
-[workspace]
-X = [-100, 100]
-Y = [-100, 100]
-Z = 0
-"""
-
-
-def test_sampled_machines_scatter_by_it_around_the_errors():
-    scene = parse_scene(HEAD + "[errors]\nEXX = 50\n[uncertainty]\nEXX = 3\n", "s")
-    result = montecarlo(uncertain_case(scene, Plan(samples=40_000, seed=2)))
-    assert result.mean_um == pytest.approx(50.0, abs=0.1)
-    spread = math.sqrt(result.rms_um**2 - result.mean_um**2)
-    assert spread == pytest.approx(3.0, abs=0.05)
-    assert result.p95_um == pytest.approx(50.0 + 1.645 * 3.0, abs=0.15)
-    flat = montecarlo(
-        uncertain_case(scene, Plan(samples=40_000), distribution=Distribution.UNIFORM)
-    )
-    # a point varies by u · cos φ and u · sin φ, each uniform: together at most √3 · √2 · u
-    assert math.sqrt(flat.rms_um**2 - flat.mean_um**2) == pytest.approx(3.0, abs=0.05)
-    assert 50.0 + math.sqrt(3.0) * 3.0 < flat.max_um < 50.0 + math.sqrt(6.0) * 3.0
-
-
-@pytest.mark.parametrize("over", ["max", "mean"])
-def test_over_all_points_each_machine_keeps_its_own_errors(over):
-    stated = "[uncertainty]\nEXX = { table = [[-100, 0.1], [100, 3]] }\n"
-    text = HEAD + "[errors]\nEXX = { ramp = 50 }\n" + stated
-    result = montecarlo(
-        uncertain_case(parse_scene(text, "s"), Plan(samples=5000, over=over, nodes=5))
-    )
-    assert result.median_um == pytest.approx(50.0 if over == "max" else 25.0, abs=0.3)

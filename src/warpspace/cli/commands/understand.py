@@ -12,7 +12,6 @@ from warpspace.cli.tables import print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.doubt import FieldDoubt
     from warpspace.field.evaluate import ErrorField, View
     from warpspace.field.grid import Grid
     from warpspace.scene.model import Scene
@@ -32,12 +31,6 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
 @options.loop_option
 @options.placed_option
 @options.direction_option
-@click.option(
-    "--uncertainty",
-    "uncertain",
-    is_flag=True,
-    help="Also the standard uncertainty (k = 1) of each point of a grid, and in files.",
-)
 @click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
 @click.option(
     "--frame",
@@ -67,16 +60,16 @@ def field(
     force: bool,
     exact: bool,
     placed: bool,
-    uncertain: bool,
     as_json: bool,
 ) -> None:
     """Evaluate the errors of SCENE at points or over a grid.
 
     Errors are actual − nominal, in µm; the orientation error is the rotation vector of the tool
-    axis, in µrad. Without --at the grid of the working volume is evaluated.
+    axis, in µrad. Without --at the grid of the working volume is evaluated. Where SCENE states how
+    sure its errors are, U95 of each point stands beside them, in files too.
     """
     from warpspace.analysis.description import plain
-    from warpspace.analysis.doubt import field_doubt, find_doubt, u95_lines, volume_doubt
+    from warpspace.analysis.doubt import field_doubt, u95_columns, u95_lines, volume_doubt
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.field.evaluate import placed_words
     from warpspace.picture.words import direction_words, own_axes, spell_at, spell_point
@@ -89,23 +82,22 @@ def field(
         raise OptionError(
             f"{output}: a .vts file holds a grid, --at gives points; expected {others}"
         )
+    files = [path for path in (csv_path, output) if path is not None]
     loaded = options.load_placed(scene, direction, loop, placed=placed)
     view = choose_view(loaded, loop, frame)
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
-        places = axes if points else None
-        if uncertain and find_doubt(loaded, view.loop) is None:
-            raise OptionError(f"{loaded.name} has no [uncertainty], for instance EXX = 0.4")
-        shown = uncertain or bool(points)
-        where = None if nodes is None else nodes.point_mm
-        spread = field_doubt(loaded, result.error_um, axes, view, where) if shown else None
-        over = spread if points else volume_doubt(loaded, view, max(result.norm_um.shape))
-        known = spread if spread and spread.doubt.is_known else None
+        places = axes if nodes is None else None
         said = {} if exact else options.say_second_order(second_order(loaded, loop, at=places))
         even = statistics(result, axes)
-        summary = even if nodes is None else volume_statistics(result, nodes)
+        if nodes is None:
+            over, summary, where = field_doubt(loaded, result.error_um, axes, view), even, None
+        else:
+            over = volume_doubt(loaded, view, max(nodes.shape))
+            summary, where = volume_statistics(result, nodes), nodes.point_mm
+        shown = bool(points or files or as_json)
+        u95 = u95_columns(loaded, result, axes, view, where) if shown else {}
         summary = over.said_of(summary) if over else summary
-    files = [path for path in (csv_path, output) if path is not None]
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
         from warpspace.picture.model import field_remarks
@@ -113,7 +105,7 @@ def field(
         about = {**field_remarks(loaded, view, exact=exact), "frame": frame}
         with progress("writing", silent=as_json):
             for path in files:
-                write_field(FieldRecord(axes, result, about, known), path, overwrite=force)
+                write_field(FieldRecord(axes, result, about, u95), path, overwrite=force)
     if as_json:
         found: dict[str, object] = {"loop": loop, "frame": frame}
         found["statistics"] = plain(summary)
@@ -126,14 +118,17 @@ def field(
             click.echo(options.spell_json({**size, **found}))
             return
         found |= {"unknown": over.doubt.unknown} if over and over.doubt.unknown else {}
-        _print_json(axes, result, found, known, loaded.limit_um, standard=uncertain)
+        if nodes is None and over and u95:
+            u95["covariance_um2"] = over.covariance_um2
+            u95 |= {} if loaded.limit_um is None else {"probability": over.keeps(loaded.limit_um)}
+        _print_json(axes, result, found, u95)
         return
     told = (*direction_words(loaded), *placed_words(view))
     words = (f"{loop} loop", *told, "exact" if exact else "first order")
     print_text(" · ".join((loaded.title, *words)))
     if points:
         units = [loaded.machine.axes[name].unit for name in axes]
-        _list_points(axes, result, units, known)
+        _list_points(axes, result, units, u95)
     volume = "" if nodes is None else ", over the volume"
     print_text(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
@@ -178,10 +173,7 @@ def _print_json(
     axes: "Mapping[str, Array]",
     result: "ErrorField",
     found: "Mapping[str, object]",
-    spread: "FieldDoubt | None",
-    limit_um: float | None,
-    *,
-    standard: bool,
+    u95: "Mapping[str, Array]",
 ) -> None:
     """Print the JSON object piece by piece: a million points are never held as one text."""
     import numpy as np
@@ -194,20 +186,7 @@ def _print_json(
     }
     if not all(np.isfinite(values).all() for values in columns.values()):
         raise OptionError("the field has points whose error is no number; JSON cannot hold them")
-    if spread is not None and standard:
-        columns |= {
-            "uncertainty_um": spread.u_um,
-            "uncertainty_norm_um": spread.u_norm_um,
-            "uncertainty_urad": spread.u_urad,
-        }
-    if spread is not None and limit_um is not None:
-        columns["probability"] = spread.keeps(limit_um)
-    if spread is not None and result.norm_um.ndim == 1:
-        columns |= {
-            "u95_um": spread.u95_um,
-            "u95_norm_um": spread.u95_norm_um,
-            "covariance_um2": spread.covariance_um2,
-        }
+    columns |= u95
     shape, size = result.norm_um.shape, result.norm_um.size
     positions = [np.broadcast_to(values, shape).reshape(-1) for values in axes.values()]
     flat = [values.reshape(size, *values.shape[len(shape) :]) for values in columns.values()]
@@ -232,7 +211,7 @@ def _list_points(
     axes: "Mapping[str, Array]",
     result: "ErrorField",
     units: "Sequence[str]",
-    spread: "FieldDoubt | None",
+    u95: "Mapping[str, Array]",
 ) -> None:
     columns = (
         Column("point", "d", leads=True),
@@ -241,7 +220,7 @@ def _list_points(
         *number_columns(("error x", "y", "z"), "+.3f", "µm"),
         Column("|E|", ".3f", "µm", joins=True),
         *number_columns(("tilt x", "y", "z"), "+.3f", "µrad"),
-        *number_columns(() if spread is None else ("u x", "y", "z", "u |E|"), ".3f", "µm"),
+        *number_columns(("U95 x", "y", "z", "U95 |E|") if u95 else (), ".3f", "µm"),
     )
     rows = [
         (
@@ -251,7 +230,7 @@ def _list_points(
             *result.error_um[index],
             result.norm_um[index],
             *result.orientation_urad[index],
-            *(() if spread is None else (*spread.u_um[index], spread.u_norm_um[index])),
+            *((*u95["u95_um"][index], u95["u95_norm_um"][index]) if u95 else ()),
         )
         for index in range(min(result.norm_um.size, MAX_LISTED))
     ]

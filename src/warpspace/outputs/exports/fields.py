@@ -23,8 +23,6 @@ from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from warpspace.analysis.doubt import FieldDoubt
-
 ABOUT = "about_json"  # name under which NPZ and VTS files say what they hold
 DECIMALS = 9  # of numbers in text: a billionth of a micrometre
 _UNITS = {"mm": "mm", "deg": "°", "um": MICROMETRE, "urad": MICRORADIAN}
@@ -38,8 +36,8 @@ class FieldRecord:
     field: ErrorField  # of points in a batch of any shape; of a grid for a VTS file
     # scene, loop, reference, convention, program
     about: Mapping[str, str] = attribute(default_factory=dict[str, str])
-    # standard uncertainty (k = 1) of each point, in columns of its own
-    uncertainty: "FieldDoubt | None" = None
+    # U95 of each point, by name; empty where it is not known
+    u95: Mapping[str, Array] = attribute(default_factory=dict[str, Array])
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -60,12 +58,12 @@ class FieldRecord:
         vectors = {"R_{}_mm": self.field.nominal_mm, error + "_{}_um": self.field.error_um}
         tilts = {f"orientation_{frame}_" + "{}_urad": self.field.orientation_urad}
         found |= _by_component(vectors) | {"norm_um": self.field.norm_um} | _by_component(tilts)
-        if self.uncertainty is not None:
-            found |= _by_component({f"uncertainty_{frame}_" + "{}_um": self.uncertainty.u_um})
-            found["uncertainty_norm_um"] = self.uncertainty.u_norm_um
-            name = f"uncertainty_orientation_{frame}_" + "{}_urad"
-            tilts = {name: self.uncertainty.u_urad}
-            found |= _by_component(tilts)
+        for name, values in self.u95.items():
+            of, _, unit = name.rpartition("_")
+            more = {name: values}
+            if values.ndim > len(self.shape):
+                more = _by_component({f"{of}_{frame}_{{}}_{unit}": values})
+            found |= more
         return found
 
     def blocks(self) -> Iterator[dict[str, Array]]:
@@ -134,18 +132,14 @@ def _write_parquet(record: FieldRecord, path: Path) -> None:
 
 
 def _arrays(record: FieldRecord) -> dict[str, Array]:
-    found, spread = record.field, record.uncertainty
-    arrays = {
+    found = record.field
+    return {
         "nominal_mm": found.nominal_mm,
         "error_um": found.error_um,
         "norm_um": found.norm_um,
         "orientation_urad": found.orientation_urad,
+        **record.u95,
     }
-    if spread is not None:
-        arrays["uncertainty_um"] = spread.u_um
-        arrays["uncertainty_norm_um"] = spread.u_norm_um
-        arrays["uncertainty_orientation_urad"] = spread.u_urad
-    return arrays
 
 
 def _write_npz(record: FieldRecord, path: Path) -> None:
