@@ -56,8 +56,6 @@ Z = [-480, -80]
 [errors]
 EC0Y = 3000
 EA0Z = 3000
-[uncertainty]
-EC0Y = 1
 [tolerances]
 default = { translation = 10, rotation = 3000, squareness = 3000 }
 """
@@ -71,7 +69,6 @@ COMMANDS = {
     "measured": (),
     "ballbar": ("--plane", "XY", "--radius", "100"),
     "montecarlo": QUICK,
-    "montecarlo uncertain": ("--from", "uncertainty", *QUICK),
     "sweep": ("--tolerance", "EC0Y=10,3000", *QUICK),
     "concepts": ("dvf5000_first", *QUICK),
     "allocate": ("--limit-um", "4000", *QUICK),
