@@ -158,15 +158,16 @@ def write_result(
 ) -> list[str]:
     from warpspace.scene.files import spell_row
 
-    wrote = [output] if output else []
-    if output is not None and (texts := found.texts(Path(output).suffix.lower())):
-        wrote = write_texts(texts, Path(output), force=force)
-    elif output is not None:
-        from warpspace.scene.save import scene_to_toml
+    wrote: list[str] = []
+    if output is not None:
+        from warpspace.scene.save import scene_files
 
-        if not (changes := found.changes()):
+        path, changes = Path(output), found.changes()
+        texts = found.texts(path.suffix.lower())
+        if not texts and not changes:
             raise OptionError(f"-o {output}: {found.no_change}, so no scene is written")
-        write_text(output, scene_to_toml(changes[-1].scene), force=force)
+        texts = texts or scene_files(changes[-1].scene, path.stem)
+        wrote = write_texts(texts, path, force=force)
     if csv_path is not None:
         table = found.file_table()
         rows = () if table is None else table.csv_rows()

@@ -214,6 +214,6 @@ def _named_files(value: object, key: str = "", table: str = "") -> Iterator[str]
         for part in cast("list[object]", value):
             yield from _named_files(part, key, table)
     elif isinstance(value, str) and (
-        key in {"csv", "file", "covariance"} or table in {"bodies", "part"}
+        key in {"csv", "file", "covariance", "matrix"} or table in {"bodies", "part"}
     ):
         yield value

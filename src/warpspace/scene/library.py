@@ -400,9 +400,11 @@ class _Document:
         where, problems = "uncertainty.covariance", self.problems
         given = self.raw.get("uncertainty")
         raw = given.get("covariance") if isinstance(given, dict) else None
-        if isinstance(raw, str):
-            path = machines.path_beside(raw, where, self.folder, problems)
+        spelled = raw if isinstance(raw, dict) else {"matrix": raw}
+        if isinstance(name := spelled.get("matrix"), str):
+            path = machines.path_beside(name, where, self.folder, problems)
             raw = read_npz(Path(path), where, problems) if path else None
+            raw = raw and raw | spelled | {"matrix": raw.get("matrix")}
         if raw is None:
             return None
         before = len(problems.lines)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
+from io import BytesIO
 from math import isinf
 from typing import cast
 
@@ -101,10 +102,22 @@ def turn_covariance(
     return replace(found, rows=tuple(map(tuple, (found.matrix * np.outer(way, way)).tolist())))
 
 
+MOST_SPELLED = 30  # errors whose covariance stands in the scene itself
 _WRAP = 8  # entries of a list that stand on one line
 
 
-def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
+def scene_files(scene: Scene, stem: str) -> dict[str, str | bytes]:
+    """Spell a scene by the ends of its files: a large covariance stands beside it, as numbers."""
+    joint = turn_covariance(scene.machine, scene.covariance, Notation().squareness)
+    if joint is None or len(joint.keys) <= MOST_SPELLED:
+        return {"": scene_to_toml(scene)}
+    packed = BytesIO()
+    np.savez_compressed(packed, keys=joint.keys, matrix=joint.matrix)
+    text = scene_to_toml(scene, matrix=f"{stem}.npz")
+    return {"": text, ".npz": packed.getvalue()}
+
+
+def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = "") -> str:
     """Spell a scene as the text of a scene file.
 
     Notes
@@ -146,7 +159,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     parts += [spell_section("errors", functions, PARAMETERS), _tolerances_section(scene)]
     joint = turn_covariance(scene.machine, scene.covariance, notation.squareness)
     uncertain = {key: function.to_toml() for key, function in scene.uncertainty.items()}
-    parts.append(spell_section("uncertainty", uncertain | _covariance(joint), PARAMETERS))
+    parts.append(spell_section("uncertainty", uncertain | _covariance(joint, matrix), PARAMETERS))
     for key, measurement in scene.measured.items():
         runs = [asdict(run) for run in measurement.runs]
         parts.append(spell_section(f"measured.{key}", {"runs": runs}))
@@ -163,13 +176,13 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None) -> str:
     return "\n".join(part for part in parts if part)
 
 
-def _covariance(found: Covariance | None) -> dict[str, object]:
-    """Spell a covariance: of its rows what stands up to the diagonal."""
+def _covariance(found: Covariance | None, matrix: str) -> dict[str, object]:
+    """Spell a covariance: the file of its matrix, or of its rows what is up to the diagonal."""
     if found is None:
         return {}
     values: dict[str, object] = {
         "keys": found.keys,
-        "matrix": [row[: at + 1] for at, row in enumerate(found.rows)],
+        "matrix": matrix or [row[: at + 1] for at, row in enumerate(found.rows)],
         "freedom": 0.0 if isinf(found.freedom) else found.freedom,
         "reach": _ranges(found.reach),
         "undetermined": found.undetermined,

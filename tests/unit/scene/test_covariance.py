@@ -12,7 +12,7 @@ from warpspace.analysis.doubt import find_doubt
 from warpspace.exceptions import SceneError
 from warpspace.machine.errors import Covariance
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.save import Notation, scene_to_toml
+from warpspace.scene.save import Notation, scene_files, scene_to_toml
 
 SCENE = """[machine]
 chain = "wFXYZt"
@@ -117,6 +117,22 @@ def test_an_uncertainty_is_above_zero_at_every_position(curve, value):
         SceneError, match=rf"uncertainty.EXX = {value}.*: expected it above 0 every"
     ):
         parse_scene(text, "s")
+
+
+def test_a_large_covariance_stands_beside_its_scene(tmp_path):
+    scene = parse_scene("machine = 'dvf5000'\n" + SCENE[SCENE.index("[workspace]") :], "s")
+    keys = scene.parameter_keys[:31]
+    root = np.random.default_rng(1).standard_normal((31, 31))
+    rows = tuple(map(tuple, (root @ root.T).tolist()))
+    scene = replace(scene, covariance=replace(WHOLE, keys=keys, rows=rows, undetermined=()))
+    for add, content in scene_files(scene, "large").items():
+        data = content if isinstance(content, bytes) else content.encode()
+        (tmp_path / f"large{add or '.toml'}").write_bytes(data)
+    assert load_scene(tmp_path / "large.toml").covariance == scene.covariance
+    (tmp_path / "large.npz").unlink()
+    with pytest.raises(SceneError, match=r"large\.npz"):
+        load_scene(tmp_path / "large.toml")
+    assert [*scene_files(parse_scene(SCENE, "s"), "small")] == [""]
 
 
 def packed(path, **files):
