@@ -1,7 +1,7 @@
 """Flatness, straightness and squareness of the bent volume: what an inspector would certify."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import combinations, product
 from typing import ClassVar
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.doubt import field_doubt, plus_minus
 from warpspace.analysis.options import LOOP_HELP, option
+from warpspace.analysis.statistics import Numbers
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
@@ -24,12 +26,13 @@ PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
 class Deviation:
     """One form deviation of one plane or line."""
 
-    keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit")
+    keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit", "sure")
     kind: str  # "flatness", "straightness" or "squareness"
     of: str  # "XY", "X in y", "X to Y"
     at: str  # where the other axes stand
     value: float
     unit: str
+    sure: Numbers = field(default_factory=dict[str, float | None])  # u95, where that is stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,17 +56,32 @@ class Certify(Analysis):
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
             raise OptionError("certify: expected a working volume with two or three linear axes")
-        error = evaluate_grid(scene, grid, choose_view(scene, self.loop)).error_um
-        nominal = grid.nominal_mm
-        found: list[Deviation] = []
-        moving = [i for i, axis in enumerate(axes) if axis]
-        for count, third in enumerate(moving):
-            found += _flatness(axes, nominal, error, [i for i in moving if i != third], third)
-            watch((count + 1) / (len(moving) + 1))
-        for axis in moving:
-            found += _straightness(axes, nominal, error, moving, axis)
-        found += [_squareness(axes, nominal, error, a, b) for a, b in combinations(moving, 2)]
-        return CertifyResult(deviations=tuple(found), title=scene.title)
+        view = choose_view(scene, self.loop)
+        error = evaluate_grid(scene, grid, view).error_um
+        found, asked = [*_deviations(axes, grid.nominal_mm, error)], 1
+        sure = field_doubt(scene, error, grid.coordinates, view, grid.point_mm)
+        count = 2 * (1 + len(sure.doubt.keys)) if sure else 1
+        watch(1 / count)
+        if sure is None:
+            return CertifyResult(deviations=tuple(found), title=scene.title)
+
+        def ask(error_um: Array) -> Array:
+            nonlocal asked
+            watch((asked := asked + 1) / count)
+            return np.array([one.value for one in _deviations(axes, grid.nominal_mm, error_um)])
+
+        each = zip(found, sure.through(ask), strict=True)
+        told = tuple(replace(one, sure={"u95": u95}) for one, u95 in each)
+        return CertifyResult(deviations=told, title=scene.title, doubt=sure.doubt)
+
+
+def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[Deviation]:
+    moving = [i for i, axis in enumerate(axes) if axis]
+    for third in moving:
+        yield from _flatness(axes, nominal, error, [i for i in moving if i != third], third)
+    for axis in moving:
+        yield from _straightness(axes, nominal, error, moving, axis)
+    yield from (_squareness(axes, nominal, error, *pair) for pair in combinations(moving, 2))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,9 +96,15 @@ class CertifyResult(Result):
         yield f"{self.title} · form of the bent volume"
         columns = (
             *(Column(name, key=name, leads=name != "at") for name in Deviation.keys[:3]),
-            *(Column("value", ".2f", key="value"), Column("unit", key="unit")),
+            Column("value", ".2f", key="value"),
+            *([Column("U95"), Column(key="u95", shows=False)] if self.doubt else ()),
+            Column("unit", key="unit"),
         )
-        rows = [(d.kind, d.of, d.at, d.value, d.unit) for d in self.deviations]
+        rows = [
+            (d.kind, d.of, d.at, d.value, *([plus_minus(u95), u95] if self.doubt else ()), d.unit)
+            for d in self.deviations
+            for u95 in [d.sure.get("u95")]
+        ]
         yield Table(columns, rows)
 
 

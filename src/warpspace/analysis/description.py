@@ -12,6 +12,7 @@ from warpspace.analysis.blocks import Block, Table, blocks_html
 from warpspace.analysis.options import PLACE, Option, options_of, outside_travel
 
 if TYPE_CHECKING:
+    from warpspace.analysis.doubt import Doubt
     from warpspace.field.evaluate import SecondOrder
     from warpspace.scene.model import Scene
 
@@ -48,6 +49,7 @@ class Result(ABC):
     no_change: ClassVar[str] = "nothing is to be changed"
     # what its numbers leave out if they are of first order: a warning, and in its JSON object
     second_order: "SecondOrder | None" = None
+    doubt: "Doubt | None" = None  # how sure the errors are, where its numbers say U95
 
     @abstractmethod
     def blocks(self) -> Iterable[Block]:
@@ -59,7 +61,7 @@ class Result(ABC):
 
     def doubts(self) -> Iterable[str]:
         """Say what a reader should doubt of its numbers."""
-        return ()
+        return self.doubt.remarks() if self.doubt else ()
 
     def texts(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
         """Give the files that -o writes, by what is added to its name: "", "_X.COM"."""

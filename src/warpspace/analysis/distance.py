@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Result, Watch, plain
-from warpspace.analysis.doubt import find_doubt, plus_minus
+from warpspace.analysis.doubt import field_doubt, plus_minus
 from warpspace.analysis.line import Between
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.exceptions import OptionError
@@ -48,19 +48,18 @@ class Distance(Between):
         solve = evaluate_exact if self.exact else evaluate_first_order
         field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
         watch(1.0)
-        found, doubt = self.between(scene, at, field), find_doubt(scene, self.loop)
-        if doubt is None:
+        found = self.between(scene, at, field)
+        sure = field_doubt(scene, field.error_um, at, scene.view(self.loop), point)
+        if sure is None:
             return found
-        ways = doubt.respond(scene.model, at, scene.view(self.loop), point).position
 
-        def ask(change: Array) -> Array:
-            error = field.error_um + np.tensordot(change, ways, 1)
-            off = self.between(scene, at, replace(field, error_um=error))
+        def ask(error_um: Array) -> Array:
+            off = self.between(scene, at, replace(field, error_um=error_um))
             return np.array([off.difference_um, off.deviation_urad or 0.0, *off.along_um])
 
-        distance, angle, *along = doubt.through(ask)
-        sure = {"u95_difference_um": distance, "u95_along_um": along}
-        return replace(found, sure=sure | ({"u95_deviation_urad": angle} if self.corner else {}))
+        distance, angle, *along = sure.through(ask)
+        told = {"u95_difference_um": distance, "u95_along_um": along}
+        return replace(found, sure=told | ({"u95_deviation_urad": angle} if self.corner else {}))
 
     def between(self, scene: Scene, at: Coordinates, field: ErrorField) -> "DistanceResult":
         """Measure between points, [n], of a field in R."""

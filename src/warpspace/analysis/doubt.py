@@ -267,6 +267,11 @@ class FieldDoubt:
             variance = np.where(none, np.trace(square, axis1=-2, axis2=-1), variance)
         return _root(variance)
 
+    def u95_along(self, point: int, way: Array) -> float | None:
+        """Give U95 of the error of a point by its number, along a unit vector, [3]."""
+        square = self.expanded_um2.reshape(-1, 3, 3)[point]
+        return float(_root(way @ square @ way)) if self.doubt.is_known else None
+
     def u95_at(self, point: int) -> float | None:
         """Give U95 of |E| at a point by its number; None where it is unknown."""
         return self.u95_norm_um.item(point) if self.doubt.is_known else None
@@ -274,6 +279,12 @@ class FieldDoubt:
     def u95(self, gradient: Array) -> float:
         """Give U95 of a number by its growth per unit of each amplitude, [K]."""
         return float(_root(gradient @ self.doubt.expanded @ gradient))
+
+    def through(self, ask: Callable[[Array], Array]) -> list[float | None]:
+        """Give U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
+        return self.doubt.through(
+            lambda change: ask(self.error_um + np.tensordot(change, self.response, 1))
+        )
 
     def parts_of(self, gradient: Array) -> dict[str, float]:
         """Split the variance of a number into shares of errors, the largest first.

@@ -7,6 +7,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.doubt import find_doubt, plus_minus, u95_columns
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
@@ -77,6 +78,8 @@ class Line(Between):
             error_um=field.error_um,
             orientation_urad=field.orientation_urad,
             title=f"{scene.title} · {self.loop} loop",
+            doubt=find_doubt(scene, self.loop),
+            sure=u95_columns(scene, field, axes, scene.view(self.loop)),
         )
 
 
@@ -84,7 +87,9 @@ class Line(Between):
 class LineResult(Result):
     """Errors along a line."""
 
-    keys = ("length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad")
+    keys = (
+        "length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad", "sure"
+    )  # fmt: skip
     length_mm: float
     axes: Mapping[str, Array]  # [n], mm or degrees
     along_mm: Array  # [n], way of the nominal point
@@ -92,24 +97,26 @@ class LineResult(Result):
     error_um: Array  # [n, 3], in R
     orientation_urad: Array  # [n, 3], in R
     title: str
+    sure: Mapping[str, Array]  # U95 of these, by name; empty where it is not known
 
     def blocks(self) -> Iterator[Block]:
         norm = np.linalg.norm(self.error_um, axis=1)
         worst = int(np.argmax(norm))
         place = {name: float(at[worst]) for name, at in self.axes.items()}
         yield f"{self.title} · {self.length_mm:.1f} mm"
-        yield f"  largest |E| {norm[worst]:.2f} µm at {place_words(place)}"
-        everything = np.column_stack(
-            [self.along_mm, *self.axes.values(), norm, self.error_um, self.orientation_urad]
-        )
+        u95 = [self.sure["u95_norm_um"]] if self.sure else []
+        about = f" {plus_minus(u95[0][worst] if u95 else None)}" if self.doubt else ""
+        yield f"  largest |E| {norm[worst]:.2f}{about} µm at {place_words(place)}"
+        columns = self.along_mm, *self.axes.values(), norm, *u95
+        everything = np.column_stack([*columns, self.error_um, self.orientation_urad])
         step = -(-(len(norm) - 1) // (SHOWN - 1)) if len(norm) > SHOWN else 1
         units = {name: "mm" if is_linear(name) else "deg" for name in self.axes}
         columns = (
             Column("along", ".1f", "mm", key="along_mm", leads=True),
             *(Column(key=f"{name}_{unit}", shows=False) for name, unit in units.items()),
-            *number_columns(
-                ("|E|", "x", "y", "z"), ".2f", "µm", ("norm_um", "x_um", "y_um", "z_um")
-            ),
+            Column("|E|", ".2f", "µm", key="norm_um"),
+            *(Column("U95", ".2f", "µm", key="u95_norm_um") for _ in u95),
+            *number_columns(("x", "y", "z"), ".2f", "µm", ("x_um", "y_um", "z_um")),
             *number_columns(
                 ("about x", "y", "z"),
                 ".2f",

@@ -1,13 +1,15 @@
 """Which part of the volume keeps a limit: its share, and the largest box that does."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.doubt import field_doubt, plus_minus
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.statistics import share_below, share_within
 from warpspace.exceptions import OptionError
@@ -16,6 +18,7 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.model import Scene, choose_view, evaluate_grid
+from warpspace.units import Array
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # parts of the volume whose limit the table says
 
@@ -40,7 +43,8 @@ class Reach(Analysis):
 
     def run(self, scene: Scene, watch: Watch, /) -> "ReachResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
-        field = evaluate_grid(scene, grid, choose_view(scene, self.loop))
+        view = choose_view(scene, self.loop)
+        field = evaluate_grid(scene, grid, view)
         watch(0.3)
         axes = scene.workspace.volume_axes
         if not any(axes):
@@ -57,11 +61,24 @@ class Reach(Analysis):
                 for axis, ends, count in zip(axes, found, keeps.shape, strict=True)
                 if axis
             }
+        sure = field_doubt(scene, field.error_um, grid.coordinates, view, grid.point_mm)
+
+        def ask(error_um: Array) -> Array:
+            moved = replace(field, error_um=error_um)
+            keeps = (share_within(moved, part) for part in SHARES)
+            return np.array([100.0 * share_below(moved, self.limit_um), *keeps])
+
+        percent, *keeps_um = ask(field.error_um).tolist()
+        u95, *u95_um = sure.through(ask) if sure else [None] * (1 + len(SHARES))
+        names = [f"{part:.0%}" for part in SHARES]
+        told = {"u95_percent": u95, "u95_keeps_um": dict(zip(names, u95_um, strict=True))}
         return ReachResult(
             limit_um=self.limit_um,
-            percent=100.0 * share_below(field, self.limit_um),
+            percent=percent,
             box=box,
-            keeps_um={f"{part:.0%}": share_within(field, part) for part in SHARES},
+            keeps_um=dict(zip(names, keeps_um, strict=True)),
+            sure=told if sure else {},
+            doubt=sure and sure.doubt,
             title=scene.title,
             ranges={axis: ranges[axis] for axis in axes if axis},
         )
@@ -71,16 +88,19 @@ class Reach(Analysis):
 class ReachResult(Result):
     """The part of a volume that keeps a limit."""
 
-    keys = ("limit_um", "percent", "box", "keeps_um")
+    keys = ("limit_um", "percent", "box", "keeps_um", "sure")
     limit_um: float
     percent: float  # of the volume
     box: Mapping[str, tuple[float, float]] | None  # axis ranges, mm or degrees
     keeps_um: Mapping[str, float]  # limit by part of the volume
+    sure: Mapping[str, Any]  # U95 of percent and of these
     title: str
     ranges: Mapping[str, tuple[float, float]]
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.title} · {self.percent:.1f} % of the volume within {self.limit_um:g} µm"
+        about = f" {plus_minus(self.sure['u95_percent'], '.1f')}" if self.sure else ""
+        share = f"{self.percent:.1f}{about} %"
+        yield f"{self.title} · {share} of the volume within {self.limit_um:g} µm"
         if self.box is None:
             yield "  no box between nodes of the grid keeps the limit"
         else:
@@ -97,7 +117,11 @@ class ReachResult(Result):
             ]  # fmt: skip
             yield Table(columns, rows, title="Largest box that keeps it everywhere:")
         columns = (Column("of the volume", leads=True), Column("keeps", ".2f", "µm"))
-        yield Table(columns, [*self.keeps_um.items()], title="What parts of the volume keep:")
+        rows = [*self.keeps_um.items()]
+        if self.sure:
+            columns += (Column("U95", unit="µm"),)
+            rows = [(*row, plus_minus(self.sure["u95_keeps_um"][row[0]])) for row in rows]
+        yield Table(columns, rows, title="What parts of the volume keep:")
 
 
 def largest_box(

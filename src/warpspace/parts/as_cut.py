@@ -4,17 +4,18 @@ Geometry only: no forces, heat, wear or servo.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import Result, Watch
-from warpspace.analysis.doubt import Doubt, u95_lines
+from warpspace.analysis.doubt import FieldDoubt, plus_minus, u95_lines
 from warpspace.analysis.options import File, option
-from warpspace.analysis.statistics import Statistics, statistics
+from warpspace.analysis.statistics import Numbers, Statistics, statistics
 from warpspace.bodies.gltf import to_gltf
 from warpspace.bodies.own_meshes import FORMATS, MM_PER_M, UNITS_MM
 from warpspace.field.evaluate import ErrorField
@@ -44,7 +45,7 @@ class Off:
     """How far the vertices of a part are from where they should be."""
 
     deviation: Statistics
-    normal: Mapping[str, float]  # min_um and max_um along normals of triangles, at their corners
+    normal: Numbers  # min_um and max_um along normals of triangles, at their corners, and U95
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +87,9 @@ class Part(OfPart):
         between = 0.0 if is_large else _between(scene, part, made)
         unseen = between if between > SEEN_UM else 0.0
         fit = partial(fit_out, made.point_mm)
-        cut, placed = _off(part, made, made.error_um, fit(made.error_um))
-        if (sure := None if is_large else made_doubt(scene, made)) is not None:
-            cut = replace(cut, deviation=sure.said_of(cut.deviation))
-            placed = replace(placed, deviation=sure.seen(fit).said_of(placed.deviation))
+        sure = None if is_large else made_doubt(scene, made)
+        both = (made.error_um, sure), (fit(made.error_um), sure and sure.seen(fit))
+        cut, placed = _off(part, made, *both)
         return PartResult(
             vertices=len(mesh.vertices_mm),
             outside=int(made.outside.sum()),
@@ -119,21 +119,31 @@ def _between(scene: Scene, part: PartMesh, made: Made) -> float:
     return float(np.linalg.norm(off, axis=1).max())
 
 
-def _off(part: PartMesh, made: Made, *errors_um: Array) -> Iterator[Off]:
+def _off(part: PartMesh, made: Made, *found: tuple[Array, FieldDoubt | None]) -> Iterator[Off]:
     from trimesh import triangles
 
-    spans = np.array([[np.inf, -np.inf]] * len(errors_um))
+    # lowest and highest so far: how far, at which vertex, along which normal
+    spans = [[(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)] for _ in found]
     for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
         some = part.triangles[first : first + TRIANGLES_AT_ONCE]
         normals, is_valid = triangles.normals(np.take(part.vertices_mm, some, axis=0))
-        for span, error in zip(spans, errors_um, strict=True):
-            at_corners = np.take(error, some[is_valid], axis=0)
-            away = np.einsum("tcx,tx->tc", at_corners, normals)
-            span[:] = away.min(initial=span[0]), away.max(initial=span[1])
-    for (low, high), error in zip(spans.tolist(), errors_um, strict=True):
+        corners = some[is_valid]
+        for span, (error, _) in zip(spans, found, strict=True):
+            away = np.einsum("tcx,tx->tc", np.take(error, corners, axis=0), normals)
+            for index, (choose, better) in enumerate(((np.argmin, min), (np.argmax, max))):
+                if away.size:
+                    at = int(choose(away))
+                    new = away.item(at), corners.item(at), normals[at // 3]
+                    span[index] = better(span[index], new, key=itemgetter(0))
+    for span, (error, sure) in zip(spans, found, strict=True):
         field = ErrorField(made.point_mm, error, np.broadcast_to(np.nan, error.shape))
-        normal = {"min_um": low, "max_um": high}
-        yield Off(deviation=statistics(field, made.coordinates), normal=normal)
+        deviation = statistics(field, made.coordinates)
+        normal: dict[str, float | None] = {}
+        for name, (value, vertex, way) in zip(("min_um", "max_um"), span, strict=True):
+            normal[name] = value
+            if sure is not None:
+                normal[f"u95_{name}"] = sure.u95_along(vertex, way)
+        yield Off(deviation=sure.said_of(deviation) if sure else deviation, normal=normal)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +159,6 @@ class PartResult(Off, Result):
     made: Made  # its vertices
     scene: Scene
     asked: Part
-    doubt: Doubt | None  # how sure its errors are
     unseen_um: float  # how far errors between vertices are off, at most; 0 where that is little
 
     def doubts(self) -> Iterator[str]:
@@ -172,10 +181,16 @@ class PartResult(Off, Result):
         yield f"  largest |E| {self.deviation.max_um:.2f} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
         yield "  Geometry only: no forces, heat, wear or servo"
         both = ("as cut", self), ("placed", self.placed)
-        rows = [(word, *astuple(one.deviation)[:4], *one.normal.values()) for word, one in both]
+        ends = "min_um", "max_um"
+        rows = [
+            (word, *one.deviation.four, *(one.normal[end] for end in ends)) for word, one in both
+        ]
         heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
         yield from u95_lines(self.doubt, {word: one.deviation for word, one in both})
+        for word, one in both if self.doubt else ():
+            low, high = (plus_minus(one.normal[f"u95_{end}"]) for end in ends)
+            yield f"  U95 along the normal, {word}: min {low}, max {high} µm"
         yield features_table(self.features)
 
     def texts(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:

@@ -3,8 +3,9 @@
 Fixtures and collisions are not looked at. Geometry only: no forces, heat, wear or servo.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise, product
 from operator import attrgetter
 from typing import Literal
@@ -13,11 +14,14 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.doubt import FieldDoubt, find_doubt, plus_minus
 from warpspace.analysis.options import option
+from warpspace.analysis.statistics import Numbers
 from warpspace.bench.placing import ball_point, following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.parts.part import OfPart, PartMesh, fit_out, make_points, place_part
+from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
+from warpspace.parts.part import OfPart, PartMesh, fit_out, made_doubt, make_points, place_part
 from warpspace.scene.model import Scene, second_order
 
 SEARCHED = 800  # vertices that tell where a part deviates least; all do at the best places
@@ -34,10 +38,12 @@ class Clamping:
     max_um: float
     placed_um: float  # after the best rigid fit
     outside: int  # vertices beyond the travel
+    sure: Numbers = field(default_factory=dict[str, float | None])  # U95, where that is stated
 
 
 JUDGED = attrgetter("max_um"), attrgetter("placed_um")
 """What is judged: as the part lies, and placed."""
+U95 = "u95_max_um", "u95_placed_um"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,11 +100,15 @@ class Clamp(OfPart):
             for at in (part.place, *(one.place for one in found[:RIVALS]))
         )
         first = min(now, *best, key=lambda one: (one.outside > 0, judged(one)))
-        return ClampResult(
+        result = ClampResult(
             places=found, best=first, present=now, gain_um=judged(now) - judged(first),
             title=f"{scene.title} · {mesh.name}", placed=self.placed, warnings=mesh.warnings,
             second_order=second_order(scene, Loop.RELATIVE),
         )  # fmt: skip
+        is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
+        if is_large or not find_doubt(scene, Loop.RELATIVE):
+            return result
+        return result.said_of(*(_doubts(scene, mesh, one.place) for one in (now, first)))
 
 
 def _judge(scene: Scene, part: PartMesh) -> Clamping:
@@ -108,11 +118,17 @@ def _judge(scene: Scene, part: PartMesh) -> Clamping:
     return Clamping(part.place, most, placed, int(made.outside.sum()))
 
 
+def _doubts(scene: Scene, mesh: PartMesh, place: Sequence[float]) -> list[FieldDoubt]:
+    made = make_points(scene, place_part(mesh, scene, place).vertices_mm)
+    found = made_doubt(scene, made)
+    return [found, found.seen(partial(fit_out, made.point_mm))] if found else []
+
+
 @dataclass(frozen=True, kw_only=True)
 class ClampResult(Result):
     """Places of a part, the best one, and what it gains."""
 
-    keys = ("places", "best", "present", "gain_um")
+    keys = ("places", "best", "present", "gain_um", "sure")
     places: list[Clamping]  # by some of the vertices, best first
     best: Clamping
     present: Clamping
@@ -120,11 +136,27 @@ class ClampResult(Result):
     title: str
     placed: bool
     warnings: tuple[str, ...]  # of the mesh
+    sure: Numbers = field(default_factory=dict[str, float | None])  # U95 of what is gained
+
+    def said_of(self, *each: list[FieldDoubt]) -> "ClampResult":
+        """Say U95 at present, at the best place and of the gain."""
+        before, after = (found[self.placed] for found in each)
+        gain = before.u95(before.gradients[-1] - after.gradients[-1])
+        told = {"u95_gain_um": gain if before.doubt.is_known else None}
+        now, best = (
+            replace(at, sure=dict(zip(U95, [x.statistics()["max_um"] for x in found], strict=True)))
+            for at, found in zip((self.present, self.best), each, strict=True)
+        )
+        return replace(self, present=now, best=best, sure=told, doubt=before.doubt)
 
     def blocks(self) -> Iterator[Block]:
         judged = "largest |E|" + " after the best rigid fit" * self.placed
         yield f"{self.title}: {len(self.places):,} places"
         yield f"  the best one gains {self.gain_um:.2f} µm of the {judged}"
+        if self.sure:
+            name, gain = U95[self.placed], plus_minus(self.sure["u95_gain_um"])
+            now, best = (plus_minus(one.sure[name]) for one in (self.present, self.best))
+            yield f"  U95 of that: at present {now}, at the best {best}, of the gain {gain} µm"
         yield "  Geometry only: no forces, heat, wear or servo"
         columns = (
             Column("where", leads=True),
@@ -146,6 +178,6 @@ class ClampResult(Result):
         yield Lines("plane", f"Where to clamp: {self.title}", "x [mm]", "y [mm]", dots, (), note)
 
     def doubts(self) -> Iterator[str]:
-        yield from self.warnings
+        yield from (*self.warnings, *super().doubts())
         if self.present.outside:
             yield f"at present {self.present.outside:,} vertices are beyond the travel"

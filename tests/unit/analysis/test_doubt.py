@@ -5,15 +5,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from warpspace import load_scene
+from warpspace.analysis.certify import Certify
 from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt, volume_doubt
+from warpspace.analysis.line import Line
+from warpspace.analysis.reach import Reach
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.bench.base import find_test, run_test
 from warpspace.exceptions import SceneError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.errors import Covariance
+from warpspace.parts.as_cut import Part
+from warpspace.parts.clamping import Clamp
+from warpspace.parts.part import OfPart
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.save import scene_to_toml
@@ -126,6 +133,50 @@ def test_one_error_makes_all_statistics_as_unsure_as_itself():
     assert u95["max_um"] == pytest.approx(2.0 * 1.5 / 20.0 * float(mean.norm_um.max()))
 
 
+ALONE = HEAD + "[errors]\nEC0Y = 20\n[uncertainty]\nEC0Y = 1.5\n"
+QUESTIONS = Line(points=5), Certify(nodes=3), Reach(nodes=5), Part(place=(0, 0, 0)), Clamp(grid=2)
+
+
+OTHERWISE = {"u95": "value", "u95_um": "error_um"}
+
+
+def numbers(value):
+    return np.ravel([*value.values()] if isinstance(value, dict) else value)
+
+
+def pairs(found):
+    """List each U95 with the number it belongs to."""
+    for one in found if isinstance(found, list) else []:
+        yield from pairs(one)
+    for key, value in found.items() if isinstance(found, dict) else []:
+        if key.startswith("u95"):
+            own = found.get(OTHERWISE.get(key, key.removeprefix("u95_")))
+            yield from zip(numbers(value), numbers(own), strict=True) if own is not None else ()
+        else:
+            yield from pairs(value)
+
+
+@pytest.mark.parametrize("asked", QUESTIONS, ids=lambda one: one.name)
+def test_one_error_makes_every_number_as_unsure_as_itself(asked, tmp_path):
+    if isinstance(asked, OfPart):
+        trimesh.creation.box((40, 30, 20)).export(file := tmp_path / "box.stl")
+        asked = replace(asked, file=str(file))
+    found = asked.run(parse_scene(ALONE, "s"), lambda _: None).as_json()
+    found.pop("u95_percent", None)  # no multiple of an error
+    u95, value = np.array([*pairs(found)]).T
+    assert (np.abs(value) > 0.1).any()
+    np.testing.assert_allclose(u95, 2.0 * 1.5 / 20.0 * np.abs(value), atol=1e-6)
+
+
+def test_numbers_of_errors_that_nobody_states_are_unknown():
+    scene = parse_scene(ALONE.replace("EC0Y = 1.5", "EXX = 1"), "s")
+    for asked in (Certify(nodes=3), Reach(nodes=5)):
+        found = asked.run(scene, lambda _: None)
+        assert all(u95 is None for u95, _ in pairs(found.as_json()))
+        assert "uncertainty not stated of EC0Y" in " ".join(found.doubts())
+        assert any("± ?" in row for block in found.blocks() for row in getattr(block, "rows", ()))
+
+
 def test_statistics_move_by_their_gradient():
     scene = parse_scene(TWO, "s")
     found, names = volume_doubt(scene, scene.view(), 21), ("mean_um", "rms_um", "max_um")
@@ -182,7 +233,6 @@ def test_a_covariance_comes_back_from_its_text_and_from_a_file(tmp_path):
         ("[[4.0], [7.0, 9.0]]", "expected a positive matrix"),
         ("[[0.0], [0.0, 9.0]]", "its diagonal above 0"),
         ("[[4.0]]", "expected 2 rows of 2 numbers, or of 1 to 2"),
-        ('"c.npz"', "expected a list"),
         ("[[4.0], [nan, 9.0]]", "matrix"),
     ],
 )
