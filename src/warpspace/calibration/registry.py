@@ -104,7 +104,7 @@ class TestReadings(Kind):
         self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
-        matrix = respond(machine, _plan(readings), keys).matrix * MM_PER_UM
+        matrix = respond(machine, _plan(readings), keys) * MM_PER_UM
         return matrix[:, None, :], _set_up(readings, guess.unknowns)[:, None, :]
 
 
