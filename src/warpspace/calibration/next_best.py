@@ -237,8 +237,7 @@ def separating(
         if not missing:
             break
         stack = solve.Stack.of(scene, [*sets, one.readings], watch)
-        by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
-        both = np.vstack(by_parameter), np.vstack(by_unknown)
+        both = stack.derivatives(terms, terms.start, stack.start())
         rank = solve.find_rank(keys, *both, stack.blind)
         still = {group[0] for group in rank.confounded}
         for group in [group for group in missing if group[0] not in still]:
@@ -253,7 +252,7 @@ def _information(
     noise_mm: float,
     instrument: Instrument = NO_INSTRUMENT,
 ) -> Array:
-    by_parameter, by_unknown = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
+    by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
     weights = np.concatenate(stack.weights(noise_mm))[:, None]
     common = [common_mode(stack, one) for one in instrument.shared]
     seen = weights * np.hstack([by_parameter, *common])

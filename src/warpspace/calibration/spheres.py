@@ -118,8 +118,7 @@ class Sphere(Centres):
         nominal = solve_linear(scene, coordinates, places(tip, table), table.source)
         readings = take_readings(self.name, scene, table, nominal, tip, notes)
         readings = replace(readings, circles=circles)
-        unknown = self.unknowns(readings)
-        about = tip - self._members(readings, unknown) @ self.start(readings, unknown)
+        about = tip - self._members(readings, self.unknowns(readings)) @ self.start(readings)
         hint = "Are they in mm, and are the offsets of the scene those of the machine?"
         check_spread(float(np.abs(about).max()), SPREAD_MM, table.source, hint)
         return readings
