@@ -11,6 +11,7 @@ import numpy as np
 
 from warpspace.calibration.readings import (
     FRAMES,
+    LABELS,
     Readings,
     ReadingTable,
     axis_columns,
@@ -299,7 +300,7 @@ class Lengths(FromVectors):
         observed = table.need(("length_mm",))
         coordinates, notes = axis_columns(table, scene, tuple(scene.machine.axes))
         check_poses(coordinates, table.source)
-        labels = table.session or ("1",) * len(table)
+        labels = table.session if table.labels.keys() & {*LABELS} else ("1",) * len(table)
         for name in dict.fromkeys(labels):
             count = labels.count(name)
             if count < LEAST:

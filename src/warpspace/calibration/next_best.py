@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.analysis.doubt import coverage_factor
-from warpspace.bench.placing import PLANES
+from warpspace.bench.placing import PLANES, ball_point
 from warpspace.calibration import solve
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
-from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import TestReadings
 from warpspace.calibration.results import Calibration, Candidate, Step, Target
 from warpspace.calibration.spheres import solve_linear
@@ -56,7 +56,7 @@ def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _nominal(scene: Scene, kind: str, at: Mapping[str, Array], observed_mm: Array) -> Readings:
-    tip, count = nominal_tip(scene, dict(at)), len(observed_mm)
+    tip, count = ball_point(scene.model, at), len(observed_mm)
     lines = tuple(range(1, count + 1))
     return Readings(kind, at, tip, observed_mm, None, (SESSION,) * count, lines, "")
 
@@ -110,7 +110,7 @@ def _test(scene: Scene, kind: str, words: str) -> Iterator[Candidate]:
 
 def _spheres(scene: Scene) -> Iterator[Candidate]:
     still = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
-    centre = nominal_tip(scene, still)
+    centre = ball_point(scene.model, still)
     rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
     travels = {name: scene.machine.axes[name].travel for name in rotary}
     turns = {

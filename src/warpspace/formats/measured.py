@@ -47,7 +47,10 @@ class Series:
         return np.array([run.values for run in self.runs if run.direction == direction])
 
     def mean(self, direction: int) -> Array | None:
-        """Give the mean of the runs in one direction, [n]; None where there are none."""
+        """Give the mean of the runs in one direction, [n]; None where there are none.
+
+        Forward it is x̄ᵢ↑ of ISO 230-2, backward x̄ᵢ↓.
+        """
         found = self._runs(direction)
         return np.nanmean(found, axis=0) if len(found) else None
 
@@ -55,16 +58,6 @@ class Series:
         """Give the mean in a direction of travel, [n]; of both where there are no such runs."""
         mean = self.mean(direction)
         return self.values if mean is None else mean
-
-    @property
-    def forward(self) -> Array | None:
-        """Mean of the forward runs, [n], µm or µrad (x̄ᵢ↑ of ISO 230-2)."""
-        return self.mean(FORWARD)
-
-    @property
-    def backward(self) -> Array | None:
-        """Mean of the backward runs, [n], µm or µrad (x̄ᵢ↓)."""
-        return self.mean(BACKWARD)
 
     @property
     def values(self) -> Array:
@@ -77,7 +70,7 @@ class Series:
     @property
     def reversal(self) -> Array | None:
         """Reversal error, [n], µm or µrad (Bᵢ = x̄ᵢ↑ − x̄ᵢ↓); None where one direction is missing."""
-        forward, backward = self.forward, self.backward
+        forward, backward = self.mean(FORWARD), self.mean(BACKWARD)
         return None if forward is None or backward is None else forward - backward
 
     def deviation(self, direction: int) -> Array | None:
