@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -181,13 +181,17 @@ def merge(parts: Sequence[Imported]) -> Imported:
 class Summary:
     """One error."""
 
+    keys: ClassVar[tuple[str, ...]] = (
+        "key", "unit", "kind", "points", "runs", "directions", "range", "smallest", "largest",
+        "mean_reversal", "repeatability", "uncertainty",
+    )  # fmt: skip
     key: str  # values below are in the unit, µm or µrad
     # "table", "by direction", "over Z", "over Z, by direction", "constant", or the name of a curve
     kind: str
     points: int = 1
     runs: int = 0
     directions: str = ""  # "+", "-", "+ -", or empty where not told
-    span: tuple[float, float] | None = None  # first and last position, mm or degrees
+    range: tuple[float, float] | None = None  # first and last position, mm or degrees
     smallest: float  # of the mean
     largest: float
     # mean over the positions of the reversal error (B̄ of ISO 230-2)
@@ -210,7 +214,7 @@ def summaries(found: Imported) -> list[Summary]:
                 kind=f"over {plane.axes[1]}{', by direction' if plane.backward else ''}",
                 points=values.size,
                 directions="+ -" if plane.backward else "",
-                span=(plane.first[0], plane.first[-1]),
+                range=(plane.first[0], plane.first[-1]),
                 smallest=float(values.min()),
                 largest=float(values.max()),
             )
@@ -231,7 +235,7 @@ def summary_table(found: Imported) -> blocks.Table:
     rows = [
         (
             one.key, one.kind, one.points, one.runs or None, one.directions,
-            f"{one.span[0]:g} … {one.span[1]:g}" if one.span else "",
+            f"{one.range[0]:g} … {one.range[1]:g}" if one.range else "",
             one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
         )
         for one in summaries(found)
@@ -262,7 +266,7 @@ def _of_series(one: Series) -> Summary:
         points=len(one.positions),
         runs=len(one.runs),
         directions=" ".join(sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in ways),
-        span=(one.positions[0], one.positions[-1]),
+        range=(one.positions[0], one.positions[-1]),
         smallest=float(values.min()),
         largest=float(values.max()),
         mean_reversal=None if reversal is None else float(reversal.mean()),
