@@ -309,8 +309,8 @@ def test_mean_reversal_and_repeatability_of_five_targets_and_five_runs(tmp_path)
         lines += [f"{q},{run + 1},-,{back[run, 4 - i]}" for i, q in enumerate(reversed(targets))]
     (one,) = read_errors(sources("\n".join(lines)), PLAIN).found.series
     mean_up, mean_down = there.sum(axis=0) / 5, back.sum(axis=0) / 5
-    assert one.forward == pytest.approx(mean_up)
-    assert one.backward == pytest.approx(mean_down)
+    assert one.mean(FORWARD) == pytest.approx(mean_up)
+    assert one.mean(BACKWARD) == pytest.approx(mean_down)
     assert one.values == pytest.approx((mean_up + mean_down) / 2)
     assert one.reversal == pytest.approx(mean_up - mean_down)
     s_up = np.sqrt(((there - mean_up) ** 2).sum(axis=0) / 4)

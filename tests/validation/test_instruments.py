@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from warpspace.analysis.doubt import field_doubt, volume_doubt
+from warpspace.bench.placing import ball_point
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.instruments import instrument_names, load_instrument
 from warpspace.calibration.kinds import VIEW
 from warpspace.calibration.next_best import candidates, observability
-from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.calibration.readings import Readings
 from warpspace.calibration.solve import build_terms
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.field.evaluate import evaluate_first_order
@@ -111,7 +112,7 @@ def own(tmp_path):
 def vectors(scene, poses, error_um, session=""):
     count = len(error_um)
     at = {axis: np.asarray(poses.get(axis, np.zeros(count))) for axis in scene.machine.axes}
-    tip, lines = nominal_tip(scene, at), tuple(range(count))
+    tip, lines = ball_point(scene.model, at), tuple(range(count))
     return Readings("points", at, tip, 1e-3 * error_um, None, (session,) * count, lines, "r.csv")
 
 

@@ -189,8 +189,7 @@ class BenchResult(Result):
         if doubt is None:
             return {}
         each = (
-            respond(replace(scene, errors=errors), run.plan, keys).matrix
-            for errors, keys in doubt.layers
+            respond(replace(scene, errors=errors), run.plan, keys) for errors, keys in doubt.layers
         )
         gains = np.hstack([*each])
 

@@ -331,8 +331,6 @@ def lay_followed(
             "sense": sense,
             "along": np.cos(theta),
             "up": np.sin(theta),
-            "radius_mm": np.full(count, radius_mm),
-            "gain_sign": np.ones(count),
             "as_read": np.ones(count),
         },
         length_mm=BAR_MM,

@@ -126,26 +126,11 @@ class Outcome:
 RELATIVE = View(Loop.RELATIVE)
 
 
-@dataclass(frozen=True, slots=True)
-class Response:
-    """Readings as a linear function of the errors: ``readings = matrix @ amplitudes``."""
-
-    keys: tuple[str, ...]  # (K,)
-    amplitudes: Array  # [K], µm or µrad; those of the scene
-    # [m, K]; reading in µm (angles: µrad) per µm or µrad of amplitude; the curve of each parameter
-    # along its axis is folded in, as in an `ErrorBasis`
-    matrix: Array
-
-    @property
-    def readings(self) -> Array:
-        """Readings for the amplitudes of the scene, [m]."""
-        return self.matrix @ self.amplitudes
-
-
 def simulate(scene: Scene, plan: Plan, *, exact: bool = True) -> Array:
     """Take the readings of a plan on the model of a scene, [m], µm (angles: µrad)."""
     if not exact:
-        return respond(scene, plan).readings
+        amplitudes = [scene.errors.amplitude(key) for key in scene.parameter_keys]
+        return respond(scene, plan, scene.parameter_keys) @ np.array(amplitudes, dtype=float)
     found = np.zeros((len(plan.point_mm), 3))
     model = _both_ways(scene)
     for rows, errors in _by_travel(scene.errors, plan):
@@ -168,13 +153,14 @@ def sense(plan: Plan, error_um: Array) -> Array:
     return plan.gain * along
 
 
-def respond(scene: Scene, plan: Plan, keys: Sequence[str] | None = None) -> Response:
-    """Give the readings of a plan as a linear function of the errors of a scene."""
-    chosen = tuple(scene.parameter_keys if keys is None else keys)
-    position = respond_sites(scene, plan, chosen)
+def respond(scene: Scene, plan: Plan, keys: Sequence[str]) -> Array:
+    """Give the readings of a plan as a linear function of errors, [m, K], µm or µrad per unit.
+
+    The curve of each parameter along its axis is folded in, as in an `ErrorBasis`.
+    """
+    position = respond_sites(scene, plan, keys)
     along = np.sum(_differences(plan, position) * plan.direction, axis=-1)
-    amplitudes = np.array([scene.errors.amplitude(key) for key in chosen], dtype=float)
-    return Response(chosen, amplitudes, (along * plan.gain).T)
+    return (along * plan.gain).T
 
 
 def respond_sites(scene: Scene, plan: Plan, keys: Sequence[str]) -> Array:

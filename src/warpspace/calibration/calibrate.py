@@ -396,8 +396,7 @@ def _moved(instrument: Instrument, stack: Stack, solved: Solved) -> list[Array]:
 def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
     by_parameter, by_unknown = stack.derivatives(terms, terms.start, unknown)
     weights = np.concatenate(stack.weights())[:, None]
-    both = weights * np.vstack(by_parameter), weights * np.vstack(by_unknown)
-    return find_rank(terms.keys, *both, stack.blind)
+    return find_rank(terms.keys, weights * by_parameter, weights * by_unknown, stack.blind)
 
 
 def _check_count(stack: Stack, rank: Rank, fitted: int, has_prior: bool) -> None:
@@ -547,7 +546,7 @@ def _predict(
     from scipy.stats import t
 
     weights = np.concatenate(held.weights(scatter[0]))[:, None]
-    by_parameter, by_unknown = map(np.vstack, held.derivatives(part, solved.amplitudes, values[1]))
+    by_parameter, by_unknown = held.derivatives(part, solved.amplitudes, values[1])
     own = np.isin(held.unknowns, new)
     at = [len(part.keys) + stack.unknowns.index(n) for n in held.unknowns if n not in new]
     chosen = [*range(len(part.keys)), *at]

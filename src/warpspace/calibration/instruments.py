@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.blocks import Column, Table
-from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.bench.placing import ball_point
+from warpspace.calibration.readings import Readings
 from warpspace.calibration.solve import Stack
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.kinematics import transforms
@@ -110,7 +111,7 @@ def _levers_mm(stack: Stack, one: Readings) -> Array:
         return one.observed_mm - one.observed_mm.mean(axis=0)
     if (plan := one.plan) is None:
         return one.nominal_mm - one.nominal_mm.mean(axis=0)
-    tip = nominal_tip(stack.scene, plan.coordinates)
+    tip = ball_point(stack.scene.model, plan.coordinates)
     turn = branch_pose(stack.scene.model, "workpiece", one.coordinates)[..., :3, :3]
     origin = np.where((plan.against >= 0)[:, None], tip[plan.against], tip[plan.site].mean(axis=0))
     away = transforms.rotate(turn, tip[plan.site] - origin)

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpspace.calibration.readings import (
     FRAMES,
+    LABELS,
     Readings,
     ReadingTable,
     axis_columns,
@@ -63,9 +63,9 @@ class Kind(ABC):
     own_columns: ClassVar[bool] = False
     blind: ClassVar[float] = BLIND
 
-    @abstractmethod
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+    def fits(self, table: ReadingTable, scene: Scene) -> bool:  # noqa: ARG002 - for others
         """Tell whether a file has the columns of this kind, and of no other."""
+        return False
 
     @abstractmethod
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
@@ -75,9 +75,9 @@ class Kind(ABC):
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         """Name what the set-up leaves unknown, each in mm, for instance ``sphere x``."""
 
-    @abstractmethod
-    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
+    def start(self, readings: Readings) -> Array:
         """Give values of the unknowns to begin with, [m], mm."""
+        return np.zeros(len(self.unknowns(readings)))
 
     @abstractmethod
     def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
@@ -99,21 +99,22 @@ class FromVectors(Kind):
     """A kind whose readings follow from the error vectors at its poses."""
 
     @abstractmethod
-    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
-        """Give the readings, [n, d], mm, that errors, [n, 3], mm, would lead to."""
+    def predict(
+        self, readings: Readings, error_mm: Array, guess: Guess
+    ) -> tuple[Array, Array, Array]:
+        """Give the readings, [n, d], mm, that errors, [n, 3], mm, would lead to.
 
-    @abstractmethod
-    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
-        """Differentiate the prediction: by the error, [n, d, 3], and by unknowns, [n, d, m]."""
+        Beside them their derivatives: by the error, [n, d, 3], and by unknowns, [n, d, m].
+        """
 
     def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
-        return self.predict(readings, _error_mm(scene, readings, guess), guess)
+        return self.predict(readings, _error_mm(scene, readings, guess), guess)[0]
 
     def slopes(
         self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         error_mm = _error_mm(scene, readings, guess)
-        by_error, by_unknown = self.derivatives(readings, error_mm, guess)
+        _, by_error, by_unknown = self.predict(readings, error_mm, guess)
         basis = build_basis(scene.model, guess.errors, keys, readings.coordinates, VIEW)
         gains = np.einsum("ndx,knx->ndk", by_error, basis.position) * MM_PER_UM
         return gains, by_unknown
@@ -137,17 +138,17 @@ class Placed(FromVectors):
             for letter in "xyz"
         )
 
-    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        member = self._members(readings, unknowns)
+    def start(self, readings: Readings) -> Array:
+        member = self._members(readings, self.unknowns(readings))
         total = np.einsum("ndm,nd->m", member, readings.observed_mm)
         return total / np.maximum(member.sum(axis=(0, 1)), 1.0)
 
-    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
-        return self.sign * error_mm + self._members(readings, guess.unknowns) @ guess.values
-
-    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
+    def predict(
+        self, readings: Readings, error_mm: Array, guess: Guess
+    ) -> tuple[Array, Array, Array]:
+        member = self._members(readings, guess.unknowns)
         by_error = np.broadcast_to(self.sign * np.eye(3), (*error_mm.shape, 3))
-        return by_error, self._members(readings, guess.unknowns)
+        return self.sign * error_mm + member @ guess.values, by_error, member
 
     def _head(self, session: str) -> str:
         return f"{self.place} {session}".strip()
@@ -232,17 +233,12 @@ class Tracker(Points):
     loops = ("relative", "relative_placed")
     place = "tracker"
 
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        del table, scene
-        return False
-
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         names = dict.fromkeys(name[:-2] for name in Placed.unknowns(self, readings))
         return tuple(f"{name} {at}{x}" for name in names for at in ("", "turn ") for x in "xyz")
 
-    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        del readings
-        return np.zeros(len(unknowns))
+    def start(self, readings: Readings) -> Array:
+        return np.zeros(len(self.unknowns(readings)))
 
     def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
         """Tell what a unit of each unknown adds to each component, [n, 3, m]."""
@@ -286,7 +282,6 @@ def in_other_frame(scene: Scene, readings: Readings) -> Readings | None:
     return replace(readings, observed_mm=observed, frame="workpiece" if was_machine else "machine")
 
 
-Indices = NDArray[np.intp]
 LEAST = 5  # readings that a station needs: its place, its dead path, and one to check
 
 
@@ -305,7 +300,7 @@ class Lengths(FromVectors):
         observed = table.need(("length_mm",))
         coordinates, notes = axis_columns(table, scene, tuple(scene.machine.axes))
         check_poses(coordinates, table.source)
-        labels = table.session or ("1",) * len(table)
+        labels = table.session if table.labels.keys() & {*LABELS} else ("1",) * len(table)
         for name in dict.fromkeys(labels):
             count = labels.count(name)
             if count < LEAST:
@@ -321,37 +316,26 @@ class Lengths(FromVectors):
             for what in ("x", "y", "z", "dead path")
         )
 
-    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        values = np.zeros(len(unknowns))
-        stations = self._stations(readings, unknowns)
-        for name in dict.fromkeys(readings.session):
-            at = unknowns.index(f"station {name} x")
-            mine = stations == at
-            values[at : at + 4] = _locate(readings.nominal_mm[mine], readings.observed_mm[mine, 0])
-        return values
+    def start(self, readings: Readings) -> Array:
+        sessions = np.array(readings.session)
+        stations = (sessions == name for name in dict.fromkeys(readings.session))
+        return np.concatenate(
+            [_locate(readings.nominal_mm[own], readings.observed_mm[own, 0]) for own in stations]
+        )
 
-    def predict(self, readings: Readings, error_mm: Array, guess: Guess) -> Array:
-        at, away = self._beams(readings, error_mm, guess)
-        return (np.linalg.norm(away, axis=-1) - guess.values[at + 3])[:, None]
-
-    def derivatives(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Array, Array]:
-        at, away = self._beams(readings, error_mm, guess)
-        beam = away / np.linalg.norm(away, axis=-1, keepdims=True)
+    def predict(
+        self, readings: Readings, error_mm: Array, guess: Guess
+    ) -> tuple[Array, Array, Array]:
+        index = {name: at for at, name in enumerate(guess.unknowns)}
+        first = np.array([index[f"station {name} x"] for name in readings.session])
+        own = first[:, None] + np.arange(4)  # place and dead path of the station of each reading
+        values = guess.values[own]
+        away = readings.nominal_mm + error_mm - values[:, :3]
+        length = np.linalg.norm(away, axis=-1)
+        beam = away / length[:, None]
         by_unknown = np.zeros((len(readings), 1, len(guess.unknowns)))
-        rows = np.arange(len(readings))
-        for component in range(3):
-            by_unknown[rows, 0, at + component] = -beam[:, component]
-        by_unknown[rows, 0, at + 3] = -1.0
-        return beam[:, None, :], by_unknown
-
-    def _beams(self, readings: Readings, error_mm: Array, guess: Guess) -> tuple[Indices, Array]:
-        at = self._stations(readings, guess.unknowns)
-        places = np.stack([guess.values[at + component] for component in range(3)], -1)
-        return at, readings.nominal_mm + error_mm - places
-
-    def _stations(self, readings: Readings, unknowns: tuple[str, ...]) -> Indices:
-        index = {name: at for at, name in enumerate(unknowns)}
-        return np.array([index[f"station {name} x"] for name in readings.session], np.intp)
+        np.put_along_axis(by_unknown[:, 0], own, np.column_stack([-beam, -np.ones(len(own))]), -1)
+        return (length - values[:, 3])[:, None], beam[:, None, :], by_unknown
 
 
 def _locate(points_mm: Array, length_mm: Array) -> Array:

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.analysis.doubt import coverage_factor
-from warpspace.bench.placing import PLANES
+from warpspace.bench.placing import PLANES, ball_point
 from warpspace.calibration import solve
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
-from warpspace.calibration.readings import Readings, nominal_tip
+from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import TestReadings
 from warpspace.calibration.results import Calibration, Candidate, Step, Target
 from warpspace.calibration.spheres import solve_linear
@@ -56,7 +56,7 @@ def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _nominal(scene: Scene, kind: str, at: Mapping[str, Array], observed_mm: Array) -> Readings:
-    tip, count = nominal_tip(scene, dict(at)), len(observed_mm)
+    tip, count = ball_point(scene.model, at), len(observed_mm)
     lines = tuple(range(1, count + 1))
     return Readings(kind, at, tip, observed_mm, None, (SESSION,) * count, lines, "")
 
@@ -110,7 +110,7 @@ def _test(scene: Scene, kind: str, words: str) -> Iterator[Candidate]:
 
 def _spheres(scene: Scene) -> Iterator[Candidate]:
     still = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
-    centre = nominal_tip(scene, still)
+    centre = ball_point(scene.model, still)
     rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
     travels = {name: scene.machine.axes[name].travel for name in rotary}
     turns = {
@@ -237,8 +237,7 @@ def separating(
         if not missing:
             break
         stack = solve.Stack.of(scene, [*sets, one.readings], watch)
-        by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
-        both = np.vstack(by_parameter), np.vstack(by_unknown)
+        both = stack.derivatives(terms, terms.start, stack.start())
         rank = solve.find_rank(keys, *both, stack.blind)
         still = {group[0] for group in rank.confounded}
         for group in [group for group in missing if group[0] not in still]:
@@ -253,7 +252,7 @@ def _information(
     noise_mm: float,
     instrument: Instrument = NO_INSTRUMENT,
 ) -> Array:
-    by_parameter, by_unknown = map(np.vstack, stack.derivatives(terms, terms.start, stack.start()))
+    by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
     weights = np.concatenate(stack.weights(noise_mm))[:, None]
     common = [common_mode(stack, one) for one in instrument.shared]
     seen = weights * np.hstack([by_parameter, *common])

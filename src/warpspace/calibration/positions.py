@@ -70,8 +70,7 @@ class Positions(Kind):
         ]
         return tuple(f"{head} {x}" for head in (*heads, UNKNOWNS[2]) for x in "xyz")
 
-    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        del unknowns
+    def start(self, readings: Readings) -> Array:
         return np.array(readings.first_fit)
 
     def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:

@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import Plan
 from warpspace.exceptions import OptionError, SceneError, near_miss
-from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose, nominal_point
-from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_CSV_BYTES
 from warpspace.resources import assets_dir
@@ -58,9 +56,10 @@ class ReadingTable:
         return np.column_stack([self.columns[name] for name in names])
 
     @property
-    def session(self) -> tuple[str, ...] | None:
-        """Names of the sessions, (n,); None where the file has no such column."""
-        return next((self.labels[name] for name in LABELS if name in self.labels), None)
+    def session(self) -> tuple[str, ...]:
+        """Names of the sessions, (n,); empty where the file has no such column."""
+        none = ("",) * len(self)
+        return next((self.labels[name] for name in LABELS if name in self.labels), none)
 
 
 def parse_table(text: str, source: str) -> ReadingTable:
@@ -95,7 +94,7 @@ def parse_table(text: str, source: str) -> ReadingTable:
         text,
         (*rows.notes, *radian_notes(numbers)),
     )
-    named = len(set(table.session or ()))
+    named = len(set(table.session))
     if named > MAX_SESSIONS:
         found = f"names {named:,} sessions; expected at most {MAX_SESSIONS}"
         raise SceneError(source, [found])
@@ -240,13 +239,6 @@ def axis_columns(
     return coordinates, tuple(notes)
 
 
-def nominal_tip(scene: Scene, coordinates: Mapping[str, Array]) -> Array:
-    """Give the nominal tool point in the workpiece frame, [n, 3], mm."""
-    model = scene.model
-    tip = nominal_point(model, Loop.TOOL, coordinates)
-    return transforms.apply(transforms.inverse(branch_pose(model, "workpiece", coordinates)), tip)
-
-
 def take_readings(
     kind: str,
     scene: Scene,
@@ -258,10 +250,10 @@ def take_readings(
     return Readings(
         kind,
         coordinates,
-        nominal_tip(scene, coordinates),
+        ball_point(scene.model, coordinates),
         observed_mm,
         uncertainties_mm(table),
-        table.session or ("",) * len(table),
+        table.session,
         table.lines,
         table.source,
         notes,

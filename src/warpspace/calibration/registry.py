@@ -52,10 +52,6 @@ class TestReadings(Kind):
         self.test: BenchTest = kind(**values)
         self._text = text
 
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:
-        del table, scene
-        return False
-
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
         own = parse_table(table.text, self.test.data_columns(scene), table.source)
         plan, measured = self.test.plan_data(scene, own)
@@ -91,10 +87,6 @@ class TestReadings(Kind):
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         return tuple(f"{readings.source} {name}" for name in _plan(readings).setup)
 
-    def start(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        del readings
-        return np.zeros(len(unknowns))
-
     def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
         machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
         taken = simulate(machine, _plan(readings)) * MM_PER_UM
@@ -104,7 +96,7 @@ class TestReadings(Kind):
         self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
-        matrix = respond(machine, _plan(readings), keys).matrix * MM_PER_UM
+        matrix = respond(machine, _plan(readings), keys) * MM_PER_UM
         return matrix[:, None, :], _set_up(readings, guess.unknowns)[:, None, :]
 
 

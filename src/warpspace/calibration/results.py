@@ -226,8 +226,6 @@ class Calibration(Result):
         return (Change("with the errors found", self.scene),)
 
     def as_json(self) -> dict[str, Any]:
-        from dataclasses import asdict
-
         return {
             "parameters": plain(self.parameters),
             "combinations": plain(self.combinations),
@@ -242,7 +240,7 @@ class Calibration(Result):
             "degrees_of_freedom": self.freedom,
             "set_up_mm": dict(self.unknowns),
             "correlation": {"keys": list(self.fit), "matrix": self.correlation.tolist()},
-            "circles": [asdict(circle) for circle in self.circles],
+            "circles": plain(self.circles),
             "lack_of_fit": self.lack_of_fit,
             "instrument": self.instrument,
             "merit": dict(self.merit),

@@ -248,8 +248,7 @@ class Stack:
         values: dict[str, float] = {}
         for one in self.sets:
             kind = find_kind(one.kind)
-            own = kind.unknowns(one)
-            for name, value in zip(own, kind.start(one, own), strict=True):
+            for name, value in zip(kind.unknowns(one), kind.start(one), strict=True):
                 values.setdefault(name, float(value))
         return np.array([values[name] for name in self.unknowns])
 
@@ -262,10 +261,8 @@ class Stack:
             for one in self.sets
         ]
 
-    def derivatives(
-        self, terms: Terms, amplitudes: Array, unknown: Array
-    ) -> tuple[list[Array], list[Array]]:
-        """Give the change of each prediction, [n·d, K] per µm or µrad and [n·d, m] per mm."""
+    def derivatives(self, terms: Terms, amplitudes: Array, unknown: Array) -> tuple[Array, Array]:
+        """Give the change of all predictions, [N, K] per µm or µrad and [N, m] per mm."""
         self.watch()
         guess = Guess(terms.errors_with(amplitudes), self.unknowns, unknown)
         by_parameter: list[Array] = []
@@ -274,7 +271,7 @@ class Stack:
             gains, own = find_kind(one.kind).slopes(self.scene, one, guess, terms.keys)
             by_parameter.append(gains.reshape(one.observed_mm.size, len(terms.keys)))
             by_unknown.append(own.reshape(one.observed_mm.size, len(self.unknowns)))
-        return by_parameter, by_unknown
+        return np.vstack(by_parameter), np.vstack(by_unknown)
 
     def weights(self, otherwise_mm: float = 1.0) -> list[Array]:
         """Give the weight of each component of each reading, [n·d], 1/mm."""
@@ -352,8 +349,8 @@ def solve(
         return np.concatenate([row.ravel() for row in rows]) * weights
 
     def slopes(values: Array) -> Array:
-        by_parameter, by_unknown = stack.derivatives(terms, values[:count], values[count:])
-        return -weights[:, None] * np.hstack([np.vstack(by_parameter), np.vstack(by_unknown)])
+        both = stack.derivatives(terms, values[:count], values[count:])
+        return -weights[:, None] * np.hstack(both)
 
     trust, unit = np.ones(stack.size), None
     freedom = max(stack.size - len(start) + (0 if prior is None else count), 1)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.analysis.axis_motion import fit_flat_circle
+from warpspace.bench.placing import ball_point
 from warpspace.calibration.kinds import Placed
 from warpspace.calibration.readings import (
     Circle,
@@ -13,7 +14,6 @@ from warpspace.calibration.readings import (
     axis_columns,
     check_poses,
     check_spread,
-    nominal_tip,
     take_readings,
 )
 from warpspace.exceptions import SceneError
@@ -105,7 +105,7 @@ class Sphere(Centres):
         for circle in circles:
             if circle.against:
                 coordinates[circle.axis] = np.where(
-                    np.isin(table.session or ("",) * len(table), circle.sessions),
+                    np.isin(table.session, circle.sessions),
                     -coordinates[circle.axis],
                     coordinates[circle.axis],
                 )
@@ -114,12 +114,11 @@ class Sphere(Centres):
                     " the scene; its positions are taken with the other sign"
                 )
                 notes = (*notes, note)
-        tip = nominal_tip(scene, coordinates)
+        tip = ball_point(scene.model, coordinates)
         nominal = solve_linear(scene, coordinates, places(tip, table), table.source)
         readings = take_readings(self.name, scene, table, nominal, tip, notes)
         readings = replace(readings, circles=circles)
-        unknown = self.unknowns(readings)
-        about = tip - self._members(readings, unknown) @ self.start(readings, unknown)
+        about = tip - self._members(readings, self.unknowns(readings)) @ self.start(readings)
         hint = "Are they in mm, and are the offsets of the scene those of the machine?"
         check_spread(float(np.abs(about).max()), SPREAD_MM, table.source, hint)
         return readings
@@ -135,8 +134,8 @@ def has_centres(table: ReadingTable, scene: Scene) -> bool:
 
 
 def spread_mm(table: ReadingTable) -> float:
-    observed, labels = table.need(READ), table.session or ("",) * len(table)
-    groups = [np.array(labels) == name for name in dict.fromkeys(labels)]
+    observed, labels = table.need(READ), np.array(table.session)
+    groups = [labels == name for name in dict.fromkeys(table.session)]
     return max(float(np.ptp(observed[group], axis=0).max()) for group in groups)
 
 
@@ -146,7 +145,7 @@ def places(observed_mm: Array, table: ReadingTable) -> Array:
     Errors are evaluated where the axes stand nominally. Positions that held the reading itself
     would let an error of scale explain any reading.
     """
-    labels = np.array(table.session or ("",) * len(table))
+    labels = np.array(table.session)
     means = {name: observed_mm[labels == name].mean(axis=0) for name in dict.fromkeys(labels)}
     return np.stack([means[name] for name in labels])
 
@@ -161,9 +160,9 @@ def solve_linear(
             one_per_direction.setdefault(direction_index(name), name)
     linear = list(one_per_direction.values())
     zero = {**coordinates, **{name: np.zeros(len(target_mm)) for name in linear}}
-    start = nominal_tip(scene, zero)
+    start = ball_point(scene.model, zero)
     columns = [
-        nominal_tip(scene, {**zero, name: np.ones(len(target_mm))}) - start for name in linear
+        ball_point(scene.model, {**zero, name: np.ones(len(target_mm))}) - start for name in linear
     ]
     system = np.stack(columns, -1) if columns else np.zeros((len(target_mm), 3, 0))
     solved = np.linalg.pinv(system) @ (target_mm - start)[..., None]
@@ -177,33 +176,24 @@ def solve_linear(
 
 def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
     """Fit a circle per run in which one rotary axis turns, and one per axis to all such runs."""
-    read = table.need(("x_mm", "y_mm", "z_mm"))
-    labels = np.array(table.session or ("",) * len(table))
-    rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
-    turned = {name: table.columns.get(f"{name.lower()}_deg") for name in rotary}
+    read, labels = table.need(READ), np.array(table.session)
+    turned = {
+        name: table.columns[column]
+        for name in rotary_axes(scene)
+        if (column := f"{name.lower()}_deg") in table.columns
+    }
     runs: dict[str, list[str]] = {}
     for session in dict.fromkeys(labels.tolist()):
         mine = labels == session
-        moving = [
-            name
-            for name, values in turned.items()
-            if values is not None and len(np.unique(values[mine])) >= LEAST
-        ]
-        still = [
-            name
-            for name, values in turned.items()
-            if values is not None and np.ptp(values[mine]) > 0.0 and name not in moving
-        ]
-        if len(moving) == 1 and not still:
+        moving = [name for name, values in turned.items() if np.ptp(values[mine]) > 0.0]
+        if len(moving) == 1 and len(np.unique(turned[moving[0]][mine])) >= LEAST:
             runs.setdefault(moving[0], []).append(session)
     found: list[Circle] = []
     for axis, sessions in runs.items():
         groups = [(one,) for one in sessions] + ([tuple(sessions)] if len(sessions) > 1 else [])
         for group in groups:
             mine = np.isin(labels, group)
-            values = turned[axis]
-            assert values is not None  # noqa: S101 - runs hold axes with a column only
-            found.append(_fit(axis, group, read[mine], values[mine], scene))
+            found.append(_fit(axis, group, read[mine], turned[axis][mine], scene))
     return tuple(found)
 
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,7 +47,10 @@ class Series:
         return np.array([run.values for run in self.runs if run.direction == direction])
 
     def mean(self, direction: int) -> Array | None:
-        """Give the mean of the runs in one direction, [n]; None where there are none."""
+        """Give the mean of the runs in one direction, [n]; None where there are none.
+
+        Forward it is x̄ᵢ↑ of ISO 230-2, backward x̄ᵢ↓.
+        """
         found = self._runs(direction)
         return np.nanmean(found, axis=0) if len(found) else None
 
@@ -55,16 +58,6 @@ class Series:
         """Give the mean in a direction of travel, [n]; of both where there are no such runs."""
         mean = self.mean(direction)
         return self.values if mean is None else mean
-
-    @property
-    def forward(self) -> Array | None:
-        """Mean of the forward runs, [n], µm or µrad (x̄ᵢ↑ of ISO 230-2)."""
-        return self.mean(FORWARD)
-
-    @property
-    def backward(self) -> Array | None:
-        """Mean of the backward runs, [n], µm or µrad (x̄ᵢ↓)."""
-        return self.mean(BACKWARD)
 
     @property
     def values(self) -> Array:
@@ -77,7 +70,7 @@ class Series:
     @property
     def reversal(self) -> Array | None:
         """Reversal error, [n], µm or µrad (Bᵢ = x̄ᵢ↑ − x̄ᵢ↓); None where one direction is missing."""
-        forward, backward = self.forward, self.backward
+        forward, backward = self.mean(FORWARD), self.mean(BACKWARD)
         return None if forward is None or backward is None else forward - backward
 
     def deviation(self, direction: int) -> Array | None:
@@ -188,13 +181,17 @@ def merge(parts: Sequence[Imported]) -> Imported:
 class Summary:
     """One error."""
 
+    keys: ClassVar[tuple[str, ...]] = (
+        "key", "unit", "kind", "points", "runs", "directions", "range", "smallest", "largest",
+        "mean_reversal", "repeatability", "uncertainty",
+    )  # fmt: skip
     key: str  # values below are in the unit, µm or µrad
     # "table", "by direction", "over Z", "over Z, by direction", "constant", or the name of a curve
     kind: str
     points: int = 1
     runs: int = 0
     directions: str = ""  # "+", "-", "+ -", or empty where not told
-    span: tuple[float, float] | None = None  # first and last position, mm or degrees
+    range: tuple[float, float] | None = None  # first and last position, mm or degrees
     smallest: float  # of the mean
     largest: float
     # mean over the positions of the reversal error (B̄ of ISO 230-2)
@@ -217,7 +214,7 @@ def summaries(found: Imported) -> list[Summary]:
                 kind=f"over {plane.axes[1]}{', by direction' if plane.backward else ''}",
                 points=values.size,
                 directions="+ -" if plane.backward else "",
-                span=(plane.first[0], plane.first[-1]),
+                range=(plane.first[0], plane.first[-1]),
                 smallest=float(values.min()),
                 largest=float(values.max()),
             )
@@ -238,7 +235,7 @@ def summary_table(found: Imported) -> blocks.Table:
     rows = [
         (
             one.key, one.kind, one.points, one.runs or None, one.directions,
-            f"{one.span[0]:g} … {one.span[1]:g}" if one.span else "",
+            f"{one.range[0]:g} … {one.range[1]:g}" if one.range else "",
             one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
         )
         for one in summaries(found)
@@ -269,7 +266,7 @@ def _of_series(one: Series) -> Summary:
         points=len(one.positions),
         runs=len(one.runs),
         directions=" ".join(sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in ways),
-        span=(one.positions[0], one.positions[-1]),
+        range=(one.positions[0], one.positions[-1]),
         smallest=float(values.min()),
         largest=float(values.max()),
         mean_reversal=None if reversal is None else float(reversal.mean()),

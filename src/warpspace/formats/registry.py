@@ -13,7 +13,7 @@ from typing import Any
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.compensation.wanted import Wanted
 from warpspace.formats.measured import Imported, merge
-from warpspace.formats.source import MAX_BYTES, Place, Source, read_source, source_of_bytes
+from warpspace.formats.source import MAX_BYTES, Place, Source, source_of_bytes
 from warpspace.formats.terms import Tables, errors_of
 from warpspace.machine.axes import is_axis_name
 from warpspace.machine.description import Machine
@@ -26,7 +26,6 @@ SIGNS = (ERROR, CORRECTION)
 Files = Mapping[str, str]
 """Text of each file by what is added to the name that the user gives: "" is that file itself."""
 MOST_FILES = 64
-HEAD_BYTES = 16
 
 
 @dataclass(frozen=True)
@@ -214,13 +213,15 @@ class Reading:
     recognised: bool  # whether the format was found in the files; if not, the user said it
 
 
-def refuse_unknown(name: str, content: bytes) -> None:
+def open_upload(name: str, content: bytes) -> Source:
+    """Take in a file; one whose structure nobody has published is refused."""
     lower = name.lower()
     for kind in _words()["unpublished"]:
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
         if content.startswith(starts) or lower.endswith(tuple(kind["endings"])):
             found = f"is {kind['what']}; expected another file: {kind['instead']}"
             raise SceneError(name, [found])
+    return source_of_bytes(content, name)
 
 
 def open_files(paths: Sequence[Path]) -> list[Source]:
@@ -228,16 +229,13 @@ def open_files(paths: Sequence[Path]) -> list[Source]:
         raise OptionError(f"{len(paths)} files; expected at most {MOST_FILES} an import")
     sources: list[Source] = []
     for path in paths:
-        check_file(path, MAX_BYTES, str(path))
-        with path.open("rb") as file:
-            refuse_unknown(str(path), file.read(HEAD_BYTES))
-        sources.append(read_source(path))
+        name = str(path)
+        check_file(path, MAX_BYTES, name)
+        try:
+            sources.append(open_upload(name, path.read_bytes()))
+        except OSError as error:
+            raise SceneError(name, [f"cannot be read: {error.strerror or error}"]) from None
     return sources
-
-
-def open_upload(name: str, content: bytes) -> Source:
-    refuse_unknown(name, content[:HEAD_BYTES])
-    return source_of_bytes(content, name)
 
 
 def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: str = "") -> Reading:

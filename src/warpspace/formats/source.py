@@ -5,12 +5,11 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NoReturn
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
-from warpspace.scene.files import CsvRows, check_file, parse_number
+from warpspace.scene.files import CsvRows, parse_number
 
 UM_PER: Mapping[str, float] = {
     "um": 1.0,
@@ -180,16 +179,6 @@ def shown(text: str) -> str:
     """Spell what a file says in at most a line, without control characters."""
     clean = "".join(letter if letter.isprintable() else " " for letter in text.strip())
     return repr(clean if len(clean) <= SHOWN else clean[: SHOWN - 1] + "…")
-
-
-def read_source(path: Path) -> Source:
-    name = str(path)
-    check_file(path, MAX_BYTES, name)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise SceneError(name, [f"cannot be read: {error.strerror or error}"]) from None
-    return source_of_bytes(content, name)
 
 
 def source_of_bytes(content: bytes, name: str) -> Source:

@@ -7,7 +7,7 @@ interpolation, the behaviour at the ends and the direction of travel are those o
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,19 +20,6 @@ from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 HELD, MODULO, EXTENDED = "held", "modulo", "extended"
 """What a table does beyond its ends: its end values, its period, or its last straight line."""
-
-
-class Term(Protocol):
-    """A part of a controller's compensation."""
-
-    def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
-        """Give what is added to the commanded positions, mm or degrees, by axis."""
-        ...
-
-    @property
-    def size(self) -> int:
-        """How many numbers it takes in the controller."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -52,6 +39,7 @@ class Line:
 
     @property
     def size(self) -> int:
+        """How many numbers it takes in the controller."""
         return len(self.values) + len(self.backward)
 
     @property
@@ -69,6 +57,7 @@ class Line:
         return interpolate(np.asarray(position, dtype=float), self.positions, values, self.ends)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
+        """Give what is added to the commanded positions, mm or degrees, by axis."""
         return {self.target: self.at(coordinates[self.source], direction)}
 
 
@@ -136,6 +125,10 @@ class Affine:
             axis: sum((weight * q for weight, q in zip(row, at, strict=True)), np.zeros(()))
             for axis, row in zip(self.axes, self.matrix, strict=True)
         }
+
+
+Term: TypeAlias = Line | Product | Grid3 | Affine
+"""A part of a controller's compensation."""
 
 
 def interpolate(position: Array, at: Sequence[float], values: Sequence[float], ends: str) -> Array:

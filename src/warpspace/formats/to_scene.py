@@ -186,7 +186,7 @@ def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]
 
 def _curve(one: Series, base: Scene) -> ErrorFunction:
     span = base.axis_span(parameter(one.key).axis)
-    forward, backward = one.forward, one.backward
+    forward, backward = one.mean(FORWARD), one.mean(BACKWARD)
     if forward is not None and backward is not None and np.any(forward != backward):
         there, back = (
             _table(span, one.positions, values.tolist()) for values in (forward, backward)

@@ -51,8 +51,8 @@ class CircleFit:
     mean_radial_um: float | None
     # H, largest difference between the senses at one angle. Both None where one sense was run.
     hysteresis_um: float | None
-    # out of the sin 2φ and cos 2φ parts; None on arcs that are too short
-    squareness_urad: float | None
+    # amplitudes of the sin 2φ and cos 2φ parts; None and 0 on arcs that are too short
+    shear_um: float | None
     scale_difference_um: float
 
 
@@ -70,8 +70,8 @@ def is_full(angle_deg: Array) -> bool:
 def fit_circle_readings(plan: Plan, readings: Array) -> CircleFit:
     """Fit centre, radius and ellipse to the readings, [m], µm, of a circular plan.
 
-    Its marks are angle_deg, sense, along, up (the direction of the bar along the two axes of the
-    plane), radius_mm and gain_sign. With the mark as_read the centre is an error of the machine,
+    Its marks are angle_deg, sense, along and up (the direction of the bar along the two axes of the
+    plane). With the mark as_read the centre is an error of the machine,
     not of the set-up, and stays in: the ball beside a rotary axis turns with it.
 
     Notes
@@ -95,10 +95,6 @@ def fit_circle_readings(plan: Plan, readings: Array) -> CircleFit:
 
     fit, radial = centred(np.ones(len(readings), dtype=bool))
     elliptic = len(fit) == 5
-    squareness = None
-    if elliptic:
-        gain = marks["gain_sign"][0] * marks["radius_mm"][0] * UM_PER_MM_URAD
-        squareness = float(2.0 * fit[4] / gain)
     senses = [sign for sign in (1.0, -1.0) if (sense == sign).any()]
     both = len(senses) == 2
     return CircleFit(
@@ -109,7 +105,7 @@ def fit_circle_readings(plan: Plan, readings: Array) -> CircleFit:
         {sign: float(np.ptp(centred(sense == sign)[1])) for sign in senses},
         float(np.linalg.lstsq(design[:, :3], readings, rcond=None)[0][0]) if both else None,
         _hysteresis(marks["angle_deg"], sense, radial) if both else None,
-        squareness,
+        float(fit[4]) if elliptic else None,
         float(fit[3]) if elliptic else 0.0,
     )
 
@@ -192,30 +188,26 @@ class Circular(BenchTest):
         middle = {name: float(value) for name, value in stand.items()}
         check_circle(scene.workspace, middle, (first, second), self.radius_mm, angle_deg)
         plane = placing.find_plane(model, stand, self.plane)
-        theta = np.deg2rad(angle_deg)
-        coordinates = {
+        theta, count = np.deg2rad(angle_deg), len(angle_deg)
+        coordinates = {  # the last site is the centre
             **stand,
-            first: middle[first] + self.radius_mm * np.cos(theta),
-            second: middle[second] + self.radius_mm * np.sin(theta),
+            first: middle[first] + self.radius_mm * np.append(np.cos(theta), 0.0),
+            second: middle[second] + self.radius_mm * np.append(np.sin(theta), 0.0),
         }
-        count = len(theta)
-        outward = placing.relative_point(model, coordinates) - placing.relative_point(model, stand)
+        seen = placing.relative_point(model, coordinates)
+        outward = seen[:-1] - seen[-1]
         outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
-        points = placing.tool_points(model, coordinates, count)
-        centre = placing.tool_points(model, stand, 1)
         # A little further on: at a point of reversal an axis is about to move.
         ahead = theta + sense * 1e-6
         return build_plan(
-            {name: np.append(np.broadcast_to(values, (count,)), middle[name])
-             for name, values in coordinates.items()},
-            np.concatenate([points, centre]),
+            coordinates,
+            placing.tool_points(model, coordinates, count + 1),
             outward,
             place=f"{self.plane} plane · radius {self.radius_mm:g} mm · centre "
             + ", ".join(f"{name} {value:g}" for name, value in middle.items()),
             marks={
                 "angle_deg": angle_deg, "sense": sense,
                 "along": outward @ plane.along, "up": outward @ plane.up,
-                "radius_mm": np.full(count, self.radius_mm),
                 "gain_sign": np.full(count, plane.sign),
             },
             site=np.arange(count), against=np.full(count, count), length_mm=self.radius_mm,
@@ -258,10 +250,12 @@ class Circular(BenchTest):
         radius = fit.radius_um
         quantities.append(Quantity("radius_um", "mean radius − nominal", radius, "µm"))
         details: dict[str, object] = {}
-        if fit.squareness_urad is not None and not self.rotary:
+        if fit.shear_um is not None and not self.rotary:
             first, second, key = placing.PLANES[self.plane]
+            lever = plan.marks["gain_sign"][0] * self.radius_mm * UM_PER_MM_URAD
+            squareness = float(2.0 * fit.shear_um / lever)
             quantities += [
-                Quantity("squareness_urad", f"squareness {key}", fit.squareness_urad, "µrad"),
+                Quantity("squareness_urad", f"squareness {key}", squareness, "µrad"),
                 Quantity(
                     "scale_difference_um", f"{first} longer than {second}",
                     fit.scale_difference_um, "µm",
@@ -288,8 +282,11 @@ class Circular(BenchTest):
                 words, full = "both ways round" if alike else word, is_full(x)
                 curves.append(run.curve(words, x, y, row, once_round=full))
         fit = fit_circle_readings(runs[0].plan, runs[0].readings)
-        if fit.squareness_urad is not None and not self.rotary:
-            curves.append(self._squareness(fit, runs[0].plan))
+        if fit.shear_um is not None and not self.rotary:
+            turn = np.linspace(0.0, TURN, 181)
+            alone = fit.radius_um + fit.shear_um * np.sin(2.0 * np.deg2rad(turn))
+            words = "mean radius and squareness alone"
+            curves.append(Curve(words, turn, alone, 2, "dashed"))
         title = f"{self.bar} deviation along the circle about {self.rotary}"
         if not self.rotary:
             title = f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
@@ -299,13 +296,6 @@ class Circular(BenchTest):
                 "As read." if self.rotary else "About the least-squares centre.",
             ),
         )  # fmt: skip
-
-    def _squareness(self, fit: CircleFit, plan: Plan) -> Curve:
-        angle = np.linspace(0.0, TURN, 181)
-        sign = float(plan.marks["gain_sign"][0])
-        half = sign * (fit.squareness_urad or 0.0) * self.radius_mm * UM_PER_MM_URAD / 2.0
-        y = fit.radius_um + half * np.sin(2.0 * np.deg2rad(angle))
-        return Curve("mean radius and squareness alone", angle, y, 2, "dashed")
 
 
 def check_circle(
@@ -369,7 +359,7 @@ class Ballbar:
     @property
     def clockwise_there_um(self) -> Array:
         """The clockwise run at the angles of the other one, µm."""
-        return np.concatenate([self.clockwise_um[:1], self.clockwise_um[:0:-1]])
+        return np.roll(self.clockwise_um[::-1], 1)
 
     @property
     def hysteresis_um(self) -> float:
@@ -418,21 +408,21 @@ def ballbar(
     at = tuple((centre or {}).items())
     test = Circular(plane=cast("Any", plane), radius_mm=radius_mm, at=at, points=points)
     plan = test.plan(scene)
-    fit = fit_circle_readings(plan, simulate(scene, plan, exact=False))
+    readings = simulate(scene, plan, exact=False)
+    fit, outcome = fit_circle_readings(plan, readings), test.evaluate(plan, readings)
     stand = test.stand(scene)
     middle = evaluate_first_order(scene.model, scene.errors, stand, RELATIVE).error_um
     found = placing.find_plane(scene.model, stand, plane)
     there = [float(middle @ vector) for vector in (found.along, found.up)]
-    back = fit.radial_um[points:][::-1]
     return Ballbar(
         plane,
         radius_mm,
         {name: float(value) for name, value in stand.items()},
         plan.marks["angle_deg"][:points],
         fit.radial_um[:points],
-        np.concatenate([back[:1], back[:0:-1]]),
+        np.roll(fit.radial_um[points:], 1),
         fit.deviation_um,
-        fit.squareness_urad or 0.0,
+        outcome["squareness_urad"],
         key,
         scene.errors.amplitude(key),
         (fit.centre_um[0] + there[0], fit.centre_um[1] + there[1]),

@@ -161,8 +161,6 @@ class ConeFrustum(BenchTest):
             marks={
                 "angle_deg": angle_deg, "sense": np.ones(len(theta)),
                 "along": np.cos(theta), "up": np.sin(theta),
-                "radius_mm": np.full(len(theta), self.radius_mm),
-                "gain_sign": np.ones(len(theta)),
             },
             length_mm=self.radius_mm,
             travel=placing.travels(coordinates, np.ones(len(theta))),

@@ -18,14 +18,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 BODY = ("PPP", "NPP", "PNP", "PPN")  # which way x, y and z run: P upwards, N downwards
-KINDS = ("body", "face", "step")
-
-
-def diagonal_names(kind: str) -> tuple[str, ...]:
-    """List the diagonals of a kind: ``NPP``, or ``XY:NP`` for those of a face."""
-    if kind == "face":
-        return tuple(f"{plane}:{way}" for plane in PLANES for way in ("PP", "NP"))
-    return BODY
+FACES = tuple(f"{plane}:{way}" for plane in PLANES for way in ("PP", "NP"))
 
 
 def diagonal_signs(names: Sequence[str]) -> Array:
@@ -91,29 +84,32 @@ class Diagonals(BenchTest):
     kind: Literal["body", "face", "step"] = option("body", "Which diagonals")
     targets: int = option(11, "Targets along each diagonal", low=2, high=500)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        return FACES if self.kind == "face" else BODY
+
     def plan(self, scene: Scene) -> Plan:
         share = np.linspace(0.0, 1.0, self.targets)
         if self.kind == "step":
             return self._steps(scene)
-        names = diagonal_names(self.kind)
-        rows = [(name, way) for name in names for way in (1.0, -1.0)]
+        count = len(self.names)
         return self._lay(
             scene,
-            np.repeat([names.index(name) for name, _ in rows], self.targets).astype(float),
-            np.repeat([way for _, way in rows], self.targets),
-            np.concatenate([share if way > 0.0 else share[::-1] for _, way in rows]),
+            np.repeat(np.arange(count, dtype=float), 2 * self.targets),
+            np.tile(np.repeat([1.0, -1.0], self.targets), count),
+            np.tile(np.concatenate([share, share[::-1]]), count),
         )
 
     def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
-        names = diagonal_names(self.kind)
-        given = table.words["diagonal"]
+        names = self.names
         problems = table.unknown_words("diagonal", names, f"one of {', '.join(names)}")
         if problems:
             raise table.refuse(*problems)
-        number = np.array([names.index(word) for word in given], dtype=float)
+        number = np.array([names.index(word) for word in table.words["diagonal"]], dtype=float)
         if self.kind == "step":
             return self._step_data(scene, table, number)
-        _, lengths = self._box(scene, names)
+        start, end = self._ends(scene)
+        lengths = np.linalg.norm(end - start, axis=-1)
         share = table["position_mm"] / lengths[number.astype(int)]
         for index in np.unique(number).astype(int):
             chosen = number == index
@@ -132,65 +128,48 @@ class Diagonals(BenchTest):
         plan = self._lay(scene, number, table["direction"], np.clip(share, 0.0, 1.0))
         return plan, table["deviation_um"]
 
-    def _box(self, scene: Scene, names: Sequence[str]) -> tuple[Array, Array]:
-        axes = following_axes(scene.model)
-        ranges = np.array([scene.workspace.ranges[name] for name in axes]).T
-        needed = np.abs(diagonal_signs(names))
-        flat = [
-            axes[index]
-            for index in np.flatnonzero(needed.any(axis=0))
-            if not ranges[0, index] < ranges[1, index]
-        ]
+    def _ends(self, scene: Scene) -> tuple[Array, Array]:
+        axes, signs = following_axes(scene.model), diagonal_signs(self.names)
+        low, high = np.array([scene.workspace.ranges[name] for name in axes]).T
+        flat = [axes[at] for at in np.flatnonzero(signs.any(axis=0)) if not low[at] < high[at]]
         if flat:
             raise OptionError(
                 f"diagonals need a range of {', '.join(flat)} in [workspace]; expected [low, high]"
             )
-        return ranges, np.linalg.norm(needed * np.ptp(ranges, axis=0), axis=-1)
-
-    def _positions(self, scene: Scene, names: Sequence[str]) -> tuple[Array, Array]:
-        ranges, _ = self._box(scene, names)
         stand = self.stand(scene)
-        here = np.array([float(stand[name]) for name in following_axes(scene.model)])
-        signs = diagonal_signs(names)
-        low, high = ranges
+        here = np.array([float(stand[name]) for name in axes])
         start = np.where(signs > 0.0, low, np.where(signs < 0.0, high, here))
         end = np.where(signs > 0.0, high, np.where(signs < 0.0, low, here))
         return start, end
 
     def _lay(self, scene: Scene, number: Array, way: Array, share: Array) -> Plan:
-        names = diagonal_names(self.kind)
-        start, end = self._positions(scene, names)
+        start, end = self._ends(scene)
         index = number.astype(np.intp)
         positions = start[index] + share[:, None] * (end - start)[index]
-        marks = {"diagonal": number, "way": way}
-        return self._plan(
-            scene, positions, diagonal_signs(names)[index] * way[:, None], index, marks
-        )
+        return self._plan(scene, positions, index, {"diagonal": number, "way": way})
 
     def _steps(self, scene: Scene) -> Plan:
-        names = diagonal_names("step")
-        start, end = self._positions(scene, names)
+        start, end = self._ends(scene)
         steps = self.targets - 1
         done = np.zeros((3 * steps + 1, 3))
         for axis in range(3):
             done[axis + 1 :: 3, axis] = 1.0
         share = np.cumsum(done, axis=0) / steps
-        index = np.repeat(np.arange(len(names)), len(share))
+        index = np.repeat(np.arange(len(BODY)), len(share))
         positions = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3)
         moved = np.concatenate([[-1.0], np.tile([0.0, 1.0, 2.0], steps)])  # the start by none
         marks = {
             "diagonal": index.astype(float),
             "way": np.ones(len(index)),
-            "axis": np.tile(moved, len(names)),
+            "axis": np.tile(moved, len(BODY)),
         }
-        return self._plan(scene, positions, diagonal_signs(names)[index], index, marks)
+        return self._plan(scene, positions, index, marks)
 
     def _step_data(self, scene: Scene, table: Table, number: Array) -> tuple[Plan, Array]:
         plan = self._steps(scene)
-        names = diagonal_names("step")
         values: list[Array] = []
-        each = plan.readings // len(names)
-        for index, name in enumerate(names):
+        each = plan.readings // len(BODY)
+        for index, name in enumerate(BODY):
             chosen = number == index
             if int(chosen.sum()) != each:
                 raise table.refuse(
@@ -200,31 +179,25 @@ class Diagonals(BenchTest):
             values.append(table["deviation_um"][chosen])
         return plan, np.concatenate(values)
 
-    def _plan(
-        self, scene: Scene, positions: Array, ways: Array, index: Whole, marks: dict[str, Array]
-    ) -> Plan:
-        names = diagonal_names(self.kind)
+    def _plan(self, scene: Scene, positions: Array, index: Whole, marks: dict[str, Array]) -> Plan:
         model, axes = self.model(scene), following_axes(scene.model)
-        start, end = self._positions(scene, names)
-        every = np.concatenate([positions, start])
-        coordinates = {
-            name: np.broadcast_to(values, (len(every),)).copy()
-            for name, values in self.stand(scene).items()
-        }
-        for column, name in enumerate(axes):
-            coordinates[name] = every[:, column]
+        start, end = self._ends(scene)
+        signs = diagonal_signs(self.names)
+        ways = np.concatenate([signs[index] * marks["way"][:, None], signs])
+
+        def standing(at: Array) -> dict[str, Array]:
+            return {**self.stand(scene), **dict(zip(axes, at.T, strict=True))}
 
         def seen(at: Array) -> Array:
-            moved = {**self.stand(scene), **dict(zip(axes, at.T, strict=True))}
-            return np.asarray(relative_point(model, moved))
+            return np.asarray(relative_point(model, standing(at)))
 
         along = seen(end) - seen(start)
         along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-        count, first = len(positions), len(positions)
-        rows = np.arange(count)
+        rows, coordinates = np.arange(len(positions)), standing(np.concatenate([positions, start]))
         distance = np.sum((seen(positions) - seen(start)[index]) * along[index], axis=-1)
         zero = {
-            f"zero_{name}_um": (index == number).astype(float) for number, name in enumerate(names)
+            f"zero_{name}_um": (index == number).astype(float)
+            for number, name in enumerate(self.names)
         }
         for plane, (_, _, key) in PLANES.items():
             found = find_plane(model, self.stand(scene), plane)
@@ -233,22 +206,19 @@ class Diagonals(BenchTest):
         ends = np.flatnonzero(np.diff(index, append=-1) != 0) + 1
         return build_plan(
             coordinates,
-            tool_points(model, coordinates, len(every)),
+            tool_points(model, coordinates, len(positions) + len(start)),
             along[index],
             place=f"{self.kind} diagonals · {self.place_words(scene, axes)}",
             marks={**marks, "position_mm": distance},
             site=rows,
-            against=first + index,
-            travel={
-                name: np.append(ways[:, column], diagonal_signs(names)[:, column])
-                for column, name in enumerate(axes)
-            },
+            against=len(positions) + index,
+            travel=dict(zip(axes, ways.T, strict=True)),
             setup=zero,
             path=tuple(np.split(rows, ends[:-1])),
         )  # fmt: skip
 
     def evaluate(self, plan: Plan, readings: Array) -> Outcome:
-        names = diagonal_names(self.kind)
+        names = self.names
         number, way = plan.marks["diagonal"], plan.marks["way"]
         position = plan.marks["position_mm"]
         rows: list[dict[str, object]] = []
@@ -292,11 +262,10 @@ class Diagonals(BenchTest):
         return Outcome(tuple(quantities), {"diagonals": rows})
 
     def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
-        names = diagonal_names(self.kind)
         curves: list[Curve] = []
         for run in runs:
             marks = run.plan.marks
-            for index, name in enumerate(names):
+            for index, name in enumerate(self.names):
                 for way, word in ((1.0, ""), (-1.0, " back")):
                     chosen = (marks["diagonal"] == index) & (marks["way"] == way)
                     if not chosen.any() or (

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -22,9 +21,6 @@ from warpspace.cli.tables import echo, print_table, print_text, progress
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_LENGTH_MM
 from warpspace.scene.files import parse_number
-
-if TYPE_CHECKING:
-    from warpspace.formats.registry import Reading
 
 
 def _test_names() -> tuple[str, ...]:
@@ -201,7 +197,8 @@ def import_(
         _import_robot(files, output, tool or "", workpiece or "", mesh_root, force=force)
         return
 
-    from warpspace.formats.measured import summary_table
+    from warpspace.analysis.description import plain
+    from warpspace.formats.measured import summaries, summary_table
     from warpspace.formats.registry import ReadOptions, open_files, parse_axis_options, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
     from warpspace.scene.machines import machine_names
@@ -231,7 +228,7 @@ def import_(
                 "machine": made.scene.machine.name,
                 "chain": str(made.scene.machine.chain),
                 "units": list(reading.found.units),
-                "errors": _errors(reading),
+                "errors": plain(summaries(reading.found)),
                 "assumed": list(reading.found.assumed),
                 "notes": notes,
                 "output": str(output),
@@ -245,19 +242,6 @@ def import_(
         print_text(f"  assumed: {text}")
     for text in notes:
         print_text(f"  {text}")
-
-
-def _errors(reading: "Reading") -> list[dict[str, object]]:
-    from warpspace.formats.measured import summaries
-
-    keys = (
-        "key", "unit", "kind", "points", "runs", "directions", "range", "smallest", "largest",
-        "mean_reversal", "repeatability", "uncertainty",
-    )  # fmt: skip
-    return [
-        {key: getattr(one, "span" if key == "range" else key) for key in keys}
-        for one in summaries(reading.found)
-    ]
 
 
 def _import_robot(

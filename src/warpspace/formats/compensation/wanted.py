@@ -21,7 +21,6 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 STEPS = 2  # newton steps: an error grows by a ten-thousandth of the correction at most
 SMALL_MM, SMALL_DEG = 1e-2, 1e-3  # moves by which the response of the tool to an axis is measured
 CUT = 1e-3  # moves that act less than this share of the best one are not used
-LOOPS = (Loop.TOOL, Loop.RELATIVE)
 
 
 @dataclass(frozen=True)
@@ -74,11 +73,9 @@ class Corrector:
     def moved(self) -> tuple[str, ...]:
         return (*self.axes, *self.tilting)
 
-    def residual(
-        self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
-    ) -> tuple[Array, Array]:
+    def residual(self, coordinates: Coordinates, moves: Mapping[str, Array]) -> tuple[Array, Array]:
         """Give what is left at commanded positions after moves of the axes."""
-        moved = self.move(coordinates, moves, point_mm)
+        moved = self.move(coordinates, moves)
         return moved.without(self.placement, *moved.residual(self.errors))
 
     def move(
@@ -185,8 +182,6 @@ def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) 
     if orientation and not set(rotary) & set(machine.chain.tool):
         carried |= set(rotary)
     chosen = Loop(loop) if loop else Loop.RELATIVE if carried else Loop.TOOL
-    if chosen not in LOOPS:
-        raise OptionError(f"loop {chosen}; expected tool or relative for a compensation")
     if chosen is Loop.TOOL:
         linear = tuple(axis for axis in linear if axis in machine.chain.tool)
         rotary = tuple(axis for axis in rotary if axis in machine.chain.tool)
