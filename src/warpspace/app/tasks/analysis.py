@@ -84,9 +84,9 @@ class AnalysisPart(Section):
         self._answer: Answer | None = None
         self._applied: Question = ()  # what is asked once a change has been applied
         self._problem: tuple[Question, str] | None = None
-        self._jobs = Jobs(self, self._again, self._fail)
+        self._jobs = Jobs(self, self.renew, self._fail)
         self._asked: Question = ()
-        self._version, self._subject = 0, ""
+        self._subject = ""
 
     @property
     def kind(self) -> type[Analysis]:
@@ -166,7 +166,7 @@ class AnalysisPart(Section):
         return {**found, **told, **{name: found[name] for name in OF_STATE & found.keys()}}
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.question(picture.state), self._version)
+        return (self.question(picture.state),)
 
     def body(self, picture: LivePicture) -> Markup:
         return self._body(picture.state)
@@ -307,7 +307,7 @@ class AnalysisPart(Section):
 
     def _take_answer(self, answer: Answer) -> None:
         self._answer, self._problem = answer, None
-        self._again()
+        self.renew()
 
     def _fail(self, error: Exception) -> None:
         words = error_words(error)
@@ -315,11 +315,7 @@ class AnalysisPart(Section):
             labels = {one.name: one.label for one in self.kind.options()}
             words = error.said(lambda name: labels.get(name, name))
         self._problem = (self._asked, words)
-        self._again()
-
-    def _again(self) -> None:
-        self._version += 1
-        self.context.renew(self)
+        self.renew()
 
     def _save(self, ending: str) -> None:
         found = self._answer.found if self._answer else None

@@ -53,9 +53,6 @@ class TasksPart(Part):
         names = {name: names[name] for name in (*FIRST, *names)}
         self.sections = {task: [name for name, of in names.items() if of == task] for task in TASKS}
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        return (picture.state.page.task,)
-
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         """Write the tabs, and an empty place for each section."""
         task = picture.state.page.task

@@ -280,9 +280,6 @@ class ErrorsPart(Part):
         self._made: Mapping[str, float] = {}  # amplitudes that the rows were written with
         self._made_for: tuple[object, ...] = ()
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture), self._sorted_for, Identity(self._said))
-
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
         made_for = (Identity(state.scene), state.seen, tuple(state.positions.items()))
@@ -376,12 +373,12 @@ class ErrorsPart(Part):
                 return put(state, f"amplitudes.{key}", value)
             state, said = edit_curve(state, what, key, value)
             self._said = {**self._said, key: said}
-            self.context.act(lambda: self.context.renew(self))  # also where it is refused
+            self.context.act(self.renew)  # also where it is refused
             return state
         if what in ("sort", "find"):
             self._sorted_for = ()
         if what == "sort":
-            self.context.act(lambda: self.context.renew(self))
+            self.context.act(self.renew)
         if what == "find":
             return replace(state, page=replace(state.page, query=value[:LONGEST_QUERY]))
         if what == "row":

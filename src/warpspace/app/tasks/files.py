@@ -43,7 +43,7 @@ class JobWindow(Window):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._jobs = Jobs(self, partial(context.renew, self), context.page.report)
+        self._jobs = Jobs(self, self.renew, context.page.report)
 
     def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
         """Make a file of what is drawn beside the session, and have the browser save it."""
@@ -287,7 +287,7 @@ class ReportWindow(JobWindow):
             index = index_of(value, len(self.context.reported))
             if index is not None:
                 del self.context.reported[index]
-                self.context.act(partial(self.context.renew, self))
+                self.context.act(self.renew)
         elif word == "write" and value in (".html", ".pdf"):
             self.context.act(partial(self._write, value))
         return super().take(state, word, value)

@@ -218,7 +218,7 @@ class ImportPart(FilesPart):
                 self._files = before
                 raise problem
         self.context.post(partial(_unfolded, keeps=keeps))
-        self._again()
+        self.renew()
 
     def problem_html(self, state: AppState) -> Markup:
         return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before

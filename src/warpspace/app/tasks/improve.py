@@ -249,7 +249,7 @@ class CompensatePart(AnalysisPart):
 
     def _take_picture(self, found: Compensation, png: bytes) -> None:
         self._picture = found, f"data:image/png;base64,{base64.b64encode(png).decode()}"
-        self._again()
+        self.renew()
 
 
 def _writable() -> dict[str, str]:

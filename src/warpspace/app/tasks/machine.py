@@ -77,10 +77,6 @@ class RotarySection(Section):
     name, task, title = "rotary", "machine", "Rotary axes"
     sentence = "See how traced points run while a rotary axis turns (ISO 230-7)"
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        stage = self.context.stage
-        return (id(picture), stage and (stage.playing, bool(stage.position)))
-
     def body(self, picture: LivePicture) -> Markup:
         state, stage = picture.state, self.context.stage
         axis, playing, position = played_axis(state), False, HERE
@@ -108,13 +104,13 @@ class RotarySection(Section):
         if stage is not None and self.is_seen(state) and self.is_open(state):
             text = ", ".join(f"{axis} = {at:.0f}°" for axis, at in stage.position.items())
             self.context.page.put({"rotary.angle": str(tag("span", text.replace("-", MINUS)))})
-            self.context.renew(self)
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         stage = self.context.stage
         if word in ("play", "stop") and stage is not None:
             on = None if word == "stop" else not stage.playing
             self.context.act(lambda: stage.play(on))
+            self.context.act(self.renew)
         return state
 
 

@@ -60,9 +60,6 @@ class EditorSection(Section):
         super().__init__(context)
         self._refused = ("", "")  # chain that was typed, and what is wrong
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture), self._refused)
-
     def body(self, picture: LivePicture) -> Markup:
         state, name = picture.state, "editor:set.chain"
         chain, tables = state.scene.machine.chain, machine_edits.tables_of(state.scene)
@@ -91,7 +88,7 @@ class EditorSection(Section):
                 value[:200],
                 "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}"),
             )
-            self.context.act(lambda: self.context.renew(self))
+            self.context.act(self.renew)
             return state
         return changed
 

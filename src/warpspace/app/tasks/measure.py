@@ -108,7 +108,7 @@ class FilesPart(AnalysisPart):
                 action()
             except WarpspaceError as error:
                 self._trouble = error_words(error)
-            self._again()
+            self.renew()
 
         self.context.act(attempted)
 
@@ -117,7 +117,7 @@ class FilesPart(AnalysisPart):
             self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
         elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
-            self.context.act(self._again)
+            self.context.act(self.renew)
         else:
             return super().take(state, word, value)
         return state
@@ -148,7 +148,7 @@ class TestsPart(FilesPart):
         return chosen_test(state) is not None
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.question(picture.drawn_state), picture.is_difference, self._version)
+        return (self.question(picture.drawn_state), picture.is_difference)
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked: Any = super().ask(state, values, scenes)
@@ -320,7 +320,7 @@ class CalibratePart(FilesPart):
             state = edits.with_sight(state, inside=bool(self._arrows))
         else:
             return super().take(state, word, value)
-        self.context.act(self._again)
+        self.context.act(self.renew)
         return state
 
     def received(self, name: str, content: bytes) -> None:

@@ -53,10 +53,6 @@ class NotesPart(Part):
         # the words of the bar over what is shown again, the note, and where one was before
         self._again: tuple[str, str, AppState, CameraMemory] | None = None
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        state = picture.state
-        return Identity(state.review), state.page, Identity(self._shown_again(state))
-
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         state, bar = picture.state, EMPTY
         if again := self._shown_again(state):

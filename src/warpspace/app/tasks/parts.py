@@ -45,6 +45,10 @@ class Part:
         """Do what an event says; word and value come from a browser and may be anything."""
         return state
 
+    def renew(self) -> None:
+        """Have its pieces made anew, whatever they depend on. For the session."""
+        self.context.renew(self)
+
 
 class Section(Part):
     """A section of a task; folded it is neither computed nor sent."""
@@ -93,9 +97,6 @@ class Window(Part):
     def closed(self, state: AppState) -> AppState:
         """Close it."""
         return replace(state, page=replace(state.page, window=""))
-
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        return (object(),)  # written anew each time; what stands there already is not sent
 
     def body(self, picture: LivePicture) -> Markup:
         """Give what stands in it."""

@@ -27,9 +27,6 @@ class StoryPart(Part):
         self._number, self._words = 0, EMPTY  # of the step that is told; empty while none is
         self._camera = context.camera.remember()  # before it
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self._words,)
-
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         return {"story": self._words}
 

@@ -58,9 +58,6 @@ class WorstPart(Section):
     sentence = "What the largest error of the volume is made of"
     _found: tuple[LivePicture, Answer] | None = None
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture), picture.state.picked, picture.state.lever)
-
     def heading(self, picture: LivePicture) -> str:
         if picture.is_difference:
             return self.title
