@@ -21,10 +21,9 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.app.tasks import jobs
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.errors import used_keys
 from warpspace.app.tasks.jobs import Jobs
-from warpspace.app.tasks.parts import Part
+from warpspace.app.tasks.parts import Context, Part
 from warpspace.exceptions import WarpspaceError
 from warpspace.scene.library import load_scene
 

@@ -37,9 +37,8 @@ from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.catalogue import build_parts
-from warpspace.app.tasks.context import PAUSE_S, Context
-from warpspace.app.tasks.parts import Part, Window
-from warpspace.app.tasks.together import PointerPart, Tabs
+from warpspace.app.tasks.over import PointerPart, Tabs
+from warpspace.app.tasks.parts import PAUSE_S, Context, Part, Window
 from warpspace.exceptions import WarpspaceError
 
 OFTEN_S = 0.4  # between two writings of what follows often

@@ -31,8 +31,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.table import without_table
-from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.parts import Part
+from warpspace.app.tasks.parts import Context, Part
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_KEPT_TEXT
 from warpspace.scene.model import Scene

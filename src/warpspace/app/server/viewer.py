@@ -32,7 +32,7 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.parts import Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 

@@ -29,11 +29,10 @@ from warpspace.app.state.forms import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.table import without_table
 from warpspace.app.tasks.charts import block_html, result_html
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import PLAIN
 from warpspace.app.tasks.forms import form_html
 from warpspace.app.tasks.jobs import Job, Jobs
-from warpspace.app.tasks.parts import Section
+from warpspace.app.tasks.parts import Context, Section
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_at

@@ -33,8 +33,7 @@ from warpspace.app.state.leaf import Identity, Span
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import comma_rows, read_rows, spell_typed
 from warpspace.app.tasks.charts import lines_html
-from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.parts import Part
+from warpspace.app.tasks.parts import Context, Part
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import ErrorKind, Parameter, parameter
 from warpspace.machine.curves.curve import ErrorFunction

@@ -17,10 +17,9 @@ from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.table import drawn_tables, without_table
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.jobs import Job, Jobs
-from warpspace.app.tasks.parts import Window, actions
+from warpspace.app.tasks.parts import Context, Window, actions
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
 from warpspace.scene.notes import story

@@ -22,7 +22,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.table import without_table
 from warpspace.app.tasks.analysis import RECORD, AnalysisPart, Question
 from warpspace.app.tasks.charts import details_html, result_html
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.parts import Context
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
 from warpspace.formats.compensation.controller import Controller

@@ -37,7 +37,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import TEST, read_form, with_form
 from warpspace.app.tasks.analysis import AnalysisPart, Question
 from warpspace.app.tasks.charts import block_html, details_html
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.parts import Context
 from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
