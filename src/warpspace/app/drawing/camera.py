@@ -42,7 +42,6 @@ class Room:
 
     @property
     def aspect(self) -> float:
-        """Width over height."""
         return self.width / self.height
 
     @property
@@ -112,7 +111,6 @@ def fit_camera(
     aspect: float,
     direction: Direction = VIEWS["iso"],
     fov_deg: float = FOV_DEG,
-    margin: float = MARGIN,
     margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> CameraMemory:
     """Place a camera so that points fill the picture but its margins: left, right, top, bottom."""
@@ -124,7 +122,7 @@ def fit_camera(
     half = np.tan(np.deg2rad(fov_deg) / 2.0) * np.array([max(aspect, 0.1), 1.0])
     before, after = np.array([margins[0], margins[3]]), np.array([margins[1], margins[2]])
     # middle and half size of what is to be filled
-    middle, free = (before - after) * half, (1.0 - before - after) * half / margin
+    middle, free = (before - after) * half, (1.0 - before - after) * half / MARGIN
     target, distance = (flat.min(axis=0) + flat.max(axis=0)) / 2.0, 1.0
     offset = np.zeros(2)
     for _ in range(_ROUNDS):

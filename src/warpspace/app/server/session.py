@@ -29,7 +29,7 @@ from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
-from warpspace.app.drawing.shapes import SCENE_PER_MM, Layer
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.budget import pick, pick_line, with_clicked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -53,7 +53,7 @@ class Display:
         self._context = context
         context.renew, context.closed = self._renew, self._closed
         context.rest_again = self._rest_again
-        self.layers: tuple[Layer, ...] = ()
+        self.layers: tuple[BoxLayer | MovingLayer, ...] = ()
         self.parts: dict[str, Part] = {}
         self._shown: dict[Part, object] = {}
         self._often: dict[Part, tuple[float, object]] = {}
@@ -64,7 +64,10 @@ class Display:
         self._late: set[Part] = set()  # that wait for a rest, whatever they usually wait for
 
     def add(
-        self, picture: LivePicture, layers: Sequence[Layer] = (), parts: Sequence[Part] = ()
+        self,
+        picture: LivePicture,
+        layers: Sequence[BoxLayer | MovingLayer] = (),
+        parts: Sequence[Part] = (),
     ) -> None:
         """Add what has just been built, and write its pieces."""
         self.layers = (*self.layers, *layers)
@@ -146,8 +149,8 @@ class Display:
                 self._shown |= dict.fromkeys(self._late)
                 self._late.clear()
                 for layer in self.layers:
-                    if rest := getattr(layer, "rest", None):
-                        guarded(partial(rest, picture))
+                    if isinstance(layer, BoxLayer):
+                        guarded(partial(layer.rest, picture))
             self._changed_at = None
         while self._waiting:
             part = self._waiting.popleft()
@@ -187,8 +190,6 @@ def turn() -> Generator[None]:
 
 
 class Session:
-    """The app of one browser tab."""
-
     def __init__(
         self,
         context: Context,

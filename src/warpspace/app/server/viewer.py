@@ -44,7 +44,6 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 def resolve_host(host: str) -> str:
-    """Turn a host name into an address of this machine."""
     try:
         found = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError, ValueError):
@@ -204,7 +203,6 @@ class RepeatedLines(logging.Filter):
 
 
 def limit_log() -> None:
-    """Have all that the program logs to the terminal limited."""
     limit = RepeatedLines()
     for handler in (logging.lastResort, *logging.getLogger().handlers):
         if handler is not None:
@@ -221,8 +219,6 @@ OTHER_USERS = (
 
 
 class Viewer:
-    """A running app."""
-
     def __init__(
         self,
         scene: Scene,

@@ -22,17 +22,21 @@ from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.evaluation.cache import taken_turn
-from warpspace.app.evaluation.compare import applied, plain_state, with_applied, with_proposal
+from warpspace.app.evaluation.compare import (
+    applied,
+    plain_state,
+    with_applied,
+    with_proposal,
+    without_table,
+)
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.table import without_table
 from warpspace.app.tasks.charts import block_html, result_html
 from warpspace.app.tasks.files import PLAIN
 from warpspace.app.tasks.forms import form_html
-from warpspace.app.tasks.jobs import Job, Jobs
-from warpspace.app.tasks.parts import Context, Section
+from warpspace.app.tasks.parts import Context, Job, Jobs, Section
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_at
@@ -59,8 +63,6 @@ Question = tuple[object, ...]
 
 
 class Answer(NamedTuple):
-    """What an analysis found."""
-
     question: Question  # that it answers
     found: Result
     cards: tuple[tuple[Change, Markup], ...] = ()  # what it proposes, and that in words
@@ -130,11 +132,9 @@ class AnalysisPart(Section):
         return self._answer.took_s < QUICK_S if self._answer else self.at_once
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        """Give what is run."""
         return read_form(self.kind, self.shown_options(state), values, scenes[0])
 
     def before_result(self, state: AppState) -> Markup:
-        """Give what stands above the result."""
         return EMPTY
 
     def headline(self, found: Result) -> Markup:
@@ -160,7 +160,6 @@ class AnalysisPart(Section):
     # --- the page --------------------------------------------------------------------------------
 
     def values(self, state: AppState) -> dict[str, str]:
-        """Give what is set of its options."""
         found, told = self.defaults(state), option_values(state, self.name)
         return {**found, **told, **{name: found[name] for name in OF_STATE & found.keys()}}
 
@@ -202,13 +201,11 @@ class AnalysisPart(Section):
         return join((*parts, self.options_html(state)))
 
     def problem_html(self, state: AppState) -> Markup:
-        """Say why there is no answer."""
         if self._problem is None or self._problem[0] != self.question(state):
             return EMPTY
         return tag("p", self._problem[1], class_="ws-problem", role="alert")
 
     def cards_html(self, question: Question) -> Markup:
-        """Offer the changes that the result proposes."""
         answer, cards = self._answer, list[Markup]()
         if answer is None:
             return EMPTY
@@ -226,7 +223,6 @@ class AnalysisPart(Section):
         return join(cards)
 
     def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
-        """Fold its options."""
         options = [one for one in self.shown_options(state) if one.name not in OF_STATE]
         if not options:
             return EMPTY
@@ -238,7 +234,6 @@ class AnalysisPart(Section):
     # --- events --------------------------------------------------------------------------------
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Set an option, run, cancel, or do something with the result."""
         name = word.removeprefix("set.")
         if word.startswith("set.") and name in {one.name for one in self.options()}:
             return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:LONGEST]})

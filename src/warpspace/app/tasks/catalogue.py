@@ -84,7 +84,6 @@ def _places(names: Iterable[str]) -> Markup:
 
 
 def build_parts(context: Context) -> list[Part]:
-    """Build the parts of a page."""
     of_tasks = (WorstPart, VolumePart, ImportPart, TestsPart)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     found: list[Section] = [

@@ -13,13 +13,12 @@ from warpspace.app.browser.html import button, choice, field, join, tag, text_bo
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents import files, scene_file
 from warpspace.app.documents.offline_page import build_offline_html, build_story_html
+from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
-from warpspace.app.state.table import drawn_tables, without_table
 from warpspace.app.tasks.forms import setting
-from warpspace.app.tasks.jobs import Job, Jobs
-from warpspace.app.tasks.parts import Context, Window, actions
+from warpspace.app.tasks.parts import Context, Job, Jobs, Window, actions
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
 from warpspace.scene.notes import story
@@ -249,8 +248,6 @@ ALWAYS = (
 
 
 class ReportWindow(JobWindow):
-    """Writes the design review of what is drawn."""
-
     name, title = "report", "Report"
 
     def body(self, picture: LivePicture) -> Markup:

@@ -385,8 +385,6 @@ WIDTH_PX = 240  # of a small picture: it is shown smaller, sharp on fine screens
 
 
 class MachinesWindow(Window):
-    """The machines of the library."""
-
     name, title = "machines", "Start from a machine"
 
     def body(self, picture: LivePicture) -> Markup:

@@ -80,7 +80,6 @@ class FilesPart(AnalysisPart):
         return bool(self._files)
 
     def received(self, name: str, content: bytes) -> None:
-        """Take in a file."""
         raise NotImplementedError
 
     def files_html(self) -> Markup:
@@ -94,7 +93,6 @@ class FilesPart(AnalysisPart):
         return join(((problem if self._trouble else EMPTY), rows(lines) if lines else EMPTY))
 
     def upload_html(self, words: str) -> Markup:
-        """Give the button that adds a file of readings."""
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
         upload = upload_button(words, self.name, MOST_BYTES, ".csv", hint=hint)
         return tag("div", upload, class_="ws-actions")
@@ -231,10 +229,9 @@ def take_file(scene: Scene, text: str, name: str, kind: str | None, others: Sequ
     """Take in the text of a file beside those that are there."""
     if len(others) >= MOST_FILES:
         raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
-    unlike = name
-    while any(one.name == unlike for one in others):
-        count = 2 if unlike == name else int(unlike.rpartition(" ")[2]) + 1
-        unlike = f"{name} {count}"
+    known = {one.name for one in others}
+    numbered = (f"{name} {count}" for count in range(2, MOST_FILES + 2))
+    unlike = next(one for one in (name, *numbered) if one not in known)
     lines = text.count("\n")
     if kind is None or kind in KINDS:
         lines = len(parse_table(text, unlike))

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,6 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.budget import pick
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.design import allowed_words
 from warpspace.app.tasks.parts import Context, Part
 from warpspace.geometry.surfaces import corners
@@ -67,19 +65,14 @@ class LegendPart(Part):
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         kept = EMPTY
         if not picture.is_difference:
-            limit = f"{picture.state.specification.limit_um:g}"
-            kept = _limit(*kept_words(picture), limit)
+            (words, is_kept), limit = kept_words(picture), picture.state.specification.limit_um
+            box = text_box("state:set.specification.limit_um", f"{limit:g}", size="short",
+                           label="Limit", id="ws-limit")  # fmt: skip
+            body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
+            kept = menu(words, body, key="limit", hint="Change the limit",
+                        kind="ws-kept" if is_kept else "ws-missed")  # fmt: skip
             kept = Markup(" · ") + kept if place_words(picture) else kept
         return {"head.kept": kept, "legend": legend_html(picture)}
-
-
-@lru_cache(maxsize=64)
-def _limit(words: str, kept: bool, limit: str) -> Markup:
-    box = text_box("state:set.specification.limit_um", limit, size="short", label="Limit",
-                   id="ws-limit")  # fmt: skip
-    body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
-    kind = "ws-kept" if kept else "ws-missed"
-    return menu(words, body, key="limit", hint="Change the limit", kind=kind)
 
 
 class OrderPart(Part):
@@ -129,7 +122,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
     isolines = look.isolines and look.surface != "grid"
     bounds = [one.grid.bounds_mm for one in picture.slices]
     return {
-        "axes": _words(Identity(axis_labels(picture))),
+        "axes": list(map(_word, axis_labels(picture))),
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
              "way": [float(k == i) * way for i in range(3)]}
@@ -158,11 +151,6 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
 
 def _scene(point_mm: Array) -> list[float]:
     return [round(value * SCENE_PER_MM, 4) for value in point_mm.tolist()]
-
-
-@lru_cache(maxsize=32)
-def _words(labels: Identity) -> list[dict[str, Any]]:
-    return list(map(_word, labels.thing))
 
 
 def _word(label: Label) -> dict[str, Any]:

@@ -30,9 +30,9 @@ from warpspace.app.evaluation.budget import (
     pick_worst,
     with_picked,
 )
+from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.table import without_words
 from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.app.tasks.analysis import AnalysisPart
 from warpspace.app.tasks.charts import block_html
