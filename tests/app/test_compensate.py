@@ -18,13 +18,12 @@ from warpspace.app.documents.scene_file import state_to_toml
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.evaluation import budget
 from warpspace.app.evaluation.budget import measured, pick_worst, with_picked
-from warpspace.app.evaluation.compare import with_pin
+from warpspace.app.evaluation.compare import with_pin, without_table, without_words
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.machine import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import PartLook, start_state
-from warpspace.app.state.table import without_table, without_words
 from warpspace.app.state.tree import put
 from warpspace.app.tasks.analysis import Answer
 from warpspace.app.tasks.conventions import with_reference

@@ -23,7 +23,7 @@ from warpspace.app.server.tab_keeper import (
 from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_host
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.context import MOST_FILES, Context
+from warpspace.app.tasks.parts import MOST_FILES, Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 

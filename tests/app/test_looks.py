@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from warpspace.app.browser.room import read_room
 from warpspace.app.drawing.around import arrows
-from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera
+from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera, read_room
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.evaluate import LiveModel

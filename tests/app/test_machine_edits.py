@@ -22,8 +22,12 @@ from warpspace.app.evaluation.machine_edits import (
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve, with_scene_tolerances
 from warpspace.app.state.tree import put
-from warpspace.app.tasks.machine import PositionsSection, RotarySection
-from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
+from warpspace.app.tasks.machine import (
+    EditorSection,
+    MachinesWindow,
+    PositionsSection,
+    RotarySection,
+)
 from warpspace.bodies.placed import load_bodies
 from warpspace.exceptions import ChainError, WarpspaceError
 from warpspace.kinematics.chain import nominal_point

@@ -20,11 +20,8 @@ from warpspace.app.server import session
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
-from warpspace.app.tasks import jobs
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.errors import used_keys
-from warpspace.app.tasks.jobs import Jobs
-from warpspace.app.tasks.parts import Part
+from warpspace.app.tasks.parts import Context, Jobs, Part
 from warpspace.exceptions import WarpspaceError
 from warpspace.scene.library import load_scene
 
@@ -141,7 +138,7 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
 @pytest.fixture
 def watched(monkeypatch):
     """Jobs, with what they show and report."""
-    monkeypatch.setattr(jobs, "TICK_S", -1.0)
+    monkeypatch.setattr("warpspace.app.tasks.parts.TICK_S", -1.0)
     bars, failures = list[str](), list[Exception]()
     found = Jobs(Part(Nobody()), lambda: bars.append(str(found.html())), failures.append)
     return found, bars, failures

@@ -59,8 +59,6 @@ class CameraMoved(_Said, tag="ViewerCameraMessage"):
 
 
 class DrawingClicked(_Said, tag="ScenePointerMessage"):
-    """A click in the drawing."""
-
     event_type: Annotated[str, Meta(pattern="^click$")]
     ray_origin: Vector
     ray_direction: Vector

@@ -72,7 +72,6 @@ class Page:
         self.call("toast", kind, title, text)
 
     def report(self, error: Exception) -> None:
-        """Tell the user of this tab what went wrong."""
         self.notify("That did not work", error_words(error), "problem")
 
 
@@ -87,7 +86,6 @@ def _spelt(value: object) -> str:
 
 
 def page_script() -> str:
-    """Write the script that lays out a page."""
     sheet = f"warpspacePage.style({json.dumps(script_source('page.css'))});"
     return "\n".join((*(script_source(f"{name}.js") for name in SCRIPTS), sheet))
 

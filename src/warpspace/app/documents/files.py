@@ -7,10 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from warpspace.app.evaluation.compare import AFTER, BEFORE
+from warpspace.app.evaluation.compare import AFTER, BEFORE, drawn_tables, without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Side
-from warpspace.app.state.table import drawn_tables, without_words
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_SCENE_BYTES
 
@@ -79,7 +78,6 @@ def read_upload(
 
 
 def upload_text(content: bytes, source: str, what: str = "scene file") -> str:
-    """Read the bytes of an uploaded file."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

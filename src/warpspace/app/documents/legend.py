@@ -11,10 +11,9 @@ from warpspace.app.browser.html import EMPTY, fill, join, lowered, number, tag
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import axis_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
+from warpspace.app.evaluation.compare import table_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.leaf import Identity
-from warpspace.app.state.table import table_words
 from warpspace.field.evaluate import placed_words, second_order_words
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.picture import words
@@ -148,15 +147,12 @@ def numbers_words(picture: LivePicture) -> str:
 
 def place_words(picture: LivePicture) -> str:
     """Say where the max is: ``at X 275 Y −225 Z −480``."""
-    node = int(np.argmax(picture.field.norm_um))
-    return _node_words(Identity(picture.drawn_state.scene), Identity(picture.grid), node)
-
-
-@lru_cache(maxsize=64)
-def _node_words(scene: Identity, grid: Identity, node: int) -> str:
-    shape, axes = grid.thing.shape, grid.thing.coordinates
-    at = {name: float(np.broadcast_to(q, shape).flat[node]) for name, q in axes.items()}
-    axes = words.own_axes(scene.thing, at)
+    node, grid = int(np.argmax(picture.field.norm_um)), picture.grid
+    at = {
+        name: float(np.broadcast_to(values, grid.shape).flat[node])
+        for name, values in grid.coordinates.items()
+    }
+    axes = words.own_axes(picture.drawn_state.scene, at)
     return f"at {words.list_axes(axes)}" if axes else ""
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from viser import ClientHandle
 
-from warpspace.app.browser.room import Room, first_room
 from warpspace.app.drawing.labels import axes_room_mm
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -16,6 +15,65 @@ from warpspace.app.state.leaf import Identity
 from warpspace.picture import model
 from warpspace.picture.model import Direction
 from warpspace.units import Array
+
+TOP_PX = 46  # height of the bar at the top; the style sheet has it too
+PHONE_PX, COLUMNS_PX = 700, 558  # width of a phone at most, and of both columns elsewhere
+PHONE_SHARE = 0.52  # of a phone's height, that the drawing has
+MOST_PX = 16_384
+LEAST_PX = 120
+LONGEST_WORD = 100
+HEADING_PX, FOOT_PX, LEGEND_PX = 66, 80, 134
+"""What heading, controls and colour bar take, until the page has said so."""
+WORDS_PX, PHONE_WORDS_PX = 46, 22
+"""Kept free at the sides, for the words at axes and corners."""
+MOST_SHARE, LEAST_SHARE = 0.4, 0.3
+"""Parts that what is written keeps free at most, and that the drawing has at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """How large the drawing is, CSS pixels; the page says it (`room.js`) whenever that changes."""
+
+    width: float
+    height: float
+    top: float = HEADING_PX
+    bottom: float = FOOT_PX
+    right: float = LEGEND_PX
+
+    @property
+    def aspect(self) -> float:
+        return self.width / self.height
+
+    @property
+    def margins(self) -> tuple[float, float, float, float]:
+        """Parts of width and height that are kept free: left, right, top, bottom."""
+        words = WORDS_PX if self.width > PHONE_PX else PHONE_WORDS_PX
+        right = min((self.right + words / 2.0) / self.width, MOST_SHARE)
+        top = min((self.top + words / 2.0) / self.height, MOST_SHARE)
+        bottom = min((self.bottom + words / 2.0) / self.height, 1.0 - LEAST_SHARE - top)
+        return min(words / self.width, MOST_SHARE), right, top, bottom
+
+
+def first_room(page_width: float, page_height: float) -> Room:
+    """Guess it, until the page has said it."""
+    phone = page_width <= PHONE_PX
+    width = page_width - (0 if phone else COLUMNS_PX)
+    height = page_height * (PHONE_SHARE if phone else 1.0) - TOP_PX
+    return Room(max(width, LEAST_PX), max(height, LEAST_PX))
+
+
+def read_room(text: str) -> Room | None:
+    """Read what a page says of its room; None where it says nothing that can be."""
+    words = text[:LONGEST_WORD].split(",")
+    if len(words) != 6 or not all(word.isascii() and word.isdigit() for word in words):
+        return None
+    width, height, top, bottom, right = (float(word[:6]) for word in words[1:])
+    if not (LEAST_PX <= width <= MOST_PX and LEAST_PX <= height <= MOST_PX):
+        return None
+    return Room(width, height, top, bottom, right)
+
+
+# --- The camera -----------------------------------------------------------------------------------
 
 FOV_DEG = 22.0  # vertical field of view: long enough that parallel edges look parallel
 TELEPHOTO_DEG = 3.0  # stands in for an orthographic camera, which viser has not
@@ -53,7 +111,6 @@ def fit_camera(
     aspect: float,
     direction: Direction = VIEWS["iso"],
     fov_deg: float = FOV_DEG,
-    margin: float = MARGIN,
     margins: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
 ) -> CameraMemory:
     """Place a camera so that points fill the picture but its margins: left, right, top, bottom."""
@@ -65,7 +122,7 @@ def fit_camera(
     half = np.tan(np.deg2rad(fov_deg) / 2.0) * np.array([max(aspect, 0.1), 1.0])
     before, after = np.array([margins[0], margins[3]]), np.array([margins[1], margins[2]])
     # middle and half size of what is to be filled
-    middle, free = (before - after) * half, (1.0 - before - after) * half / margin
+    middle, free = (before - after) * half, (1.0 - before - after) * half / MARGIN
     target, distance = (flat.min(axis=0) + flat.max(axis=0)) / 2.0, 1.0
     offset = np.zeros(2)
     for _ in range(_ROUNDS):

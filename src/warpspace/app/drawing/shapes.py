@@ -6,7 +6,7 @@ viser clips beyond 1000 units.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,11 @@ from viser.transforms import SO3
 
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.colours import Rgb, line_colour
-from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.units import Array
 
 SCENE_PER_MM = 0.01
 UNLIT = {"scale": SCENE_PER_MM, "cast_shadow": False, "receive_shadow": False}
 Pieces = NDArray[np.float32]  # [S, 2, 3], mm; ends of pieces of line
-
-
-class Layer(Protocol):
-    """Something drawn that follows the picture."""
-
-    def show(self, picture: LivePicture) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,6 @@ from dataclasses import replace
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.state.app_state import PRESENT, AppState, Comparison, Side, start_state
 from warpspace.app.state.look import RotaryLook
-from warpspace.app.state.table import table_words
 from warpspace.geometry.colour import ColourScale
 from warpspace.picture.model import choose_scale, same_nodes, subtract_pictures, subtract_traces
 from warpspace.scene.model import Scene
@@ -177,3 +176,37 @@ def with_proposal(state: AppState, scene: Scene, title: str) -> AppState:
 def with_applied(state: AppState, scene: Scene, before: str) -> AppState:
     """Apply a proposal; the state before it stays as A of a comparison."""
     return applied(with_before(state, Side(before, plain_state(state))), scene)
+
+
+# --- The table of compensation whose effect is drawn: in words, and without it --------------------
+
+WITHOUT = "Of the machine without the table of compensation, which the box is drawn with: {}."
+"""Said wherever numbers are worked out from the errors, not taken from what is drawn."""
+
+
+def table_words(state: AppState) -> str:
+    """Say which table corrects the machine; empty where none does."""
+    return "" if state.controller is None else f"with the table {state.controller.label}"
+
+
+def drawn_tables(state: AppState) -> tuple[str, ...]:
+    """Name the tables of a state and of what it is compared with, each once."""
+    sides = (Side(), state.comparison.a, state.comparison.b or Side())
+    tables = [(side.state or state).controller for side in sides]
+    return tuple(dict.fromkeys(table.label for table in tables if table is not None))
+
+
+def without_words(state: AppState) -> str:
+    """Say that numbers are of the machine without a table; empty where there is none."""
+    names = " and ".join(drawn_tables(state))
+    return WITHOUT.format(names) if names else ""
+
+
+def without_table(state: AppState) -> AppState:
+    """Give a state without its table; a comparison that has one ends, since it would be another.
+
+    What was pinned goes with it, if it has a table.
+    """
+    if not drawn_tables(state):
+        return state
+    return replace(state, controller=None, comparison=replace(state.comparison.off(), pinned=None))

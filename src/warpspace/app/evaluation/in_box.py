@@ -144,7 +144,6 @@ def path_in_box(state: AppState) -> InBox[ToolPath] | None:
 
 
 def chosen_test(state: AppState) -> type[BenchTest] | None:
-    """Give the standard test that a state has chosen."""
     name = state.forms.get(TEST, "")
     return find_test(name) if name in bench_names() else None
 

@@ -280,7 +280,6 @@ def with_word(state: AppState, word: str) -> AppState:
 
 
 def with_changed_scene(state: AppState, scene: Scene) -> AppState:
-    """Show a scene whose machine or working volume has been changed."""
     before, keys = state.scene, scene.parameter_keys
     was, stands = before.workspace.positions, scene.workspace.positions
     # an axis whose position in the working volume was changed goes there

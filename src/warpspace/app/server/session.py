@@ -29,7 +29,7 @@ from warpspace.app.browser.viser_private import queued
 from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
-from warpspace.app.drawing.shapes import SCENE_PER_MM, Layer
+from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.budget import pick, pick_line, with_clicked
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -37,9 +37,8 @@ from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
 from warpspace.app.tasks.catalogue import build_parts
-from warpspace.app.tasks.context import PAUSE_S, Context
-from warpspace.app.tasks.parts import Part, Window
-from warpspace.app.tasks.together import PointerPart, Tabs
+from warpspace.app.tasks.over import PointerPart, Tabs
+from warpspace.app.tasks.parts import PAUSE_S, Context, Part, Window
 from warpspace.exceptions import WarpspaceError
 
 OFTEN_S = 0.4  # between two writings of what follows often
@@ -54,10 +53,9 @@ class Display:
         self._context = context
         context.renew, context.closed = self._renew, self._closed
         context.rest_again = self._rest_again
-        self.layers: tuple[Layer, ...] = ()
+        self.layers: tuple[BoxLayer | MovingLayer, ...] = ()
         self.parts: dict[str, Part] = {}
         self._shown: dict[Part, object] = {}
-        self._following: list[Part] = []
         self._often: dict[Part, tuple[float, object]] = {}
         self._waiting: deque[Part] = deque()
         self._noted_at = 0.0
@@ -66,12 +64,14 @@ class Display:
         self._late: set[Part] = set()  # that wait for a rest, whatever they usually wait for
 
     def add(
-        self, picture: LivePicture, layers: Sequence[Layer] = (), parts: Sequence[Part] = ()
+        self,
+        picture: LivePicture,
+        layers: Sequence[BoxLayer | MovingLayer] = (),
+        parts: Sequence[Part] = (),
     ) -> None:
         """Add what has just been built, and write its pieces."""
         self.layers = (*self.layers, *layers)
         self.parts |= {part.name: part for part in parts}
-        self._following = [p for p in self.parts.values() if p.follows in ("at once", "often")]
         self._write(parts, picture)
         self._note(picture)
 
@@ -81,11 +81,7 @@ class Display:
             layer.show(picture)
         if anew:
             self._shown.clear()
-        # what is in sight changes with what is open on the page
-        known = self._context.shown
-        same = known is not None and known.state.page is picture.state.page and not anew
-        parts = self._following if same else self.parts.values()
-        self._write([one for one in parts if self._is_due(one, picture)], picture)
+        self._write([p for p in self.parts.values() if self._is_due(p, picture)], picture)
         self._note(picture)
 
     def _is_due(self, part: Part, picture: LivePicture) -> bool:
@@ -111,6 +107,7 @@ class Display:
 
     def _renew(self, part: Part) -> None:
         if self._context.shown is not None:
+            self._shown[part] = None  # whatever it depends on
             self._write([part], self._context.shown)
 
     def _closed(self) -> None:
@@ -152,8 +149,8 @@ class Display:
                 self._shown |= dict.fromkeys(self._late)
                 self._late.clear()
                 for layer in self.layers:
-                    if rest := getattr(layer, "rest", None):
-                        guarded(partial(rest, picture))
+                    if isinstance(layer, BoxLayer):
+                        guarded(partial(layer.rest, picture))
             self._changed_at = None
         while self._waiting:
             part = self._waiting.popleft()
@@ -193,8 +190,6 @@ def turn() -> Generator[None]:
 
 
 class Session:
-    """The app of one browser tab."""
-
     def __init__(
         self,
         context: Context,

@@ -27,12 +27,11 @@ from warpspace.app.documents.scene_file import (
     state_to_toml,
 )
 from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
-from warpspace.app.state.table import without_table
-from warpspace.app.tasks.context import Context
-from warpspace.app.tasks.parts import Part
+from warpspace.app.tasks.parts import Context, Part
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_KEPT_TEXT
 from warpspace.scene.model import Scene
@@ -95,8 +94,6 @@ START_VALUES = "the values that Reset goes back to: it goes back to those restor
 
 
 class Kept(msgspec.Struct, omit_defaults=True):
-    """What a page keeps."""
-
     file: str = ""
     name: str = ""
     link: str = ""  # where there is one: it knows what Reset goes back to

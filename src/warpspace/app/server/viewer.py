@@ -32,7 +32,7 @@ from warpspace.app.server.session import Session
 from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.parts import Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
@@ -44,7 +44,6 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
 def resolve_host(host: str) -> str:
-    """Turn a host name into an address of this machine."""
     try:
         found = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError, ValueError):
@@ -204,7 +203,6 @@ class RepeatedLines(logging.Filter):
 
 
 def limit_log() -> None:
-    """Have all that the program logs to the terminal limited."""
     limit = RepeatedLines()
     for handler in (logging.lastResort, *logging.getLogger().handlers):
         if handler is not None:
@@ -221,8 +219,6 @@ OTHER_USERS = (
 
 
 class Viewer:
-    """A running app."""
-
     def __init__(
         self,
         scene: Scene,

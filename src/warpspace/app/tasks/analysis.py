@@ -22,18 +22,21 @@ from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
 from warpspace.app.evaluation.cache import taken_turn
-from warpspace.app.evaluation.compare import applied, plain_state, with_applied, with_proposal
+from warpspace.app.evaluation.compare import (
+    applied,
+    plain_state,
+    with_applied,
+    with_proposal,
+    without_table,
+)
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import LONGEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
-from warpspace.app.state.table import without_table
 from warpspace.app.tasks.charts import block_html, result_html
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import PLAIN
 from warpspace.app.tasks.forms import form_html
-from warpspace.app.tasks.jobs import Job, Jobs
-from warpspace.app.tasks.parts import Section
+from warpspace.app.tasks.parts import Context, Job, Jobs, Section
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.picture.words import spell_at
@@ -60,8 +63,6 @@ Question = tuple[object, ...]
 
 
 class Answer(NamedTuple):
-    """What an analysis found."""
-
     question: Question  # that it answers
     found: Result
     cards: tuple[tuple[Change, Markup], ...] = ()  # what it proposes, and that in words
@@ -84,9 +85,9 @@ class AnalysisPart(Section):
         self._answer: Answer | None = None
         self._applied: Question = ()  # what is asked once a change has been applied
         self._problem: tuple[Question, str] | None = None
-        self._jobs = Jobs(self, self._again, self._fail)
+        self._jobs = Jobs(self, self.renew, self._fail)
         self._asked: Question = ()
-        self._version, self._subject = 0, ""
+        self._subject = ""
 
     @property
     def kind(self) -> type[Analysis]:
@@ -131,11 +132,9 @@ class AnalysisPart(Section):
         return self._answer.took_s < QUICK_S if self._answer else self.at_once
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        """Give what is run."""
         return read_form(self.kind, self.shown_options(state), values, scenes[0])
 
     def before_result(self, state: AppState) -> Markup:
-        """Give what stands above the result."""
         return EMPTY
 
     def headline(self, found: Result) -> Markup:
@@ -161,12 +160,11 @@ class AnalysisPart(Section):
     # --- the page --------------------------------------------------------------------------------
 
     def values(self, state: AppState) -> dict[str, str]:
-        """Give what is set of its options."""
         found, told = self.defaults(state), option_values(state, self.name)
         return {**found, **told, **{name: found[name] for name in OF_STATE & found.keys()}}
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.question(picture.state), self._version)
+        return (self.question(picture.state),)
 
     def body(self, picture: LivePicture) -> Markup:
         return self._body(picture.state)
@@ -203,13 +201,11 @@ class AnalysisPart(Section):
         return join((*parts, self.options_html(state)))
 
     def problem_html(self, state: AppState) -> Markup:
-        """Say why there is no answer."""
         if self._problem is None or self._problem[0] != self.question(state):
             return EMPTY
         return tag("p", self._problem[1], class_="ws-problem", role="alert")
 
     def cards_html(self, question: Question) -> Markup:
-        """Offer the changes that the result proposes."""
         answer, cards = self._answer, list[Markup]()
         if answer is None:
             return EMPTY
@@ -227,7 +223,6 @@ class AnalysisPart(Section):
         return join(cards)
 
     def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
-        """Fold its options."""
         options = [one for one in self.shown_options(state) if one.name not in OF_STATE]
         if not options:
             return EMPTY
@@ -239,7 +234,6 @@ class AnalysisPart(Section):
     # --- events --------------------------------------------------------------------------------
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        """Set an option, run, cancel, or do something with the result."""
         name = word.removeprefix("set.")
         if word.startswith("set.") and name in {one.name for one in self.options()}:
             return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:LONGEST]})
@@ -307,7 +301,7 @@ class AnalysisPart(Section):
 
     def _take_answer(self, answer: Answer) -> None:
         self._answer, self._problem = answer, None
-        self._again()
+        self.renew()
 
     def _fail(self, error: Exception) -> None:
         words = error_words(error)
@@ -315,11 +309,7 @@ class AnalysisPart(Section):
             labels = {one.name: one.label for one in self.kind.options()}
             words = error.said(lambda name: labels.get(name, name))
         self._problem = (self._asked, words)
-        self._again()
-
-    def _again(self) -> None:
-        self._version += 1
-        self.context.renew(self)
+        self.renew()
 
     def _save(self, ending: str) -> None:
         found = self._answer.found if self._answer else None

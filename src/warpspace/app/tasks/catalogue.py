@@ -9,7 +9,6 @@ from warpspace.app.browser.html import join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import TASKS
 from warpspace.app.tasks.analysis import AnalysisPart
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.controls import ComparePart, ControlsPart
 from warpspace.app.tasks.conventions import ConventionsSection
 from warpspace.app.tasks.design import ConceptsPart, TolerancesPart
@@ -17,14 +16,17 @@ from warpspace.app.tasks.errors import ErrorsPart
 from warpspace.app.tasks.files import FilesWindow, ReportWindow
 from warpspace.app.tasks.importing import ImportPart
 from warpspace.app.tasks.improve import BestPart, CompensatePart, RepairPart
-from warpspace.app.tasks.machine import PositionsSection, RotarySection
-from warpspace.app.tasks.machine_editor import EditorSection, MachinesWindow
+from warpspace.app.tasks.machine import (
+    EditorSection,
+    MachinesWindow,
+    PositionsSection,
+    RotarySection,
+)
 from warpspace.app.tasks.measure import CalibratePart, TestsPart
-from warpspace.app.tasks.notes import NoteNumbersPart, NotesPart
+from warpspace.app.tasks.notes import NoteNumbersPart, NotesPart, StoryPart
 from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart, RoomPart
 from warpspace.app.tasks.part import PartPart, ProgramPart
-from warpspace.app.tasks.parts import Part, Section
-from warpspace.app.tasks.story import StoryPart
+from warpspace.app.tasks.parts import Context, Part, Section
 from warpspace.app.tasks.top import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
 from warpspace.app.tasks.understand import DistancePart, VolumePart, WorstPart
 
@@ -52,9 +54,6 @@ class TasksPart(Part):
         names = {one.name: one.task for one in found}
         names = {name: names[name] for name in (*FIRST, *names)}
         self.sections = {task: [name for name, of in names.items() if of == task] for task in TASKS}
-
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        return (picture.state.page.task,)
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         """Write the tabs, and an empty place for each section."""
@@ -85,7 +84,6 @@ def _places(names: Iterable[str]) -> Markup:
 
 
 def build_parts(context: Context) -> list[Part]:
-    """Build the parts of a page."""
     of_tasks = (WorstPart, VolumePart, ImportPart, TestsPart)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     found: list[Section] = [

@@ -56,7 +56,6 @@ def details_html(blocks: Iterable[Block], words: str = "Details") -> Markup:
 
 
 def block_html(block: Block) -> Markup:
-    """Say one block."""
     if isinstance(block, str):
         return tag("p", spelt(block))
     if isinstance(block, Lines):

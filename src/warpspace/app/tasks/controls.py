@@ -64,14 +64,6 @@ def chosen_map(state: AppState) -> str:
 class ControlsPart(Part):
     name = "controls"
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        state = picture.state
-        return (picture.exaggeration, picture.scale.high, state.exaggeration, state.component,
-                Identity(state.look), Identity(state.shown), Identity(state.machine), state.loop,
-                state.placed, state.nodes, state.specification.limit_um, Identity(state.scene),
-                self.context.camera.view, self.context.camera.orthographic, picture.quantity,
-                picture.uncertainty and picture.uncertainty.doubt.unknown)  # fmt: skip
-
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         camera = self.context.camera
         lens = switch("controls:set.lens", "Orthographic", on=camera.orthographic,
@@ -106,7 +98,7 @@ class ControlsPart(Part):
         lens = value == "1" if word == "set.lens" else None
         if view is not None or lens is not None:
             context.act(lambda: context.fit_view(view, lens))
-            context.act(lambda: context.renew(self))
+            context.act(self.renew)
         return state
 
 

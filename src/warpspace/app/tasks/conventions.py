@@ -120,7 +120,6 @@ def with_choice(state: AppState, choice: str) -> AppState:
 
 
 def with_own_conventions(state: AppState) -> AppState:
-    """Go back to the conventions of the scene."""
     own, machine = state.origin, state.scene.machine
     said = {**machine.axes, **own.machine.axes}
     axes = {

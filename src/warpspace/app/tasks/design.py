@@ -306,7 +306,6 @@ class ConceptsPart(AnalysisPart):
         )  # fmt: skip
 
     def before_result(self, state: AppState) -> Markup:
-        """Choose a machine to compare, and list those chosen."""
         offers, lines = self.offers(state), list[tuple[Markup, Markup]]()
         chosen = [key for key in self.chosen(state) if key in offers]
         for letter, key in zip(ascii_uppercase, chosen, strict=False):

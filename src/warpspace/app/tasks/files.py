@@ -13,14 +13,12 @@ from warpspace.app.browser.html import button, choice, field, join, tag, text_bo
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents import files, scene_file
 from warpspace.app.documents.offline_page import build_offline_html, build_story_html
+from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.evaluate import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Comparison
-from warpspace.app.state.table import drawn_tables, without_table
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.forms import setting
-from warpspace.app.tasks.jobs import Job, Jobs
-from warpspace.app.tasks.parts import Window, actions
+from warpspace.app.tasks.parts import Context, Job, Jobs, Window, actions
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
 from warpspace.scene.notes import story
@@ -43,7 +41,7 @@ class JobWindow(Window):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._jobs = Jobs(self, partial(context.renew, self), context.page.report)
+        self._jobs = Jobs(self, self.renew, context.page.report)
 
     def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
         """Make a file of what is drawn beside the session, and have the browser save it."""
@@ -250,8 +248,6 @@ ALWAYS = (
 
 
 class ReportWindow(JobWindow):
-    """Writes the design review of what is drawn."""
-
     name, title = "report", "Report"
 
     def body(self, picture: LivePicture) -> Markup:
@@ -287,7 +283,7 @@ class ReportWindow(JobWindow):
             index = index_of(value, len(self.context.reported))
             if index is not None:
                 del self.context.reported[index]
-                self.context.act(partial(self.context.renew, self))
+                self.context.act(self.renew)
         elif word == "write" and value in (".html", ".pdf"):
             self.context.act(partial(self._write, value))
         return super().take(state, word, value)

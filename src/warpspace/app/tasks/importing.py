@@ -17,9 +17,9 @@ from warpspace.app.browser.html import EMPTY, tag, upload_button
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import read_form
 from warpspace.app.tasks.charts import details_html
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
 from warpspace.app.tasks.measure import FilesPart, Held
+from warpspace.app.tasks.parts import Context
 from warpspace.exceptions import WarpspaceError
 from warpspace.formats import registry
 from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summary_table
@@ -218,7 +218,7 @@ class ImportPart(FilesPart):
                 self._files = before
                 raise problem
         self.context.post(partial(_unfolded, keeps=keeps))
-        self._again()
+        self.renew()
 
     def problem_html(self, state: AppState) -> Markup:
         return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before

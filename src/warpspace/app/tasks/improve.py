@@ -16,13 +16,12 @@ from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.repair import Repair
 from warpspace.app.browser.html import EMPTY, button, choice, join, tag
-from warpspace.app.evaluation.compare import pinned_side, with_before
+from warpspace.app.evaluation.compare import pinned_side, with_before, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.table import without_table
 from warpspace.app.tasks.analysis import RECORD, AnalysisPart, Question
 from warpspace.app.tasks.charts import details_html, result_html
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.parts import Context
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
 from warpspace.formats.compensation.controller import Controller
@@ -249,7 +248,7 @@ class CompensatePart(AnalysisPart):
 
     def _take_picture(self, found: Compensation, png: bytes) -> None:
         self._picture = found, f"data:image/png;base64,{base64.b64encode(png).decode()}"
-        self._again()
+        self.renew()
 
 
 def _writable() -> dict[str, str]:

@@ -37,7 +37,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import TEST, read_form, with_form
 from warpspace.app.tasks.analysis import AnalysisPart, Question
 from warpspace.app.tasks.charts import block_html, details_html
-from warpspace.app.tasks.context import Context
+from warpspace.app.tasks.parts import Context
 from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
@@ -80,7 +80,6 @@ class FilesPart(AnalysisPart):
         return bool(self._files)
 
     def received(self, name: str, content: bytes) -> None:
-        """Take in a file."""
         raise NotImplementedError
 
     def files_html(self) -> Markup:
@@ -94,7 +93,6 @@ class FilesPart(AnalysisPart):
         return join(((problem if self._trouble else EMPTY), rows(lines) if lines else EMPTY))
 
     def upload_html(self, words: str) -> Markup:
-        """Give the button that adds a file of readings."""
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
         upload = upload_button(words, self.name, MOST_BYTES, ".csv", hint=hint)
         return tag("div", upload, class_="ws-actions")
@@ -108,7 +106,7 @@ class FilesPart(AnalysisPart):
                 action()
             except WarpspaceError as error:
                 self._trouble = error_words(error)
-            self._again()
+            self.renew()
 
         self.context.act(attempted)
 
@@ -117,7 +115,7 @@ class FilesPart(AnalysisPart):
             self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
         elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
-            self.context.act(self._again)
+            self.context.act(self.renew)
         else:
             return super().take(state, word, value)
         return state
@@ -148,7 +146,7 @@ class TestsPart(FilesPart):
         return chosen_test(state) is not None
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.question(picture.drawn_state), picture.is_difference, self._version)
+        return (self.question(picture.drawn_state), picture.is_difference)
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked: Any = super().ask(state, values, scenes)
@@ -231,10 +229,9 @@ def take_file(scene: Scene, text: str, name: str, kind: str | None, others: Sequ
     """Take in the text of a file beside those that are there."""
     if len(others) >= MOST_FILES:
         raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
-    unlike = name
-    while any(one.name == unlike for one in others):
-        count = 2 if unlike == name else int(unlike.rpartition(" ")[2]) + 1
-        unlike = f"{name} {count}"
+    known = {one.name for one in others}
+    numbered = (f"{name} {count}" for count in range(2, MOST_FILES + 2))
+    unlike = next(one for one in (name, *numbered) if one not in known)
     lines = text.count("\n")
     if kind is None or kind in KINDS:
         lines = len(parse_table(text, unlike))
@@ -320,7 +317,7 @@ class CalibratePart(FilesPart):
             state = edits.with_sight(state, inside=bool(self._arrows))
         else:
             return super().take(state, word, value)
-        self.context.act(self._again)
+        self.context.act(self.renew)
         return state
 
     def received(self, name: str, content: bytes) -> None:

@@ -1,13 +1,14 @@
-"""What lies over the drawing in every state: heading, colour bar, words and scale bars."""
+"""What lies over the drawing: heading, colour bar, words and scale bars, pointers of other tabs."""
 
-from collections.abc import Mapping
-from functools import lru_cache
+import time
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from warpspace.app.browser.html import EMPTY, fill, join, menu, tag, text_box
-from warpspace.app.browser.room import read_room
+from warpspace.app.browser.viser_private import queued
 from warpspace.app.documents.legend import (
     kept_words,
     legend_html,
@@ -17,14 +18,14 @@ from warpspace.app.documents.legend import (
     place_words,
     subject_words,
 )
+from warpspace.app.drawing.camera import read_room
 from warpspace.app.drawing.labels import Label, axis_labels, note_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM
+from warpspace.app.evaluation.budget import pick
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.leaf import Identity
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.design import allowed_words
-from warpspace.app.tasks.parts import Part
+from warpspace.app.tasks.parts import Context, Part
 from warpspace.geometry.surfaces import corners
 from warpspace.machine.axes import is_linear
 from warpspace.picture.mesh import isoline_labels
@@ -64,19 +65,14 @@ class LegendPart(Part):
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         kept = EMPTY
         if not picture.is_difference:
-            limit = f"{picture.state.specification.limit_um:g}"
-            kept = _limit(*kept_words(picture), limit)
+            (words, is_kept), limit = kept_words(picture), picture.state.specification.limit_um
+            box = text_box("state:set.specification.limit_um", f"{limit:g}", size="short",
+                           label="Limit", id="ws-limit")  # fmt: skip
+            body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
+            kept = menu(words, body, key="limit", hint="Change the limit",
+                        kind="ws-kept" if is_kept else "ws-missed")  # fmt: skip
             kept = Markup(" · ") + kept if place_words(picture) else kept
         return {"head.kept": kept, "legend": legend_html(picture)}
-
-
-@lru_cache(maxsize=64)
-def _limit(words: str, kept: bool, limit: str) -> Markup:
-    box = text_box("state:set.specification.limit_um", limit, size="short", label="Limit",
-                   id="ws-limit")  # fmt: skip
-    body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
-    kind = "ws-kept" if kept else "ws-missed"
-    return menu(words, body, key="limit", hint="Change the limit", kind=kind)
 
 
 class OrderPart(Part):
@@ -126,7 +122,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
     isolines = look.isolines and look.surface != "grid"
     bounds = [one.grid.bounds_mm for one in picture.slices]
     return {
-        "axes": _words(Identity(axis_labels(picture))),
+        "axes": list(map(_word, axis_labels(picture))),
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
              "way": [float(k == i) * way for i in range(3)]}
@@ -157,13 +153,46 @@ def _scene(point_mm: Array) -> list[float]:
     return [round(value * SCENE_PER_MM, 4) for value in point_mm.tolist()]
 
 
-@lru_cache(maxsize=32)
-def _words(labels: Identity) -> list[dict[str, Any]]:
-    return list(map(_word, labels.thing))
-
-
 def _word(label: Label) -> dict[str, Any]:
     found = {"text": label.text, "at": _scene(label.at_mm), "kind": label.kind}
     if label.from_mm is not None:
         found |= {"from": _scene(label.from_mm), "axis": label.axis}
     return found
+
+
+# --- A shared review: each tab sees where the others point ----------------------------------------
+
+OFTEN_S = 0.08  # between two places of one pointer; a page sends one each tenth of a second
+LONGEST_NAME, LONGEST_RAY = 24, 200  # characters
+MOST_QUEUED = 8  # messages that wait for a page; one that takes none is sent no pointers
+Tabs = Callable[[], Iterable[Context]]
+
+
+class PointerPart(Part):
+    """Takes where the mouse is over the map: ``pointer:at``, a name, then a ray of six numbers."""
+
+    name = "pointer"
+
+    def __init__(self, context: Context, tabs: Tabs) -> None:
+        super().__init__(context)
+        self._tabs, self._last = tabs, 0.0
+        context.page.call("together")
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        now, picture, at = time.monotonic(), self.context.shown, None
+        spelt, _, name = value.partition("\n")
+        if word == "at":
+            if len(spelt) > LONGEST_RAY or now - self._last < OFTEN_S or self.context.telling:
+                return state
+            try:
+                ray = np.array([float(one) for one in spelt.split(",")]).reshape(2, 3)
+            except ValueError:  # not six numbers; what is not finite or too far meets nothing
+                return state
+            self._last = now
+            found = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
+            at = found and (found[1] * SCENE_PER_MM).round(4).tolist()
+        for one in self._tabs():
+            if one is not self.context and not one.telling and queued(one.client) <= MOST_QUEUED:
+                said = " ".join(name[:LONGEST_NAME].split())
+                one.page.call("pointer", self.context.client.client_id, said, at)
+        return state

@@ -12,9 +12,8 @@ from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box,
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
-from warpspace.app.tasks.context import Context
 from warpspace.app.tasks.files import accepted_endings
-from warpspace.app.tasks.parts import Part, Window
+from warpspace.app.tasks.parts import Context, Part, Window
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
 LONGEST_SENTENCE = 110

@@ -30,9 +30,9 @@ from warpspace.app.evaluation.budget import (
     pick_worst,
     with_picked,
 )
+from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
-from warpspace.app.state.table import without_words
 from warpspace.app.state.tree import EXAMPLE, put
 from warpspace.app.tasks.analysis import AnalysisPart
 from warpspace.app.tasks.charts import block_html
@@ -57,9 +57,6 @@ class WorstPart(Section):
     name, task, title = "worst", "understand", "Worst point"
     sentence = "What the largest error of the volume is made of"
     _found: tuple[LivePicture, Answer] | None = None
-
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (id(picture), picture.state.picked, picture.state.lever)
 
     def heading(self, picture: LivePicture) -> str:
         if picture.is_difference:
