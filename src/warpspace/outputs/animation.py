@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from warpspace.bodies.placed import PlacedBody
+from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.exceptions import OptionError, OutputError, RenderError, WorkersLostError
 from warpspace.geometry.surfaces import deform
 from warpspace.kinematics.model import Loop
@@ -20,7 +20,7 @@ from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.render import fit_projection
 from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
-from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.outputs.figures.machine import draw_bodies
 from warpspace.outputs.figures.maps import isoline_words, say_statistics
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
@@ -127,7 +127,7 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
     sheet = start_sheet("rotation", figure, title, facts, [scene], [], exact=True)
     canvas = sheet.canvas
     carried = [axis.name for axis in scene.machine.branch("workpiece")]
-    placed = bodies_of(picture, factor, only=[*carried, "w"])
+    placed = place_bodies(turned, picture.view, factor, [*carried, "w"])
     left, bottom, right, top = sheet.content
     side = 0.03 * (right - left)
     reach = [nominal.reshape(-1, 3), actual.reshape(-1, 3), *map(_swept, placed)]

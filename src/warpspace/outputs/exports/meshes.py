@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
-from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.bodies.placed import place_bodies
 from warpspace.field.grid import DEFAULT_NODES
 from warpspace.geometry import surfaces
 from warpspace.geometry.colour import srgb_to_linear
@@ -138,11 +138,6 @@ def _traces(picture: ScenePicture) -> list[Part]:
     return found
 
 
-def _placed_bodies(picture: ScenePicture) -> tuple[PlacedBody, ...]:
-    motions = scene_motions(picture.scene, picture.view)
-    return place_bodies(picture.scene, motions, picture.exaggeration)
-
-
 def _bodies(picture: ScenePicture) -> list[Part]:
     return [
         Part(
@@ -153,7 +148,7 @@ def _bodies(picture: ScenePicture) -> list[Part]:
             targets={"nominal": to_gltf(part.nominal_mm - part.vertices_mm)},
             group="bodies",
         )
-        for part in _placed_bodies(picture)
+        for part in place_bodies(picture.scene, picture.view, picture.exaggeration)
     ]
 
 
@@ -231,7 +226,7 @@ def to_pyvista(
         actual.point_data["norm_um"] = np.linalg.norm(drawn.error_um, axis=-1)
         traces.append(pv.MultipleLines(drawn.nominal_mm), f"nominal {label}")
         traces.append(actual, f"actual {label}")
-    for part in _placed_bodies(picture):
+    for part in place_bodies(picture.scene, picture.view, picture.exaggeration):
         mesh = pv.PolyData.from_regular_faces(part.vertices_mm, part.body.triangles)
         colour = np.array(part.body.colour, dtype=np.uint8)
         mesh.cell_data["colour"] = np.tile(colour, (len(part.body.triangles), 1))

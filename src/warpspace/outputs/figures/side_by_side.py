@@ -8,7 +8,7 @@ import numpy as np
 
 from warpspace.analysis.concepts import LETTERS, Concept, compare_concepts
 from warpspace.analysis.repair import Repair, RepairResult
-from warpspace.bodies.placed import PlacedBody
+from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
@@ -27,7 +27,7 @@ from warpspace.outputs.drawing.sheet import (
     scene_facts,
     start_sheet,
 )
-from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.outputs.figures.machine import draw_bodies
 from warpspace.outputs.figures.maps import EVERY, isoline_words
 from warpspace.picture.comparison import (
     CHANGE,
@@ -37,7 +37,7 @@ from warpspace.picture.comparison import (
     share_exaggeration,
     statistics_change,
 )
-from warpspace.picture.model import ConceptPicture, ScenePicture, picture_concept, view_words
+from warpspace.picture.model import ScenePicture, picture_concept, view_words
 from warpspace.picture.words import LOOP_WORDS, tolerance_words
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
@@ -191,9 +191,7 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     return sheet.finish(1.0, maps)
 
 
-def _evaluate_concepts(
-    concepts: Sequence[Concept], settings: FigureSettings
-) -> list[ConceptPicture]:
+def _evaluate_concepts(concepts: Sequence[Concept], settings: FigureSettings) -> list[ScenePicture]:
     pictures = [picture_concept(concept, settings.grid) for concept in concepts]
     scale = shared_colours(replace(settings, component="norm"), pictures)
     return [replace(picture, colours=scale) for picture in pictures]
@@ -201,12 +199,12 @@ def _evaluate_concepts(
 
 def _draw_machines(
     canvas: Canvas,
-    pictures: Sequence[ConceptPicture],
+    pictures: Sequence[ScenePicture],
     rooms: Sequence[Rect],
     settings: FigureSettings,
 ) -> tuple[tuple[DrawnMap, ...], float]:
     view = settings.view
-    bodies = [bodies_of(picture, 1.0) for picture in pictures]
+    bodies = [place_bodies(one.scene, one.view, 1.0) for one in pictures]
     seen = [_points_mm(picture, own) for picture, own in zip(pictures, bodies, strict=True)]
     px_per_mm = min(
         fit_projection(view, points, room).px_per_mm
@@ -244,7 +242,7 @@ def _room(canvas: Canvas, cell: Rect) -> Rect:
     return (left + side, bottom + foot, right - side, top - head)
 
 
-def _points_mm(picture: ConceptPicture, placed: Sequence[PlacedBody]) -> Array:
+def _points_mm(picture: ScenePicture, placed: Sequence[PlacedBody]) -> Array:
     parts = [picture.grid.nominal_mm.reshape(-1, 3), *(part.vertices_mm for part in placed)]
     if not picture.grid.longest_edge_mm > 0.0:
         parts.append(picture.grid.bounds_mm + 0.5 * picture.size_mm * np.array([[-1.0], [1.0]]))
