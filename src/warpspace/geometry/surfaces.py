@@ -247,18 +247,12 @@ def face_lines(faces: Sequence[Index], shape: Shape, every: Shape) -> list[Index
     lines: list[Index] = []
     for face in faces:
         for patch in (face, face.T):
-            for row in patch:
-                at = np.stack(np.unravel_index(row, shape), -1)
-                across = _held_axis(patch, shape)
-                if len(row) > 1 and at[0, across] % every[across] == 0:
-                    lines.append(row)
+            at = np.stack(np.unravel_index(patch, shape))  # [3, a, b]
+            across = int(np.argmax(at[:, 0, 0] != at[:, -1, 0]))
+            if patch.shape[1] > 1:
+                lines.extend(patch[at[across, :, 0] % every[across] == 0])
     wanted = {pair for line in lines for pair in _pairs(line)} - creases
     return _collect(iter(lines), wanted)
-
-
-def _held_axis(patch: Index, shape: Shape) -> int:
-    first, last = (np.stack(np.unravel_index(patch[row, 0], shape)) for row in (0, -1))
-    return int(np.argmax(first != last))
 
 
 def _pairs(line: Index) -> list[tuple[int, int]]:
@@ -309,22 +303,6 @@ def isolines(
             if len(at) > 1:
                 found.append((level, _bilinear(corners, at[:, 1], at[:, 0])))
     return found
-
-
-def isoline_segments(
-    faces: Sequence[Index],
-    nodes_mm: Array,
-    values: Array,
-    levels: Sequence[float],
-    lift_mm: Array | None = None,
-) -> Array:
-    """Find the lines of equal value on all faces as pieces of line, [S, 2, 3], mm."""
-    pieces: list[Array] = []
-    for number, face in enumerate(faces):
-        off = np.zeros(3) if lift_mm is None else lift_mm[number]
-        for _, line in isolines(face, nodes_mm, values, levels):
-            pieces.append(np.stack([line[:-1], line[1:]], axis=1) + off)
-    return np.concatenate(pieces) if pieces else np.zeros((0, 2, 3))
 
 
 def _bilinear(corners: Array, row: Array, column: Array) -> Array:

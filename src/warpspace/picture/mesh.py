@@ -10,7 +10,6 @@ from warpspace.geometry.surfaces import (
     Index,
     is_thin,
     isoline_levels,
-    isoline_segments,
     isolines,
     spread,
     spread_nodes,
@@ -145,12 +144,12 @@ def isoline_pieces(picture: Picture) -> Pieces:
     found: list[Pieces] = []
     for part in map_parts(picture):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
-        faces, normals = part.drawn_of.faces, part.drawn_of.normals * part.ways
+        normals = part.drawn_of.normals * part.ways
         found += [
-            isoline_segments(faces, nodes, values, levels, ISOLINE_LIFT * lift * normals).astype(
-                np.float32
-            )
+            (np.stack([line[:-1], line[1:]], axis=1) + off).astype(np.float32)
             for lift in part.lifts
+            for face, off in zip(part.drawn_of.faces, ISOLINE_LIFT * lift * normals, strict=True)
+            for _, line in isolines(face, nodes, values, levels)
         ]
     return _joined(found)
 
