@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from PIL import Image
 
@@ -18,12 +19,13 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import ANIMATION_FRAMES
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.render import fit_projection
-from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for
+from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
 from warpspace.outputs.figures.machine import draw_bodies
 from warpspace.outputs.figures.maps import isoline_words, say_statistics
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
+from warpspace.outputs.save import figure_bytes
 from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
 from warpspace.picture.traces import TraceLine, evaluate_traces
 from warpspace.resources import __version__
@@ -211,12 +213,7 @@ def _pictures(
 
 
 def _draw(scene: Scene, settings: AnimationSettings, number: int) -> bytes:
-    import matplotlib as mpl
-
-    from warpspace.outputs.drawing.settings import SAVE_RC
-    from warpspace.outputs.save import figure_bytes
-
-    with mpl.rc_context(dict(SAVE_RC)):
+    with mpl.rc_context(SAVE_RC):
         drawing = draw_frame(scene, settings, number)
     return figure_bytes(drawing, "png")
 
