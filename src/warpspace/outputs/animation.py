@@ -190,7 +190,7 @@ def write_animation(
         if ending == ".mp4":
             _write_video(pictures, temporary, encoder, settings, about)
         else:
-            temporary.write_bytes(_image_bytes(pictures, ending, settings, about))
+            _write_images(pictures, temporary, ending, settings, about)
 
 
 def _pictures(
@@ -218,11 +218,10 @@ def _draw(scene: Scene, settings: AnimationSettings, number: int) -> bytes:
     return figure_bytes(drawing, "png")
 
 
-def _image_bytes(
-    pictures: list[Image.Image], ending: str, settings: AnimationSettings, about: str
-) -> bytes:
+def _write_images(
+    pictures: list[Image.Image], path: Path, ending: str, settings: AnimationSettings, about: str
+) -> None:
     duration = round(1000.0 / settings.fps)
-    buffer = io.BytesIO()
     if ending == ".gif":
         palette = shared_palette(pictures)
         frames = [
@@ -233,7 +232,7 @@ def _image_bytes(
         frames = pictures
         options = {"quality": 85, "method": 4}
     frames[0].save(
-        buffer,
+        path,
         format=ending[1:],
         save_all=True,
         append_images=frames[1:],
@@ -241,7 +240,6 @@ def _image_bytes(
         loop=0,
         **options,
     )
-    return buffer.getvalue()
 
 
 def shared_palette(pictures: Sequence[Image.Image]) -> Image.Image:

@@ -15,7 +15,7 @@ from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import draw_map, draw_maps_alike
 from warpspace.outputs.drawing.render import Rect, fit_projection
-from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for, shared_colours
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for, share_colours
 from warpspace.outputs.drawing.sheet import (
     Drawing,
     DrawnMap,
@@ -49,8 +49,7 @@ def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[Sc
         settings.exaggeration,
         scenes[0].exaggeration,
     )
-    scale = shared_colours(settings, pictures)
-    return [replace(picture, colours=scale) for picture in pictures]
+    return share_colours(settings, pictures)
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -157,7 +156,10 @@ CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     plan = replace(settings.concepts, loop=Loop(settings.loop))
     concepts = compare_concepts(scenes, plan)
-    pictures = _evaluate_concepts(concepts, settings)
+    pictures = share_colours(
+        replace(settings, component="norm"),
+        [picture_concept(concept, settings.grid) for concept in concepts],
+    )
     scale, first = pictures[0].scale, concepts[0]
     title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
     facts = [
@@ -189,12 +191,6 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
         scale, "RMS |E|  [µm]", [], [] if settings.printed else rows, (px_per_mm, None)
     )
     return sheet.finish(1.0, maps)
-
-
-def _evaluate_concepts(concepts: Sequence[Concept], settings: FigureSettings) -> list[ScenePicture]:
-    pictures = [picture_concept(concept, settings.grid) for concept in concepts]
-    scale = shared_colours(replace(settings, component="norm"), pictures)
-    return [replace(picture, colours=scale) for picture in pictures]
 
 
 def _draw_machines(
