@@ -98,9 +98,10 @@ def _kept(count: int, every: int) -> list[int]:
     return sorted({*range(0, count, every), count - 1})
 
 
-def line_spacing(nodes: int) -> int:
+def line_spacing(shape: Shape) -> Shape:
     """Choose how many nodes apart grid lines are drawn, so that at most twelve cells remain."""
-    return max(1, -(-(nodes - 1) // _CELLS))
+    x, y, z = (max(1, -(-(nodes - 1) // _CELLS)) for nodes in shape)
+    return x, y, z
 
 
 def segments(lines: list[Index]) -> Index:

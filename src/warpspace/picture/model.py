@@ -62,13 +62,10 @@ def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
     faces = map_faces(shape, cut=cut)
     normals = np.array([_normal(face, shape) for face in faces]).reshape(-1, 3)
     outwards = np.zeros((int(np.prod(shape)), 3))
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            on = [f for f, n in zip(faces, normals, strict=True) if n[axis] == sign]
-            if on:
-                outwards[np.unique(np.concatenate([f.ravel() for f in on])), axis] += sign
-    every = tuple(map(surfaces.line_spacing, shape))
-    lines = surfaces.face_lines(faces, shape, (every[0], every[1], every[2]))
+    for face, normal in zip(faces, normals, strict=True):
+        outwards[face] += normal
+    outwards = np.sign(outwards)  # patches of one plane share nodes
+    lines = surfaces.face_lines(faces, shape, surfaces.line_spacing(shape))
     grid, edges = surfaces.segments(lines), surfaces.segments(surfaces.crease_lines(faces, shape))
     return Topology(
         surfaces.triangulate(faces),

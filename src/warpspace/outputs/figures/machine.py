@@ -130,7 +130,7 @@ def _draw_volume_lines(
     theme, shape = canvas.theme, picture.shape
     nodes, nominal = picture.drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
     faces = surfaces.outer_faces(shape)
-    nx, ny, nz = (2 * surfaces.line_spacing(count) for count in shape)
+    nx, ny, nz = (2 * nodes for nodes in surfaces.line_spacing(shape))
     for lines, width, alpha in (
         (surfaces.face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
         (surfaces.crease_lines(faces, shape) or surfaces.box_edges(shape), SIZES.line, 0.95),

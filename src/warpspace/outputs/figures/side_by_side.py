@@ -44,12 +44,8 @@ from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 
 
 def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[ScenePicture]:
-    pictures = share_exaggeration(
-        [evaluate_for(settings, scene) for scene in scenes],
-        settings.exaggeration,
-        scenes[0].exaggeration,
-    )
-    return share_colours(settings, pictures)
+    pictures = [evaluate_for(settings, scene) for scene in scenes]
+    return share_colours(settings, share_exaggeration(pictures, settings.exaggeration))
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
