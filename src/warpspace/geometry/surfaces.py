@@ -149,15 +149,15 @@ def thicken(points_mm: Array, thickness_mm: float) -> Array:
 
 
 def spread(values: NDArray[Any]) -> NDArray[Any]:
-    """Repeat what is known at the nodes of a line or a point, [nx, ny, nz, ...], as `thicken`."""
-    for axis in range(3):
-        if values.shape[axis] == 1:
-            values = np.repeat(values, 2, axis=axis)
+    """Repeat what is known at the nodes, [nx, ny, nz, ...], of a line or a point, as `thicken`."""
+    still = [axis for axis in range(3) if values.shape[axis] == 1]
+    for axis in still if is_thin(values.shape[:3]) else ():
+        values = np.repeat(values, 2, axis=axis)
     return values
 
 
 def spread_nodes(shape: Shape) -> NDArray[np.intp]:
-    """Give the flat index of the grid node that each node of a thickened grid belongs to, [M]."""
+    """Give the flat index of the grid node that each node belongs to as it is drawn, [M]."""
     return spread(np.arange(np.prod(shape), dtype=np.intp).reshape(shape)).reshape(-1)
 
 

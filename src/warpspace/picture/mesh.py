@@ -61,13 +61,15 @@ def map_parts(picture: Picture) -> list[Part]:
 
 
 def _part(picture: Picture, lifts: tuple[float, ...]) -> Part:
-    if is_thin(picture.shape):
-        drawn_mm = thick_nodes(picture, picture.drawn_mm)
-        values, faded = spread(picture.values), picture.faded
-        drawn = drawn_mm, values, topology(values.shape), lifts, picture.grid.ways
-        return Part(*drawn, None if faded is None else spread(faded.astype(float)) > 0.0)
-    drawn = picture.drawn_mm, picture.values, picture.topology, lifts
-    return Part(*drawn, picture.grid.ways, picture.faded)
+    values, faded = spread(picture.values), picture.faded
+    return Part(
+        thick_nodes(picture, picture.drawn_mm),
+        values,
+        topology(values.shape, cut=picture.cut),
+        lifts,
+        picture.grid.ways,
+        None if faded is None else spread(faded),
+    )
 
 
 def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
@@ -76,10 +78,10 @@ def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
     return thicken(nodes_mm, THICKNESS * picture.size_mm) if thin else nodes_mm
 
 
-def thick_map(picture: Picture) -> tuple[Array, Index, Index]:
-    """Give what a ray can meet of a line or a point that is drawn thick."""
+def solid_map(picture: Picture) -> tuple[Array, Index, Index]:
+    """Give what a ray can meet of a map: points, triangles, and the grid node of each point."""
     thick = thick_nodes(picture, picture.drawn_mm)
-    surface = topology(thick.shape[:3]).surface
+    surface = topology(thick.shape[:3], cut=picture.cut).surface
     nodes = spread_nodes(picture.shape)[surface.nodes]
     return thick.reshape(-1, 3)[surface.nodes], surface.triangles, nodes
 

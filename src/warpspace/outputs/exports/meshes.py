@@ -76,8 +76,7 @@ def _surface(picture: ScenePicture) -> Part:
     field = picture.field
     nominal = thick_nodes(picture, picture.grid.nominal_mm)
     surface = surfaces.outer_surface(nominal.shape[:3])
-    thin = surfaces.is_thin(picture.shape)
-    at = surfaces.spread_nodes(picture.shape)[surface.nodes] if thin else surface.nodes
+    at = surfaces.spread_nodes(picture.shape)[surface.nodes]
     error = field.error_um.reshape(-1, 3)[at]
     colours = picture.scale.colours(picture.values.reshape(-1)[at])
     tilts = field.orientation_urad.reshape(-1, 3)[at]
