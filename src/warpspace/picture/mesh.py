@@ -55,21 +55,14 @@ class Part:
 def map_parts(picture: Picture) -> list[Part]:
     """List the grids that the map of a picture consists of; a slice is seen from both sides."""
     lift = LIFT * picture.size_mm
-    if not picture.slices:
-        return [_part(picture, (lift,))]
-    return [_part(one, (lift, -lift)) for one in picture.slices]
-
-
-def _part(picture: Picture, lifts: tuple[float, ...]) -> Part:
-    values, faded = spread(picture.values), picture.faded
-    return Part(
-        thick_nodes(picture, picture.drawn_mm),
-        values,
-        topology(values.shape, cut=picture.cut),
-        lifts,
-        picture.grid.ways,
-        None if faded is None else spread(faded),
-    )
+    lifts = (lift, -lift) if picture.slices else (lift,)
+    parts: list[Part] = []
+    for one in picture.slices or (picture,):
+        drawn_mm, values = thick_nodes(one, one.drawn_mm), spread(one.values)
+        faded = None if one.faded is None else spread(one.faded)
+        drawn_of = topology(values.shape, cut=one.cut)
+        parts.append(Part(drawn_mm, values, drawn_of, lifts, one.grid.ways, faded))
+    return parts
 
 
 def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
