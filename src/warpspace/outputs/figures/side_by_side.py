@@ -43,11 +43,6 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 
 
-def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[ScenePicture]:
-    pictures = [evaluate_for(settings, scene) for scene in scenes]
-    return share_colours(settings, share_exaggeration(pictures, settings.exaggeration))
-
-
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     title = f"Comparison of A: {scenes[0].title} and B: {scenes[1].title}"
     return _draw_pair("comparison", title, scenes, settings, [], exact=exact)
@@ -62,7 +57,8 @@ def _draw_pair(
     *,
     exact: bool,
 ) -> Drawing:
-    first, second = _evaluate_pair(settings, scenes)
+    pictures = [evaluate_for(settings, scene) for scene in scenes]
+    first, second = share_colours(settings, share_exaggeration(pictures, settings.exaggeration))
     scale, exaggeration, component = first.scale, first.exaggeration, settings.component
     change = scene_change(first, second)
     if settings.range_fixed:
