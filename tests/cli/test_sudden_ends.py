@@ -183,11 +183,12 @@ from warpspace.scene.library import load_scene
 serve = viewer.run_viewer
 def run(scene, scenes, *, services, **options):
     def draw():
+        from warpspace.outputs.drawing.settings import FigureSettings
         from warpspace.outputs.processes import FigureWorker
         try:
             with FigureWorker() as worker:
                 while True:
-                    worker.render("error-map", [scene])
+                    worker.begin("error-map", [scene], FigureSettings())()
         except Exception as error:
             print("gave up", type(error).__name__, flush=True)
     threading.Thread(target=draw).start()

@@ -23,24 +23,24 @@ LARGE = FigureSettings(size=(8000, 6000))
 def test_a_crash_loses_one_figure_only():
     scene = load_scene("dvf5000_first")
     with FigureWorker() as worker:
-        first = worker.render("error-map", [scene], SMALL)
+        first = worker.begin("error-map", [scene], SMALL)()
         (process,) = (found.process for found in worker._pool._workers)
         threading.Timer(0.3, os.kill, (process.pid, signal.SIGSEGV)).start()
         with pytest.raises(RenderError, match="renderer crashed; other figures are not affected"):
-            worker.render("error-map", [scene], LARGE)
-        assert worker.render("error-map", [scene], SMALL) == first
+            worker.begin("error-map", [scene], LARGE)()
+        assert worker.begin("error-map", [scene], SMALL)() == first
 
 
 def test_messages_come_through():
     scene = parse_scene('title="x"\n[machine]\nchain="wFXt"\n[workspace]\nX=[0,9]\n', "x")
     with FigureWorker() as worker:
         with pytest.raises(OptionError, match="does not extend along X, Y and Z"):
-            worker.render("slices", [scene], SMALL)
+            worker.begin("slices", [scene], SMALL)()
         with pytest.raises(OptionError, match="unknown figure"):
-            worker.render("slizes", [scene], SMALL)
+            worker.begin("slizes", [scene], SMALL)()
         with pytest.raises(OptionError, match="tolerance"):
-            worker.render("montecarlo", [scene], SMALL)
-        assert worker.render("error-map", [scene], SMALL).startswith(b"\x89PNG")
+            worker.begin("montecarlo", [scene], SMALL)()
+        assert worker.begin("error-map", [scene], SMALL)().startswith(b"\x89PNG")
 
 
 def test_concurrent_requests_queue():
@@ -49,7 +49,7 @@ def test_concurrent_requests_queue():
     with FigureWorker() as worker:
         threads = [
             threading.Thread(
-                target=lambda: found.append(worker.render("error-map", [scene], SMALL))
+                target=lambda: found.append(worker.begin("error-map", [scene], SMALL)())
             )
             for _ in range(4)
         ]
@@ -65,7 +65,7 @@ def test_a_figure_that_takes_too_long_is_given_up():
     with FigureWorker(timeout_s=0.05) as worker:
         started = time.monotonic()
         with pytest.raises(RenderError, match="given up"):
-            worker.render("error-map", [load_scene("dvf5000_first")], LARGE)
+            worker.begin("error-map", [load_scene("dvf5000_first")], LARGE)()
         assert time.monotonic() - started < 20.0
 
 

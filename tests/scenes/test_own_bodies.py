@@ -5,7 +5,7 @@ import pytest
 from trimesh import creation
 
 from warpspace import SceneError, load_scene
-from warpspace.bodies.placed import load_bodies, place_bodies, scene_motions
+from warpspace.bodies.placed import load_bodies, place_bodies
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import parse_scene
 from warpspace.scene.save import scene_to_toml
@@ -54,16 +54,14 @@ def test_a_mesh_has_its_unit_and_its_place_and_rides_on_its_axis(folder):
     assert body.vertices_mm.mean(axis=0) == pytest.approx([10, 20, 30], abs=1e-4)
     heights = []
     for z in (-500.0, 0.0):
-        motions = scene_motions(scene, scene.view(), positions={"Z": z})
-        placed = next(p for p in place_bodies(scene, motions, 0.0) if p.body.frame == "Z")
+        (placed,) = place_bodies(scene, scene.view(), 0.0, ["Z"], positions={"Z": z})
         heights.append(placed.vertices_mm[:, 2].mean())
     assert heights[1] - heights[0] == pytest.approx(500.0)
 
 
 def test_a_mesh_bends_with_the_errors(folder):
     scene = scene_of(folder, 'Z = "column.stl"\n[errors]\nEXX = 20')
-    motions = scene_motions(scene, scene.view(Loop.RELATIVE))
-    part = next(p for p in place_bodies(scene, motions, 1000.0) if p.body.frame == "Z")
+    (part,) = place_bodies(scene, scene.view(Loop.RELATIVE), 1000.0, ["Z"])
     shift = part.vertices_mm - part.nominal_mm
     np.testing.assert_allclose(shift, np.tile([-20.0, 0.0, 0.0], (len(shift), 1)), atol=1e-9)
 

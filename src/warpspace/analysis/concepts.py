@@ -15,7 +15,7 @@ from warpspace.analysis.montecarlo import MonteCarlo, Progress, montecarlo
 from warpspace.analysis.options import option
 from warpspace.analysis.sampled import KeptLimit
 from warpspace.exceptions import SceneError
-from warpspace.field.evaluate import ErrorField, build_basis
+from warpspace.field.evaluate import build_basis
 from warpspace.field.grid import Grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -228,8 +228,3 @@ def expected_um(concept: Concept, grid: Grid) -> Array:
     square = np.einsum("k,k...c->...", draws.variance, basis.position**2)
     middle = np.einsum("k,k...c->...c", draws.centre, basis.position)
     return np.broadcast_to(np.sqrt(square + np.sum(middle**2, axis=-1)), grid.shape)
-
-
-def zero_field(grid: Grid) -> ErrorField:
-    zero = np.zeros(grid.nominal_mm.shape)
-    return ErrorField(grid.nominal_mm, zero, zero)

@@ -60,28 +60,6 @@ def build_gltf(
     generator: str = "warpspace",
     extras: Mapping[str, Any] | None = None,
 ) -> bytes:
-    document, body = _lay_out(parts, root, generator)
-    if extras:
-        json.dumps(extras, allow_nan=False)
-        document["asset"]["extras"] = dict(extras)
-    return _join(document, body)
-
-
-def _join(document: Json, body: bytes | bytearray) -> bytes:
-    text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    return b"".join(
-        (
-            struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(body)),
-            struct.pack("<I4s", len(text), b"JSON"),
-            text,
-            struct.pack("<I4s", len(body), b"BIN\0"),
-            body,
-        )
-    )
-
-
-def _lay_out(parts: Sequence[Part], root: str, generator: str) -> tuple[Json, bytearray]:
     parts = [part for part in parts if len(part.indices)]
     materials = list(dict.fromkeys(part.material for part in parts))
     groups = list(dict.fromkeys(part.group for part in parts if part.group))
@@ -91,7 +69,11 @@ def _lay_out(parts: Sequence[Part], root: str, generator: str) -> tuple[Json, by
         children[part.group].append(at)
     arrays = _Arrays()
     document: Json = {
-        "asset": {"version": "2.0", "generator": generator},
+        "asset": {
+            "version": "2.0",
+            "generator": generator,
+            **({"extras": extras} if extras else {}),
+        },
         "extensionsUsed": [UNLIT],
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -105,7 +87,17 @@ def _lay_out(parts: Sequence[Part], root: str, generator: str) -> tuple[Json, by
         "bufferViews": arrays.views,
         "buffers": [{"byteLength": len(arrays.body)}],
     }
-    return document, arrays.body
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    return b"".join(
+        (
+            struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(arrays.body)),
+            struct.pack("<I4s", len(text), b"JSON"),
+            text,
+            struct.pack("<I4s", len(arrays.body), b"BIN\0"),
+            arrays.body,
+        )
+    )
 
 
 class _Arrays:
@@ -126,14 +118,15 @@ class _Arrays:
             view = {"buffer": 0, "byteOffset": len(self.body), "byteLength": len(data)}
             self.views.append(view)
             self.body += data + bytes(-len(data) % 4)
+            columns = np.ascontiguousarray(rows.T)  # ten times as fast to search as rows
             self.accessors.append(
                 {
                     "bufferView": at,
                     "componentType": _COMPONENTS[kind],
                     "count": len(rows),
                     "type": _TYPES[rows.shape[1]],
-                    "min": rows.min(axis=0).tolist(),
-                    "max": rows.max(axis=0).tolist(),
+                    "min": columns.min(axis=1).tolist(),
+                    "max": columns.max(axis=1).tolist(),
                 }
             )
         if target is not None:
@@ -176,28 +169,3 @@ def _material(material: Material) -> Json:
     if material.opacity < 1.0:
         spelled["alphaMode"] = "BLEND"
     return spelled
-
-
-# A slider move replaces positions, colours and bounds in a file that is laid out once.
-
-
-class GltfTemplate:
-    """The file of one coloured part."""
-
-    def __init__(self, name: str, indices: NDArray[np.integer[Any]], count: int) -> None:
-        # equal arrays are stored once: points and colours must differ
-        numbers = np.arange(3.0 * count).reshape(-1, 3)
-        part = Part(name, numbers, indices, colours=-1.0 - numbers)
-        self._document, self._body = _lay_out([part], "scene", "warpspace")
-        attributes = self._document["meshes"][0]["primitives"][0]["attributes"]
-        self._position, self._colour = attributes["POSITION"], attributes["COLOR_0"]
-
-    def fill(self, points: Array, colours: NDArray[np.floating[Any]]) -> bytes:
-        body = bytearray(self._body)
-        for at, values in ((self._position, points), (self._colour, colours)):
-            start = self._document["bufferViews"][at]["byteOffset"]
-            rows = np.ascontiguousarray(values, "<f4")
-            body[start : start + rows.nbytes] = rows.tobytes()
-            columns, found = np.ascontiguousarray(rows.T), self._document["accessors"][at]
-            found["min"], found["max"] = columns.min(axis=1).tolist(), columns.max(axis=1).tolist()
-        return _join(self._document, body)

@@ -40,15 +40,18 @@ def _error_values(
     }
 
 
-def view_motions(
-    model: Model,
-    errors: ErrorSet,
-    amplitudes: Mapping[str, float],
-    positions: Mapping[str, float],
-    view: View | None = None,
+def scene_motions(
+    scene: Scene,
+    view: View,
+    amplitudes: Mapping[str, float] | None = None,
+    positions: Mapping[str, float] | None = None,
 ) -> dict[str, BodyMotion]:
     """Find how the bodies move as a view sees it, so that they agree with its deformed grid."""
-    view = view or View()
+    model, errors = scene.model, scene.errors
+    if amplitudes is None:
+        amplitudes = {key: errors.amplitude(key) for key in errors}
+    stands = {**scene.workspace.positions, **(positions or {})}
+    positions = {name: stands.get(name, 0.0) for name in scene.machine.axes}
     coordinates = complete_coordinates(model.machine, positions)
     values = _error_values(errors, amplitudes, coordinates, model.direction)
     motions = body_motions(model, values, coordinates)
@@ -123,26 +126,17 @@ class PlacedBody:
         return place_points(self.motion, self.body.edges_mm, self.exaggeration)
 
 
-def scene_motions(
+def place_bodies(
     scene: Scene,
     view: View,
+    exaggeration: float,
+    only: Collection[str] | None = None,
     *,
     amplitudes: Mapping[str, float] | None = None,
     positions: Mapping[str, float] | None = None,
-) -> dict[str, BodyMotion]:
-    if amplitudes is None:
-        amplitudes = {key: scene.errors.amplitude(key) for key in scene.errors}
-    known = {**scene.workspace.positions, **(positions or {})}
-    stands = {name: known.get(name, 0.0) for name in scene.machine.axes}
-    return view_motions(scene.model, scene.errors, amplitudes, stands, view)
-
-
-def place_bodies(
-    scene: Scene,
-    motions: Mapping[str, BodyMotion],
-    exaggeration: float,
-    only: Collection[str] | None = None,
 ) -> tuple[PlacedBody, ...]:
+    """Place the bodies of a scene, or of some of its frames, bent by its errors or by others."""
+    motions = scene_motions(scene, view, amplitudes, positions)
     return tuple(
         PlacedBody(body, motions[body.frame], exaggeration)
         for body in load_bodies(scene.machine)

@@ -43,7 +43,7 @@ class ColourScale:
 
     def colours(self, values: Array) -> Bytes:
         """Map values, [...], to sRGB, [..., 3]; those beyond take the colour of the end."""
-        table = _table(self.name)
+        table = colour_table(diverging=self.diverging)
         return table[np.rint(self.fraction(values) * (LEVELS - 1)).astype(np.intp)]
 
     def fraction(self, values: Array) -> Array:
@@ -59,13 +59,10 @@ class ColourScale:
 
 
 @cache
-def _table(name: str) -> Bytes:
-    return (np.asarray(Colormap(name).lut(LEVELS))[:, :3] * 255.0 + 0.5).astype(np.uint8)
-
-
 def colour_table(*, diverging: bool = False) -> Bytes:
     """Give the colours of a scale from its low to its high end, [256, 3] of uint8, sRGB."""
-    return _table(DIVERGING if diverging else SEQUENTIAL)
+    colours = Colormap(DIVERGING if diverging else SEQUENTIAL).lut(LEVELS)
+    return (np.asarray(colours)[:, :3] * 255.0 + 0.5).astype(np.uint8)
 
 
 def nice_step(span: float) -> float:

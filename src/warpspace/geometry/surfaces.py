@@ -98,9 +98,10 @@ def _kept(count: int, every: int) -> list[int]:
     return sorted({*range(0, count, every), count - 1})
 
 
-def line_spacing(nodes: int) -> int:
+def line_spacing(shape: Shape) -> Shape:
     """Choose how many nodes apart grid lines are drawn, so that at most twelve cells remain."""
-    return max(1, -(-(nodes - 1) // _CELLS))
+    x, y, z = (max(1, -(-(nodes - 1) // _CELLS)) for nodes in shape)
+    return x, y, z
 
 
 def segments(lines: list[Index]) -> Index:
@@ -148,15 +149,15 @@ def thicken(points_mm: Array, thickness_mm: float) -> Array:
 
 
 def spread(values: NDArray[Any]) -> NDArray[Any]:
-    """Repeat what is known at the nodes of a line or a point, [nx, ny, nz, ...], as `thicken`."""
-    for axis in range(3):
-        if values.shape[axis] == 1:
-            values = np.repeat(values, 2, axis=axis)
+    """Repeat what is known at the nodes, [nx, ny, nz, ...], of a line or a point, as `thicken`."""
+    still = [axis for axis in range(3) if values.shape[axis] == 1]
+    for axis in still if is_thin(values.shape[:3]) else ():
+        values = np.repeat(values, 2, axis=axis)
     return values
 
 
 def spread_nodes(shape: Shape) -> NDArray[np.intp]:
-    """Give the flat index of the grid node that each node of a thickened grid belongs to, [M]."""
+    """Give the flat index of the grid node that each node belongs to as it is drawn, [M]."""
     return spread(np.arange(np.prod(shape), dtype=np.intp).reshape(shape)).reshape(-1)
 
 
@@ -247,18 +248,12 @@ def face_lines(faces: Sequence[Index], shape: Shape, every: Shape) -> list[Index
     lines: list[Index] = []
     for face in faces:
         for patch in (face, face.T):
-            for row in patch:
-                at = np.stack(np.unravel_index(row, shape), -1)
-                across = _held_axis(patch, shape)
-                if len(row) > 1 and at[0, across] % every[across] == 0:
-                    lines.append(row)
+            at = np.stack(np.unravel_index(patch, shape))  # [3, a, b]
+            across = int(np.argmax(at[:, 0, 0] != at[:, -1, 0]))
+            if patch.shape[1] > 1:
+                lines.extend(patch[at[across, :, 0] % every[across] == 0])
     wanted = {pair for line in lines for pair in _pairs(line)} - creases
     return _collect(iter(lines), wanted)
-
-
-def _held_axis(patch: Index, shape: Shape) -> int:
-    first, last = (np.stack(np.unravel_index(patch[row, 0], shape)) for row in (0, -1))
-    return int(np.argmax(first != last))
 
 
 def _pairs(line: Index) -> list[tuple[int, int]]:
@@ -309,22 +304,6 @@ def isolines(
             if len(at) > 1:
                 found.append((level, _bilinear(corners, at[:, 1], at[:, 0])))
     return found
-
-
-def isoline_segments(
-    faces: Sequence[Index],
-    nodes_mm: Array,
-    values: Array,
-    levels: Sequence[float],
-    lift_mm: Array | None = None,
-) -> Array:
-    """Find the lines of equal value on all faces as pieces of line, [S, 2, 3], mm."""
-    pieces: list[Array] = []
-    for number, face in enumerate(faces):
-        off = np.zeros(3) if lift_mm is None else lift_mm[number]
-        for _, line in isolines(face, nodes_mm, values, levels):
-            pieces.append(np.stack([line[:-1], line[1:]], axis=1) + off)
-    return np.concatenate(pieces) if pieces else np.zeros((0, 2, 3))
 
 
 def _bilinear(corners: Array, row: Array, column: Array) -> Array:

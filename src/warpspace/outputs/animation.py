@@ -8,22 +8,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from PIL import Image
 
-from warpspace.bodies.placed import PlacedBody
+from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.exceptions import OptionError, OutputError, RenderError, WorkersLostError
 from warpspace.geometry.surfaces import deform
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import ANIMATION_FRAMES
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
 from warpspace.outputs.drawing.render import fit_projection
-from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for
+from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
-from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.outputs.figures.machine import draw_bodies
 from warpspace.outputs.figures.maps import isoline_words, say_statistics
 from warpspace.outputs.files import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
+from warpspace.outputs.save import figure_bytes
 from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
 from warpspace.picture.traces import TraceLine, evaluate_traces
 from warpspace.resources import __version__
@@ -127,7 +129,7 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
     sheet = start_sheet("rotation", figure, title, facts, [scene], [], exact=True)
     canvas = sheet.canvas
     carried = [axis.name for axis in scene.machine.branch("workpiece")]
-    placed = bodies_of(picture, factor, only=[*carried, "w"])
+    placed = place_bodies(turned, picture.view, factor, [*carried, "w"])
     left, bottom, right, top = sheet.content
     side = 0.03 * (right - left)
     reach = [nominal.reshape(-1, 3), actual.reshape(-1, 3), *map(_swept, placed)]
@@ -188,7 +190,7 @@ def write_animation(
         if ending == ".mp4":
             _write_video(pictures, temporary, encoder, settings, about)
         else:
-            temporary.write_bytes(_image_bytes(pictures, ending, settings, about))
+            _write_images(pictures, temporary, ending, settings, about)
 
 
 def _pictures(
@@ -211,21 +213,15 @@ def _pictures(
 
 
 def _draw(scene: Scene, settings: AnimationSettings, number: int) -> bytes:
-    import matplotlib as mpl
-
-    from warpspace.outputs.drawing.settings import SAVE_RC
-    from warpspace.outputs.save import figure_bytes
-
-    with mpl.rc_context(dict(SAVE_RC)):
+    with mpl.rc_context(SAVE_RC):
         drawing = draw_frame(scene, settings, number)
     return figure_bytes(drawing, "png")
 
 
-def _image_bytes(
-    pictures: list[Image.Image], ending: str, settings: AnimationSettings, about: str
-) -> bytes:
+def _write_images(
+    pictures: list[Image.Image], path: Path, ending: str, settings: AnimationSettings, about: str
+) -> None:
     duration = round(1000.0 / settings.fps)
-    buffer = io.BytesIO()
     if ending == ".gif":
         palette = shared_palette(pictures)
         frames = [
@@ -236,7 +232,7 @@ def _image_bytes(
         frames = pictures
         options = {"quality": 85, "method": 4}
     frames[0].save(
-        buffer,
+        path,
         format=ending[1:],
         save_all=True,
         append_images=frames[1:],
@@ -244,7 +240,6 @@ def _image_bytes(
         loop=0,
         **options,
     )
-    return buffer.getvalue()
 
 
 def shared_palette(pictures: Sequence[Image.Image]) -> Image.Image:

@@ -249,7 +249,10 @@ def _draw_chart(draw: str, form: str, *arguments: Any) -> bytes:
 
 
 class FigureWorker:
-    """One renderer in a process of its own; requests from any thread queue up."""
+    """One renderer in a process of its own; requests from any thread queue up.
+
+    What begins to draw gives a function that waits for the bytes of the figure.
+    """
 
     def __init__(self, timeout_s: float = TIMEOUT_S) -> None:
         check_address_space(LEAST_MB, "drawing")
@@ -257,21 +260,10 @@ class FigureWorker:
         self._lock = threading.Lock()
         self._pool: ProcessPool | None = None
 
-    def render(
-        self,
-        name: str,
-        scenes: "Sequence[Scene]",
-        settings: "FigureSettings | None" = None,
-        form: str = "png",
-    ) -> bytes:
-        from warpspace.outputs.drawing.settings import FigureSettings
-
-        return self.begin(name, scenes, settings or FigureSettings(), form)()
-
     def begin(
-        self, name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form: str
+        self, name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form: str = "png"
     ) -> Callable[[], bytes]:
-        """Begin to draw a figure; what is given waits for it."""
+        """Begin to draw a figure."""
         return self.call(name, _draw, name, tuple(scenes), settings, form)
 
     def begin_chart(self, name: str, draw: str, form: str, *arguments: Any) -> Callable[[], bytes]:
@@ -279,7 +271,7 @@ class FigureWorker:
         return self.call(name, _draw_chart, draw, form, *arguments)
 
     def call(self, name: str, draw: Callable[..., bytes], *arguments: Any) -> Callable[[], bytes]:
-        """Begin to draw with a function of a module's own level; what is given waits for it."""
+        """Begin to draw with a function of a module's own level."""
         with self._lock:
             if self._pool is None:
                 self._pool = ProcessPool(1, tasks_per_process=PICTURES_PER_PROCESS)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, cast
+from typing import Any
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.description import plain
@@ -13,8 +13,6 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.picture.model import (
     DIFFERENCE_LENGTH,
     Exaggeration,
-    P,
-    Picture,
     ScenePicture,
     choose_exaggeration,
     same_nodes,
@@ -144,13 +142,13 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
 
 
 def share_exaggeration(
-    pictures: Sequence[P], wanted: Exaggeration, own: float | None
-) -> tuple[P, ...]:
-    """Give pictures one display factor: what is asked for, or a round one that suits all."""
+    pictures: Sequence[ScenePicture], wanted: Exaggeration
+) -> tuple[ScenePicture, ...]:
+    """Give pictures one display factor: what is asked for, the first scene's, or a round one."""
     factor = choose_exaggeration(
         wanted,
-        own,
+        pictures[0].scene.exaggeration,
         max(picture.statistics.max_um for picture in pictures),
         max(picture.size_mm for picture in pictures),
     )
-    return tuple(cast("P", replace(cast("Picture", one), exaggeration=factor)) for one in pictures)
+    return tuple(replace(one, exaggeration=factor) for one in pictures)

@@ -10,7 +10,6 @@ from warpspace.geometry.surfaces import (
     Index,
     is_thin,
     isoline_levels,
-    isoline_segments,
     isolines,
     spread,
     spread_nodes,
@@ -56,19 +55,14 @@ class Part:
 def map_parts(picture: Picture) -> list[Part]:
     """List the grids that the map of a picture consists of; a slice is seen from both sides."""
     lift = LIFT * picture.size_mm
-    if not picture.slices:
-        return [_part(picture, (lift,))]
-    return [_part(one, (lift, -lift)) for one in picture.slices]
-
-
-def _part(picture: Picture, lifts: tuple[float, ...]) -> Part:
-    if is_thin(picture.shape):
-        drawn_mm = thick_nodes(picture, picture.drawn_mm)
-        values, faded = spread(picture.values), picture.faded
-        drawn = drawn_mm, values, topology(values.shape), lifts, picture.grid.ways
-        return Part(*drawn, None if faded is None else spread(faded.astype(float)) > 0.0)
-    drawn = picture.drawn_mm, picture.values, picture.topology, lifts
-    return Part(*drawn, picture.grid.ways, picture.faded)
+    lifts = (lift, -lift) if picture.slices else (lift,)
+    parts: list[Part] = []
+    for one in picture.slices or (picture,):
+        drawn_mm, values = thick_nodes(one, one.drawn_mm), spread(one.values)
+        faded = None if one.faded is None else spread(one.faded)
+        drawn_of = topology(values.shape, cut=one.cut)
+        parts.append(Part(drawn_mm, values, drawn_of, lifts, one.grid.ways, faded))
+    return parts
 
 
 def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
@@ -77,10 +71,10 @@ def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
     return thicken(nodes_mm, THICKNESS * picture.size_mm) if thin else nodes_mm
 
 
-def thick_map(picture: Picture) -> tuple[Array, Index, Index]:
-    """Give what a ray can meet of a line or a point that is drawn thick."""
+def solid_map(picture: Picture) -> tuple[Array, Index, Index]:
+    """Give what a ray can meet of a map: points, triangles, and the grid node of each point."""
     thick = thick_nodes(picture, picture.drawn_mm)
-    surface = topology(thick.shape[:3]).surface
+    surface = topology(thick.shape[:3], cut=picture.cut).surface
     nodes = spread_nodes(picture.shape)[surface.nodes]
     return thick.reshape(-1, 3)[surface.nodes], surface.triangles, nodes
 
@@ -145,12 +139,12 @@ def isoline_pieces(picture: Picture) -> Pieces:
     found: list[Pieces] = []
     for part in map_parts(picture):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
-        faces, normals = part.drawn_of.faces, part.drawn_of.normals * part.ways
+        normals = part.drawn_of.normals * part.ways
         found += [
-            isoline_segments(faces, nodes, values, levels, ISOLINE_LIFT * lift * normals).astype(
-                np.float32
-            )
+            (np.stack([line[:-1], line[1:]], axis=1) + off).astype(np.float32)
             for lift in part.lifts
+            for face, off in zip(part.drawn_of.faces, ISOLINE_LIFT * lift * normals, strict=True)
+            for _, line in isolines(face, nodes, values, levels)
         ]
     return _joined(found)
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.concepts import Concept, expected_um, zero_field
+from warpspace.analysis.concepts import Concept, expected_um
 from warpspace.analysis.description import plain
 from warpspace.analysis.doubt import SURE, FieldDoubt, field_doubt
 from warpspace.analysis.statistics import Statistics, volume_statistics
@@ -62,13 +62,10 @@ def topology(shape: surfaces.Shape, *, cut: bool = False) -> Topology:
     faces = map_faces(shape, cut=cut)
     normals = np.array([_normal(face, shape) for face in faces]).reshape(-1, 3)
     outwards = np.zeros((int(np.prod(shape)), 3))
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            on = [f for f, n in zip(faces, normals, strict=True) if n[axis] == sign]
-            if on:
-                outwards[np.unique(np.concatenate([f.ravel() for f in on])), axis] += sign
-    every = tuple(map(surfaces.line_spacing, shape))
-    lines = surfaces.face_lines(faces, shape, (every[0], every[1], every[2]))
+    for face, normal in zip(faces, normals, strict=True):
+        outwards[face] += normal
+    outwards = np.sign(outwards)  # patches of one plane share nodes
+    lines = surfaces.face_lines(faces, shape, surfaces.line_spacing(shape))
     grid, edges = surfaces.segments(lines), surfaces.segments(surfaces.crease_lines(faces, shape))
     return Topology(
         surfaces.triangulate(faces),
@@ -458,34 +455,16 @@ def evaluate_picture(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class ConceptPicture(ScenePicture):
-    """A nominal volume with the RMS of |E| of machines within tolerance."""
-
-    concept: Concept
-    expected_um: Array  # [nx, ny, nz]
-
-    @cached_property
-    def values(self) -> Array:
-        """What is coloured at each node, [nx, ny, nz], µm."""
-        return self.expected_um
-
-    @cached_property
-    def statistics(self) -> Statistics:
-        """Statistics of the RMS of |E| of machines within tolerance over the volume."""
-        along = np.stack([self.expected_um, *[np.zeros_like(self.expected_um)] * 2], axis=-1)
-        return volume_statistics(replace(self.field, error_um=along), self.grid)
-
-
-def picture_concept(concept: Concept, nodes: int) -> ConceptPicture:
+def picture_concept(concept: Concept, nodes: int) -> ScenePicture:
+    """Give the nominal volume in the colours of the RMS of |E| of machines within tolerance."""
     scene = concept.scene
     grid = build_grid(scene.model, scene.workspace, nodes)
-    return ConceptPicture(
+    expected, zero = expected_um(concept, grid), np.zeros(grid.nominal_mm.shape)
+    along_x = np.stack([expected, zero[..., 0], zero[..., 0]], axis=-1)
+    return ScenePicture(
         view=concept.sampled.view,
         grid=grid,
-        field=zero_field(grid),
-        exaggeration=1.0,
+        field=ErrorField(grid.nominal_mm, along_x, zero),
+        exaggeration=0.0,
         scene=scene,
-        concept=concept,
-        expected_um=expected_um(concept, grid),
     )

@@ -58,6 +58,7 @@ def build_traces(
 ) -> tuple[TraceGroup, ...]:
     """Lay the traces of points over every rotary axis of a machine."""
     groups: list[TraceGroup] = []
+    axes, sweep = model.machine.axes, np.linspace(0.0, 1.0, samples)
     for side, loop in (("workpiece", Loop.WORKPIECE), ("tool", Loop.TOOL)):
         rotary = [axis.name for axis in model.machine.branch(side) if not axis.is_linear]
         if not rotary or not points_mm:
@@ -68,7 +69,19 @@ def build_traces(
             for axis in rotary
             for trace in _traces_of(model, axis, rotary, point, positions, held or {})
         ]
-        groups.append(_group(model, side, loop, found, positions, samples))
+        coordinates = {name: np.asarray(positions.get(name, 0.0), dtype=float) for name in axes}
+        for name in rotary:
+            low, high = axes[name].travel
+            turn = low + (min(high, low + FULL_TURN_DEG) - low) * sweep
+            coordinates[name] = np.stack(
+                [
+                    turn if trace.axis == name else np.full(samples, trace.at[name])
+                    for trace in found
+                ]
+            )
+        points = np.array([trace.point_mm for trace in found])[:, None, :]
+        nominal = transforms.apply(branch_pose(model, side, coordinates), points)
+        groups.append(TraceGroup(loop, tuple(found), coordinates, nominal))
     return tuple(groups)
 
 
@@ -96,33 +109,6 @@ def _traces_of(
         {here, *(at for at in (here - TILT_STEP_DEG, here + TILT_STEP_DEG) if first <= at <= last)}
     )
     return [Trace(axis, point, {**held, tilting: tilt}, closed) for tilt in tilts]
-
-
-def _group(
-    model: Model,
-    side: str,
-    loop: Loop,
-    traces: Sequence[Trace],
-    positions: Mapping[str, float],
-    samples: int,
-) -> TraceGroup:
-    axes = model.machine.axes
-    coordinates = {name: np.asarray(positions.get(name, 0.0), dtype=float) for name in axes}
-    sweep = np.linspace(0.0, 1.0, samples)
-    for name in {trace.axis for trace in traces} | {name for trace in traces for name in trace.at}:
-        low, high = axes[name].travel
-        high = min(high, low + FULL_TURN_DEG)
-        coordinates[name] = np.stack(
-            [
-                low + (high - low) * sweep
-                if trace.axis == name
-                else np.full(samples, trace.at[name])
-                for trace in traces
-            ]
-        )
-    points = np.array([trace.point_mm for trace in traces])[:, None, :]
-    nominal = transforms.apply(branch_pose(model, side, coordinates), points)
-    return TraceGroup(loop, tuple(traces), coordinates, nominal)
 
 
 @dataclass(frozen=True)
@@ -191,7 +177,6 @@ def trace_lines(groups: Sequence[TraceLines]) -> tuple[TraceLine, ...]:
     return tuple(line for group in groups for line in group.each())
 
 
-Evaluate = Callable[..., ErrorField]
 LEAST_RADIUS_MM = 1e-3  # A point nearer to the axis is on it and has no direction from it
 LEAST_UM = 1e-6  # traces with smaller errors are moved by none
 MOTION_SAMPLES = 181  # places of a turn: every two degrees
@@ -209,7 +194,7 @@ def name_trace(trace: Trace) -> str:
 
 
 def evaluate_axis_motion(
-    scene: Scene, line: TraceLine, evaluate: Evaluate = evaluate_first_order
+    scene: Scene, line: TraceLine, evaluate: Callable[..., ErrorField] = evaluate_first_order
 ) -> AxisMotion | None:
     trace = line.trace
     found = build_traces(

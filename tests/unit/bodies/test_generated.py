@@ -9,13 +9,7 @@ from trimesh import Trimesh
 import warpspace
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import DARK, METAL, Body
-from warpspace.bodies.placed import (
-    load_bodies,
-    place_bodies,
-    place_points,
-    scene_motions,
-    view_motions,
-)
+from warpspace.bodies.placed import load_bodies, place_bodies, place_points, scene_motions
 from warpspace.bodies.schematic import BODY_FILE, box, build_layout, cylinder, read_bodies
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis
@@ -108,7 +102,7 @@ def test_bodies_of_any_chain_are_closed_small_and_clear_of_the_volume(first):
 @pytest.mark.parametrize("name", SCENES)
 def test_bodies_of_a_bundled_machine_are_closed_small_grey_and_clear_of_its_volume(name):
     scene = load_scene(name)
-    placed = place_bodies(scene, scene_motions(scene, scene.view()), 0.0)
+    placed = place_bodies(scene, scene.view(), 0.0)
     nodes = build_grid(scene.model, scene.workspace, 7).nominal_mm.reshape(-1, 3)
     assert sum(len(part.body.triangles) for part in placed) < MAX_TRIANGLES
     for part in placed:
@@ -193,7 +187,7 @@ def amplitudes(scene):
 
 
 def nominal(scene, body, **positions):
-    motion = view_motions(scene.model, scene.errors, {}, {**scene.workspace.positions, **positions})
+    motion = scene_motions(scene, View(), {}, positions)
     return place_points(motion[body.frame], body.vertices_mm, 0.0)
 
 
@@ -217,12 +211,12 @@ def test_bent_tool_point_lies_in_the_deformed_grid(scene, bodies):
         for reference in (None, {"X": 0.0, "Y": 0.0, "Z": -280.0}):
             view = View(loop, "machine", reference)
             coordinates = complete_coordinates(scene.machine, at)
-            tip = view_motions(scene.model, scene.errors, {}, at)["t"].nominal[:3, 3]
+            tip = scene_motions(scene, View(), {}, at)["t"].nominal[:3, 3]
             basis = build_basis(
                 scene.model, scene.errors, scene.parameter_keys, coordinates, view, tip
             )
             field = basis.evaluate(np.array(list(values.values())))
-            motions = view_motions(scene.model, scene.errors, values, at, view)
+            motions = scene_motions(scene, view, values, at)
             frame = "w" if loop is Loop.WORKPIECE else "t"
             inside = np.linalg.inv(motions[frame].nominal) @ [*tip, 1.0]
             for factor in (1.0, 2000.0):

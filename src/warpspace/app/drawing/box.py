@@ -2,7 +2,6 @@
 
 import json
 from base64 import b64encode
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from warpspace.app.drawing.colours import (
 from warpspace.app.drawing.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.leaf import Identity
-from warpspace.bodies.gltf import GltfTemplate
+from warpspace.bodies.gltf import Part, build_gltf
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.surfaces import box_edges, is_thin
 from warpspace.picture.mesh import (
@@ -73,13 +72,8 @@ def coloured_shape(
     if faded is not None:
         grey = inverse_tone_map(np.array(COLOURS["ghost"][0], dtype=np.uint8))
         colours[faded] = FADED * grey + (1.0 - FADED) * colours[faded]
-    filled = _template(Identity(indices), len(points)).fill(points, colours)
-    return Shape("add_glb", UNLIT, {"glb_data": filled})
-
-
-@lru_cache(maxsize=8)  # of a large part 15 MB
-def _template(triangles: Identity, count: int) -> GltfTemplate:
-    return GltfTemplate("surface", triangles.thing, count)
+    data = build_gltf([Part("surface", points, indices, colours=colours)])
+    return Shape("add_glb", UNLIT, {"glb_data": data})
 
 
 def box(picture: LivePicture) -> Shapes:

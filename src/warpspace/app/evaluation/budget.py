@@ -18,12 +18,12 @@ from warpspace.app.state.leaf import Identity
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
 from warpspace.field.grid import seen_from_workpiece
-from warpspace.geometry.surfaces import deform, is_thin
+from warpspace.geometry.surfaces import deform
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.machine.axes import is_linear
-from warpspace.picture.mesh import thick_map
+from warpspace.picture.mesh import solid_map
 from warpspace.picture.traces import is_moved
 from warpspace.picture.words import spell_at
 from warpspace.units import Array
@@ -93,13 +93,10 @@ def _on_surfaces(
     picture: LivePicture, origin: Array, unit: Array
 ) -> Iterator[tuple[Picked, float]]:
     for one in picture.slices or (picture,):
-        surface, points = one.topology.surface, one.drawn_mm.reshape(-1, 3)
-        solid = points[surface.nodes], surface.triangles, surface.nodes
-        if is_thin(one.shape):
-            solid = thick_map(one)
-        hit = pick_surface(origin, unit, *solid[:2])
+        points, triangles, node_of = solid_map(one)
+        hit = pick_surface(origin, unit, points, triangles)
         if hit is not None:
-            nodes, grid = solid[2][hit.vertices], one.grid
+            nodes, grid = node_of[hit.vertices], one.grid
             at = {
                 name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ hit.weights)
                 for name, values in grid.coordinates.items()

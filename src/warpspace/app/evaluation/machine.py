@@ -8,7 +8,7 @@ from warpspace.app.evaluation.budget import drawn_field
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_positions
-from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.geometry.surfaces import deform
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
@@ -36,10 +36,11 @@ def drawn_bodies(
     """
     state, scene = picture.state, picture.state.scene
     positions, _ = standing(state, turned)
-    motions = scene_motions(scene, state.view(), amplitudes=state.active, positions=positions)
     factor = picture.exaggeration if state.machine.bent and not nominal else 0.0
     only = None if state.machine.shown or nominal else _turning_frames(state)
-    return place_bodies(scene, motions, factor, only)
+    return place_bodies(
+        scene, state.view(), factor, only, amplitudes=state.active, positions=positions
+    )
 
 
 def tool_point(picture: LivePicture) -> tuple[Array, Array]:

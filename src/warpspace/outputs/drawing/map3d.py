@@ -262,12 +262,11 @@ def _draw_surface_lines(stage: Stage, faces: list[surfaces.Index]) -> None:
     canvas, picture, taken = stage.canvas, stage.picture, stage.taken
     theme, shape = canvas.theme, picture.shape
     nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
-    nx, ny, nz = (surfaces.line_spacing(count) for count in shape)
 
     def visible(lines: Iterable[surfaces.Index]) -> list[Array]:
         return stage.split(nodes[line] for line in lines)[0]
 
-    grid = visible(surfaces.face_lines(faces, shape, (nx, ny, nz)))
+    grid = visible(surfaces.face_lines(faces, shape, surfaces.line_spacing(shape)))
     canvas.lines(grid, width=SIZES.hair, colour=theme.grid, alpha=0.42, zorder=2.0)
     creases = visible(surfaces.crease_lines(faces, shape))
     canvas.lines(creases, width=SIZES.line, colour=theme.grid, zorder=3.0)

@@ -107,7 +107,6 @@ class Body:
     # one colour (sRGB, 0 to 1) for a body without values
     colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
     shaded: bool = False  # whether light falls on it: for machine bodies, never for coloured errors
-    opacity: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +241,7 @@ def _add_body(plotter: "pv.Plotter", body: Body) -> None:
     mesh = pv.PolyData.from_regular_faces(
         np.ascontiguousarray(body.vertices_mm, dtype=float), body.triangles
     )
-    look: dict[str, Any] = {"color": body.colour, "opacity": body.opacity, "lighting": body.shaded}
+    look: dict[str, Any] = {"color": body.colour, "lighting": body.shaded}
     if body.shaded:
         look |= {"interpolation": "flat", "ambient": 0.45, "diffuse": 0.6}
     if body.values is not None and body.scale is not None:

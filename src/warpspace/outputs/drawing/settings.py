@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from warpspace.analysis.concepts import Concepts
 from warpspace.exceptions import OptionError
-from warpspace.geometry.colour import COMPONENTS, ColourScale
+from warpspace.geometry.colour import COMPONENTS
 from warpspace.machine.limits import MAX_FIGURE_AREA_PX as LARGEST_AREA
 from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
 from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
@@ -158,18 +158,22 @@ def evaluate_for(
         component=settings.component,
         quantity=quantity,
     )
-    scale = shared_colours(settings, [picture])
+    (picture,) = share_colours(settings, [picture])
     conditions = (*picture.conditions, *settings.conditions)
     if settings.range_fixed and settings.range_top is not None:
+        scale = picture.scale
         conditions = (*conditions, range_words(scale.low, scale.high, scale.unit))
-    return replace(picture, colours=scale, conditions=conditions)
+    return replace(picture, conditions=conditions)
 
 
-def shared_colours(settings: FigureSettings, pictures: Sequence[model.Picture]) -> ColourScale:
-    """Choose the colours of pictures that share one bar."""
-    return model.choose_scale(
+def share_colours(
+    settings: FigureSettings, pictures: Sequence[model.ScenePicture]
+) -> list[model.ScenePicture]:
+    """Give pictures the colours of one bar."""
+    scale = model.choose_scale(
         [picture.values for picture in pictures],
         settings.component,
         pictures[0].quantity,
         settings.range_top,
     )
+    return [replace(picture, colours=scale) for picture in pictures]

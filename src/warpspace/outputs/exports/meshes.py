@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
-from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.bodies.placed import place_bodies
 from warpspace.field.grid import DEFAULT_NODES
 from warpspace.geometry import surfaces
 from warpspace.geometry.colour import srgb_to_linear
@@ -40,7 +40,7 @@ def write_glb(picture: ScenePicture, path: str | Path, *, overwrite: bool = True
 
 def build_glb(picture: ScenePicture) -> bytes:
     parts = [
-        *_surface(picture),
+        _surface(picture),
         *_lines(picture),
         *_traces(picture),
         *_bodies(picture),
@@ -57,64 +57,52 @@ def build_glb(picture: ScenePicture) -> bytes:
     )
 
 
-def _placed(
-    nominal_mm: Array, error_um: Array, exaggeration: float
-) -> tuple[Array, dict[str, Array]]:
-    position = to_gltf(surfaces.deform(nominal_mm, error_um, exaggeration))
-    return position, {"nominal": to_gltf(error_um * (-exaggeration * MM_PER_UM))}
+def _bent(
+    picture: ScenePicture,
+    name: str,
+    nominal_mm: Array,
+    error_um: Array,
+    indices: surfaces.Index,
+    material: Material,
+    **more: Any,
+) -> Part:
+    """Build a part that is drawn displaced; its target leads back to where it nominally is."""
+    drawn_mm = surfaces.deform(nominal_mm, error_um, picture.exaggeration)
+    back = to_gltf(error_um * (-picture.exaggeration * MM_PER_UM))
+    return Part(name, to_gltf(drawn_mm), indices, material, targets={"nominal": back}, **more)
 
 
-def _surface(picture: ScenePicture) -> list[Part]:
+def _surface(picture: ScenePicture) -> Part:
     field = picture.field
     nominal = thick_nodes(picture, picture.grid.nominal_mm)
     surface = surfaces.outer_surface(nominal.shape[:3])
-    thin = surfaces.is_thin(picture.shape)
-    at = surfaces.spread_nodes(picture.shape)[surface.nodes] if thin else surface.nodes
+    at = surfaces.spread_nodes(picture.shape)[surface.nodes]
     error = field.error_um.reshape(-1, 3)[at]
-    position, back = _placed(nominal.reshape(-1, 3)[surface.nodes], error, picture.exaggeration)
     colours = picture.scale.colours(picture.values.reshape(-1)[at])
-    return [
-        Part(
-            "deformed_surface",
-            position,
-            surface.triangles,
-            Material("error"),
-            colours=srgb_to_linear(colours / 255.0),
-            attributes={
-                "_ERROR_UM": error,
-                "_ORIENTATION_URAD": field.orientation_urad.reshape(-1, 3)[at],
-            },
-            targets=back,
-        )
-    ]
+    tilts = field.orientation_urad.reshape(-1, 3)[at]
+    return _bent(
+        picture,
+        "deformed_surface",
+        nominal.reshape(-1, 3)[surface.nodes],
+        error,
+        surface.triangles,
+        Material("error"),
+        colours=srgb_to_linear(colours / 255.0),
+        attributes={"_ERROR_UM": error, "_ORIENTATION_URAD": tilts},
+    )
 
 
-def _lines(picture: ScenePicture) -> list[Part]:
-    grid = picture.grid
-    nominal = grid.nominal_mm.reshape(-1, 3)
+def _lines(picture: ScenePicture) -> Iterator[Part]:
+    shape, ink = picture.shape, Material("line", INK)
+    nominal = picture.grid.nominal_mm.reshape(-1, 3)
     error = picture.field.error_um.reshape(-1, 3)
-    x, y, z = (surfaces.line_spacing(count) for count in grid.shape)
-    edges = surfaces.segments(surfaces.box_edges(grid.shape))
-    ink, ghost = Material("line", INK), Material("ghost", GHOST)
-    found: list[Part] = []
-    for name, pairs, material, displaced in (
-        (
-            "deformed_grid",
-            surfaces.segments(surfaces.grid_lines(grid.shape, (x, y, z))),
-            ink,
-            error,
-        ),
-        ("deformed_edges", edges, ink, error),
-        ("ghost", edges, ghost, None),
-    ):
-        if not len(pairs):
-            continue
-        used, numbered = np.unique(pairs, return_inverse=True)
-        shift = np.zeros((len(used), 3)) if displaced is None else displaced[used]
-        position, back = _placed(nominal[used], shift, picture.exaggeration)
-        targets = {} if displaced is None else back
-        found.append(Part(name, position, numbered.reshape(-1, 2), material, targets=targets))
-    return found
+    grid = surfaces.segments(surfaces.grid_lines(shape, surfaces.line_spacing(shape)))
+    at, pairs = np.unique(grid, return_inverse=True)
+    yield _bent(picture, "deformed_grid", nominal[at], error[at], pairs.reshape(-1, 2), ink)
+    edges = surfaces.segments(surfaces.box_edges(shape))
+    at, pairs = np.unique(edges, return_inverse=True)
+    yield _bent(picture, "deformed_edges", nominal[at], error[at], pairs.reshape(-1, 2), ink)
+    yield Part("ghost", to_gltf(nominal[at]), pairs.reshape(-1, 2), Material("ghost", GHOST))
 
 
 def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
@@ -123,24 +111,14 @@ def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
         yield f"({point}) {drawn.trace.label}", drawn
 
 
-def _traces(picture: ScenePicture) -> list[Part]:
+def _traces(picture: ScenePicture) -> Iterator[Part]:
     nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
-    found: list[Part] = []
     for label, drawn in _named_traces(picture):
-        count = len(drawn.nominal_mm)
+        still, count = drawn.nominal_mm, len(drawn.nominal_mm)
         pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
-        still = to_gltf(drawn.nominal_mm)
-        moved, back = _placed(drawn.nominal_mm, drawn.error_um, picture.exaggeration)
-        found += [
-            Part(f"trace nominal {label}", still, pairs, nominal, group="traces"),
-            Part(f"trace actual {label}", moved, pairs, actual, targets=back, group="traces"),
-        ]
-    return found
-
-
-def _placed_bodies(picture: ScenePicture) -> tuple[PlacedBody, ...]:
-    motions = scene_motions(picture.scene, picture.view)
-    return place_bodies(picture.scene, motions, picture.exaggeration)
+        yield Part(f"trace nominal {label}", to_gltf(still), pairs, nominal, group="traces")
+        name = f"trace actual {label}"
+        yield _bent(picture, name, still, drawn.error_um, pairs, actual, group="traces")
 
 
 def _bodies(picture: ScenePicture) -> list[Part]:
@@ -153,7 +131,7 @@ def _bodies(picture: ScenePicture) -> list[Part]:
             targets={"nominal": to_gltf(part.nominal_mm - part.vertices_mm)},
             group="bodies",
         )
-        for part in _placed_bodies(picture)
+        for part in place_bodies(picture.scene, picture.view, picture.exaggeration)
     ]
 
 
@@ -231,7 +209,7 @@ def to_pyvista(
         actual.point_data["norm_um"] = np.linalg.norm(drawn.error_um, axis=-1)
         traces.append(pv.MultipleLines(drawn.nominal_mm), f"nominal {label}")
         traces.append(actual, f"actual {label}")
-    for part in _placed_bodies(picture):
+    for part in place_bodies(picture.scene, picture.view, picture.exaggeration):
         mesh = pv.PolyData.from_regular_faces(part.vertices_mm, part.body.triangles)
         colour = np.array(part.body.colour, dtype=np.uint8)
         mesh.cell_data["colour"] = np.tile(colour, (len(part.body.triangles), 1))

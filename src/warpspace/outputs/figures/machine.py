@@ -1,11 +1,11 @@
 """Figures with the machine: its bent bodies around the bent volume, and the traces of its table."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from warpspace.bodies.placed import PlacedBody, place_bodies, scene_motions
+from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.exceptions import OptionError
 from warpspace.geometry import surfaces
 from warpspace.geometry.colour import ColourScale, component_values
@@ -47,17 +47,10 @@ def _drawn_body(part: PlacedBody, theme: Theme) -> render.Body:
     return render.Body(part.vertices_mm, triangles, colour=(red, green, blue), shaded=True)
 
 
-def bodies_of(
-    picture: ScenePicture, exaggeration: float, only: Collection[str] | None = None
-) -> tuple[PlacedBody, ...]:
-    motions = scene_motions(picture.scene, picture.view)
-    return place_bodies(picture.scene, motions, exaggeration, only)
-
-
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     picture = evaluate_for(settings, scenes[0])
     title = f"Machine and working volume: {picture.scene.title}"
-    placed = bodies_of(picture, picture.exaggeration)
+    placed = place_bodies(picture.scene, picture.view, picture.exaggeration)
     facts = [
         *scene_facts(picture, picture.exaggeration),
         "bodies schematic, deformed and tilted like their frames",
@@ -137,7 +130,7 @@ def _draw_volume_lines(
     theme, shape = canvas.theme, picture.shape
     nodes, nominal = picture.drawn_mm.reshape(-1, 3), picture.grid.nominal_mm.reshape(-1, 3)
     faces = surfaces.outer_faces(shape)
-    nx, ny, nz = (2 * surfaces.line_spacing(count) for count in shape)
+    nx, ny, nz = (2 * nodes for nodes in surfaces.line_spacing(shape))
     for lines, width, alpha in (
         (surfaces.face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
         (surfaces.crease_lines(faces, shape) or surfaces.box_edges(shape), SIZES.line, 0.95),
@@ -215,7 +208,8 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     scale = choose_scale([values], settings.component, end=settings.range_top)
     picture = evaluate_picture(scene, grid=2, loop="workpiece", exaggeration=factor)
     turning = [axis.name for axis in scene.machine.axes.values() if not axis.is_linear]
-    placed = bodies_of(picture, factor, only=(*turning, "w"))  # others would hide the traces
+    # others would hide the traces
+    placed = place_bodies(scene, picture.view, factor, (*turning, "w"))
     title = f"Traces of the rotary axes: {scene.title}"
     facts = [
         fact for fact in scene_facts(picture, factor) if not fact.startswith(("working", "2 "))

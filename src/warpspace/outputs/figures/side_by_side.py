@@ -8,14 +8,14 @@ import numpy as np
 
 from warpspace.analysis.concepts import LETTERS, Concept, compare_concepts
 from warpspace.analysis.repair import Repair, RepairResult
-from warpspace.bodies.placed import PlacedBody
+from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import draw_map, draw_maps_alike
 from warpspace.outputs.drawing.render import Rect, fit_projection
-from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for, shared_colours
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for, share_colours
 from warpspace.outputs.drawing.sheet import (
     Drawing,
     DrawnMap,
@@ -27,7 +27,7 @@ from warpspace.outputs.drawing.sheet import (
     scene_facts,
     start_sheet,
 )
-from warpspace.outputs.figures.machine import bodies_of, draw_bodies
+from warpspace.outputs.figures.machine import draw_bodies
 from warpspace.outputs.figures.maps import EVERY, isoline_words
 from warpspace.picture.comparison import (
     CHANGE,
@@ -37,20 +37,10 @@ from warpspace.picture.comparison import (
     share_exaggeration,
     statistics_change,
 )
-from warpspace.picture.model import ConceptPicture, ScenePicture, picture_concept, view_words
+from warpspace.picture.model import ScenePicture, picture_concept, view_words
 from warpspace.picture.words import LOOP_WORDS, tolerance_words
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
-
-
-def _evaluate_pair(settings: FigureSettings, scenes: Sequence[Scene]) -> list[ScenePicture]:
-    pictures = share_exaggeration(
-        [evaluate_for(settings, scene) for scene in scenes],
-        settings.exaggeration,
-        scenes[0].exaggeration,
-    )
-    scale = shared_colours(settings, pictures)
-    return [replace(picture, colours=scale) for picture in pictures]
 
 
 def draw_comparison(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -67,7 +57,8 @@ def _draw_pair(
     *,
     exact: bool,
 ) -> Drawing:
-    first, second = _evaluate_pair(settings, scenes)
+    pictures = [evaluate_for(settings, scene) for scene in scenes]
+    first, second = share_colours(settings, share_exaggeration(pictures, settings.exaggeration))
     scale, exaggeration, component = first.scale, first.exaggeration, settings.component
     change = scene_change(first, second)
     if settings.range_fixed:
@@ -157,7 +148,10 @@ CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     plan = replace(settings.concepts, loop=Loop(settings.loop))
     concepts = compare_concepts(scenes, plan)
-    pictures = _evaluate_concepts(concepts, settings)
+    pictures = share_colours(
+        replace(settings, component="norm"),
+        [picture_concept(concept, settings.grid) for concept in concepts],
+    )
     scale, first = pictures[0].scale, concepts[0]
     title = f"Concepts within {'their own' if plan.own_tolerances else 'the same'} tolerances"
     facts = [
@@ -191,22 +185,14 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     return sheet.finish(1.0, maps)
 
 
-def _evaluate_concepts(
-    concepts: Sequence[Concept], settings: FigureSettings
-) -> list[ConceptPicture]:
-    pictures = [picture_concept(concept, settings.grid) for concept in concepts]
-    scale = shared_colours(replace(settings, component="norm"), pictures)
-    return [replace(picture, colours=scale) for picture in pictures]
-
-
 def _draw_machines(
     canvas: Canvas,
-    pictures: Sequence[ConceptPicture],
+    pictures: Sequence[ScenePicture],
     rooms: Sequence[Rect],
     settings: FigureSettings,
 ) -> tuple[tuple[DrawnMap, ...], float]:
     view = settings.view
-    bodies = [bodies_of(picture, 1.0) for picture in pictures]
+    bodies = [place_bodies(one.scene, one.view, 1.0) for one in pictures]
     seen = [_points_mm(picture, own) for picture, own in zip(pictures, bodies, strict=True)]
     px_per_mm = min(
         fit_projection(view, points, room).px_per_mm
@@ -244,7 +230,7 @@ def _room(canvas: Canvas, cell: Rect) -> Rect:
     return (left + side, bottom + foot, right - side, top - head)
 
 
-def _points_mm(picture: ConceptPicture, placed: Sequence[PlacedBody]) -> Array:
+def _points_mm(picture: ScenePicture, placed: Sequence[PlacedBody]) -> Array:
     parts = [picture.grid.nominal_mm.reshape(-1, 3), *(part.vertices_mm for part in placed)]
     if not picture.grid.longest_edge_mm > 0.0:
         parts.append(picture.grid.bounds_mm + 0.5 * picture.size_mm * np.array([[-1.0], [1.0]]))

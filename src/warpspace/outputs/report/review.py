@@ -130,7 +130,6 @@ def share_pictures(scenes: Sequence[Scene], settings: ReportSettings) -> tuple[S
     return share_exaggeration(
         [evaluate_picture(scene, grid=settings.grid, loop=settings.loop) for scene in scenes],
         settings.exaggeration,
-        scenes[0].exaggeration,
     )
 
 

@@ -5,6 +5,7 @@ import platform
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -129,12 +130,13 @@ class ReportFigures:
         chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
         size = PRINTED_PX, OTHER_PX.get(name, HEIGHT_PX)
         chosen = replace(chosen, size=size, printed=True)
-        begun = self._worker.begin(name, scenes, chosen, self._form)
+        begin = partial(self._worker.begin, name, scenes, chosen, self._form)
+        begun = begin()
 
         def drawn() -> Block:
-            for wait in (begun, lambda: self._worker.render(name, scenes, chosen, self._form)):
+            for first_or_second in (lambda: begun, begin):
                 try:
-                    return Picture(name, caption, wait(), self._form)
+                    return Picture(name, caption, first_or_second()(), self._form)
                 except NoRendererError:
                     raise
                 except RenderError as error:
