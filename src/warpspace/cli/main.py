@@ -136,11 +136,10 @@ def main() -> None:
                 os._exit(0)
         except click.exceptions.Exit as stop:
             sys.exit(stop.exit_code)
-        except click.exceptions.NoArgsIsHelpError as error:
-            echo(error.format_message(), err=True)
-            sys.exit(BAD_INPUT)
         except click.ClickException as error:
-            click.echo(_shown(error), err=True, nl=False)
+            page = io.StringIO()
+            error.show(file=page)
+            click.echo(plain(page.getvalue()), err=True, nl=False)
             sys.exit(BAD_INPUT)
         except (click.exceptions.Abort, KeyboardInterrupt):
             _end(ending)
@@ -174,12 +173,6 @@ def _end(ending: "Ending") -> NoReturn:
     if ending.number:
         os._exit(ending.status)
     sys.exit(ending.status)
-
-
-def _shown(error: click.ClickException) -> str:
-    page = io.StringIO()
-    error.show(file=page)
-    return plain(page.getvalue())
 
 
 def _is_nowhere() -> bool:

@@ -98,17 +98,12 @@ _THESIS_CONSTANTS = {
     "EX0C": "δx_ZC",
     "EY0C": "δy_ZC",
 }
-_LINEAR_ROTATIONS = {  # roll about the motion, pitch about the horizontal normal, yaw the rest
-    "AX": "roll",
-    "BX": "pitch",
-    "CX": "yaw",
-    "AY": "pitch",
-    "BY": "roll",
-    "CY": "yaw",
-    "AZ": "pitch",
-    "BZ": "yaw",
-    "CZ": "roll",
-}
+# Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
+_LINEAR_ROTATIONS = (
+    ("roll", "pitch", "yaw"),
+    ("pitch", "roll", "yaw"),
+    ("pitch", "yaw", "roll"),
+)
 
 
 _THESIS_AXES = ("X", "Y", "Z", "B", "C")
@@ -182,7 +177,7 @@ def _component(letter: str, axis: str) -> Parameter:
     low = "xyz"[about]
     if is_linear(axis):
         if rotation:
-            name = f"{_LINEAR_ROTATIONS[letter + 'XYZ'[own]]} of {axis}"
+            name = f"{_LINEAR_ROTATIONS[own][about]} of {axis}"
         else:
             name = f"positioning of {axis}" if about == own else f"straightness of {axis} in {low}"
     elif rotation:

@@ -26,8 +26,7 @@ CLOSE = 1e-5  # largest deviation of a sampled sum half way between its points, 
 
 def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> ErrorFunction:
     span = first.span
-    for one, other in ((first, second), (second, first)):
-        weight = weights[0] if one is first else weights[1]
+    for one, other, weight in ((first, second, weights[0]), (second, first, weights[1])):
         if isinstance(other, Constant) and other.value == 0.0:
             return one.scaled(weight)
     if isinstance(first, Directional) or isinstance(second, Directional):

@@ -140,10 +140,8 @@ def machine_of(
         source=section["source"],
     )
     _check_columns(section["columns"], chain.axes, f"{prefix}columns", problems)
-    machine = replace(machine, columns=section["columns"])
-    if not section["bodies"]:
-        return machine
-    return replace(machine, bodies=read_bodies(section["bodies"], machine, folder, problems))
+    bodies = read_bodies(section["bodies"], machine, folder, problems)
+    return replace(machine, columns=section["columns"], bodies=bodies)
 
 
 def _check_columns(

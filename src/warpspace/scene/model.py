@@ -17,8 +17,7 @@ from warpspace.field.evaluate import (
     build_basis,
     compare_orders,
     error_values,
-    evaluate_exact,
-    evaluate_first_order,
+    evaluate_field,
 )
 from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
@@ -196,17 +195,16 @@ def evaluate(
     scene = placed_in(scene, loop, placed=placed)
     view = choose_view(scene, loop, frame)
     if at is not None:
-        solve = evaluate_exact if exact else evaluate_first_order
         given = complete_coordinates(scene.machine, at, scene.workspace.positions)
         check_magnitude(scene, given)
-        return solve(scene.model, scene.errors, given, view)
+        return evaluate_field(scene.model, scene.errors, given, view, exact=exact)
     nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
     return evaluate_grid(scene, nodes, view, exact=exact)
 
 
 def evaluate_grid(scene: Scene, grid: Grid, view: View, *, exact: bool = False) -> ErrorField:
-    solve = evaluate_exact if exact else evaluate_first_order
-    field = solve(scene.model, scene.errors, grid.coordinates, view, grid.point_mm)
+    at, point = grid.coordinates, grid.point_mm
+    field = evaluate_field(scene.model, scene.errors, at, view, point, exact=exact)
     return replace(field, nominal_mm=grid.nominal_mm)
 
 

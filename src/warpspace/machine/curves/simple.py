@@ -19,7 +19,6 @@ from warpspace.machine.curves.curve import (
     ValueReader,
     limited,
     refuse_more,
-    single_value,
 )
 from warpspace.units import Array
 
@@ -51,7 +50,9 @@ class OneNumber(ErrorFunction):
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        return cls(span, single_value(rows))
+        if len(rows) != 1 or len(rows[0]) != 1:
+            raise OptionError("expected one number")
+        return cls(span, limited(rows[0][0], 1))
 
     def rows(self) -> Rows:
         return [[self.value]]
