@@ -383,6 +383,12 @@ class ErrorFunction(ABC):
         return replace(present, span=span)
 
 
+def single_value(rows: Rows) -> float:
+    if len(rows) != 1 or len(rows[0]) != 1:
+        raise OptionError("expected one number")
+    return limited(rows[0][0], 1)
+
+
 def limited(value: float, row: int, limit: float = MAX_ERROR, what: str = "value") -> float:
     if abs(value) > limit:
         raise OptionError(f"row {row}: {what} {value:g}; expected at most ±{limit:g}")

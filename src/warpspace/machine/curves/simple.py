@@ -19,6 +19,7 @@ from warpspace.machine.curves.curve import (
     ValueReader,
     limited,
     refuse_more,
+    single_value,
 )
 from warpspace.units import Array
 
@@ -50,9 +51,7 @@ class OneNumber(ErrorFunction):
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        if len(rows) != 1 or len(rows[0]) != 1:
-            raise OptionError("expected one number")
-        return cls(span, limited(rows[0][0], 1))
+        return cls(span, single_value(rows))
 
     def rows(self) -> Rows:
         return [[self.value]]
