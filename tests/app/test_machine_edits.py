@@ -67,7 +67,7 @@ def test_curves_that_were_scaled_stay_the_same_functions_of_the_position(state):
     key, at = "EAX", np.linspace(-200.0, 300.0, 5)
 
     def curve(state):
-        return state.amplitudes[key] * state.scene.errors.shape(key, at)
+        return state.amplitudes[key] * state.scene.errors.shape_at(key, {"X": at})
 
     scaled = state.with_amplitude(key, 2.5 * state.amplitudes[key])
     changed = with_word(scaled, "volume X 1 400")

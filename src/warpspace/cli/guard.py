@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, MutableMapping
 from contextlib import suppress
 from copy import copy
-from functools import wraps
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any, cast
 
@@ -117,21 +117,18 @@ class Commands(MutableMapping[str, click.Command]):
     """Commands by name, each built when it is first asked for and guarded.
 
     One command therefore does not pay for the imports of all others. What is built need not be
-    listed: former names are understood only.
+    listed: former names of tests are understood only.
     """
 
     def __init__(
         self, names: Callable[[], Iterable[str]], build: Callable[[str], click.Command]
     ) -> None:
-        self._names, self._build = names, build
-        self._built: dict[str, click.Command] = {}
+        self._names, self._build = names, cache(lambda name: guarded(build(name)))
         self._added: dict[str, click.Command] = {}
 
     def __getitem__(self, name: str) -> click.Command:
         """Build the command if it is not there yet; a `KeyError` where there is none."""
-        if name not in self._added and name not in self._built:
-            self._built[name] = guarded(self._build(name))
-        return self._added.get(name) or self._built[name]
+        return self._added.get(name) or self._build(name)
 
     def __setitem__(self, name: str, command: click.Command) -> None:
         self._added[name] = guarded(command)

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -43,40 +43,19 @@ BUNDLED: "dict[Task, str]" = {
     "machine": "check notes merge list new-machine thesis",
 }
 """Commands that are made from no analysis, by their task; `warpspace.cli.commands` has them."""
-FORMER: dict[str, tuple[str, tuple[str, ...]]] = {
-    "animate": ("draw", ()),
-    "ballbar": ("test", ("ballbar",)),
-    "formats": ("import", ("--formats",)),
-    "import-machine": ("import", ("--format", "urdf")),
-    "measured": ("check", ("--against", "own")),
-    "machines": ("list", ("machines",)),
-    "scenes": ("list", ("scenes",)),
-    "snapshot": ("draw", ()),
-    "sweep": ("montecarlo", ("--rows",)),
-    "template": ("import", ("--template",)),
+FORMER = {
+    "animate": "draw",
+    "ballbar": "test ballbar",
+    "formats": "import --formats",
+    "import-machine": "import --format urdf",
+    "measured": "check --against own",
+    "machines": "list machines",
+    "scenes": "list scenes",
+    "snapshot": "draw",
+    "sweep": "montecarlo --rows",
+    "template": "import --template",
 }
 """Former name of a command: its present name, and the arguments it stands for."""
-
-
-class RenamedCommand(click.Command):
-    """A former command: the present one, with the arguments that it stands for put first."""
-
-    def __init__(self, name: str, now: click.Command, prefix: tuple[str, ...]) -> None:
-        super().__init__(name, help=f"Former name of {now.name}.", hidden=True)
-        self.now = now
-        self.prefix = prefix
-
-    def make_context(
-        self,
-        info_name: str | None,  # noqa: ARG002 - signature of click
-        args: list[str],
-        parent: click.Context | None = None,
-        **extra: Any,
-    ) -> click.Context:
-        return self.now.make_context(self.now.name, [*self.prefix, *args], parent, **extra)
-
-    def invoke(self, ctx: click.Context) -> Any:
-        return self.now.invoke(ctx)
 
 
 def task_of(name: str) -> "Task":
@@ -91,9 +70,6 @@ def _build(name: str) -> click.Command:
             from warpspace.cli.analyses import command_of
 
             return command_of(entry.load())
-    if name in FORMER:
-        now, prefix = FORMER[name]
-        return RenamedCommand(name, COMMANDS[now], prefix)
     home = import_module(f"warpspace.cli.commands.{task_of(name)}")
     found = [thing for thing in vars(home).values() if isinstance(thing, click.Command)]
     return {command.name: command for command in found}[name]
@@ -114,16 +90,20 @@ def register_command(command: click.Command) -> None:
 class TaskGroup(click.Group):
     """The commands under headings by task; analyses are listed without being imported."""
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        now = FORMER[args[0]].split() if args[0] in FORMER else args[:1]
+        return super().resolve_command(ctx, [*now, *args[1:]])
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         sentences = {entry.name: entry.sentence for entry in entries()}
         tasks: dict[str, list[tuple[str, str]]] = {words: [] for words in TASKS.values()}
         room = formatter.width - 6 - max(map(len, self.commands))
         for name in self.list_commands(ctx):
-            if name in sentences:
-                words = click.Command(name, help=sentences[name]).get_short_help_str(room)
-            else:
-                words = self.commands[name].get_short_help_str(room)
-            tasks[TASKS[task_of(name)]].append((name, words))
+            is_made = name in sentences
+            command = click.Command(name, help=sentences[name]) if is_made else self.commands[name]
+            tasks[TASKS[task_of(name)]].append((name, command.get_short_help_str(room)))
         for heading, rows in tasks.items():
             if rows:
                 with formatter.section(heading):
@@ -156,11 +136,10 @@ def main() -> None:
                 os._exit(0)
         except click.exceptions.Exit as stop:
             sys.exit(stop.exit_code)
-        except click.exceptions.NoArgsIsHelpError as error:
-            echo(error.format_message(), err=True)
-            sys.exit(BAD_INPUT)
         except click.ClickException as error:
-            click.echo(_shown(error), err=True, nl=False)
+            page = io.StringIO()
+            error.show(file=page)
+            click.echo(plain(page.getvalue()), err=True, nl=False)
             sys.exit(BAD_INPUT)
         except (click.exceptions.Abort, KeyboardInterrupt):
             _end(ending)
@@ -194,12 +173,6 @@ def _end(ending: "Ending") -> NoReturn:
     if ending.number:
         os._exit(ending.status)
     sys.exit(ending.status)
-
-
-def _shown(error: click.ClickException) -> str:
-    page = io.StringIO()
-    error.show(file=page)
-    return plain(page.getvalue())
 
 
 def _is_nowhere() -> bool:

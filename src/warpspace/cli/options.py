@@ -1,7 +1,6 @@
 """Arguments and options that several commands share."""
 
 import json
-import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -99,12 +98,10 @@ def read_exaggeration(
     if text.strip().lower() == "auto":
         return "auto"
     try:
-        value = parse_number(text)
+        return parse_number(text)
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise OptionError(f"--exaggeration {text!r}; expected auto or a number above 0")
-    return value
+        expected = "expected auto or a number above 0"
+        raise OptionError(f"--exaggeration {text!r}; {expected}") from None
 
 
 exaggeration_option = click.option(

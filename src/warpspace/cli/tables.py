@@ -145,18 +145,16 @@ def _draw(columns: "Sequence[Column]", rows: Sequence[Row], gap: int, width: int
 
 
 _STEERING = re.compile(
-    "[\x00-\x1f\x7f-\x9f"  # control characters
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f"  # control characters but tabs and line breaks
     "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"  # direction of writing
     "\u2028\u2029"  # line and paragraph separators
     "\ud800-\udfff]"  # bytes of file names that are no text
 )
-_LINE_BREAKS = "\n\t"
 
 
-def plain(text: str, *, breaks: bool = True) -> str:
+def plain(text: str) -> str:
     r"""Spell out the characters that would steer a terminal, for instance ``\x1b``."""
-    kept = _LINE_BREAKS if breaks else ""
-    return _STEERING.sub(lambda found: found[0] if found[0] in kept else _spell(found[0]), text)
+    return _STEERING.sub(lambda found: _spell(found[0]), text)
 
 
 def escape_json(text: str) -> str:
@@ -164,9 +162,9 @@ def escape_json(text: str) -> str:
     return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
-def echo(text: str = "", *, err: bool = False, breaks: bool = True, **style: Any) -> None:
+def echo(text: str = "", *, err: bool = False, **style: Any) -> None:
     """Print a text without characters that would steer the terminal."""
-    click.secho(plain(text, breaks=breaks), err=err, **style)
+    click.secho(plain(text), err=err, **style)
 
 
 def warn(*sentences: str) -> None:

@@ -314,12 +314,13 @@ def find_placement(
     if view.placed_over is None:
         return None
     volume = build_grid(model, view.placed_over)
-    absolute = View(view.loop)
-    field = _evaluate(model, errors, volume.coordinates, absolute, volume.point_mm, exact=exact)
+    field = evaluate_field(
+        model, errors, volume.coordinates, View(view.loop), volume.point_mm, exact=exact
+    )
     return fit_placement(model, volume, field.error_um)
 
 
-def _evaluate(
+def evaluate_field(
     model: Model,
     errors: ErrorSet,
     coordinates: Coordinates,
@@ -350,7 +351,7 @@ def _evaluate(
     else:
         held, held_point = reference
         still = replace(view, frame="machine", reference=None)
-        fixed = _evaluate(model, errors, held, still, held_point, exact=exact).error_um
+        fixed = evaluate_field(model, errors, held, still, held_point, exact=exact).error_um
     placement = find_placement(model, errors, view, exact=exact)
 
     def steps(at: Coordinates) -> chain.LoopLinks:
@@ -376,5 +377,5 @@ def _evaluate(
     return ErrorField(np.broadcast_to(point, shape), error, orientation)
 
 
-evaluate_exact = partial(_evaluate, exact=True)
-evaluate_first_order = partial(_evaluate, exact=False)
+evaluate_exact = partial(evaluate_field, exact=True)
+evaluate_first_order = partial(evaluate_field, exact=False)

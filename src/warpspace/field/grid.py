@@ -249,16 +249,11 @@ def build_slice(
         return grid
     # the slice is drawn where the whole volume is: with the table in the middle of its range
     here, home = (
-        branch_pose(model, "workpiece", complete_coordinates(model.machine, positions))
-        for positions in (
-            workspace.moved({axis: position_mm}).positions,
-            workspace.positions,
-        )
+        branch_pose(model, "workpiece", complete_coordinates(model.machine, volume.positions))
+        for volume in (workspace.moved({axis: position_mm}), workspace)
     )
-    return replace(
-        grid,
-        nominal_mm=transforms.apply(home @ transforms.inverse(here), grid.nominal_mm),
-    )
+    step = home @ transforms.inverse(here)
+    return replace(grid, nominal_mm=transforms.apply(step, grid.nominal_mm))
 
 
 # --- Values in cells of a volume ------------------------------------------------------------------

@@ -6,10 +6,11 @@ broadcasts go together, and no array ends with a short dimension, which numpy is
 """
 
 from collections.abc import Iterable
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from warpspace.units import Array
 
+T = TypeVar("T")
 Number: TypeAlias = Array | float  # one component, [...]; a float where it is the same everywhere.
 Triple: TypeAlias = tuple[Number, Number, Number]  # components of a vector along x, y and z
 Rows: TypeAlias = tuple[Triple, Triple, Triple]  # rows of a matrix of three by three
@@ -18,7 +19,7 @@ ZERO: Triple = (0.0, 0.0, 0.0)
 ZERO_ROWS: Rows = (ZERO, ZERO, ZERO)
 
 
-def triple(values: Iterable[Number]) -> Triple:
+def triple(values: Iterable[T]) -> tuple[T, T, T]:
     x, y, z = values
     return x, y, z
 
@@ -30,8 +31,7 @@ def split(vectors: Array) -> Triple:
 
 def split_rows(matrices: Array) -> Rows:
     """Split matrices, [..., 3, 3], into components; one that never varies becomes a float."""
-    x, y, z = (split(matrices[..., index, :]) for index in range(3))
-    return x, y, z
+    return triple(split(matrices[..., index, :]) for index in range(3))
 
 
 def join(components: Iterable[Number], out: Array) -> None:
@@ -94,18 +94,15 @@ def move(transform: Array, point: Triple) -> Triple:
 
 def multiply(one: Rows, other: Rows) -> Rows:
     columns = transpose(other)
-    x, y, z = (triple(dot(row, column) for column in columns) for row in one)
-    return x, y, z
+    return triple(triple(dot(row, column) for column in columns) for row in one)
 
 
 def add_rows(one: Rows, other: Rows) -> Rows:
-    x, y, z = map(add, one, other)
-    return x, y, z
+    return triple(map(add, one, other))
 
 
 def subtract_rows(one: Rows, other: Rows) -> Rows:
-    x, y, z = map(subtract, one, other)
-    return x, y, z
+    return triple(map(subtract, one, other))
 
 
 def transpose(rows: Rows) -> Rows:

@@ -11,7 +11,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.axis_errors import Along, AxisErrors, SmallMotion
 from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model
-from warpspace.machine.axes import direction_index, is_linear, parameter
+from warpspace.machine.axes import ErrorKind, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import Span
 from warpspace.machine.curves.pieces import SMALL
 from warpspace.machine.curves.simple import Constant
@@ -246,20 +246,18 @@ def move_measuring_line(
     for axis, place in lines_mm.items():
         own = AxisErrors(model, errors, axis, spans[axis])
         point = np.array(place, dtype=float)
-        fixed = own.order == ComponentErrors.BEFORE_MOTION
-
-        def along(
-            position: Array,
-            present: SmallMotion,
-            own: AxisErrors = own,
-            point: Array = point,
-            fixed: bool = fixed,
-        ) -> SmallMotion:
-            lever = transforms.apply(own.pose(position), point) if fixed else point
-            return SmallMotion(present.half, present.shift_mm + sign * present.arm(lever))
-
-        errors = own.with_components(along, adds=True)
+        errors = own.with_components(_on_arm(own, point, sign), adds=True)
     return errors
+
+
+def _on_arm(own: AxisErrors, point_mm: Array, sign: float) -> Along:
+    is_fixed = own.order == ComponentErrors.BEFORE_MOTION
+
+    def along(position: Array, errors: SmallMotion) -> SmallMotion:
+        lever = transforms.apply(own.pose(position), point_mm) if is_fixed else point_mm
+        return SmallMotion(errors.half, errors.shift_mm + sign * errors.arm(lever))
+
+    return along
 
 
 class SquarenessSign(StrEnum):
@@ -279,14 +277,14 @@ def angle_sign(key: str) -> int:
 
 def squareness_keys(machine: Machine) -> tuple[str, ...]:
     directions = {direction_index(axis) for axis in machine.axes if is_linear(axis)}
-    found: list[str] = []
-    for axis in machine.axes:
-        own = direction_index(axis)
-        for letter in "ABC":
-            other = 3 - own - direction_index(letter)
-            if is_linear(axis) and direction_index(letter) != own and other in directions:
-                found.append(f"E{letter}0{axis}")
-    return tuple(found)
+    own = [(parameter(key), direction_index(parameter(key).axis)) for key in machine.allowed_keys]
+    return tuple(
+        row.key
+        for row, along in own
+        if row.kind is ErrorKind.SQUARENESS
+        and row.direction != along
+        and 3 - along - row.direction in directions
+    )
 
 
 def convert_squareness(machine: Machine, errors: ErrorSet, sign: SquarenessSign | str) -> ErrorSet:

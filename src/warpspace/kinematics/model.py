@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,8 @@ from warpspace.machine.axes import Parameter, TravelDirection
 from warpspace.machine.description import ORIGIN, Axis, Machine, Vector
 from warpspace.plugins import Registry
 from warpspace.units import Array
+
+Factor: TypeAlias = Array | None  # of a product of transformations, [..., 4, 4]; None is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +37,7 @@ class Convention(ABC):
     meaning: ClassVar[str]  # what component errors do, after the words "component errors"
 
     @abstractmethod
-    def factors(
-        self, constant: Array | None, motion: Array, component: Array | None
-    ) -> tuple[Array | None, ...]:
+    def factors(self, constant: Factor, motion: Array, component: Factor) -> tuple[Factor, ...]:
         """Give the factors of the exact chain behind the offset, from the frame outwards.
 
         Parameters
@@ -84,9 +84,7 @@ class AfterMotion(Convention):
     place = "after the motion"
     meaning = "ride on the moving body"
 
-    def factors(
-        self, constant: Array | None, motion: Array, component: Array | None
-    ) -> tuple[Array | None, ...]:
+    def factors(self, constant: Factor, motion: Array, component: Factor) -> tuple[Factor, ...]:
         return constant, motion, component
 
     def frame(self, frames: AxisFrames, row: Parameter) -> Array:
@@ -101,9 +99,7 @@ class BeforeMotion(Convention):
     place = "before the motion"
     meaning = "act in fixed directions"
 
-    def factors(
-        self, constant: Array | None, motion: Array, component: Array | None
-    ) -> tuple[Array | None, ...]:
+    def factors(self, constant: Factor, motion: Array, component: Factor) -> tuple[Factor, ...]:
         return constant, component, motion
 
     def frame(self, frames: AxisFrames, row: Parameter) -> Array:

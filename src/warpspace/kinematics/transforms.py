@@ -16,11 +16,7 @@ _SMALL = 1e-9
 
 def translation(vector: ArrayLike) -> Array:
     """Build pure translations, [..., 4, 4], by vectors, [..., 3], mm."""
-    values = np.asarray(vector, dtype=float)
-    out = np.zeros((*values.shape[:-1], 4, 4))
-    out[..., range(4), range(4)] = 1.0
-    out[..., :3, 3] = values
-    return out
+    return rigid(np.eye(3), vector)
 
 
 def axis_rotation(index: int, angle_rad: ArrayLike) -> Array:

@@ -9,11 +9,10 @@ for a constant (``EC0Y``: the squareness of Y to X). Directions X Y Z are transl
 rotations about them.
 """
 
-import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache, lru_cache
+from functools import cache
 
 from warpspace.exceptions import UnknownNameError
 from warpspace.units import MICROMETRE, MICRORADIAN
@@ -26,13 +25,12 @@ MAX_AXES = 8  # of a chain
 AXIS_NAMES = tuple(letter + digit for letter in AXIS_LETTERS for digit in ("", *"0123456789"))
 """Every name that an axis can have, in the order that axes are listed in."""
 
-_NAME = re.compile(rf"[{AXIS_LETTERS}][0-9]?")
 _ORDER = {name: number for number, name in enumerate(AXIS_NAMES)}
 _WITHIN = {letter: number % 3 for number, letter in enumerate(AXIS_LETTERS)}
 
 
 def is_axis_name(name: str) -> bool:
-    return _NAME.fullmatch(name) is not None
+    return name in _ORDER
 
 
 def is_linear(name: str) -> bool:
@@ -100,21 +98,15 @@ _THESIS_CONSTANTS = {
     "EX0C": "δx_ZC",
     "EY0C": "δy_ZC",
 }
-_LINEAR_ROTATIONS = {  # roll about the motion, pitch about the horizontal normal, yaw the rest
-    "AX": "roll",
-    "BX": "pitch",
-    "CX": "yaw",
-    "AY": "pitch",
-    "BY": "roll",
-    "CY": "yaw",
-    "AZ": "pitch",
-    "BZ": "yaw",
-    "CZ": "roll",
-}
+# Of axes along x, y, z, about x, y, z: roll about the motion, pitch about the horizontal normal.
+_LINEAR_ROTATIONS = (
+    ("roll", "pitch", "yaw"),
+    ("pitch", "roll", "yaw"),
+    ("pitch", "yaw", "roll"),
+)
 
 
 _THESIS_AXES = ("X", "Y", "Z", "B", "C")
-_KEY = re.compile(r"E([XYZABC])(0?)([XYZUVWABC][0-9]?)")
 
 
 class ErrorKind(StrEnum):
@@ -185,7 +177,7 @@ def _component(letter: str, axis: str) -> Parameter:
     low = "xyz"[about]
     if is_linear(axis):
         if rotation:
-            name = f"{_LINEAR_ROTATIONS[letter + 'XYZ'[own]]} of {axis}"
+            name = f"{_LINEAR_ROTATIONS[own][about]} of {axis}"
         else:
             name = f"positioning of {axis}" if about == own else f"straightness of {axis} in {low}"
     elif rotation:
@@ -229,40 +221,15 @@ def axis_parameters(axis: str) -> tuple[Parameter, ...]:
     return tuple(build(letter, axis) for build in (_component, _constant) for letter in DIRECTIONS)
 
 
-@lru_cache(maxsize=4096)
-def _row(key: str) -> Parameter | None:
-    matched = _KEY.fullmatch(key)
-    if matched is None:
-        return None
-    letter, constant, axis = matched.groups()
-    return axis_parameters(axis)[DIRECTIONS.index(letter) + (len(DIRECTIONS) if constant else 0)]
-
-
-class ParameterTable(Mapping[str, Parameter]):
-    """Key to parameter, for every axis that a machine may have. Rows are made when asked for."""
-
-    def __getitem__(self, key: str) -> Parameter:
-        row = _row(key)
-        if row is None:
-            raise KeyError(key)
-        return row
-
-    def __iter__(self) -> Iterator[str]:
-        return (row.key for axis in AXIS_NAMES for row in axis_parameters(axis))
-
-    def __len__(self) -> int:
-        return 2 * len(DIRECTIONS) * len(AXIS_NAMES)
-
-
-PARAMETERS = ParameterTable()  # the only table of parameters there is
+PARAMETERS = {row.key: row for axis in AXIS_NAMES for row in axis_parameters(axis)}
+"""The only table of parameters there is: by key, those of every axis that a machine may have."""
 
 
 def parameter(key: str) -> Parameter:
-    row = _row(key)
-    if row is None:
+    if key not in PARAMETERS:
         classic = [row.key for axis in "XYZABC" for row in axis_parameters(axis)]
         raise UnknownNameError("error parameter", key, classic)
-    return row
+    return PARAMETERS[key]
 
 
 def default_keys(axes: Sequence[str]) -> tuple[str, ...]:

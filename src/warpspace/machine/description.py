@@ -240,7 +240,7 @@ def build_machine(
     rotation_deg: Mapping[str, Vector] | None = None,
     travel: Mapping[str, Range] | None = None,
     direction: Mapping[str, int] | None = None,
-    gantry: Mapping[str, tuple[float, str | None]] | None = None,
+    gantries: Mapping[str, Gantry] | None = None,
     name: str = "machine",
     title: str = "",
     body_dir: str = "",
@@ -264,9 +264,5 @@ def build_machine(
     fixed = {frame: offsets.get(frame, ORIGIN) for frame in FIXED_FRAMES}
     turned = {frame: rotations.get(frame, ORIGIN) for frame in FIXED_FRAMES}
     turned = {frame: angles for frame, angles in turned.items() if angles != ORIGIN}
-    gantries = {
-        axis: Gantry(axis, span_mm, across or default_across(axis))
-        for axis, (span_mm, across) in (gantry or {}).items()
-    }
     names = (name, title or name, body_dir)
-    return Machine(parsed, axes, fixed, *names, turned, gantries, source=source)
+    return Machine(parsed, axes, fixed, *names, turned, gantries or {}, source=source)

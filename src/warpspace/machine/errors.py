@@ -67,18 +67,18 @@ class ErrorSet:
         """Give one error where the axes it depends on stand, reached in a direction, [...]."""
         return self._function(key).evaluate_at(parameter(key).axis, coordinates, direction)
 
-    def shape(self, key: str, position: Array) -> Array:
-        """Give the curve of one error for an amplitude of one, [...]; 1 where it is absent."""
-        return self._function(key).shape(position)
-
     def shape_at(
         self,
         key: str,
         coordinates: Mapping[str, Array],
         direction: str = TravelDirection.MEAN,
     ) -> Array:
-        """Give `evaluate_at` for an amplitude of one; an absent error is a constant."""
-        return self._function(key).shape_at(parameter(key).axis, coordinates, direction)
+        """Give `evaluate_at` for an amplitude of one; an absent error is a constant.
+
+        One that is zero takes the shape it grows into.
+        """
+        shape = self._function(key).with_amplitude(1.0)
+        return shape.evaluate_at(parameter(key).axis, coordinates, direction)
 
     def amplitude(self, key: str) -> float:
         """Give the amplitude of one error, µm or µrad; 0 where it is absent."""

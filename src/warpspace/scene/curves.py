@@ -26,8 +26,7 @@ CLOSE = 1e-5  # largest deviation of a sampled sum half way between its points, 
 
 def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> ErrorFunction:
     span = first.span
-    for one, other in ((first, second), (second, first)):
-        weight = weights[0] if one is first else weights[1]
+    for one, other, weight in ((first, second, weights[0]), (second, first, weights[1])):
         if isinstance(other, Constant) and other.value == 0.0:
             return one.scaled(weight)
     if isinstance(first, Directional) or isinstance(second, Directional):
@@ -139,24 +138,22 @@ RUN, DIRECTION = "run", "direction"  # columns that a file of runs may have
 T = TypeVar("T")
 
 
-def read_csv_column(
-    path: Path, column: str, limit: float, max_rows: int
-) -> list[tuple[float, float]]:
+def read_csv_column(path: Path, column: str) -> list[tuple[float, float]]:
     """Read positions (mm or degrees, ascending, first column) and a named column (µm or µrad)."""
-    return _read_csv(path, max_rows, lambda rows: _points(rows, column, limit))
+    return _read_csv(path, lambda rows: _points(rows, column))
 
 
 def read_csv_runs(path: Path, column: str) -> tuple[Run, ...]:
     """Read the runs of one error, a row a reading; ``run`` and ``direction`` tell them apart."""
-    return _read_csv(path, limits.MAX_POINTS, lambda rows: _runs(rows, column))
+    return _read_csv(path, lambda rows: _runs(rows, column))
 
 
-def _read_csv(path: Path, max_rows: int, read: Callable[[files.CsvRows], T]) -> T:
+def _read_csv(path: Path, read: Callable[[files.CsvRows], T]) -> T:
     source = str(path)
     files.check_file(path, limits.MAX_CSV_BYTES, source)
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = files.CsvRows(file, source, max_rows)
+            rows = files.CsvRows(file, source, limits.MAX_POINTS)
             found = read(rows)
             rows.check()
             return found
@@ -176,11 +173,11 @@ def _column(rows: files.CsvRows, column: str) -> int:
     raise SceneError(rows.source, [f"column {column!r} {found}{hint}"])
 
 
-def _points(rows: files.CsvRows, column: str, limit: float) -> list[tuple[float, float]]:
+def _points(rows: files.CsvRows, column: str) -> list[tuple[float, float]]:
     points: list[tuple[float, float]] = []
     index = _column(rows, column) if rows.header else 0
     for line, row in rows:
-        position, value = (rows.number(row[at], line, limit=limit) for at in (0, index))
+        position, value = (rows.number(row[at], line, limit=limits.MAX_ERROR) for at in (0, index))
         if points and position <= points[-1][0]:
             found = f"position {position:g} after {points[-1][0]:g}"
             rows.note(f"line {line}: {found}; expected ascending positions")
@@ -236,7 +233,7 @@ class CurveReader:
             return None
         reader = ValueReader(
             # a constant must be a number: the file that a table names need not be read
-            (lambda _file, _column: ()) if constant else self.folder and self._column,
+            (lambda _file, _column: ()) if constant else self.folder and self._csv_points,
             axis=self.axis,
             axes=self.axes,
             curve=lambda inner, path: self._read(inner, files.location(where, path), constant),
@@ -254,9 +251,8 @@ class CurveReader:
         self.problems.only(where, table, form, "key")
         return curve
 
-    def _column(self, file: str, column: str) -> Points:
-        path = cast("Path", self.folder) / file
-        return read_csv_column(path, column, limits.MAX_ERROR, limits.MAX_POINTS)
+    def _csv_points(self, file: str, column: str) -> Points:
+        return read_csv_column(cast("Path", self.folder) / file, column)
 
     def guides(
         self,

@@ -42,45 +42,31 @@ def check_outline(text: str, source: str) -> None:
     dots = depth = keys = 0
     for count, found in enumerate(_TOKENS.finditer(text)):
         mark = found[0]
-        if count >= MAX_MARKS:
-            _refuse(
-                text,
-                found,
-                source,
-                f"more than {MAX_MARKS:,} brackets, commas, dots and lines; expected long tables in"
-                " CSV files of their own",
-            )
         if mark == ".":  # between the parts of a key; a number has one at most
             dots += 1
-            if dots >= MAX_KEY_PARTS:
-                _refuse(
-                    text,
-                    found,
-                    source,
-                    f"a key of over {MAX_KEY_PARTS} parts; expected at most {MAX_KEY_PARTS}",
-                )
+        elif mark[0] not in "\"'#":
+            if mark == "=" or (mark == "]" and depth == 1):
+                keys += dots + 1
+            elif mark == "{":
+                keys += 1
+            dots = 0
+            if mark in "]}":
+                depth = max(depth - 1, 0)
+            elif mark in "[{":
+                depth += 1
+        if count >= MAX_MARKS:
+            problem = f"more than {MAX_MARKS:,} brackets, commas, dots and lines; expected long"
+            problem += " tables in CSV files of their own"
+        elif dots >= MAX_KEY_PARTS:
+            problem = f"a key of over {MAX_KEY_PARTS} parts; expected at most {MAX_KEY_PARTS}"
+        elif keys > MAX_KEYS:
+            problem = f"more than {MAX_KEYS:,} parts of keys"
+        elif depth > MAX_NESTING:
+            problem = f"is not valid TOML: nested too deeply, more than {MAX_NESTING} levels"
+        else:
             continue
-        if mark[0] in "\"'#":
-            continue
-        if mark == "=" or (mark == "]" and depth == 1):
-            keys += dots + 1
-        elif mark == "{":
-            keys += 1
-        if keys > MAX_KEYS:
-            _refuse(text, found, source, f"more than {MAX_KEYS:,} parts of keys")
-        dots = 0
-        if mark in "]}":
-            depth = max(depth - 1, 0)
-        elif mark in "[{":
-            depth += 1
-            if depth > MAX_NESTING:
-                expected = f"is not valid TOML: nested too deeply, more than {MAX_NESTING} levels"
-                _refuse(text, found, source, expected)
-
-
-def _refuse(text: str, found: re.Match[str], source: str, problem: str) -> None:
-    line = text.count("\n", 0, found.start()) + 1
-    raise SceneError(source, [f"line {line}: {problem}"])
+        line = text.count("\n", 0, found.start()) + 1
+        raise SceneError(source, [f"line {line}: {problem}"])
 
 
 def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:

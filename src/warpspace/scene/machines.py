@@ -133,17 +133,15 @@ def machine_of(
     machine = description.build_machine(
         chain,
         **tables,
-        gantry=_gantries(section["gantry"], chain.axes, f"{prefix}gantry", problems),
+        gantries=_gantries(section["gantry"], chain.axes, f"{prefix}gantry", problems),
         name=name,
         title=section["title"] or name,
         body_dir=body_dir,
         source=section["source"],
     )
     _check_columns(section["columns"], chain.axes, f"{prefix}columns", problems)
-    machine = replace(machine, columns=section["columns"])
-    if not section["bodies"]:
-        return machine
-    return replace(machine, bodies=read_bodies(section["bodies"], machine, folder, problems))
+    bodies = read_bodies(section["bodies"], machine, folder, problems)
+    return replace(machine, columns=section["columns"], bodies=bodies)
 
 
 def _check_columns(
@@ -159,8 +157,8 @@ def _check_columns(
 
 def _gantries(
     section: Mapping[str, Mapping[str, Any]], axes: Sequence[str], key: str, problems: Problems
-) -> dict[str, tuple[float, str | None]]:
-    found: dict[str, tuple[float, str | None]] = {}
+) -> dict[str, description.Gantry]:
+    found: dict[str, description.Gantry] = {}
     for axis, given in section.items():
         if axis not in axes:  # noted already
             continue
@@ -172,5 +170,6 @@ def _gantries(
             expected = f"is the direction of the axis itself; expected {others}"
             problems.add(f"{key}.{axis}.across", expected, given["across"])
         else:
-            found[axis] = (given["span_mm"], given["across"])
+            across = given["across"] or description.default_across(axis)
+            found[axis] = description.Gantry(axis, given["span_mm"], across)
     return found

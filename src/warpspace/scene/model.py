@@ -1,6 +1,6 @@
 """A scene as the program holds it: validated, frozen, without a trace of its file; evaluated."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -17,8 +17,7 @@ from warpspace.field.evaluate import (
     build_basis,
     compare_orders,
     error_values,
-    evaluate_exact,
-    evaluate_first_order,
+    evaluate_field,
 )
 from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
@@ -196,17 +195,16 @@ def evaluate(
     scene = placed_in(scene, loop, placed=placed)
     view = choose_view(scene, loop, frame)
     if at is not None:
-        solve = evaluate_exact if exact else evaluate_first_order
         given = complete_coordinates(scene.machine, at, scene.workspace.positions)
         check_magnitude(scene, given)
-        return solve(scene.model, scene.errors, given, view)
+        return evaluate_field(scene.model, scene.errors, given, view, exact=exact)
     nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
     return evaluate_grid(scene, nodes, view, exact=exact)
 
 
 def evaluate_grid(scene: Scene, grid: Grid, view: View, *, exact: bool = False) -> ErrorField:
-    solve = evaluate_exact if exact else evaluate_first_order
-    field = solve(scene.model, scene.errors, grid.coordinates, view, grid.point_mm)
+    at, point = grid.coordinates, grid.point_mm
+    field = evaluate_field(scene.model, scene.errors, at, view, point, exact=exact)
     return replace(field, nominal_mm=grid.nominal_mm)
 
 
@@ -267,10 +265,9 @@ def second_order(
     loop: Loop | str = Loop.TOOL,
     *,
     at: Mapping[str, ArrayLike] | None = None,
-    grid: int = CHECK_NODES,
 ) -> SecondOrder:
     """Compare the first order with the exact chain, over the grid unless at points."""
-    nodes = grid if at is None else None
+    nodes = CHECK_NODES if at is None else None
     first, exact = (
         evaluate(scene, at=at, grid=nodes, loop=loop, exact=way).error_um for way in (False, True)
     )
@@ -292,74 +289,63 @@ def scene_notes(machine: Machine, workspace: Workspace, errors: ErrorSet) -> tup
     )
 
 
-def _direction_notes(machine: Machine) -> tuple[str, ...]:
-    notes: list[str] = []
+def _direction_notes(machine: Machine) -> Iterator[str]:
     for name, axis in machine.axes.items():
         if not axis.is_linear or machine.sense(name) > 0:
             continue
         said = f"machine.direction.{name} = {axis.direction}"
         if axis.direction_given:
-            notes.append(f"{said} is against ISO 841")
+            yield f"{said} is against ISO 841"
         else:
-            notes.append(
+            yield (
                 f"{said} since none is given: positive {name} moves the tool towards −{name} over"
                 " the workpiece, against ISO 841; expected −1, or 1 given if the machine does so"
             )
-    return tuple(notes)
 
 
-def coverage_notes(scene: Scene, measured: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
+def coverage_notes(scene: Scene, measured: Mapping[str, tuple[float, float]]) -> Iterator[str]:
     """Remark on axes whose measured range is less than half of the one that the scene covers."""
-    notes: list[str] = []
     for axis, (low, high) in measured.items():
         first, last = scene.axis_span(axis)
         share, unit = (high - low) / (last - first), scene.machine.axes[axis].unit
         if 0.0 < share < LEAST_SHARE:
-            notes.append(
+            yield (
                 f"data over {axis} {low:g} … {high:g} {unit}, {100.0 * share:.0f} % of its range"
                 f" {first:g} … {last:g} {unit}: the rest is not measured"
             )
-    return tuple(notes)
 
 
-def _travel_notes(machine: Machine, workspace: Workspace) -> tuple[str, ...]:
-    notes: list[str] = []
-    for name in machine.axes:
-        (low, high), (first, last) = workspace.ranges[name], machine.axes[name].travel
+def _travel_notes(machine: Machine, workspace: Workspace) -> Iterator[str]:
+    for name, axis in machine.axes.items():
+        (low, high), (first, last) = workspace.ranges[name], axis.travel
         if low < first or high > last:
-            unit = machine.axes[name].unit
-            notes.append(
-                f"workspace.{name} {low:g} … {high:g} {unit} reaches beyond the travel"
-                f" {first:g} … {last:g} {unit}"
+            yield (
+                f"workspace.{name} {low:g} … {high:g} {axis.unit} reaches beyond the travel"
+                f" {first:g} … {last:g} {axis.unit}"
             )
-    return tuple(notes)
 
 
-def _costly_notes(errors: ErrorSet) -> tuple[str, ...]:
+def _costly_notes(errors: ErrorSet) -> Iterator[str]:
     curves = [part for curve in errors.functions.values() for part in curve.parts]
     waves = [curve for curve in curves if isinstance(curve, Harmonics)]
-    if sum(curve.cosines for curve in waves) <= MANY_COSINES:
-        return ()
-    terms = sum(len(curve.terms) for curve in waves)
-    found = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
-    return (f"{found}: opening the scene takes seconds; fewer terms are faster",)
+    if sum(curve.cosines for curve in waves) > MANY_COSINES:
+        terms = sum(len(curve.terms) for curve in waves)
+        found = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
+        yield f"{found}: opening the scene takes seconds; fewer terms are faster"
 
 
-def _carried_notes(machine: Machine, errors: ErrorSet) -> tuple[str, ...]:
-    notes: list[str] = []
+def _carried_notes(machine: Machine, errors: ErrorSet) -> Iterator[str]:
     for key in errors:
         row = axes.PARAMETERS[key]
-        if row.kind is not axes.ErrorKind.SQUARENESS or errors.amplitude(key) == 0.0:
-            continue
         own = axes.direction_index(row.axis)
-        if row.direction == own:
+        is_squareness = row.kind is axes.ErrorKind.SQUARENESS and row.direction != own
+        if not is_squareness or errors.amplitude(key) == 0.0:
             continue
         branches = (machine.chain.tool, machine.chain.workpiece)
         branch = next(branch for branch in branches if row.axis in branch)
-        notes += [
-            f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
-            f" between them stays, the pair turns as a whole"
-            for other in branch[branch.index(row.axis) + 1 :]
-            if axes.is_linear(other) and axes.direction_index(other) == 3 - row.direction - own
-        ]
-    return tuple(notes)
+        for other in branch[branch.index(row.axis) + 1 :]:
+            if axes.is_linear(other) and axes.direction_index(other) == 3 - row.direction - own:
+                yield (
+                    f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
+                    " between them stays, the pair turns as a whole"
+                )

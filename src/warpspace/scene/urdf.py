@@ -40,8 +40,7 @@ def read_robot(path: Path) -> tuple[Any, tuple[str, ...]]:
     text = read_text(path, limits.MAX_SCENE_BYTES)
     others = _check_xml(text, source)
     robot = _parse(text, source)
-    problems = list(_problems(robot))
-    if problems:
+    if problems := list(_problems(robot)):
         raise SceneError(source, problems)
     return robot, others
 
@@ -171,9 +170,7 @@ def axis_frame(origin_mm: Array, direction: Array) -> tuple[Array, int]:
     if np.abs(direction - own).max() > PARALLEL:
         from scipy.spatial.transform import Rotation
 
-        about = np.cross(own, direction)
-        angle = np.arctan2(np.linalg.norm(about), own @ direction)
-        pose[:3, :3] = Rotation.from_rotvec(about / np.linalg.norm(about) * angle).as_matrix()
+        pose[:3, :3] = Rotation.align_vectors(direction, own)[0].as_matrix()
     return pose, sign
 
 
@@ -239,7 +236,8 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
     ]
     branches = [path[shared:] for path in paths]
     every = [joint for branch in branches for joint in branch]
-    _check_joints(every, source)
+    if problems := list(_joint_problems(every)):
+        raise SceneError(source, problems)
     still = [joint.name for joint in every if _stands(joint)]
     notes += [f"joint {name!r} has one position only: taken as fixed at zero" for name in still]
     joints = [joint for joint in every if joint.type in MOVING and joint.name not in still]
@@ -309,24 +307,18 @@ def _end(robot: Any, source: str, what: str, wanted: str) -> str:
     raise SceneError(source, [f"ends in {shown}; expected --tool LINK to say which is the tool"])
 
 
-def _check_joints(joints: Sequence[Any], source: str) -> None:
-    problems: list[str] = []
+def _joint_problems(joints: Sequence[Any]) -> Iterable[str]:
     for joint in joints:
+        where = f"joint {joint.name!r}"
         if joint.mimic is not None:
-            problems.append(
-                f"joint {joint.name!r} mimics {joint.mimic.joint!r}; expected joints between"
-                " workpiece and tool that move on their own"
-            )
+            expected = "expected joints between workpiece and tool that move on their own"
+            yield f"{where} mimics {joint.mimic.joint!r}; {expected}"
         elif joint.type in ("floating", "planar"):
-            problems.append(
-                f"joint {joint.name!r} is {joint.type}; expected joints with one axis each"
-            )
+            yield f"{where} is {joint.type}; expected joints with one axis each"
         elif joint.type in MOVING and not _finite_direction(joint):
-            problems.append(f"joint {joint.name!r}: its axis is no direction")
+            yield f"{where}: its axis is no direction"
         if joint.origin is not None and not (np.abs(joint.origin) < LARGEST).all():
-            problems.append(f"joint {joint.name!r}: its origin is no finite number")
-    if problems:
-        raise SceneError(source, problems)
+            yield f"{where}: its origin is no finite number"
 
 
 def _finite_direction(joint: Any) -> bool:

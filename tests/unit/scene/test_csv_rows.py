@@ -23,7 +23,7 @@ Reader = Callable[[str, Path], Points]
 def _scene(text, folder):
     path = folder / "t.csv"
     path.write_text(text, encoding="utf-8")
-    return read_csv_column(path, CsvRows(io.StringIO(text), "", 1).header[1], 1e5, 100)
+    return read_csv_column(path, CsvRows(io.StringIO(text), "", 1).header[1])
 
 
 def _import(text, folder):

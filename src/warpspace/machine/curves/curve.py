@@ -254,15 +254,6 @@ class ErrorFunction(ABC):
             return np.zeros(np.shape(coordinates[axis]))
         return self.evaluate(coordinates[axis])
 
-    def shape_at(
-        self,
-        axis: str,
-        coordinates: Mapping[str, Array],
-        direction: str = TravelDirection.MEAN,
-    ) -> Array:
-        """Give `evaluate_at` for an amplitude of one; of a zero curve that of the `grown` one."""
-        return self.with_amplitude(1.0).evaluate_at(axis, coordinates, direction)
-
     @property
     def has_directions(self) -> bool:
         """Whether it depends on the direction of travel."""
@@ -328,10 +319,6 @@ class ErrorFunction(ABC):
         kind that keeps zero needs no more than its own `with_amplitude`.
         """
         return self
-
-    def shape(self, position: Array) -> Array:
-        """Give the curve at positions, [...], for an amplitude of one; of a zero one `grown`."""
-        return self.with_amplitude(1.0).evaluate(position)
 
     @classmethod
     @abstractmethod

@@ -282,14 +282,10 @@ class TwoArguments(ErrorFunction):
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
         """Read ``{ table2 = { axes = ["X", "Z"], X = […], Z = […], values = [[…], …] } }``."""
-        empty = cls(span)
-        place: Path = (FORM,)
-        inner = raw[FORM]
-        named = cast("dict[str, object]", inner).get("axes") if isinstance(inner, dict) else None
-        axes = _axes(named, reader) if isinstance(inner, dict) else None
+        empty, place = cls(span), (FORM,)
+        inner = reader.dictionary(raw[FORM], place)
+        axes = None if reader.findings else _axes(inner.get("axes", MISSING), reader)
         if axes is None:
-            if not isinstance(inner, dict):
-                reader.note(place, "expected a table", inner)
             return empty
         known = ("axes", *axes, "values")
         reader.only(inner, place, known)
@@ -350,8 +346,7 @@ def _axes(raw: object, reader: ValueReader) -> tuple[str, str] | None:
     own = reader.axis
     names = list(cast("Sequence[object]", raw)) if isinstance(raw, list | tuple) else []
     if len(names) != 2 or not all(isinstance(name, str) for name in names):
-        expected = f'expected two names of axes, for instance ["{own or "X"}", "Z"]'
-        reader.note(place, "is missing" if raw is None else expected, ... if raw is None else raw)
+        reader.note(place, f'expected two names of axes, for instance ["{own or "X"}", "Z"]', raw)
         return None
     first, second = cast("list[str]", names)
     known = ", ".join(reader.axes)
