@@ -26,7 +26,7 @@ PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
 class Deviation:
     """One form deviation of one plane or line."""
 
-    keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit", "sure")
+    keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit")
     kind: str  # "flatness", "straightness" or "squareness"
     of: str  # "XY", "X in y", "X to Y"
     at: str  # where the other axes stand

@@ -192,8 +192,9 @@ def plain(value: Any) -> Any:
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
         names = keys or [entry.name for entry in fields(value)]
-        found = {name: plain(getattr(value, name)) for name in names}
-        return found | dict(found.pop("sure", {}))
+        found = {name: plain(getattr(value, name)) for name in names if name != "sure"}
+        sure = getattr(value, "sure", None)
+        return found | plain(sure) if isinstance(sure, Mapping) else found
     if isinstance(value, (list, tuple, set, frozenset)):
         return [plain(one) for one in value]
     return value

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Result, Watch, plain
+from warpspace.analysis.description import Result, Watch
 from warpspace.analysis.doubt import field_doubt, plus_minus
 from warpspace.analysis.line import Between
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
@@ -112,9 +112,6 @@ class DistanceResult(Result):
     is_squareness: bool
     title: str
     sure: Mapping[str, Any] = attribute(default_factory=dict[str, Any])  # U95 of what differs
-
-    def as_plain(self) -> dict[str, Any]:
-        return {**plain(self), **self.sure}
 
     def words(self) -> list[str]:
         """Say it in short: the distance, its parts, and the angle where there is one."""

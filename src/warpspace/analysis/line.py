@@ -88,7 +88,7 @@ class LineResult(Result):
     """Errors along a line."""
 
     keys = (
-        "length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad", "sure"
+        "length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad"
     )  # fmt: skip
     length_mm: float
     axes: Mapping[str, Array]  # [n], mm or degrees

@@ -88,7 +88,7 @@ class Reach(Analysis):
 class ReachResult(Result):
     """The part of a volume that keeps a limit."""
 
-    keys = ("limit_um", "percent", "box", "keeps_um", "sure")
+    keys = ("limit_um", "percent", "box", "keeps_um")
     limit_um: float
     percent: float  # of the volume
     box: Mapping[str, tuple[float, float]] | None  # axis ranges, mm or degrees

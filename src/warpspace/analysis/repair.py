@@ -31,7 +31,7 @@ FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
 class Best(Summary):
     """The whole volume with one error at its best value."""
 
-    keys: ClassVar[tuple[str, ...]] = ("value", *FOUR, "sure")
+    keys: ClassVar[tuple[str, ...]] = ("value", *FOUR)
     value: float  # µm or µrad; within its limit
 
 
@@ -39,7 +39,7 @@ class Best(Summary):
 class Effect:
     """One error alone: left out, or at its best value, with all others as they are."""
 
-    keys: ClassVar[tuple[str, ...]] = ("key", "unit", "present", "left_out", "best", "sure")
+    keys: ClassVar[tuple[str, ...]] = ("key", "unit", "present", "left_out", "best")
     key: str
     present: float  # µm or µrad
     left_out: Summary
@@ -59,7 +59,7 @@ class Effect:
 class AdjustedSet(Summary):
     """The best set of so many adjustments, and the whole volume with it."""
 
-    keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact", "sure")
+    keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact")
     adjust: Mapping[str, float]  # µm or µrad; new values by key
     # whether all sets of this size were compared; else the set was built up and improved by
     # swapping its members

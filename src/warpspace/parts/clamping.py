@@ -128,7 +128,7 @@ def _doubts(scene: Scene, mesh: PartMesh, place: Sequence[float]) -> list[FieldD
 class ClampResult(Result):
     """Places of a part, the best one, and what it gains."""
 
-    keys = ("places", "best", "present", "gain_um", "sure")
+    keys = ("places", "best", "present", "gain_um")
     places: list[Clamping]  # by some of the vertices, best first
     best: Clamping
     present: Clamping
