@@ -163,11 +163,13 @@ def write_result(
         from warpspace.scene.save import scene_files
 
         path, changes = Path(output), found.changes()
-        texts = found.texts(path.suffix.lower())
-        if not texts and not changes:
+        if texts := found.texts(path.suffix.lower()):
+            wrote = write_texts(texts, path, force=force)
+        elif changes:
+            _, *beside = write_texts(scene_files(changes[-1].scene, path.stem), path, force=force)
+            wrote = [output, *beside]
+        else:
             raise OptionError(f"-o {output}: {found.no_change}, so no scene is written")
-        texts = texts or scene_files(changes[-1].scene, path.stem)
-        wrote = write_texts(texts, path, force=force)
     if csv_path is not None:
         table = found.file_table()
         rows = () if table is None else table.csv_rows()
