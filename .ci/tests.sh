@@ -15,7 +15,11 @@ $python -m pytest -n 2 --dist worksteal -m "not browser and not nightly" --durat
     failed+=("tests without a browser")
 .venv/bin/pyright >"$types" 2>&1 &
 pyright=$!
-$python -m pytest -m "browser and not nightly" --durations=25 "$@" || failed+=("journeys in a browser")
+# only what asks for a browser, or a fixture that opens one, is imported: the others take 15 s
+opens='^(def .*\b|    (\w+, )*)(browser|page|tab|open_tab)(,|\)|$)'
+mapfile -t journeys < <(grep -rlE "$opens" tests --include='test_*.py')
+$python -m pytest -m "browser and not nightly" "${journeys[@]}" --durations=25 "$@" ||
+    failed+=("journeys in a browser")
 wait "$pyright" || failed+=("pyright")
 cat "$types"
 

@@ -173,7 +173,7 @@ def test_residuals_beyond_their_stated_uncertainty_are_said():
 
 def test_a_scale_of_the_tracker_makes_the_links_of_a_robot_as_unsure():
     """±0.5 K of steel, rectangular: 3.32 µm/m, on the upper arm of 612 mm 2.03 µm."""
-    readings = read_readings("fit_600.csv", UR10)
+    readings = parse_readings("\n".join(FIT.splitlines()[:201]), "robot.csv", UR10)
     kept = tuple(one for one in TRACKER.contributions if one.acts != "scale")
     whole, less = (
         calibrate(UR10, [readings], Calibrate(instrument=one))
