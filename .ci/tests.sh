@@ -15,7 +15,10 @@ $python -m pytest -n 2 --dist worksteal -m "not browser and not nightly" --durat
     failed+=("tests without a browser")
 .venv/bin/pyright >"$types" 2>&1 &
 pyright=$!
-$python -m pytest -m "browser and not nightly" --durations=25 "$@" || failed+=("journeys in a browser")
+# only files that name a browser, or a fixture of a conftest.py that opens one, are imported
+mapfile -t journeys < <(grep -rlwE 'browser|page|tab|open_tab' tests --include='test_*.py')
+$python -m pytest -m "browser and not nightly" "${journeys[@]}" --durations=25 "$@" ||
+    failed+=("journeys in a browser")
 wait "$pyright" || failed+=("pyright")
 cat "$types"
 

@@ -2,6 +2,7 @@
 
 import logging
 import os
+import re
 import sys
 import time
 import zlib
@@ -31,6 +32,7 @@ hypothesis.settings.register_profile("local", deadline=None)
 hypothesis.settings.register_profile("ci", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("ci" if IN_CI else "local")
 
+NAMES_A_BROWSER = re.compile(r"\b(browser|page|tab|open_tab)\b")  # as .ci/tests.sh looks for them
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # Software WebGL, the page around it put together without it, and no calls home.
 CHROMIUM_ARGS = (
@@ -129,6 +131,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
             item.add_marker("browser")
+            if not NAMES_A_BROWSER.search(item.path.read_text("utf-8")):
+                words = "names no browser, page, tab or open_tab: .ci/tests.sh would not find it"
+                raise pytest.UsageError(f"{item.path}: {words}")
     if config.getoption("--minutes") is not None:
         day = datetime.now(UTC).date()
         items.sort(key=lambda item: zlib.crc32(f"{day} {item.path.name}".encode()))

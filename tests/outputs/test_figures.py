@@ -106,7 +106,7 @@ def test_corner_labels_of_every_scene_keep_apart(name):
 
 @pytest.mark.parametrize("form", ["png", "svg", "pdf"])
 def test_repeated_pictures_are_the_same_bytes(form):
-    settings = FigureSettings(size=(800, 600))
+    settings = FigureSettings(size=(800, 600), grid=5)
     scene = load_scene("dvf5000_first")
     assert render_figure("error-map", [scene], settings, form) == render_figure(
         "error-map", [scene], settings, form
@@ -126,7 +126,7 @@ def test_files_say_what_they_show():
 
 def test_vector_formats_embed_fonts_and_carry_no_date():
     scene = load_scene("dvf5000_first")
-    settings = FigureSettings(size=(800, 600))
+    settings = FigureSettings(size=(800, 600), grid=5)
     pdf = render_figure("error-map", [scene], settings, "pdf")
     assert b"/FontFile2" in pdf
     assert b"DejaVuSans" in pdf

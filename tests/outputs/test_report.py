@@ -105,12 +105,12 @@ def test_difference_of_two_scenes_is_taken_as_vectors():
 
 @pytest.fixture(scope="module")
 def both(renderer):
-    scenes = [load_scene("dvf5000_first"), load_scene("dvf5000_second")]
+    hostile = replace(load_scene("dvf5000_first"), title=TITLE, name="<b>")
     other = [load_scene("machine_printer_3d")]
     return build_report(
-        scenes,
-        replace(FAST, author="A. Engineer", questions=(TITLE,)),
-        embed=lambda scene, **_: f"<p>{scene.title}</p>",
+        [hostile, load_scene("dvf5000_second")],
+        replace(FAST, author=TITLE, questions=(TITLE,)),
+        embed=lambda scene, **_: f"<p>{scene.machine.title}</p>",
         concepts=other,
     )
 
@@ -126,7 +126,7 @@ def test_every_part_is_there(both):
     assert isinstance(first[0], Text)
     assert isinstance(first[1], Table)
     assert Items((TITLE,)) in first
-    assert "by A. Engineer" in both.facts
+    assert f"by {TITLE}" in both.facts
     tables = [b for s in both.sections for b in s.blocks if isinstance(b, Table)]
     for table in tables:
         assert all(len(row) == len(table.columns) for row in table.rows)
@@ -152,9 +152,8 @@ def test_concepts_have_the_numbers_of_the_command(both):
 
 
 @pytest.mark.render
-def test_page_points_nowhere_and_escapes(renderer):
-    scene = replace(load_scene("dvf5000_first"), title=TITLE, name="<b>")
-    page = render_html(build_report([scene], replace(FAST, author=TITLE, questions=(TITLE,))))
+def test_page_points_nowhere_and_escapes(both):
+    page = render_html(both)
     assert "<script>window" not in page
     assert "<img src=x" not in page
     outer = re.sub(r'(src|srcdoc)="[^"]*"', "", page)
@@ -200,7 +199,8 @@ def test_pdf_repeats_and_says_everything(renderer, tmp_path, monkeypatch):
 def test_other_loops_and_scenes_without_tolerances(loop, renderer, tmp_path):
     path = tmp_path / "bare.toml"
     path.write_text('title = "bare"\nmachine = "dvf5000"\n[errors]\nEXC = 4.0\n')
-    report = build_report([load_scene(path)], replace(FAST, loop=loop))
+    report = build_report([load_scene(path)], replace(FAST, loop=loop), form="pdf")
+    assert render_pdf(report).startswith(b"%PDF-")
     notes = [b.text for s in report.sections for b in s.blocks if isinstance(b, Text)]
     assert any("no tolerances" in note for note in notes)
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from products import first
 from warpspace import load_scene
 from warpspace.analysis.reviewing import note_numbers, said_stale
 from warpspace.exceptions import OptionError, SceneError
@@ -26,7 +27,6 @@ from warpspace.scene.notes import (
 )
 from warpspace.scene.save import scene_to_toml
 
-HISTORIES = 1000
 BEGAN = datetime(2026, 11, 22, 10, tzinfo=UTC)
 SCENE = load_scene("dvf5000_first")
 
@@ -67,8 +67,9 @@ class History:
         return with_note(notes, edited)
 
 
-def test_merging_loses_nothing_and_gives_the_same_in_any_order():
-    for seed in range(HISTORIES):
+@pytest.mark.parametrize("histories", first(200, 1000))
+def test_merging_loses_nothing_and_gives_the_same_in_any_order(histories):
+    for seed in range(histories):
         history = History(seed)
         merged = merge_notes(*history.copies)
         left = {one: text for one, text in history.said.items() if one not in history.replaced}

@@ -112,7 +112,6 @@ def survives(scene, sent):
     assert steps.state == state
 
 
-@settings(max_examples=300)
 @given(events())
 def test_any_state_comes_back_from_link_file_and_undo(drawn):
     survives(*drawn)

@@ -22,9 +22,9 @@ NGINX = pytest.mark.skipif(not nginx_is_there(), reason="needs nginx and openssl
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        ("files", 200),
-        ("scenes", 200),
-        ("kills", 15),
+        ("files", 100),
+        ("scenes", 100),
+        ("kills", 8),
         pytest.param("messages", 3000, marks=NIGHTLY),
         pytest.param("surroundings", 8, marks=NIGHTLY),
         pytest.param("soak", 1, marks=NIGHTLY),

@@ -67,7 +67,7 @@ def test_the_zone_is_the_narrowest():
 def test_of_an_error_that_grows_along_x_the_reach_is_its_share_of_the_range():
     # |E| = |s·q| ≤ limit for |q| ≤ limit/s: limit 13.75 µm of 27.5 µm at the ends is half of X
     scene = with_errors(EXX=Poly(X, (0.0, 0.1)))
-    found = Reach(limit_um=13.75, nodes=41).run(scene, silent)
+    found = Reach(limit_um=13.75, nodes=21).run(scene, silent)
     assert found.percent == pytest.approx(50.0, abs=1.5)
     assert found.box["X"] == pytest.approx((-137.5, 137.5), abs=1e-6)
     assert found.box["Y"] == pytest.approx(Y)

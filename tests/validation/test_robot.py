@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from products import first
 from warpspace import evaluate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.instruments import load_instrument
@@ -145,7 +146,7 @@ def planted_points(scatter_um, session="", stated_um="", seed=0, count=40):
     return parse_readings("\n".join(rows), "planted.csv", NOMINAL, "points")
 
 
-@pytest.mark.parametrize("session", ["", "new"])
+@pytest.mark.parametrize("session", first("new", ""))
 def test_95_percent_of_planted_readings_lie_inside_the_intervals_stated_for_them(session):
     """Also where the predicted readings place their own set-up, which fits them in part."""
     shares = []
@@ -172,7 +173,7 @@ def test_residuals_beyond_their_stated_uncertainty_are_said():
 
 def test_a_scale_of_the_tracker_makes_the_links_of_a_robot_as_unsure():
     """±0.5 K of steel, rectangular: 3.32 µm/m, on the upper arm of 612 mm 2.03 µm."""
-    readings = read_readings("fit_600.csv", UR10)
+    readings = parse_readings("\n".join(FIT.splitlines()[:201]), "robot.csv", UR10)
     kept = tuple(one for one in TRACKER.contributions if one.acts != "scale")
     whole, less = (
         calibrate(UR10, [readings], Calibrate(instrument=one))

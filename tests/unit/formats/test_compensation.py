@@ -274,7 +274,8 @@ def test_a_machine_without_errors_has_nothing_to_correct(form, name):
 )
 def test_a_part_on_a_moving_bed_is_corrected_where_it_has_its_shape(name, asked, left_um):
     text = 'title = "p"\nmachine = "printer_3d"\n[errors]\nEC0Y = 1000\n'
-    found = corrected(replace(parse_scene(text, "p"), placed=asked), name, stem="p")
+    scene = replace(parse_scene(text, "p"), placed=asked)
+    found = corrected(scene, name, 3 if asked else None, stem="p")
     assert 43.0 < found.before_statistics.rms_um < 46.0
     assert found.after_statistics.rms_um < left_um
     assert found.assumed[-1].startswith("a part is judged by its shape")
@@ -295,7 +296,8 @@ ONE_HELD = BOTH_HELD | {"linuxcnc-comp", "heidenhain"}
 
 
 def table(scene, name):
-    return corrected(scene, name, 5 if not WRITTEN[name].grid.startswith("none") else None)
+    points = None if WRITTEN[name].grid.startswith("none") else 3
+    return corrected(scene, name, points, 5)  # what they hold here is linear
 
 
 def looking(scene, direction):
