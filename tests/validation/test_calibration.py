@@ -281,6 +281,20 @@ def test_what_looks_alike_is_said():
     assert not rank.is_identifiable("EC0B")
 
 
+def test_poses_at_the_ends_of_the_travel_are_proposed():
+    scene = load_scene("machine_trunnion_bc")
+    names = [one.name for one in candidates(scene) if one.name.startswith("sphere, TCP on: B")]
+    # B at ±90° brings a linear axis to an end of its travel, but for rounding
+    assert "B at -90, -60, -30, 0, 30, 60, 90°" in names[0]
+
+
+def test_lengths_to_stations_are_no_centres_of_a_sphere(tmp_path):
+    path = tmp_path / "lengths.csv"
+    rows = [f"{turn},{turn},0,0,{100 + turn}\n" for turn in range(8)]
+    path.write_text("c_deg,x_mm,y_mm,z_mm,length_mm\n" + "".join(rows), encoding="utf-8")
+    assert read_readings(str(path), load_scene("dvf5000_nominal")).kind == "lengths"
+
+
 @pytest.mark.parametrize("instrument", ["tracker", "ball bar", "probe", "sphere"])
 def test_predicted_covariance_of_the_next_measurement_is_the_one_obtained(instrument):
     """What an instrument reads and what its set-up leaves open: the promise is what a fit gives."""

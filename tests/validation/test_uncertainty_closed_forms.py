@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2, norm, t
 
-from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt
-from warpspace.analysis.machines import Machines
+from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt, volume_doubt
 from warpspace.analysis.repair import Repair
 from warpspace.analysis.trust import Trust
 from warpspace.bench.base import run_test
@@ -133,8 +132,10 @@ def test_a_test_is_as_sure_as_the_squareness_it_shows():
 def test_machines_drawn_move_together():
     # all of it is one number t: E = (3 + 2·t, 4 − 1.5·t) µm, so that |E|² = 25 + 6.25·t²
     scene = parse_scene(TWO.format(between=-2.999999, second=2.25), "s")
-    found = Machines(source="uncertainty", samples=20_000, over="max").run(scene, lambda _: None)
-    assert found.p95_um == pytest.approx(math.sqrt(25 + 6.25 * norm.ppf(0.975) ** 2), rel=0.01)
+    norm_um = np.concatenate([*volume_doubt(scene, scene.view(), 2).machines(20_000, 0)])
+    assert np.quantile(norm_um.max(axis=1), 0.95) == pytest.approx(
+        math.sqrt(25 + 6.25 * norm.ppf(0.975) ** 2), rel=0.01
+    )
 
 
 MIXED = (

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.analysis.doubt import coverage_factor
-from warpspace.bench.placing import PLANES, ball_point
+from warpspace.bench.placing import PLANES, ball_point, within_travel
 from warpspace.calibration import solve
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
 from warpspace.calibration.readings import Readings
@@ -130,19 +130,13 @@ def _spheres(scene: Scene) -> Iterator[Candidate]:
                     held = f" at {other} {turn:g}°"
                 at, target = _complete(scene, place), np.repeat(centre, len(turns[name]), axis=0)
                 with suppress(SceneError):
-                    at = _reached(scene, solve_linear(scene, at, target, ""))
+                    at = solve_linear(scene, at, target, "")
+                    inside = within_travel(scene.machine, at)
+                    at = {axis: values[inside] for axis, values in at.items()}
                     if (count := len(at[name])) > 1:
                         spelled = ", ".join(f"{value:g}" for value in at[name])
                         title = f"sphere, TCP on: {name} at {spelled}°{held}"
                         yield Candidate(title, _nominal(scene, "sphere-tcp", at, target[:count]))
-
-
-def _reached(scene: Scene, at: Mapping[str, Array]) -> dict[str, Array]:
-    inside = np.ones(max(map(len, at.values())), dtype=bool)
-    for name, axis in scene.machine.axes.items():
-        if axis.is_linear:
-            inside &= (at[name] >= axis.travel[0]) & (at[name] <= axis.travel[1])
-    return {name: values[inside] for name, values in at.items()}
 
 
 MINUTES = {

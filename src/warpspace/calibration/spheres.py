@@ -130,7 +130,8 @@ def rotary_axes(scene: Scene) -> tuple[str, ...]:
 
 def has_centres(table: ReadingTable, scene: Scene) -> bool:
     rotary = {f"{name.lower()}_deg" for name in rotary_axes(scene)}
-    return set(READ) <= set(table.columns) and bool(rotary & set(table.columns))
+    there = set(table.columns)
+    return set(READ) <= there and bool(rotary & there) and "length_mm" not in there
 
 
 def spread_mm(table: ReadingTable) -> float:
