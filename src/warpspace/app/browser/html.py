@@ -141,13 +141,13 @@ def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False
     )  # fmt: skip
 
 
-def slider(name: str, value: float, low: float, high: float, step: float, *,
+def slider(name: str, value: float | str, low: float, high: float, step: float, *,
            label: str = "", twin: str = "", text: str = "") -> Markup:  # fmt: skip
     """Give a slider; `twin` is the name of the number box that digits typed on it go into."""
     return _input(
         type="range", id=None if not label else ident(name) + "-slider", class_="ws-slider",
         min=f"{low:g}", max=f"{high:g}", step=f"{step:g}",
-        value=f"{value:.10g}", data_set=name,
+        value=value if isinstance(value, str) else f"{value:.10g}", data_set=name,
         data_twin=ident(twin) if twin else None, aria_label=label or None,
         aria_valuetext=text or None,
     )  # fmt: skip

@@ -1,11 +1,13 @@
 """What is drawn on and around the box: axes, traces, paths, arrows, markers."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.drawing.box import coloured_shape
-from warpspace.app.drawing.colours import colour, colour_levels, level_colours
-from warpspace.app.drawing.labels import TICK, axes, axis_labels, point_labels
+from warpspace.app.drawing.colours import Rgb, colour, colour_levels, level_colours
+from warpspace.app.drawing.labels import TICK, Axis, axes, axis_labels, point_labels
 from warpspace.app.drawing.shapes import (
     SCENE_PER_MM,
     Shape,
@@ -57,10 +59,15 @@ def around(picture: LivePicture) -> Shapes:
 def _axes(picture: LivePicture) -> Shapes:
     if not picture.state.shown.axes or picture.state.machine.shown:
         return {}
-    of, tick = axes(picture), TICK * picture.size_mm
+    tick, rgb = TICK * picture.size_mm, colour(picture, "axis")
+    return {"/axes/lines": _axis_lines(axes(picture), tick, rgb)}
+
+
+@lru_cache(maxsize=32)
+def _axis_lines(of: tuple[Axis, ...], tick: float, rgb: Rgb) -> Shape | None:
     pieces = [axis.ends_mm for axis in of]
     pieces += [np.stack([at, at + tick * axis.out]) for axis in of for _, at in axis.ticks]
-    return {"/axes/lines": lines(np.stack(pieces), colour(picture, "axis"), 1.2)}
+    return lines(np.stack(pieces), rgb, 1.2)
 
 
 def _traces(picture: LivePicture) -> Shapes:

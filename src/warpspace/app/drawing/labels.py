@@ -108,8 +108,13 @@ def axis_labels(picture: LivePicture) -> list[Label]:
     state = picture.state
     if not state.shown.axes or state.machine.shown:  # their numbers would cover the machine
         return []
-    found, tick = list[Label](), TICK * picture.size_mm
-    for k, axis in enumerate(axes(picture)):
+    return _axis_labels(axes(picture), TICK * picture.size_mm)
+
+
+@lru_cache(maxsize=32)
+def _axis_labels(of: tuple[Axis, ...], tick: float) -> list[Label]:
+    found: list[Label] = []
+    for k, axis in enumerate(of):
         found += [Label(text, at + tick * axis.out, "tick", at, k) for text, at in axis.ticks]
         middle = axis.ends_mm.mean(axis=0)
         found.append(Label(f"{axis.name} [mm]", middle + tick * axis.out, "axis", middle, k))

@@ -56,6 +56,7 @@ class Display:
         self.layers: tuple[BoxLayer | MovingLayer, ...] = ()
         self.parts: dict[str, Part] = {}
         self._shown: dict[Part, object] = {}
+        self._following: list[Part] = []
         self._often: dict[Part, tuple[float, object]] = {}
         self._waiting: deque[Part] = deque()
         self._noted_at = 0.0
@@ -72,6 +73,7 @@ class Display:
         """Add what has just been built, and write its pieces."""
         self.layers = (*self.layers, *layers)
         self.parts |= {part.name: part for part in parts}
+        self._following = [p for p in self.parts.values() if p.follows in ("at once", "often")]
         self._write(parts, picture)
         self._note(picture)
 
@@ -81,7 +83,11 @@ class Display:
             layer.show(picture)
         if anew:
             self._shown.clear()
-        self._write([p for p in self.parts.values() if self._is_due(p, picture)], picture)
+        # what is in sight changes with what is open on the page
+        known = self._context.shown
+        same = known is not None and known.state.page is picture.state.page and not anew
+        parts = self._following if same else self.parts.values()
+        self._write([one for one in parts if self._is_due(one, picture)], picture)
         self._note(picture)
 
     def _is_due(self, part: Part, picture: LivePicture) -> bool:

@@ -275,6 +275,7 @@ class ErrorsPart(Part):
         self._used: tuple[str, ...] = ()
         self._largest = 1.0
         self._spans: dict[str, Span] = {}
+        self._listed: object = None  # what the list was written for
         self._made: Mapping[str, float] = {}  # amplitudes that the rows were written with
         self._made_for: tuple[object, ...] = ()
 
@@ -290,7 +291,10 @@ class ErrorsPart(Part):
         if sorted_for != self._sorted_for or changed - self._own:
             self._sort(state)
             self._sorted_for, self._sorted_at, self._own = sorted_for, state.amplitudes, set()
-        return {**self._list(state), **self._rows(state)}
+        listed = (self._order, self._used, state.page, state.exclusions, bool(state.changed_keys))
+        found = {} if listed == self._listed else self._list(state)
+        self._listed = listed
+        return {**found, **self._rows(state)}
 
     def _effect(self, state: AppState, key: str) -> float:
         return self._gains.get(key, 0.0) * abs(state.amplitudes[key])
@@ -396,24 +400,34 @@ def _row(
     row: Parameter, value: float, span: Span, effect: float, share: float, hint: str, *,
     active: bool,
 ) -> Markup:  # fmt: skip
-    key, name, text = row.key, f"errors:set.{row.key}", _shown(value)
+    html = _row_template(row, span, hint, active).format(
+        effect=number(effect) if active else "–", share=f"{100.0 * share:.1f}",
+        value=f"{value:.10g}", typed=spell_typed(value), text=_shown(value),
+    )  # fmt: skip
+    return Markup(html)  # noqa: S704 - escaped there
+
+
+@lru_cache(maxsize=128)
+def _row_template(row: Parameter, span: Span, hint: str, active: bool) -> str:
+    key, name, text = row.key, f"errors:set.{row.key}", Markup("{text}")
+    hint = f"{row.name}: {hint}. Drag, or type a number.".replace("{", "{{").replace("}", "}}")
     head = fill(
         '<div class="{kind}" id="ws-error-{key}" data-do="errors:row" data-value="{key}"'
         ' title="{symbol}, {words}: {of}"><span>{effect} µm</span><b>{key}</b> {words}</div>',
         kind="ws-error-head" if active else "ws-error-head off", key=key, symbol=row.symbol,
-        of=row.kind.value, words=row.name, effect=number(effect) if active else "–",
+        of=row.kind.value, words=row.name, effect=Markup("{effect}"),
     )  # fmt: skip
-    return head + fill(
+    body = fill(
         '<div class="ws-effect"><i style="width:{share}%"></i></div>'
         '<div class="ws-error-set" title="{hint}">{slider}'
         '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
         ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
-        share=f"{100.0 * share:.1f}", key=key, name=name, typed=spell_typed(value), text=text,
-        hint=f"{row.name}: {hint}. Drag, or type a number.",
-        slider=slider(name, value, span.low, span.high, span.step, twin=f"box-{key}",
+        share=Markup("{share}"), key=key, name=name, typed=Markup("{typed}"), text=text, hint=hint,
+        slider=slider(name, "{value}", span.low, span.high, span.step, twin=f"box-{key}",
                       label=f"{key} {row.name}", text=f"{text} {row.unit}"),
         unit=row.unit,
     )  # fmt: skip
+    return f"{head}{body}"
 
 
 def _shown(value: float) -> str:

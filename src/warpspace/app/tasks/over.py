@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.budget import pick
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
 from warpspace.app.tasks.design import allowed_words
 from warpspace.app.tasks.parts import Context, Part
 from warpspace.geometry.surfaces import corners
@@ -122,7 +124,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
     isolines = look.isolines and look.surface != "grid"
     bounds = [one.grid.bounds_mm for one in picture.slices]
     return {
-        "axes": list(map(_word, axis_labels(picture))),
+        "axes": _words(Identity(axis_labels(picture))),
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
              "way": [float(k == i) * way for i in range(3)]}
@@ -151,6 +153,11 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
 
 def _scene(point_mm: Array) -> list[float]:
     return [round(value * SCENE_PER_MM, 4) for value in point_mm.tolist()]
+
+
+@lru_cache(maxsize=32)
+def _words(labels: Identity) -> list[dict[str, Any]]:
+    return list(map(_word, labels.thing))
 
 
 def _word(label: Label) -> dict[str, Any]:
