@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+import tomli_w
 
 from golden.running import run_refused
 from offline import EVIL, opened_offline, wait_for_the_map
@@ -20,6 +21,7 @@ from warpspace.exceptions import NoRendererError, RenderError
 from warpspace.outputs.report import ReportSettings, build_report, sections, write_report
 from warpspace.outputs.report.render import Embedded, Items, Table, Text, render_html, render_pdf
 from warpspace.outputs.report.review import build_review, first_page
+from warpspace.scene.library import parse_scene
 
 FAST = ReportSettings(grid=5, samples=2000, spec_um=50.0)
 TITLE = f"{EVIL}#*_$[]"
@@ -56,6 +58,24 @@ def test_the_limit_is_that_of_the_scene_unless_another_is_given():
     assert "Nothing to adjust: the limit is kept." in text
     assert shares == [1.0]
     assert "The limit of 50 µm is missed" in page_one(scene)[0]
+
+
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        (4.0, "The limit of 4 µm is missed"),
+        (4.9, "It cannot be told whether the limit of 4.9 µm is kept"),
+        (6.0, "The limit of 6 µm is kept"),
+    ],
+)
+def test_a_verdict_is_given_where_it_holds_with_95_percent(limit, said):
+    # the largest error is 5 µm, u 0.3: 4.9 is a third of u away, the others more than three
+    own = {"errors": {"EXX": 5.0}, "uncertainty": {"EXX": 0.3}}
+    ranges = {"X": [-275, 275], "Y": [-225, 225], "Z": [-480, -80]}
+    text = tomli_w.dumps({"machine": "dvf5000", "workspace": ranges, **own})
+    words, _ = page_one(parse_scene(text, "s"), spec_um=limit)
+    assert said in words
+    assert "'max', '5.0 ± 0.60 µm'" in words
 
 
 def test_verdict_without_a_limit_and_on_a_perfect_machine():

@@ -11,6 +11,7 @@ from warpspace.analysis.cases import LIMIT_OVER, Over, Plan
 from warpspace.analysis.contributions import Explanation, Shares, explain
 from warpspace.analysis.description import Analysis, Result, silent
 from warpspace.analysis.distribution import choose_distribution
+from warpspace.analysis.doubt import SURE, FieldDoubt, volume_doubt
 from warpspace.analysis.gains import Gains
 from warpspace.analysis.machines import Machines
 from warpspace.analysis.repair import Repair, RepairResult
@@ -22,7 +23,7 @@ from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.report.render import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
-from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r
+from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r, u95_behind
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import spell, spell_short, spell_signed
 
@@ -77,6 +78,7 @@ class Reviewed:
     results: Mapping[str, Result | str]  # of each analysis; why there is none
     within: float  # share of the volume within the limit; 0 where there is none
     advice: str  # the one thing to do
+    sure: FieldDoubt | None  # how sure its errors are
 
     @property
     def keeps(self) -> bool:
@@ -90,7 +92,23 @@ class Reviewed:
 
     @property
     def statistics(self) -> Statistics:
-        return self.picture.statistics
+        found = self.picture.statistics
+        return self.sure.said_of(found) if self.sure else found
+
+    @property
+    def largest(self) -> str:
+        found = self.statistics
+        return f"{spell(found.max_um)}{_behind(found, 'max_um')}{UM} at {self.worst_axes}"
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the limit is kept, or missed, with enough probability (ISO 14253-1)."""
+        found, limit = self.statistics, self.scene.limit_um
+        u95 = found.sure.get("u95_max_um")
+        if self.sure is None or u95 is None or limit is None:
+            return True
+        kept = float(self.sure.doubt.within(found.max_um, u95, -np.inf, limit))
+        return not 1.0 - SURE < kept < SURE
 
     @property
     def worst_axes(self) -> str:
@@ -163,7 +181,12 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
         results,
         _within(picture),
         _advice(picture, results["advice"], settings),
+        volume_doubt(scene, picture.view, settings.grid),
     )
+
+
+def _behind(found: Statistics, name: str) -> str:
+    return u95_behind(found.sure[f"u95_{name}"]) if found.sure else ""
 
 
 def _within(picture: ScenePicture) -> float:
@@ -214,13 +237,15 @@ def verdict(review: Review) -> str:
 
 
 def _verdict_on(one: Reviewed) -> str:
-    limit, largest = one.scene.limit_um, one.statistics.max_um
-    worst = f"{spell(largest)}{UM} at {one.worst_axes}"
+    limit, largest, worst = one.scene.limit_um, one.statistics.max_um, one.largest
     volume = f"the working volume of {one.volume}"
     if largest == 0.0:
         return f"The error is zero in {volume}."
     if limit is None:
         return f"No limit is set. The largest error in {volume} is {worst}."
+    if not one.is_told:
+        words = f"It cannot be told whether the limit of {spell_short(limit)}{UM} is kept"
+        return f"{words} in {volume}: the largest error is {worst}."
     words = f"The limit of {spell_short(limit)}{UM} is"
     if one.keeps:
         return f"{words} kept in {volume}: the largest error is {worst}."
@@ -262,8 +287,8 @@ def first_page(review: Review, picture: Block) -> list[Block]:
     rows: list[list[str]] = []
     for one in review.scenes:
         found = one.statistics
-        numbers = (found.mean_um, found.p95_um, found.max_um, found.rms_um)
-        rows.append([spell(value) + UM for value in numbers])
+        numbers = ("mean_um", "p95_um", "max_um", "rms_um")
+        rows.append([spell(getattr(found, of)) + _behind(found, of) + UM for of in numbers])
         if limited:
             rows[-1][-1] = volume_share(one.within) if one.scene.limit_um is not None else "–"
     names.append("within the limit" if limited else "RMS")

@@ -16,6 +16,7 @@ from warpspace.analysis.blocks import Block as AnyBlock
 from warpspace.analysis.concepts import Concepts
 from warpspace.analysis.description import Result, silent
 from warpspace.analysis.distribution import choose_distribution
+from warpspace.analysis.doubt import u95_lines
 from warpspace.analysis.reviewing import notes_table
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
@@ -333,6 +334,8 @@ def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterat
     yield Text("Each node counts for its share of the volume.")
     blocks = statistics_blocks(review.scenes[0].scene, names, found)
     yield from said(block for block in blocks if not str(block).startswith("  --at"))
+    for one in review.scenes:
+        yield from said(u95_lines(one.sure and one.sure.doubt, {one.letter: one.statistics}))
     for number, reviewed in enumerate(review.scenes):
         if embed is not None:
             page = embed(
