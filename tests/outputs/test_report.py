@@ -75,7 +75,7 @@ def test_a_verdict_is_given_where_it_holds_with_95_percent(limit, said):
     text = tomli_w.dumps({"machine": "dvf5000", "workspace": ranges, **own})
     words, _ = page_one(parse_scene(text, "s"), spec_um=limit)
     assert said in words
-    assert "'max', '5.0 ± 0.60 µm'" in words
+    assert "'max', '5.00 ± 0.6 µm'" in words
 
 
 def test_verdict_without_a_limit_and_on_a_perfect_machine():
