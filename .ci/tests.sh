@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Run the tests, on two workers: first those without a browser, then the journeys in a browser and
-# beside them pyright, since journeys wait for pages and leave the cores idle. All parts always run, and
+# Run the tests: first those without a browser, on two workers, then the journeys in a browser one by
+# one and beside them pyright, since a journey leaves half of two cores idle (two journeys at a time
+# run into their time limits where a machine is slow). All parts always run, and
 # those that failed are named last. What takes long (full products of parameters, a hundred kills,
 # every detail of a page) is `make nightly`. Arguments go to both runs of pytest.
 set -u
@@ -17,7 +18,7 @@ $python -m pytest -n 2 --dist worksteal -m "not browser and not nightly" --durat
 pyright=$!
 # only files that name a browser, or a fixture of a conftest.py that opens one, are imported
 mapfile -t journeys < <(grep -rlwE 'browser|page|tab|open_tab' tests --include='test_*.py')
-$python -m pytest -n 2 --dist worksteal -m "browser and not nightly" "${journeys[@]}" --durations=25 "$@" ||
+$python -m pytest -m "browser and not nightly" "${journeys[@]}" --durations=25 "$@" ||
     failed+=("journeys in a browser")
 wait "$pyright" || failed+=("pyright")
 cat "$types"
