@@ -398,9 +398,15 @@ def field_doubt(
     shares: Array | None = None,
 ) -> FieldDoubt | None:
     """Say how sure a field of a scene is; None where the scene says nothing of that."""
-    if (doubt := find_doubt(scene, view.loop)) is None:
-        return None
-    basis = doubt.respond(scene.model, at, view, point_mm)
+    doubt = find_doubt(scene, view.loop)
+    return doubt and _field_doubt(doubt, scene.model, error_um, at, view, point_mm, shares)
+
+
+def _field_doubt(
+    doubt: Doubt, model: Model, error_um: Array, at: Coordinates, view: View,
+    point_mm: Array | None, shares: Array | None = None,
+) -> FieldDoubt:  # fmt: skip
+    basis = doubt.respond(model, at, view, point_mm)
     return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
 
 
@@ -408,14 +414,14 @@ def u95_columns(
     scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
 ) -> dict[str, Array]:
     """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
-    shape, found = field.norm_um.shape, dict[str, Array]()
+    shape, found, doubt = field.norm_um.shape, dict[str, Array](), find_doubt(scene, view.loop)
+    if doubt is None or not doubt.is_known:
+        return found
     point_mm = None if point_mm is None else np.broadcast_to(point_mm, (*shape, 3))
     for piece in pieces(shape):
         here = {name: cut(np.asarray(values), piece) for name, values in at.items()}
         point = None if point_mm is None else point_mm[piece]
-        one = field_doubt(scene, field.error_um[piece], here, view, point)
-        if one is None or not one.doubt.is_known:
-            break
+        one = _field_doubt(doubt, scene.model, field.error_um[piece], here, view, point)
         for name, values in one.columns.items():
             whole = found.setdefault(name, np.empty(shape + values.shape[len(shape) :]))
             whole[piece] = values

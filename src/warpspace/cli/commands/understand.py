@@ -90,13 +90,15 @@ def field(
         places = axes if nodes is None else None
         said = {} if exact else options.say_second_order(second_order(loaded, loop, at=places))
         even = statistics(result, axes)
+        u95 = {}
         if nodes is None:
-            over, summary, where = field_doubt(loaded, result.error_um, axes, view), even, None
+            over, summary = field_doubt(loaded, result.error_um, axes, view), even
+            u95 = over.columns if over and over.doubt.is_known else {}
         else:
             over = volume_doubt(loaded, view, max(nodes.shape))
-            summary, where = volume_statistics(result, nodes), nodes.point_mm
-        shown = bool(points or files or as_json)
-        u95 = u95_columns(loaded, result, axes, view, where) if shown else {}
+            summary = volume_statistics(result, nodes)
+            if files or as_json:
+                u95 = u95_columns(loaded, result, axes, view, nodes.point_mm)
         summary = over.said_of(summary) if over else summary
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
