@@ -41,7 +41,7 @@ from websockets.asyncio.server import ServerConnection
 from warpspace.app.browser.page import page_script
 from warpspace.app.browser.viser_private import send_script_to_all
 from warpspace.app.drawing.shapes import light_scene
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state

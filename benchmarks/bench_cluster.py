@@ -10,10 +10,10 @@ import pickle
 import time
 
 import warpspace
-from warpspace.analysis.cases import BLOCK, MOST_BLOCKS, Case, Plan, sample_blocks
-from warpspace.analysis.machines import sweep
-from warpspace.analysis.montecarlo import montecarlo_each
-from warpspace.analysis.sampled import scene_draws
+from warpspace.analysis.commands.montecarlo import sweep
+from warpspace.analysis.sampling.cases import BLOCK, MOST_BLOCKS, Case, Plan, sample_blocks
+from warpspace.analysis.sampling.machine_sampling import montecarlo_each
+from warpspace.analysis.sampling.sampling_options import scene_draws
 
 TRILLION = 10**12
 FLEET = 100_000

@@ -11,7 +11,7 @@ from timing import Cost, commands_in_turns, in_turns
 from warpspace import load_scene
 from warpspace.outputs.drawing.settings import FigureSettings
 from warpspace.outputs.exports.meshes import to_pyvista
-from warpspace.outputs.save import render_figure
+from warpspace.outputs.figure_files import render_figure
 
 PICTURES = 40
 BARE = """

@@ -7,8 +7,8 @@ from table import Growth, Row, Section
 from timing import best, in_turns
 
 from warpspace import load_scene
-from warpspace.analysis.doubt import volume_doubt
 from warpspace.analysis.statistics import volume_statistics
+from warpspace.analysis.uncertainty.propagation import volume_doubt
 from warpspace.field.evaluate import ErrorBasis, amplitudes_of
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop

@@ -6,10 +6,10 @@ from table import Growth, Row, Section
 from timing import best, in_turns, python
 
 import warpspace
-from warpspace.analysis.cases import Plan, Site, node_gains, reduce_nodes
-from warpspace.analysis.concepts import Concepts, compare_concepts
-from warpspace.analysis.distribution import build_draws, loop_keys
-from warpspace.analysis.montecarlo import sample_chunks
+from warpspace.analysis.commands.concepts import Concepts, compare_concepts
+from warpspace.analysis.sampling.cases import Plan, Site, node_gains, reduce_nodes
+from warpspace.analysis.sampling.distribution import build_draws, loop_keys
+from warpspace.analysis.sampling.machine_sampling import sample_chunks
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
 

@@ -11,8 +11,7 @@ from timing import best
 
 from warpspace import load_scene
 from warpspace.analysis.description import silent
-from warpspace.parts.as_cut import Part
-from warpspace.parts.part import load_part, make_points, point_basis
+from warpspace.parts.workpiece import Part, load_part, make_points, point_basis
 
 AROUND = 1000  # vertices of a million
 GROWING = (400, 566, 800, 1000)  # above what features are looked for in

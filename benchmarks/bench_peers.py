@@ -20,7 +20,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import jacobian, loop_error, nominal_point
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import DIRECTIONS
-from warpspace.machine.description import Axis
+from warpspace.machine.definition import Axis
 
 POINTS = 10_000
 GROWING = (1_000, 10_000, 100_000)

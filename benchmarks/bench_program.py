@@ -6,7 +6,7 @@ from timing import best
 
 from warpspace import load_scene
 from warpspace.analysis.description import silent
-from warpspace.parts.control import Setup, read_program
+from warpspace.parts.interpreter import Setup, read_program
 from warpspace.parts.program import Program, trace_program
 
 BLOCKS = 5600

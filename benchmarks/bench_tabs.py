@@ -16,9 +16,9 @@ from timing import best
 
 from warpspace import load_scene
 from warpspace.app.drawing.box import packed
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import start_state
-from warpspace.picture.mesh import map_mesh
+from warpspace.picture.map_mesh import map_mesh
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 from page_client import App, Tab, running_app

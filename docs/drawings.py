@@ -24,7 +24,7 @@ from warpspace import evaluate, load_scene
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.chain import branch_frames, branch_pose, columns, loop_error
 from warpspace.kinematics.model import ComponentErrors, Loop, Model, complete_coordinates
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 
 Points = NDArray[np.float64]
 

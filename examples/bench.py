@@ -20,8 +20,8 @@ from warpspace.bench.base import bench_names, find_test
 from warpspace.bench.kinds.positioning import Positioning
 from warpspace.machine.curves.simple import Directional
 from warpspace.machine.errors import ErrorSet, Poly, Ramp
-from warpspace.outputs.charts.results import bench_chart
-from warpspace.outputs.save import write_chart
+from warpspace.outputs.charts.result_charts import bench_chart
+from warpspace.outputs.figure_files import write_chart
 
 SPAN = (-275.0, 275.0)
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else ".")

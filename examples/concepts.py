@@ -10,9 +10,9 @@ Run ``python examples/concepts.py [FILE]``; FILE ends in .png, .svg or .pdf.
 
 import sys
 
-from warpspace.analysis.concepts import Concepts
+from warpspace.analysis.commands.concepts import Concepts
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.save import write_figure
+from warpspace.outputs.figure_files import write_figure
 from warpspace.scene.starter import starter_scene
 
 target = sys.argv[1] if len(sys.argv) > 1 else "concepts.png"

@@ -11,7 +11,7 @@ import sys
 
 from warpspace import load_scene
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.save import write_figure
+from warpspace.outputs.figure_files import write_figure
 
 target = sys.argv[1] if len(sys.argv) > 1 else "error_map_component.png"
 write_figure(

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from warpspace.kinematics.chain import loop_error
 from warpspace.kinematics.model import Loop, Model, convention_names
 from warpspace.machine.axes import AXIS_NAMES, MAX_AXES, is_linear
-from warpspace.machine.description import FIXED_FRAMES, Chain, build_machine
+from warpspace.machine.definition import FIXED_FRAMES, Chain, build_machine
 
 MAX_OFFSET_MM = 1000.0
 MAX_LINEAR_MM = 500.0

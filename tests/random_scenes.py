@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from chains import chains
 from warpspace.exceptions import SceneError
 from warpspace.machine.axes import is_linear, parameter
-from warpspace.machine.description import Chain, build_machine
+from warpspace.machine.definition import Chain, build_machine
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 

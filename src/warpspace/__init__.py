@@ -7,13 +7,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from warpspace.analysis.allocate import AllocateResult
-    from warpspace.analysis.catalogue import Verb
-    from warpspace.analysis.contributions import SharesResult
-    from warpspace.analysis.gains import GainsResult
-    from warpspace.analysis.machines import MachinesResult, sweep
-    from warpspace.analysis.measured import measured
-    from warpspace.analysis.thesis import thesis
+    from warpspace.analysis.commands.allocate import AllocateResult
+    from warpspace.analysis.commands.contributions import SharesResult
+    from warpspace.analysis.commands.gains import GainsResult
+    from warpspace.analysis.commands.montecarlo import MachinesResult, sweep
+    from warpspace.analysis.registry import Verb
+    from warpspace.analysis.tolerance_check import measured
     from warpspace.bench.base import run_test
     from warpspace.bench.kinds.circular import ballbar
     from warpspace.calibration.calibrate import calibrate
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from warpspace.resources import __version__
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene, evaluate
+    from warpspace.thesis.rows import thesis
 
     allocate: Verb[AllocateResult]
     contributions: Verb[SharesResult]
@@ -38,10 +38,10 @@ _HOME = {
     "evaluate": "warpspace.scene.model",
     "ballbar": "warpspace.bench.kinds.circular",
     "calibrate": "warpspace.calibration.calibrate",
-    "measured": "warpspace.analysis.measured",
+    "measured": "warpspace.analysis.tolerance_check",
     "run_test": "warpspace.bench.base",
-    "sweep": "warpspace.analysis.machines",
-    "thesis": "warpspace.analysis.thesis",
+    "sweep": "warpspace.analysis.commands.montecarlo",
+    "thesis": "warpspace.thesis.rows",
     "to_pyvista": "warpspace.outputs.exports.meshes",
     "load_scene": "warpspace.scene.library",
     "scene_names": "warpspace.scene.library",
@@ -76,7 +76,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     if not name.startswith("_"):
-        from warpspace.analysis.catalogue import entries, verb
+        from warpspace.analysis.registry import entries, verb
 
         if any(entry.name == name for entry in entries()):
             return verb(name)

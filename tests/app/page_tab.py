@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from app.frames import new_visitor
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState
-from warpspace.picture.mesh import map_mesh
+from warpspace.picture.map_mesh import map_mesh
 from warpspace.scene.library import load_scene
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from warpspace.analysis.catalogue import entries
+from warpspace.analysis.registry import entries
+from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList
-from warpspace.app.documents.services import Services
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import WarpspaceError

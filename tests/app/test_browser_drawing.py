@@ -5,11 +5,11 @@ import re
 import numpy as np
 
 from app.page_tab import SCENES, same_points
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.machine import drawn_bodies, tool_point
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.machine_bodies import drawn_bodies, tool_point
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
-from warpspace.picture.mesh import isoline_pieces
+from warpspace.picture.map_mesh import isoline_pieces
 
 LIVE = LiveModel()
 START = start_state(SCENES[0])

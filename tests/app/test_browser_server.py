@@ -13,7 +13,7 @@ from app.frames import new_visitor
 from app.page_tab import Tab, open_page, wait_until_open
 from app.wire import end_work
 from page_client import running_app
-from warpspace.app.server.doors import Access
+from warpspace.app.server.request_policy import Access
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import load_scene

@@ -9,7 +9,7 @@ from viser.transforms import SO3
 from app.frames import new_visitor
 from app.page_tab import Tab
 from warpspace.app.drawing.shapes import SCENE_PER_MM
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import load_scene
 

@@ -11,30 +11,30 @@ import pytest
 
 from app.parts import answer_of, lone_part, section
 from still_scenes import still_scene
-from warpspace.app.documents.files import exported_words
 from warpspace.app.documents.legend import picture_conditions, subject_words
 from warpspace.app.documents.offline_page import build_offline_html
 from warpspace.app.documents.scene_file import state_to_toml
+from warpspace.app.documents.transfers import exported_words
 from warpspace.app.drawing.labels import point_labels
-from warpspace.app.evaluation import budget
-from warpspace.app.evaluation.budget import measured, pick_worst, with_picked
+from warpspace.app.evaluation import point_explanation
 from warpspace.app.evaluation.compare import with_pin, without_table, without_words
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.machine import tool_point
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.machine_bodies import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
+from warpspace.app.evaluation.point_explanation import measured, pick_worst, with_picked
+from warpspace.app.panels.analysis_panel import Answer
+from warpspace.app.panels.conventions import with_reference
+from warpspace.app.panels.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
-from warpspace.app.tasks.analysis import Answer
-from warpspace.app.tasks.conventions import with_reference
-from warpspace.app.tasks.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
 from warpspace.cli.services import draw_compensation
 from warpspace.exceptions import WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import Compensate, compensate, read_points
 from warpspace.kinematics.model import Loop
-from warpspace.outputs.charts.results import compensation_maps
-from warpspace.parts.part import PartMesh
+from warpspace.outputs.charts.result_charts import compensation_maps
+from warpspace.parts.workpiece import PartMesh
 from warpspace.scene.library import load_scene
 
 SCENE = load_scene("dvf5000_first")
@@ -240,12 +240,12 @@ def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
     picture = LIVE.evaluate(left)
     asked = with_picked(left, pick_worst(picture))
     assert asked.picked is not None
-    explained = budget.answer(asked, asked.picked, picture.exaggeration)
+    explained = point_explanation.answer(asked, asked.picked, picture.exaggeration)
     worst = np.unravel_index(int(np.argmax(picture.field.norm_um)), picture.shape)
     assert np.abs(explained.drawn_um - picture.field.error_um[worst]).max() < 1e-9
     assert np.abs(explained.drawn_mm - picture.drawn_mm[worst]).max() < 1e-6
     # what it is made of are the errors, of which the table is none
-    plain = budget.answer(without_table(asked), asked.picked, picture.exaggeration)
+    plain = point_explanation.answer(without_table(asked), asked.picked, picture.exaggeration)
     assert np.array_equal(explained.explanation.error_um, plain.explanation.error_um)
     assert np.linalg.norm(plain.drawn_um) > 2.0 * np.linalg.norm(explained.drawn_um)
     assert explained.is_corrected

@@ -11,6 +11,7 @@ import pytest
 
 from app.wire import Wire, dial, end_work
 from warpspace.app.browser.incoming import LONGEST_VALUE, Events
+from warpspace.app.panels.panel import MOST_FILES, Context
 from warpspace.app.server import viewer
 from warpspace.app.server.tab_keeper import (
     KEPT_SECONDS,
@@ -23,7 +24,6 @@ from warpspace.app.server.tab_keeper import (
 from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_host
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.parts import MOST_FILES, Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 

@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 
 from app.parts import lone_part
-from warpspace.analysis.repair import repaired
+from warpspace.analysis.commands.adjust import repaired
 from warpspace.app.documents.legend import order_conditions, picture_conditions, subject_words
-from warpspace.app.documents.scene_file import (
-    open_text,
-    state_to_toml,
-)
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import Picked, start_state
-from warpspace.app.state.tree import put
-from warpspace.app.tasks.conventions import (
+from warpspace.app.documents.scene_file import open_text, state_to_toml
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.panels.conventions import (
     ConventionsSection,
     choices,
     chosen,
@@ -26,13 +21,15 @@ from warpspace.app.tasks.conventions import (
     with_reference,
     with_travel,
 )
+from warpspace.app.state.app_state import Picked, start_state
+from warpspace.app.state.tree import put
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import TravelDirection
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 from warpspace.machine.errors import Constant, ErrorSet, Ramp, Table
-from warpspace.picture.mesh import edge_pieces
+from warpspace.picture.map_mesh import edge_pieces
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import Scene, evaluate
 

@@ -8,13 +8,10 @@ import pytest
 import warpspace
 from app.parts import answer_of, lone_part, section, wait
 from warpspace import load_scene
-from warpspace.analysis.concepts import Concepts, compare_concepts
-from warpspace.analysis.repair import Repair
-from warpspace.app.documents.services import Services
-from warpspace.app.state import edits
-from warpspace.app.state.app_state import Specification, start_state
-from warpspace.app.state.tree import put
-from warpspace.app.tasks.design import (
+from warpspace.analysis.commands.adjust import Repair
+from warpspace.analysis.commands.concepts import Concepts, compare_concepts
+from warpspace.app.documents.output_services import Services
+from warpspace.app.panels.design import (
     PRESENT,
     SAMPLES,
     ConceptsPart,
@@ -24,7 +21,10 @@ from warpspace.app.tasks.design import (
     sample_machines,
     tolerance_shares,
 )
-from warpspace.app.tasks.improve import RepairPart
+from warpspace.app.panels.improve import RepairPart
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import Specification, start_state
+from warpspace.app.state.tree import put
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.report.review import ReportSettings, build_review
 

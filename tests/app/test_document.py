@@ -10,14 +10,6 @@ from urllib.parse import parse_qsl, urlencode
 import pytest
 
 from app.hostile import upload
-from warpspace.app.documents.files import (
-    pack,
-    read_upload,
-    safe_file_name,
-    safe_name,
-    unpack,
-    upload_text,
-)
 from warpspace.app.documents.scene_file import (
     MOST_OPENED,
     PREFIX,
@@ -32,6 +24,14 @@ from warpspace.app.documents.scene_file import (
     state_to_toml,
     with_settings,
 )
+from warpspace.app.documents.transfers import (
+    pack,
+    read_upload,
+    safe_file_name,
+    safe_name,
+    unpack,
+    upload_text,
+)
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import (
     pinned_side,
@@ -40,7 +40,8 @@ from warpspace.app.evaluation.compare import (
     with_proposal,
     with_sides,
 )
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.panels.conventions import with_choice, with_reference
 from warpspace.app.server.tab_keeper import (
     COMPARISON,
     NEVER_KEPT,
@@ -51,7 +52,6 @@ from warpspace.app.server.tab_keeper import (
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Comparison, Side, start_state
 from warpspace.app.state.tree import leaves, put
-from warpspace.app.tasks.conventions import with_choice, with_reference
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.machine.errors import Ramp, Table
 from warpspace.machine.limits import MAX_ERROR, MAX_PACKED_TEXT

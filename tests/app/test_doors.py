@@ -19,9 +19,9 @@ from app.wire import dial
 from page_client import pack, said
 from reliability import doors
 from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN, UPGRADE
-from warpspace.app.server import guard, viewer
-from warpspace.app.server.doors import Access, Doors, Place, read_place
-from warpspace.app.server.guard import Limits, Rate
+from warpspace.app.server import connection_guard, viewer
+from warpspace.app.server.connection_guard import Limits, Rate
+from warpspace.app.server.request_policy import Access, Doors, Place, read_place
 from warpspace.app.server.viewer import Viewer, served_names
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
@@ -104,7 +104,7 @@ def test_each_kind_is_logged_once(caplog):
         for number in range(5):
             ask(running, Host=f"evil{number}.example\xe9")
             ask(running, upgrade=UPGRADE, Origin=f"http://evil{number}.example")
-    assert [record.name for record in caplog.records] == [guard.__name__] * 2
+    assert [record.name for record in caplog.records] == [connection_guard.__name__] * 2
     assert caplog.text.isascii()
 
 
@@ -233,7 +233,9 @@ def limited(monkeypatch):
     """Gives an app with other limits."""
 
     def start(**limits):
-        monkeypatch.setattr(viewer, "Guard", lambda doors: guard.Guard(doors, Limits(**limits)))
+        monkeypatch.setattr(
+            viewer, "Guard", lambda doors: connection_guard.Guard(doors, Limits(**limits))
+        )
         return Viewer(SCENE)
 
     return start

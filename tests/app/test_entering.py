@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
+from warpspace.app.panels.error_list import edit_curve, kind_titles, read_curve, spell_rows
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Exclusions, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import toggled
 from warpspace.app.state.typed_numbers import read_typed, spell_typed
-from warpspace.app.tasks.errors import edit_curve, kind_titles, read_curve, spell_rows
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.registry import curve_kind
 from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table

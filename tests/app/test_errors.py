@@ -5,10 +5,10 @@ import re
 import pytest
 
 from app.parts import LIVE, lone_part
+from warpspace.app.panels.conventions import with_reference
+from warpspace.app.panels.error_list import ErrorsPart, find_parameters
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import toggled
-from warpspace.app.tasks.conventions import with_reference
-from warpspace.app.tasks.errors import ErrorsPart, find_parameters
 from warpspace.machine.axes import parameter
 from warpspace.scene.library import load_scene
 

@@ -14,7 +14,6 @@ from PIL import Image
 
 import glb
 from offline import EVIL, opened_offline, wait_for_the_map
-from warpspace.app.documents.files import exported_words, file_stem, shown_sides
 from warpspace.app.documents.legend import (
     look_words,
     picture_conditions,
@@ -22,17 +21,18 @@ from warpspace.app.documents.legend import (
     state_conditions,
 )
 from warpspace.app.documents.offline_page import build_offline_html, offline_picture
+from warpspace.app.documents.transfers import exported_words, file_stem, shown_sides
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import Picked, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.cli.services import draw_figure, draw_view, write_export
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.figures.catalogue import draw_figure as draw
-from warpspace.picture.words import range_words
+from warpspace.outputs.figures.registry import draw_figure as draw
+from warpspace.picture.formatting import range_words
 from warpspace.scene.library import load_scene
 
 LIVE = LiveModel()

@@ -8,8 +8,8 @@ from PIL import Image
 
 from app.frames import draw
 from app.page_tab import SCENES
-from warpspace.analysis.adjusting import Objective
-from warpspace.analysis.repair import Repair
+from warpspace.analysis.adjustment_search import Objective
+from warpspace.analysis.commands.adjust import Repair
 from warpspace.app.state.app_state import start_state
 from warpspace.scene.library import parse_scene
 

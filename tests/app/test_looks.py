@@ -11,8 +11,8 @@ from warpspace.app.drawing.around import arrows
 from warpspace.app.drawing.camera import VIEWS, clipping, fit_camera, read_room
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.cache import Cache
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.evaluation.machine import (
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.machine_bodies import (
     chosen_trace,
     drawn_bodies,
     played_axis,
@@ -23,7 +23,7 @@ from warpspace.app.evaluation.machine import (
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import put
 from warpspace.geometry.surfaces import isoline_levels
-from warpspace.picture.mesh import isoline_labels
+from warpspace.picture.map_mesh import isoline_labels
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import evaluate
 

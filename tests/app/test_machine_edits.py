@@ -19,15 +19,15 @@ from warpspace.app.evaluation.machine_edits import (
     with_own_machine,
     with_word,
 )
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.edits import with_curve, with_scene_tolerances
-from warpspace.app.state.tree import put
-from warpspace.app.tasks.machine import (
+from warpspace.app.panels.machine_editor import (
     EditorSection,
     MachinesWindow,
     PositionsSection,
     RotarySection,
 )
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.edits import with_curve, with_scene_tolerances
+from warpspace.app.state.tree import put
 from warpspace.bodies.placed import load_bodies
 from warpspace.exceptions import ChainError, WarpspaceError
 from warpspace.kinematics.chain import nominal_point
@@ -35,7 +35,7 @@ from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.errors import Constant, Directional, Ramp
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, parse_scene, scene_names
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 
 @pytest.fixture

@@ -9,15 +9,12 @@ import pytest
 
 from app.hostile import upload
 from app.parts import Alone
-from warpspace.analysis.catalogue import entries
+from warpspace.analysis.registry import entries
 from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.store import StateStore
-from warpspace.app.state.tree import put
-from warpspace.app.tasks.importing import ImportPart
-from warpspace.app.tasks.measure import (
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.panels.import_panel import ImportPart
+from warpspace.app.panels.measurement import (
     MOST_FILES,
     CalibratePart,
     Held,
@@ -25,6 +22,9 @@ from warpspace.app.tasks.measure import (
     arrows_of,
     take_file,
 )
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.store import StateStore
+from warpspace.app.state.tree import put
 from warpspace.bench.base import bench_names
 from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.readings import find_data

@@ -20,7 +20,7 @@ from warpspace.app.browser.incoming import MOST_EVENTS, Event, event_of, read_me
 from warpspace.app.browser.page import Page
 from warpspace.app.browser.viser_private import connection_of, send_at_once
 from warpspace.app.server import session
-from warpspace.app.server.guard import TabConnection
+from warpspace.app.server.connection_guard import TabConnection
 from warpspace.app.server.session import turn
 from warpspace.app.server.viewer import RepeatedLines, Viewer
 from warpspace.cli.services import build_services

@@ -8,21 +8,16 @@ import pytest
 from app.frames import new_visitor
 from app.page_tab import SCENES, Tab
 from app.parts import LIVE, Alone
-from warpspace.analysis.reviewing import note_numbers
-from warpspace.app.documents.scene_file import (
-    open_link,
-    open_text,
-    state_to_link,
-    state_to_toml,
-)
+from warpspace.analysis.note_tables import note_numbers
+from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import note_labels
-from warpspace.app.evaluation.budget import answer, drawn_places
-from warpspace.app.evaluation.machine import drawn_bodies
+from warpspace.app.evaluation.machine_bodies import drawn_bodies
+from warpspace.app.evaluation.point_explanation import answer, drawn_places
+from warpspace.app.panels.note_panels import NotesPart
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
-from warpspace.app.tasks.notes import NotesPart
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene
 from warpspace.scene.notes import Mark, Note, story, told

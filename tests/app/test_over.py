@@ -12,18 +12,18 @@ from warpspace.app.documents.legend import kept_words, legend_html, marks
 from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
+from warpspace.app.panels.design import SAMPLES
+from warpspace.app.panels.overlay import HeadPart, LegendPart, OrderPart
+from warpspace.app.panels.toolbar import ComparePart, ControlsPart, chosen_map
 from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
-from warpspace.app.tasks.controls import ComparePart, ControlsPart, chosen_map
-from warpspace.app.tasks.design import SAMPLES
-from warpspace.app.tasks.over import HeadPart, LegendPart, OrderPart
 from warpspace.exceptions import SceneError
 from warpspace.geometry.colour import component_values
 from warpspace.geometry.surfaces import deform
 from warpspace.machine.errors import ToleranceSet
-from warpspace.picture.mesh import map_mesh
+from warpspace.picture.map_mesh import map_mesh
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 FIRST, SECOND = (load_scene(f"dvf5000_{name}") for name in ("first", "second"))
 START = start_state(FIRST, nodes=9)

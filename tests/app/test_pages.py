@@ -12,16 +12,16 @@ import pytest
 from app.parts import Nobody
 from app.wire import Wire, dial, opened
 from still_scenes import TEXTS, still_scene
-from warpspace.analysis.catalogue import register, unregister
 from warpspace.analysis.description import Analysis, Result
-from warpspace.app.documents.services import CancelledError, Services
+from warpspace.analysis.registry import register, unregister
+from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.evaluation import cache
+from warpspace.app.panels.error_list import used_keys
+from warpspace.app.panels.panel import Context, Jobs, Part
 from warpspace.app.server import session
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
-from warpspace.app.tasks.errors import used_keys
-from warpspace.app.tasks.parts import Context, Jobs, Part
 from warpspace.exceptions import WarpspaceError
 from warpspace.scene.library import load_scene
 
@@ -138,7 +138,7 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
 @pytest.fixture
 def watched(monkeypatch):
     """Jobs, with what they show and report."""
-    monkeypatch.setattr("warpspace.app.tasks.parts.TICK_S", -1.0)
+    monkeypatch.setattr("warpspace.app.panels.panel.TICK_S", -1.0)
     bars, failures = list[str](), list[Exception]()
     found = Jobs(Part(Nobody()), lambda: bars.append(str(found.html())), failures.append)
     return found, bars, failures

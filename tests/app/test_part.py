@@ -13,15 +13,15 @@ from app.page_tab import Tab, open_page
 from app.parts import LIVE
 from warpspace.app.documents.legend import GEOMETRY_ONLY, part_html
 from warpspace.app.documents.scene_file import open_link, open_text, state_to_link, state_to_toml
-from warpspace.app.evaluation.budget import pick_line
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.in_box import moved_place, part_in_box
+from warpspace.app.evaluation.point_explanation import pick_line
+from warpspace.app.evaluation.scene_overlays import moved_place, part_in_box
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.kinematics import transforms
-from warpspace.parts.part import PartMesh, make_points, place_part
+from warpspace.parts.workpiece import PartMesh, make_points, place_part
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_edits import with_word
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Exclusions, start_state

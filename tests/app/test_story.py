@@ -12,10 +12,10 @@ from warpspace.app.browser.html import linked
 from warpspace.app.documents.offline_page import build_story_html
 from warpspace.app.documents.scene_file import view_of
 from warpspace.app.drawing.camera import CameraMemory
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import start_state
-from warpspace.picture.mesh import map_mesh
+from warpspace.picture.map_mesh import map_mesh
 from warpspace.scene.library import load_scene
 from warpspace.scene.notes import Note
 

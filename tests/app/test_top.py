@@ -4,13 +4,11 @@ import random
 from dataclasses import replace
 
 from app.parts import Alone, wait
-from warpspace.app.documents.files import unpack
+from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList, open_link
-from warpspace.app.documents.services import Services
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.tree import put
-from warpspace.app.tasks.files import FilesWindow, ReportWindow
-from warpspace.app.tasks.top import (
+from warpspace.app.documents.transfers import unpack
+from warpspace.app.panels.file_dialogs import FilesWindow, ReportWindow
+from warpspace.app.panels.top_bar import (
     COMMANDS,
     HelpWindow,
     PagePart,
@@ -19,6 +17,8 @@ from warpspace.app.tasks.top import (
     TopPart,
     key_events,
 )
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.tree import put
 from warpspace.scene.library import load_scene
 from warpspace.scene.notes import Note
 

@@ -18,10 +18,10 @@ from warpspace.app.drawing.around import around
 from warpspace.app.drawing.box import box
 from warpspace.app.drawing.labels import point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM, ellipsoid
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
-from warpspace.picture.mesh import map_mesh
+from warpspace.picture.map_mesh import map_mesh
 from warpspace.picture.model import evaluate_picture
 from warpspace.scene.library import parse_scene
 

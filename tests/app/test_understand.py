@@ -7,27 +7,27 @@ import numpy as np
 import pytest
 
 from app.parts import LIVE, Alone, lone_part, wait
-from warpspace.analysis.catalogue import entries
+from warpspace.analysis.commands.distance import Distance
 from warpspace.analysis.description import silent
-from warpspace.analysis.distance import Distance
+from warpspace.analysis.registry import entries
 from warpspace.app.drawing.around import around
 from warpspace.app.drawing.labels import point_labels
-from warpspace.app.evaluation.budget import (
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.point_explanation import (
     answer,
     pick,
     pick_worst,
     with_clicked,
     with_picked,
 )
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.panels.analysis_panel import AnalysisPart
+from warpspace.app.panels.explanation import DistancePart, VolumePart, WorstPart
+from warpspace.app.panels.improve import BestPart
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_positions
-from warpspace.app.tasks.analysis import AnalysisPart
-from warpspace.app.tasks.improve import BestPart
-from warpspace.app.tasks.understand import DistancePart, VolumePart, WorstPart
 from warpspace.kinematics.model import Loop
-from warpspace.picture.words import spell_at, spell_axes, spell_point
+from warpspace.picture.formatting import spell_at, spell_axes, spell_point
 from warpspace.scene.library import load_scene, scene_names
 from warpspace.scene.model import evaluate
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from warpspace.exceptions import SceneError
-from warpspace.scene.curves import read_csv_column
+from warpspace.scene.curve_reader import read_csv_column
 
 DVF = 'machine = "dvf5000"\n'
 MALFORMED = {

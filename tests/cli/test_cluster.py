@@ -8,9 +8,9 @@ import pytest
 
 import warpspace as package
 from lost_process import square
-from warpspace.analysis.cases import BLOCK
-from warpspace.cli import machines
-from warpspace.cli.machines import find_workers
+from warpspace.analysis.sampling.cases import BLOCK
+from warpspace.cli import sampling_output
+from warpspace.cli.sampling_output import find_workers
 from warpspace.exceptions import OptionError, WorkersLostError
 from warpspace.outputs.processes import ProcessPool
 
@@ -64,7 +64,7 @@ def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nowhere", "gopher://x:1", ""])
 def test_a_scheduler_that_is_none_is_refused(warpspace, monkeypatch, address):
-    monkeypatch.setattr(machines, "CONNECT_S", 0.3)
+    monkeypatch.setattr(sampling_output, "CONNECT_S", 0.3)
     warpspace("montecarlo", "dvf5000_general", "--scheduler", address).refused(
         f"--scheduler {address!r}", "expected the address of a Dask scheduler"
     )
@@ -110,10 +110,12 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
 def test_workers_that_die_again_and_again_end_the_run_with_a_message(tmp_path):
-    said = f"died {machines.LOSSES + 1} times .out of memory... run again with fewer --workers"
+    said = (
+        f"died {sampling_output.LOSSES + 1} times .out of memory... run again with fewer --workers"
+    )
 
     def run():
-        with find_workers(None, 2, machines.WORTH_A_POOL) as found:
+        with find_workers(None, 2, sampling_output.WORTH_A_POOL) as found:
             found[0].submit(square, 3, str(tmp_path), "always").result(120)
 
     with pytest.raises(WorkersLostError, match=said):
@@ -121,11 +123,11 @@ def test_workers_that_die_again_and_again_end_the_run_with_a_message(tmp_path):
 
 
 def test_a_large_run_gets_processes_and_a_small_one_threads():
-    with find_workers(None, None, machines.WORTH_A_POOL - 1) as few:
+    with find_workers(None, None, sampling_output.WORTH_A_POOL - 1) as few:
         assert few[0] is None
     with find_workers(None, 1, 10**9) as alone:
         assert alone[0] is None
-    with find_workers(None, 2, machines.WORTH_A_POOL) as many:
+    with find_workers(None, 2, sampling_output.WORTH_A_POOL) as many:
         assert isinstance(many[0], ProcessPool)
         assert many[1] == 2
     with pytest.raises(OptionError, match="workers: 513"), find_workers(None, 513, 1):
@@ -135,7 +137,7 @@ def test_a_large_run_gets_processes_and_a_small_one_threads():
 @pytest.mark.nightly
 def test_processes_give_the_same_numbers(warpspace, monkeypatch):
     run = (*RUN, "--samples", str(20 * BLOCK))
-    monkeypatch.setattr(machines, "WORTH_A_POOL", 1)
+    monkeypatch.setattr(sampling_output, "WORTH_A_POOL", 1)
     here, there = warpspace(*run, "--workers", "1"), warpspace(*run, "--workers", "2")
     assert there.status == 0, there.err
     assert here.out == there.out

@@ -151,7 +151,7 @@ def test_fields_have_a_direction_and_an_uncertainty(warpspace, tmp_path):
 
 
 def test_a_table_that_is_cut_says_so(warpspace, tmp_path, monkeypatch):
-    monkeypatch.setattr("warpspace.analysis.convert.MAX_SHOWN", 2)
+    monkeypatch.setattr("warpspace.analysis.commands.convert.MAX_SHOWN", 2)
     wishes = ("--to", "component_errors=before_motion", "--to", "squareness=over_90")
     found = warpspace("convert", "dvf5000_first", *wishes, "-o", tmp_path / "a.toml", "--json")
     count = len(found.json["changed"])

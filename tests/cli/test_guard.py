@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 import pytest
 
-from warpspace.cli.guard import NUMBERS, DataFile, InputFile, OutputFile, SceneName
+from warpspace.cli.file_arguments import NUMBERS, DataFile, InputFile, OutputFile, SceneName
 from warpspace.cli.main import cli
 from warpspace.exceptions import OutputError
 

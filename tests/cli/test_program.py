@@ -17,7 +17,7 @@ from warpspace import evaluate, load_scene
 from warpspace.cli import register_command
 from warpspace.cli.commands.understand import POINTS_AT_ONCE
 from warpspace.cli.main import BUNDLED, COMMANDS, cli
-from warpspace.cli.options import spell_json
+from warpspace.cli.shared_options import spell_json
 from warpspace.exceptions import SceneError
 
 
@@ -189,7 +189,7 @@ def test_json_is_printed_in_pieces_and_is_one_object_with_every_point(monkeypatc
         lengths.extend([len(value)] if isinstance(value, list) else [])
         return spell_json(value)
 
-    monkeypatch.setattr("warpspace.cli.options.spell_json", count)
+    monkeypatch.setattr("warpspace.cli.shared_options.spell_json", count)
     result = warpspace("field", "dvf5000_first", "--grid", 23, "--json")
     assert result.status == 0, result.err
     assert sum(lengths) == 23**3 > 2 * POINTS_AT_ONCE >= 2 * max(lengths)

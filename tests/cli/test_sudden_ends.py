@@ -26,7 +26,7 @@ WORKING = """
 import os, signal, sys, time
 from warpspace.cli import main
 from warpspace.cli.main import cli
-from warpspace.outputs.files import write_atomically
+from warpspace.outputs.file_output import write_atomically
 {}
 cli.main = work
 main()

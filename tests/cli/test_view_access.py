@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from warpspace.app.server import viewer
-from warpspace.app.server.doors import Access
+from warpspace.app.server.request_policy import Access
 
 
 def test_options_reach_the_app(warpspace, monkeypatch):

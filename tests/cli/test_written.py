@@ -8,7 +8,7 @@ import pytest
 
 from products import first, pairwise
 from warpspace import __version__
-from warpspace.outputs.figures import catalogue
+from warpspace.outputs.figures import registry
 from warpspace.scene.library import load_scene
 
 SCENE = """
@@ -165,7 +165,7 @@ SMALL = ("--size", "400x300", "--grid", "3")
 
 def test_the_command_names_every_figure_of_one_scene(warpspace):
     words = warpspace("draw", "--help").out.replace(",", " ").replace(".", " ").split()
-    assert set(catalogue.figure_names()) <= set(words)
+    assert set(registry.figure_names()) <= set(words)
 
 
 @pytest.mark.render

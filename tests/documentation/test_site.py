@@ -12,10 +12,10 @@ import pytest
 
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
+from warpspace.app.panels.page_panels import build_parts
+from warpspace.app.panels.panel import Section
+from warpspace.app.panels.top_bar import COMMANDS as KEYS
 from warpspace.app.state.app_state import TASKS
-from warpspace.app.tasks.catalogue import build_parts
-from warpspace.app.tasks.parts import Section
-from warpspace.app.tasks.top import COMMANDS as KEYS
 from warpspace.cli.main import COMMANDS
 from warpspace.kinematics.model import convention_names
 from warpspace.machine.curves.registry import curve_kinds

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from products import first
-from warpspace.outputs.figures.catalogue import figure_kinds
+from warpspace.outputs.figures.registry import figure_kinds
 
 FIGURES = tuple(kind.name for kind in figure_kinds())
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -14,8 +14,8 @@ from warpspace import load_scene, scene_names
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ToleranceSet
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.figures.catalogue import draw_figure, figure_kinds
-from warpspace.outputs.save import figure_bytes, render_figure
+from warpspace.outputs.figure_files import figure_bytes, render_figure
+from warpspace.outputs.figures.registry import draw_figure, figure_kinds
 from warpspace.picture.model import evaluate_picture
 from warpspace.picture.traces import trace_lines
 from warpspace.scene.library import parse_scene

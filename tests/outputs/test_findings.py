@@ -8,7 +8,7 @@ import pytest
 
 from offline import EVIL
 from warpspace import evaluate, load_scene
-from warpspace.analysis.reviewing import note_numbers, notes_table
+from warpspace.analysis.note_tables import note_numbers, notes_table
 from warpspace.app.documents.scene_file import view_of
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import scene_side
@@ -16,8 +16,8 @@ from warpspace.app.state.app_state import Comparison, start_state
 from warpspace.app.state.tree import put
 from warpspace.cli.services import tell_story
 from warpspace.outputs.report import ReportSettings, build_report
-from warpspace.outputs.report.render import Picture, render_html, render_pdf
 from warpspace.outputs.report.review import build_review, first_page
+from warpspace.outputs.report.templating import Picture, render_html, render_pdf
 from warpspace.scene.notes import Note, Reply
 
 FAST = ReportSettings(grid=5, samples=2000)

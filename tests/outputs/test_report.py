@@ -15,12 +15,19 @@ from offline import EVIL, opened_offline, wait_for_the_map
 from products import first
 from warpspace import evaluate, load_scene
 from warpspace.analysis.blocks import Column, number_columns
-from warpspace.analysis.concepts import Concepts, compare_concepts
+from warpspace.analysis.commands.concepts import Concepts, compare_concepts
 from warpspace.analysis.statistics import share_below
 from warpspace.exceptions import NoRendererError, RenderError
 from warpspace.outputs.report import ReportSettings, build_report, sections, write_report
-from warpspace.outputs.report.render import Embedded, Items, Table, Text, render_html, render_pdf
 from warpspace.outputs.report.review import build_review, first_page
+from warpspace.outputs.report.templating import (
+    Embedded,
+    Items,
+    Table,
+    Text,
+    render_html,
+    render_pdf,
+)
 from warpspace.scene.library import parse_scene
 
 FAST = ReportSettings(grid=5, samples=2000, spec_um=50.0)

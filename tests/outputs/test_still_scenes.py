@@ -13,7 +13,7 @@ from warpspace import to_pyvista
 from warpspace.cli.services import write_page
 from warpspace.exceptions import WarpspaceError
 from warpspace.outputs.exports.formats import write_export
-from warpspace.outputs.figures.catalogue import draw_figure, figure_names
+from warpspace.outputs.figures.registry import draw_figure, figure_names
 from warpspace.outputs.report import write_report
 from warpspace.picture.model import evaluate_picture
 

@@ -70,7 +70,7 @@ def test_a_figure_that_takes_too_long_is_given_up():
 
 
 def test_a_system_without_opengl_is_told_what_to_install():
-    code = "from warpspace.outputs.drawing.render import check_renderer; check_renderer()"
+    code = "from warpspace.outputs.drawing.off_screen import check_renderer; check_renderer()"
     bare = {**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere"}
     done = subprocess.run([sys.executable, "-c", code], env=bare, capture_output=True, check=False)
     assert done.returncode == 1

@@ -24,7 +24,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, columns, jacobian, loop_error, nominal_point
 from warpspace.kinematics.model import Loop, convention_names
 from warpspace.machine.axes import parameter
-from warpspace.machine.description import parse_chain
+from warpspace.machine.definition import parse_chain
 from warpspace.machine.errors import Constant, ErrorSet
 
 SHAPES = hnp.array_shapes(min_dims=0, max_dims=2, max_side=3)

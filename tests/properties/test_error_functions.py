@@ -8,12 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chains import models, positions, vectors
-from warpspace.field.evaluate import (
-    View,
-    build_basis,
-    evaluate_exact,
-    evaluate_first_order,
-)
+from warpspace.field.evaluate import View, build_basis, evaluate_exact, evaluate_first_order
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection, axis_parameters
 from warpspace.machine.errors import Constant, Directional, ErrorSet, Ramp, Table, TwoArguments

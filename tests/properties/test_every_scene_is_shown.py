@@ -20,19 +20,19 @@ from warpspace.app.drawing.camera import VIEWS, fit_camera
 from warpspace.app.drawing.labels import axes_room_mm
 from warpspace.app.drawing.moving import machine
 from warpspace.app.drawing.shapes import Nodes
-from warpspace.app.evaluation.budget import pick, with_picked
 from warpspace.app.evaluation.compare import with_pin
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.point_explanation import pick, with_picked
+from warpspace.app.panels.conventions import ConventionsSection
+from warpspace.app.panels.explanation import WorstPart
+from warpspace.app.panels.machine_editor import RotarySection
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
-from warpspace.app.tasks.conventions import ConventionsSection
-from warpspace.app.tasks.machine import RotarySection
-from warpspace.app.tasks.understand import WorstPart
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.outputs.exports.fields import build_vts
 from warpspace.outputs.exports.meshes import build_glb
-from warpspace.picture.mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
+from warpspace.picture.map_mesh import edge_pieces, grid_pieces, isoline_pieces, line_mesh, map_mesh
 from warpspace.picture.model import evaluate_picture
 
 SLOW = settings(

@@ -4,13 +4,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace.analysis.cases import Case, Over, Plan, reduce_nodes
-from warpspace.analysis.distribution import Distribution, Stream, build_draws, loop_keys
-from warpspace.analysis.montecarlo import montecarlo
+from warpspace.analysis.sampling.cases import Case, Over, Plan, reduce_nodes
+from warpspace.analysis.sampling.distribution import Distribution, Stream, build_draws, loop_keys
+from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 from warpspace.machine.errors import ToleranceSet
 
 CHAINS = ("wCBFXYZt", "wYFXZAt", "wFXYZt", "wAFZt", "wZABFXYCt")

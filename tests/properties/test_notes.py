@@ -11,21 +11,12 @@ from hypothesis import strategies as st
 
 from products import first
 from warpspace import load_scene
-from warpspace.analysis.reviewing import note_numbers, said_stale
+from warpspace.analysis.note_tables import note_numbers, said_stale
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_NOTES, MAX_REPLACED, MAX_REPLIES
 from warpspace.scene.library import parse_scene
-from warpspace.scene.notes import (
-    KINDS,
-    STATUSES,
-    Note,
-    Reply,
-    merge_notes,
-    story,
-    told,
-    with_note,
-)
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.notes import KINDS, STATUSES, Note, Reply, merge_notes, story, told, with_note
+from warpspace.scene.scene_writer import scene_to_toml
 
 BEGAN = datetime(2026, 11, 22, 10, tzinfo=UTC)
 SCENE = load_scene("dvf5000_first")

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 
 MACHINES = 200
 LETTERS = "XYZUVWABC"

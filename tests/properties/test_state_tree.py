@@ -15,11 +15,11 @@ from warpspace.app.documents.scene_file import (
     view_of,
     with_settings,
 )
+from warpspace.app.panels.note_panels import clean
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.leaf import default_of, description
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import leaves, put, spell, stored, value
-from warpspace.app.tasks.notes import clean
 from warpspace.scene.library import load_scene
 from warpspace.scene.notes import Note, with_note
 

@@ -23,10 +23,10 @@ def _writers() -> dict[str, Callable[[int, Path], None]]:
 
     from warpspace.outputs.exports.fields import write_rows
     from warpspace.outputs.exports.formats import write_export
-    from warpspace.outputs.files import write_atomically
+    from warpspace.outputs.file_output import write_atomically
     from warpspace.picture.model import evaluate_picture
     from warpspace.scene.library import load_scene
-    from warpspace.scene.save import scene_to_toml
+    from warpspace.scene.scene_writer import scene_to_toml
 
     scenes = [load_scene(name) for name in SCENES]
     pictures = [evaluate_picture(scene, grid=9) for scene in scenes]

@@ -140,9 +140,9 @@ def _serve() -> None:
     sys.path.append(str(HERE.parent / "benchmarks"))
     import soak_app
 
-    from warpspace.app.evaluation import evaluate
+    from warpspace.app.evaluation import live_model
 
-    evaluate.CACHE_BYTES = CACHE_BYTES
+    live_model.CACHE_BYTES = CACHE_BYTES
     soak_app.serve()
 
 

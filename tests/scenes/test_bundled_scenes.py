@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpspace import evaluate, load_scene
-from warpspace.analysis.reviewing import note_numbers, said_stale
+from warpspace.analysis.note_tables import note_numbers, said_stale
 from warpspace.analysis.statistics import statistics
 from warpspace.app.documents.scene_file import reopened
 from warpspace.app.state.app_state import start_state

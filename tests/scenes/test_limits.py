@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from warpspace import evaluate
-from warpspace.analysis.cases import Plan
+from warpspace.analysis.sampling.cases import Plan
 from warpspace.app.documents.scene_file import open_text, state_to_toml
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import EXAGGERATION, NODES, start_state
 from warpspace.app.state.edits import half_width_span
 from warpspace.app.state.look import RANGE_TOP
@@ -20,7 +20,7 @@ from warpspace.machine import limits
 from warpspace.machine.errors import Harmonics
 from warpspace.outputs.drawing.settings import FigureSettings, check_size, evaluate_for
 from warpspace.scene.library import parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 SMALL, LARGE = limits.MIN_NUMBER, limits.MAX_ERROR
 LOW, HIGH = limits.EXAGGERATION

@@ -8,11 +8,11 @@ from warpspace import evaluate, load_scene
 from warpspace.bodies.placed import load_bodies
 from warpspace.kinematics.chain import body_motions
 from warpspace.kinematics.model import Model, complete_coordinates
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 from warpspace.outputs.exports.meshes import write_glb
 from warpspace.picture.model import evaluate_picture
 from warpspace.scene.library import scene_names
-from warpspace.scene.machines import load_machine, machine_names, machine_picture
+from warpspace.scene.machine_library import load_machine, machine_names, machine_picture
 
 MACHINES = machine_names()
 LIBRARY = tuple(name for name in MACHINES if name not in ("dvf5000", "ur10"))

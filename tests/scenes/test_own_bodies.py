@@ -8,7 +8,7 @@ from warpspace import SceneError, load_scene
 from warpspace.bodies.placed import load_bodies, place_bodies
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 HEAD = 'title = "Mine"\nmachine = "c_frame_mill"\n'
 INLINE = 'title = "Mine"\n[machine]\nchain = "wXYFZt"\n'

@@ -19,7 +19,7 @@ from warpspace.machine.errors import (
 )
 from warpspace.machine.limits import MIN_HALF_WIDTH
 from warpspace.scene.library import parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 finite = st.floats(-1e3, 1e3, allow_subnormal=False)
 

@@ -16,17 +16,17 @@ from cli.conftest import warpspace
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.app.documents.scene_file import open_text, state_to_toml
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.state.app_state import start_state
-from warpspace.app.state.edits import with_curve
-from warpspace.app.tasks.conventions import (
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.panels.conventions import (
     ConventionsSection,
     choices,
     chosen,
     effects_of,
     with_choice,
 )
-from warpspace.app.tasks.errors import kind_titles, read_curve, spell_rows
+from warpspace.app.panels.error_list import kind_titles, read_curve, spell_rows
+from warpspace.app.state.app_state import start_state
+from warpspace.app.state.edits import with_curve
 from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
 from warpspace.bench.data import DataColumn
 from warpspace.bench.plan import Outcome, Quantity, build_plan
@@ -51,7 +51,7 @@ from warpspace.outputs.exports.formats import (
     register_format,
     unregister_format,
 )
-from warpspace.outputs.figures.catalogue import (
+from warpspace.outputs.figures.registry import (
     FigureKind,
     draw_figure,
     figure_names,
@@ -63,7 +63,7 @@ from warpspace.outputs.report import ReportSettings, build_report, sections
 from warpspace.picture.model import evaluate_picture
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.units import spell, spell_short
 
 __all__ = ["warpspace"]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.analysis.certify import Certify, zone_width
+from warpspace.analysis.commands.conformance import Reach, largest_box
+from warpspace.analysis.commands.form import Certify, zone_width
+from warpspace.analysis.commands.line import Line
 from warpspace.analysis.description import silent
-from warpspace.analysis.line import Line
-from warpspace.analysis.reach import Reach, largest_box
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.simple import Constant, Poly
 from warpspace.machine.errors import ErrorSet

@@ -7,7 +7,7 @@ import GTC
 import numpy as np
 import pytest
 
-from warpspace.analysis.doubt import field_doubt, volume_doubt
+from warpspace.analysis.uncertainty.propagation import field_doubt, volume_doubt
 from warpspace.bench.placing import ball_point
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.instruments import instrument_names, load_instrument

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
+from warpspace.analysis.commands.distance import Distance
 from warpspace.analysis.description import silent
-from warpspace.analysis.distance import Distance
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.simple import Constant, Poly
 from warpspace.machine.errors import ErrorSet

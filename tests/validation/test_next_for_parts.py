@@ -9,7 +9,7 @@ from warpspace.calibration import Calibrate, read_readings
 from warpspace.calibration.next_best import u95_at
 from warpspace.calibration.solve import build_terms
 from warpspace.exceptions import OptionError
-from warpspace.parts.part import load_part, place_part
+from warpspace.parts.workpiece import load_part, place_part
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import PartSource
 

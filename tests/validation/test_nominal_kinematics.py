@@ -6,7 +6,7 @@ import pytest
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 
 TABLE = Model(build_machine("wCBFt"))
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.analysis.doubt import find_doubt, volume_doubt
+from warpspace.analysis.uncertainty.propagation import find_doubt, volume_doubt
 from warpspace.bench.placing import ball_point
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.readings import Readings
 from warpspace.machine.errors import Constant
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 MACHINE = """[machine]
 chain = "wFXYZt"

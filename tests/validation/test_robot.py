@@ -16,7 +16,7 @@ from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.chain import branch_pose
 from warpspace.machine.errors import Constant, ErrorSet
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 UR10 = load_scene("ur10")
 NOMINAL = load_scene("dvf5000_nominal")

@@ -11,12 +11,11 @@ import pytest
 import trimesh
 from scipy.stats import norm, t
 
+from warpspace.analysis.commands.distance import Distance
 from warpspace.analysis.description import silent
-from warpspace.analysis.distance import Distance
 from warpspace.formats.compensation.compensate import Compensate
-from warpspace.parts.as_cut import Part
-from warpspace.parts.part import PartMesh
 from warpspace.parts.program import Program
+from warpspace.parts.workpiece import Part, PartMesh
 from warpspace.scene.library import parse_scene
 
 MACHINE = """[machine]

@@ -7,9 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2, norm, t
 
-from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt, volume_doubt
-from warpspace.analysis.repair import Repair
-from warpspace.analysis.trust import Trust
+from warpspace.analysis.commands.adjust import Repair
+from warpspace.analysis.commands.uncertainty import Trust
+from warpspace.analysis.uncertainty.propagation import (
+    coverage_factor,
+    field_doubt,
+    find_doubt,
+    volume_doubt,
+)
 from warpspace.bench.base import run_test
 from warpspace.bench.kinds.circular import Circular
 from warpspace.bench.kinds.straightness import Squareness

@@ -7,11 +7,11 @@ import pytest
 
 import warpspace
 from products import pairwise
-from warpspace.analysis.cases import Case, Plan
-from warpspace.analysis.contributions import expected_square
-from warpspace.analysis.distribution import build_draws, loop_keys
-from warpspace.analysis.machines import case_of
-from warpspace.analysis.montecarlo import montecarlo
+from warpspace.analysis.commands.contributions import expected_square
+from warpspace.analysis.commands.montecarlo import case_of
+from warpspace.analysis.sampling.cases import Case, Plan
+from warpspace.analysis.sampling.distribution import build_draws, loop_keys
+from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.kinematics.model import Loop
 
 MEANS = [
@@ -71,7 +71,7 @@ def test_max_over_the_corners_is_the_max_over_the_grid():
     scene = warpspace.load_scene("dvf5000_general")
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, "uniform")
-    from warpspace.analysis.cases import Case, Over, reduce_nodes
+    from warpspace.analysis.sampling.cases import Case, Over, reduce_nodes
 
     case = Case(scene.model, draws, scene.workspace)
     machines = draws.draw(np.random.default_rng(0), 500)

@@ -7,7 +7,7 @@ from trimesh import Trimesh
 
 from warpspace.geometry.colour import ColourScale, colour_table
 from warpspace.geometry.surfaces import crease_lines, triangulate
-from warpspace.outputs.drawing.render import Raster
+from warpspace.outputs.drawing.off_screen import Raster
 from warpspace.outputs.drawing.sheet import DrawnMap
 from warpspace.picture.model import map_faces
 from warpspace.units import Array

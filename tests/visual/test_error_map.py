@@ -12,8 +12,8 @@ from visual.reading import read_map
 from warpspace import load_scene
 from warpspace.geometry.colour import component_values
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.figures.catalogue import draw_figure
-from warpspace.outputs.save import figure_bytes
+from warpspace.outputs.figure_files import figure_bytes
+from warpspace.outputs.figures.registry import draw_figure
 from warpspace.picture.model import evaluate_picture
 from warpspace.units import MM_PER_UM
 

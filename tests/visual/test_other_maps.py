@@ -6,7 +6,7 @@ import pytest
 from visual.reading import read_map
 from warpspace import evaluate, load_scene
 from warpspace.outputs.drawing.settings import FigureSettings
-from warpspace.outputs.figures.catalogue import draw_figure
+from warpspace.outputs.figures.registry import draw_figure
 from warpspace.picture.model import evaluate_picture
 from warpspace.units import MM_PER_UM
 

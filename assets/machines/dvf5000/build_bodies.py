@@ -19,19 +19,11 @@ from trimesh import util
 
 from warpspace.bodies.gltf import Material, Part, build_gltf
 from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE, Body, build_body
-from warpspace.bodies.schematic import (
-    BODY_FILE,
-    LINES,
-    Shape,
-    box,
-    cone,
-    cylinder,
-    frame_of,
-)
+from warpspace.bodies.schematic import BODY_FILE, LINES, Shape, box, cone, cylinder, frame_of
 from warpspace.kinematics.chain import body_motions
 from warpspace.kinematics.model import Model
 from warpspace.kinematics.transforms import axis_rotation
-from warpspace.scene.machines import load_machine
+from warpspace.scene.machine_library import load_machine
 from warpspace.units import Array
 
 HERE = Path(__file__).parent

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from warpspace.analysis.blocks import Bars, Column, Curve, Lines, Panel, Series, Table
-    from warpspace.analysis.catalogue import find_analysis, register, unregister
     from warpspace.analysis.description import Analysis, Change, Quantity, Result, Watch, silent
     from warpspace.analysis.options import Grammar, Keys, Limits, Place, option
+    from warpspace.analysis.registry import find_analysis, register, unregister
 
 _HOMES = ("blocks", "catalogue", "description", "options")
 

@@ -12,7 +12,7 @@ from warpspace.analysis.blocks import Block, Table, blocks_html
 from warpspace.analysis.options import PLACE, Option, options_of, outside_travel
 
 if TYPE_CHECKING:
-    from warpspace.analysis.doubt import Doubt
+    from warpspace.analysis.uncertainty.propagation import Doubt
     from warpspace.field.evaluate import SecondOrder
     from warpspace.scene.model import Scene
 

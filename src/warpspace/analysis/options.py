@@ -21,10 +21,10 @@ from typing import (
 
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_LENGTH_MM
-from warpspace.scene.files import parse_number
+from warpspace.scene.text_files import parse_number
 
 if TYPE_CHECKING:
-    from warpspace.machine.description import Machine
+    from warpspace.machine.definition import Machine
     from warpspace.scene.model import Scene
 
 T = TypeVar("T")

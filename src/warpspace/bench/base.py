@@ -12,9 +12,9 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table
 from warpspace.analysis.description import Analysis, Result, Watch
-from warpspace.analysis.distribution import round_width
-from warpspace.analysis.doubt import find_doubt, plus_minus
 from warpspace.analysis.options import File, Option, Place, option, options_of
+from warpspace.analysis.sampling.distribution import round_width
+from warpspace.analysis.uncertainty.propagation import find_doubt, plus_minus
 from warpspace.bench.data import DataColumn, read_table, unit_notes
 from warpspace.bench.data import Table as DataTable
 from warpspace.bench.plan import Outcome, Plan, fit_setup, respond, simulate
@@ -160,7 +160,7 @@ class BenchTest(Analysis):
 class BenchResult(Result):
     """A test that was run."""
 
-    drawn_by: ClassVar[str] = "warpspace.outputs.charts.results:bench_chart"
+    drawn_by: ClassVar[str] = "warpspace.outputs.charts.result_charts:bench_chart"
     test: BenchTest
     scene: Scene
     runs: tuple[Run, ...]  # the model; behind it what was measured, if anything

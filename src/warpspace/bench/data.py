@@ -11,7 +11,7 @@ import numpy as np
 
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.machine.limits import MAX_CSV_BYTES, MAX_ERROR, MAX_POINTS
-from warpspace.scene import files
+from warpspace.scene import text_files
 from warpspace.units import Array
 
 ColumnKind = Literal["number", "reading", "sign", "name"]
@@ -73,15 +73,15 @@ class Table:
 def read_table(path: str | Path, columns: Sequence[DataColumn]) -> Table:
     """Read a file of readings; columns that are not asked for are left aside."""
     source = str(path)
-    text = files.read_text(Path(path), MAX_CSV_BYTES, source)
+    text = text_files.read_text(Path(path), MAX_CSV_BYTES, source)
     return parse_table(text, columns, source)
 
 
 def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Table:
-    rows = files.CsvRows(io.StringIO(text, newline=""), source, MAX_POINTS, once=True)
+    rows = text_files.CsvRows(io.StringIO(text, newline=""), source, MAX_POINTS, once=True)
     if not rows.header:
         raise SceneError(source, ["is empty; expected a header " + _header(columns)])
-    header = [files.plain_heading(name) for name in rows.header]
+    header = [text_files.plain_heading(name) for name in rows.header]
     _check_header(header, rows.line, columns, source)
     there = [(one, header.index(one.name)) for one in columns if one.name in header]
     values: dict[str, list[float]] = {one.name: [] for one in columns if one.kind != "name"}
@@ -106,7 +106,7 @@ def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Table:
         {name: np.array(column) for name, column in values.items()},
         {name: tuple(column) for name, column in words.items()},
         np.array(lines, dtype=float),
-        (*rows.notes, *files.radian_notes(values)),
+        (*rows.notes, *text_files.radian_notes(values)),
     )
 
 
@@ -129,21 +129,23 @@ def _check_header(header: list[str], line: int, columns: Sequence[DataColumn], s
         raise SceneError(source, problems)
 
 
-def _value(column: DataColumn, line: int, text: str, rows: files.CsvRows) -> float:
+def _value(column: DataColumn, line: int, text: str, rows: text_files.CsvRows) -> float:
     if column.kind == "sign":
-        text = files.unguard_cell(text)
+        text = text_files.unguard_cell(text)
         if text not in SIGNS:
-            rows.note(f"line {line}, {column.name}: {files.spell_value(text)}; expected + or -")
+            rows.note(
+                f"line {line}, {column.name}: {text_files.spell_value(text)}; expected + or -"
+            )
         return SIGNS.get(text, math.nan)
     hint = ", in µm or µrad: is the file in nm?" if column.kind == "reading" else ""
     return rows.number(text, line, column.name, MAX_ERROR, hint)
 
 
-def _word(column: DataColumn, line: int, text: str, rows: files.CsvRows) -> str:
-    text = files.unguard_cell(text)
+def _word(column: DataColumn, line: int, text: str, rows: text_files.CsvRows) -> str:
+    text = text_files.unguard_cell(text)
     if column.names and text not in column.names:
         known = near_miss(text, column.names)
-        rows.note(f"line {line}, {column.name}: {files.spell_value(text)}{known}")
+        rows.note(f"line {line}, {column.name}: {text_files.spell_value(text)}{known}")
     return text
 
 

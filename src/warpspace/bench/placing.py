@@ -12,7 +12,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import AxisFrames, branch_frames, branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import direction_index, parameter
-from warpspace.machine.description import Machine
+from warpspace.machine.definition import Machine
 from warpspace.machine.limits import FULL_TURN_DEG
 from warpspace.scene.model import Scene
 from warpspace.units import Array

@@ -25,7 +25,7 @@ from warpspace.bodies.schematic import (
     rod,
 )
 from warpspace.kinematics.chain import BASE
-from warpspace.machine.description import TOOL_SHAPES, Axis, Machine, Vector, parse_chain
+from warpspace.machine.definition import TOOL_SHAPES, Axis, Machine, Vector, parse_chain
 from warpspace.units import Array
 
 _LYING = 0.7

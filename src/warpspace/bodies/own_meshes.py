@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpspace.bodies.mesh import MIDDLE, Body, build_body, open_meshes
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.transforms import apply, placed
-from warpspace.machine.description import BodySource, Machine
+from warpspace.machine.definition import BodySource, Machine
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_TRIANGLES, MAX_URDF_TRIANGLES
 from warpspace.units import Array
 

@@ -16,7 +16,7 @@ from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import BASE, BodyMotion, body_motions, branch_pose
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
 from warpspace.machine.axes import parameter
-from warpspace.machine.description import Machine
+from warpspace.machine.definition import Machine
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array

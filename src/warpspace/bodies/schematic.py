@@ -13,7 +13,7 @@ from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE, Body, build_body, 
 from warpspace.geometry.colour import linear_to_srgb
 from warpspace.kinematics.chain import body_motions
 from warpspace.kinematics.model import Model
-from warpspace.machine.description import Axis, Machine
+from warpspace.machine.definition import Axis, Machine
 from warpspace.units import Array
 
 BODY_FILE = "bodies.glb"

@@ -11,6 +11,15 @@ import numpy as np
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.description import Watch as Share
 from warpspace.analysis.options import PLACE, Files, Grammar, option, typed_word
+from warpspace.calibration.calibration_result import (
+    TARGETS,
+    Calibration,
+    Combination,
+    Found,
+    Residuals,
+    Target,
+    target_words,
+)
 from warpspace.calibration.instruments import (
     NO_INSTRUMENT,
     Instrument,
@@ -23,15 +32,6 @@ from warpspace.calibration.instruments import (
 from warpspace.calibration.kinds import in_other_frame
 from warpspace.calibration.next_best import next_best, observability, separating, u95_at
 from warpspace.calibration.readings import Readings, read_readings
-from warpspace.calibration.results import (
-    TARGETS,
-    Calibration,
-    Combination,
-    Found,
-    Residuals,
-    Target,
-    target_words,
-)
 from warpspace.calibration.solve import (
     MAD,
     Rank,

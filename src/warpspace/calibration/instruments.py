@@ -22,7 +22,7 @@ from warpspace.kinematics.chain import branch_pose
 from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
 from warpspace.scene import schema
-from warpspace.scene.files import parse_toml, read_text
+from warpspace.scene.text_files import parse_toml, read_text
 from warpspace.units import MM_PER_UM, Array
 
 

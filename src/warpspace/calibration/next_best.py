@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from warpspace.analysis.doubt import coverage_factor
+from warpspace.analysis.uncertainty.propagation import coverage_factor
 from warpspace.bench.placing import PLANES, ball_point, within_travel
 from warpspace.calibration import solve
+from warpspace.calibration.calibration_result import Calibration, Candidate, Step, Target
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import TestReadings
-from warpspace.calibration.results import Calibration, Candidate, Step, Target
 from warpspace.calibration.spheres import solve_linear
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.field.evaluate import build_basis
@@ -23,8 +23,8 @@ from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.axes import default_keys, is_linear, parameter
 from warpspace.machine.errors import ErrorSet
 from warpspace.machine.limits import MAX_SCENE_BYTES
-from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene, grid_basis
+from warpspace.scene.text_files import read_text
 from warpspace.units import UM_PER_MM, Array
 
 # Poses and small tests on the machine of a scene.
@@ -304,7 +304,7 @@ def u95_at(scene: Scene, terms: solve.Terms, target: Target) -> Callable[[Array]
 
 def _u95_of_part(scene: Scene, terms: solve.Terms, target: str) -> Callable[[Array], float]:
     from warpspace.parts.inspection import measure_changes
-    from warpspace.parts.part import fit_out, load_part, make_points, place_part, point_basis
+    from warpspace.parts.workpiece import fit_out, load_part, make_points, place_part, point_basis
 
     if (file := scene.part.path("file")) is None:
         raise OptionError(f"{{target}} {target}: expected a scene whose [part] has a file")

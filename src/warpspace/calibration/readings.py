@@ -14,8 +14,8 @@ from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_CSV_BYTES
 from warpspace.resources import assets_dir
-from warpspace.scene.files import CsvRows, plain_heading, radian_notes, read_text, unguard_cell
 from warpspace.scene.model import Scene, coverage_notes
+from warpspace.scene.text_files import CsvRows, plain_heading, radian_notes, read_text, unguard_cell
 from warpspace.units import Array
 
 MAX_READINGS = 20_000  # rows that a file of readings may have

@@ -17,8 +17,8 @@ from warpspace.calibration.readings import Readings, ReadingTable, check_spread
 from warpspace.calibration.spheres import Sphere, SphereTcp
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.machine.limits import MAX_ERROR
-from warpspace.scene.files import parse_number
 from warpspace.scene.model import Scene
+from warpspace.scene.text_files import parse_number
 from warpspace.units import MM_PER_UM, Array
 
 RENAMED = {"r-test": "sphere"}

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpspace.analysis.options import Option, options_of
-from warpspace.cli.guard import DataFile, check_files, flag_of
-from warpspace.cli.machines import MORE
-from warpspace.cli.options import (
+from warpspace.cli.file_arguments import DataFile, check_files, flag_of
+from warpspace.cli.sampling_output import MORE
+from warpspace.cli.shared_options import (
     SCENES,
     RenamedOption,
     csv_option,
@@ -156,11 +156,11 @@ def print_blocks(blocks: "Iterable[Block]") -> None:
 def write_result(
     found: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
 ) -> list[str]:
-    from warpspace.scene.files import spell_row
+    from warpspace.scene.text_files import spell_row
 
     wrote: list[str] = []
     if output is not None:
-        from warpspace.scene.save import scene_files
+        from warpspace.scene.scene_writer import scene_files
 
         path, changes = Path(output), found.changes()
         if texts := found.texts(path.suffix.lower()):
@@ -175,8 +175,8 @@ def write_result(
         rows = () if table is None else table.csv_rows()
         write_text(csv_path, "".join(map(spell_row, rows)), force=force)
     if plot is not None:
-        from warpspace.outputs.charts.results import result_chart
-        from warpspace.outputs.save import write_chart
+        from warpspace.outputs.charts.result_charts import result_chart
+        from warpspace.outputs.figure_files import write_chart
 
         draw = resolve_name(found.drawn_by) if found.drawn_by else result_chart
         write_chart(draw(found), plot, overwrite=force)

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from warpspace.analysis.catalogue import TASKS, entries
-from warpspace.cli.guard import Commands
+from warpspace.analysis.registry import TASKS, entries
+from warpspace.cli.file_arguments import Commands
 from warpspace.cli.tables import echo, plain
 from warpspace.exceptions import WarpspaceError
 from warpspace.resources import __version__

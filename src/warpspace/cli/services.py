@@ -6,11 +6,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from warpspace.cli.options import write_text
+from warpspace.cli.shared_options import write_text
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.outputs.exports.formats import ExportFormat, export_formats, register_format
 from warpspace.outputs.exports.formats import write_export as write
-from warpspace.outputs.figures.catalogue import figure_kinds
+from warpspace.outputs.figures.registry import figure_kinds
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from warpspace.analysis.concepts import Concepts
+    from warpspace.analysis.commands.concepts import Concepts
     from warpspace.analysis.description import Result
-    from warpspace.app.documents.services import Services
+    from warpspace.app.documents.output_services import Services
     from warpspace.app.drawing.camera import CameraMemory
     from warpspace.app.evaluation.live_picture import LivePicture
     from warpspace.formats.compensation.compensate import Compensation
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 MOST_RENDERERS = 2  # figures drawn at the same time for all tabs together
 POLL_S = 0.1
-MAPS = "warpspace.outputs.charts.results:compensation_maps"
+MAPS = "warpspace.outputs.charts.result_charts:compensation_maps"
 _renderers = threading.Semaphore(MOST_RENDERERS)
 
 
 def build_services() -> "Services":
-    from warpspace.app.documents.services import Services
+    from warpspace.app.documents.output_services import Services
 
     return Services(
         draw_figure,
@@ -63,8 +63,8 @@ def _figure_of(
 
     Where tilts are coloured it is the orientation map; a comparison is always of position errors.
     """
-    from warpspace.app.documents.files import shown_sides
     from warpspace.app.documents.legend import state_conditions
+    from warpspace.app.documents.transfers import shown_sides
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.picture.comparison import conditions_of_both
 
@@ -150,7 +150,7 @@ def _drawn(
 ) -> bytes:
     from concurrent.futures import ThreadPoolExecutor, wait
 
-    from warpspace.app.documents.services import CancelledError
+    from warpspace.app.documents.output_services import CancelledError
     from warpspace.outputs.processes import FigureWorker
 
     with _turn(cancelled), FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
@@ -165,7 +165,7 @@ def _drawn(
 
 @contextmanager
 def _turn(cancelled: threading.Event) -> Generator[None]:
-    from warpspace.app.documents.services import CancelledError
+    from warpspace.app.documents.output_services import CancelledError
 
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
@@ -178,9 +178,9 @@ def _turn(cancelled: threading.Event) -> Generator[None]:
 
 def write_export(picture: "LivePicture", ending: str) -> bytes:
     """Write an export of what a page shows."""
-    from warpspace.app.documents.files import shown_sides
     from warpspace.app.documents.legend import range_conditions, state_conditions
-    from warpspace.outputs.files import temporary_folder
+    from warpspace.app.documents.transfers import shown_sides
+    from warpspace.outputs.file_output import temporary_folder
     from warpspace.picture.comparison import scene_change
     from warpspace.picture.model import evaluate_picture
 
@@ -214,9 +214,9 @@ def write_report(
     cancelled: threading.Event,
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; give the file, and which figures are missing."""
-    from warpspace.app.documents.files import shown_sides
     from warpspace.app.documents.scene_file import kept_views
-    from warpspace.outputs.files import temporary_folder
+    from warpspace.app.documents.transfers import shown_sides
+    from warpspace.outputs.file_output import temporary_folder
     from warpspace.outputs.report import ReportSettings
     from warpspace.outputs.report import write_report as write
 
@@ -297,7 +297,7 @@ def tell_story(scene: "Scene", nodes: int) -> "list[Step]":
 
     from warpspace.app.documents.legend import look_words, numbers_words, picture_conditions
     from warpspace.app.documents.scene_file import reopened
-    from warpspace.app.evaluation.evaluate import LiveModel
+    from warpspace.app.evaluation.live_model import LiveModel
     from warpspace.app.state.app_state import START_NODES, start_state
     from warpspace.kinematics.model import Loop
     from warpspace.picture.model import VIEW_WORDS, VIEWS

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.analysis import blocks
-from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.compensation.corrections import Wanted
 from warpspace.formats.source import Place, Source
 from warpspace.machine.axes import TravelDirection, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction

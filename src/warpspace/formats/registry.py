@@ -11,14 +11,14 @@ from pkgutil import resolve_name
 from typing import Any
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.compensation.corrections import Wanted
 from warpspace.formats.measured import Imported, merge
 from warpspace.formats.source import MAX_BYTES, Place, Source, source_of_bytes
 from warpspace.formats.terms import Tables, errors_of
 from warpspace.machine.axes import is_axis_name
-from warpspace.machine.description import Machine
+from warpspace.machine.definition import Machine
 from warpspace.plugins import Registry
-from warpspace.scene.files import check_file
+from warpspace.scene.text_files import check_file
 
 ERROR, CORRECTION = "error", "correction"
 """What the numbers of a controller's table are: the error, which it subtracts, or what it adds."""

@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
-from warpspace.scene.files import CsvRows, parse_number
+from warpspace.scene.text_files import CsvRows, parse_number
 
 UM_PER: Mapping[str, float] = {
     "um": 1.0,

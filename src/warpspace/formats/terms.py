@@ -15,7 +15,7 @@ from warpspace.formats import measured
 from warpspace.formats.source import DEG_TO_URAD, Source
 from warpspace.kinematics.model import Coordinates
 from warpspace.machine.axes import direction_index, is_linear
-from warpspace.machine.description import Machine
+from warpspace.machine.definition import Machine
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 HELD, MODULO, EXTENDED = "held", "modulo", "extended"

@@ -16,13 +16,13 @@ from warpspace.machine.curves.simple import Constant, Directional
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run
 from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN
-from warpspace.scene.curves import CurveReader
-from warpspace.scene.files import radian_notes
+from warpspace.scene.curve_reader import CurveReader
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.machines import machine_names
+from warpspace.scene.machine_library import machine_names
 from warpspace.scene.model import Scene, coverage_notes
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.schema import Problems
+from warpspace.scene.text_files import radian_notes
 
 LEEWAY = 1e-6  # mm or degrees by which a position may lie beyond the travel
 LARGE = {False: 1000.0, True: 5000.0}

@@ -11,7 +11,7 @@ from warpspace.kinematics.chain import motion
 from warpspace.kinematics.model import ComponentErrors, Model
 from warpspace.machine.axes import DIRECTIONS, TravelDirection
 from warpspace.machine.curves.curve import ErrorFunction, Span
-from warpspace.machine.curves.pieces import SMALL, Pieces, fit_curves
+from warpspace.machine.curves.polynomial_pieces import SMALL, Pieces, fit_curves
 from warpspace.machine.curves.simple import Constant, Directional
 from warpspace.machine.curves.table import Table
 from warpspace.machine.errors import ErrorSet

@@ -16,7 +16,7 @@ from warpspace.kinematics import components, transforms
 from warpspace.kinematics.components import Rows, Triple
 from warpspace.kinematics.model import TOOL_AXIS, AxisFrames, Coordinates, Loop, Model, batch_shape
 from warpspace.machine.axes import DIRECTIONS, Parameter, axis_parameters, parameter
-from warpspace.machine.description import Axis, Vector
+from warpspace.machine.definition import Axis, Vector
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, UM_PER_MM_URAD, URAD_PER_RAD, Array
 
 ErrorValues = Mapping[str, Array]  # parameter key to values at the coordinates, [...], µm or µrad

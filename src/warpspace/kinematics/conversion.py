@@ -13,9 +13,9 @@ from warpspace.kinematics.chain import loop_error, nominal_point
 from warpspace.kinematics.model import ComponentErrors, Coordinates, Loop, Model
 from warpspace.machine.axes import ErrorKind, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import Span
-from warpspace.machine.curves.pieces import SMALL
+from warpspace.machine.curves.polynomial_pieces import SMALL
 from warpspace.machine.curves.simple import Constant
-from warpspace.machine.description import Machine, Vector
+from warpspace.machine.definition import Machine, Vector
 from warpspace.machine.errors import ErrorSet
 from warpspace.units import MM_PER_UM, Array
 

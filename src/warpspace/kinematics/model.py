@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import Parameter, TravelDirection
-from warpspace.machine.description import ORIGIN, Axis, Machine, Vector
+from warpspace.machine.definition import ORIGIN, Axis, Machine, Vector
 from warpspace.plugins import Registry
 from warpspace.units import Array
 

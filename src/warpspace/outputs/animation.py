@@ -18,14 +18,14 @@ from warpspace.geometry.surfaces import deform
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import ANIMATION_FRAMES
 from warpspace.outputs.drawing.map3d import draw_map, fit_map
-from warpspace.outputs.drawing.render import fit_projection
+from warpspace.outputs.drawing.off_screen import fit_projection
 from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
-from warpspace.outputs.figures.machine import draw_bodies
+from warpspace.outputs.figure_files import figure_bytes
+from warpspace.outputs.figures.machine_figures import draw_bodies
 from warpspace.outputs.figures.maps import isoline_words, say_statistics
-from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.file_output import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
-from warpspace.outputs.save import figure_bytes
 from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
 from warpspace.picture.traces import TraceLine, evaluate_traces
 from warpspace.resources import __version__

@@ -231,7 +231,7 @@ LEAST_MB = 1600  # address space that the renderer takes for a picture
 
 
 def _draw(name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form: str) -> bytes:
-    from warpspace.outputs.save import render_figure
+    from warpspace.outputs.figure_files import render_figure
 
     gc.collect()
     gc.freeze()  # what stays is not searched for garbage before every figure
@@ -243,7 +243,7 @@ def _draw(name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form
 
 
 def _draw_chart(draw: str, form: str, *arguments: Any) -> bytes:
-    from warpspace.outputs.save import encode_figure
+    from warpspace.outputs.figure_files import encode_figure
 
     return encode_figure(resolve_name(draw)(*arguments), form)
 

@@ -15,7 +15,7 @@ from warpspace.outputs.drawing.canvas import (
 )
 from warpspace.outputs.drawing.settings import DARK, LIGHT, FigureSettings, factor
 from warpspace.outputs.drawing.sheet import Row, Sheet, draw_heading
-from warpspace.outputs.save import encode_figure
+from warpspace.outputs.figure_files import encode_figure
 from warpspace.resources import __version__
 from warpspace.units import Array
 

@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Column, Table, number_columns
-from warpspace.analysis.contributions import budget_words
-from warpspace.analysis.doubt import SURE, Doubt, FieldDoubt, plus_minus
+from warpspace.analysis.commands.contributions import budget_words
+from warpspace.analysis.uncertainty.propagation import SURE, Doubt, FieldDoubt, plus_minus
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
-from warpspace.parts.part import Made, PartMesh, fit_out, point_basis
+from warpspace.parts.workpiece import Made, PartMesh, fit_out, point_basis
 from warpspace.scene import schema
-from warpspace.scene.files import parse_toml
 from warpspace.scene.model import Scene, evaluate
+from warpspace.scene.text_files import parse_toml
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array, spell_signed
 
 SMOOTH_DEG = 30.5  # triangles meeting at less may belong to one curved surface: 12 around a hole

@@ -1,263 +1,207 @@
-"""A part as the machine makes it: a mesh in the workpiece frame, moved by the relative error.
+"""A part as this machine cuts it: how far it deviates, its features, and its mesh as a file.
 
-The error of a point is that of the tool against the workpiece, in the workpiece frame w, where the
-linear axes bring the tool to the point and the rotary axes stand as they do in the scene. The part
-as cut is the nominal one plus that error. Geometry only: no forces, heat, wear or servo.
+Geometry only: no forces, heat, wear or servo.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import partial
+from operator import itemgetter
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from warpspace.analysis.description import Analysis
-from warpspace.analysis.doubt import FieldDoubt, combine, find_doubt
-from warpspace.analysis.options import File, Grammar, option
-from warpspace.bench.placing import ball_point, follow, within_travel
-from warpspace.bodies.mesh import CREASE_DEG
-from warpspace.bodies.own_meshes import read_mesh
-from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import ErrorBasis, build_basis
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.options import File, option
+from warpspace.analysis.statistics import Numbers, Statistics, statistics
+from warpspace.analysis.uncertainty.propagation import FieldDoubt, plus_minus, u95_lines
+from warpspace.bodies.gltf import to_gltf
+from warpspace.bodies.own_meshes import FORMATS, MM_PER_M, UNITS_MM
+from warpspace.field.evaluate import ErrorField
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import branch_pose
-from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_LENGTH_MM, MAX_PART_TRIANGLES
-from warpspace.scene.files import parse_number
-from warpspace.scene.model import Scene, evaluate
-from warpspace.units import Array, Integers
+from warpspace.kinematics.model import Loop
+from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
+from warpspace.parts.inspection import FeatureResult, features_table, inspect
+from warpspace.parts.workpiece import (
+    Made,
+    OfPart,
+    PartMesh,
+    fit_out,
+    made_doubt,
+    make_points,
+    place_part,
+)
+from warpspace.scene.model import Scene, second_order
+from warpspace.scene.text_files import read_text
+from warpspace.units import MM_PER_UM, Array
 
-POINTS_AT_ONCE, PAIRS_AT_ONCE = 50_000, 500_000  # what lies between needs memory, too
-TOUCHING = 1e-5  # share of the largest coordinate up to which triangles only touch others
-TOGETHER, MOST_PAIRS = 100, 2e8  # triangles that are not parted any more; pairs that are looked at
-
-
-class Corners(NamedTuple):
-    """Vertices once for each smooth face that they belong to, so that creases stay sharp."""
-
-    corner_of: NDArray[np.int32]  # [W], number of the vertex of each corner
-    triangles: NDArray[np.int32]  # [T, 3], numbers of corners
-    normals: Array  # [W, 3], unit vectors; zero where all triangles are slivers
-    creases: NDArray[np.int32]  # [S, 2], corners at the ends of the edges where smooth faces meet
-
-
-@dataclass(frozen=True, eq=False)
-class PartMesh:
-    """A closed surface, vertices merged, its triangles counter-clockwise seen from outside."""
-
-    name: str
-    vertices_mm: Array  # [V, 3]
-    triangles: NDArray[np.int32]  # [T, 3]
-    unit: str | None = None  # of the numbers in its file; None for that of the format
-    warnings: tuple[str, ...] = ()  # open, inverted, crooked: shown and said
-    place: tuple[float, ...] = (0.0,) * 6  # where it is clamped, mm and degrees
-
-    @cached_property
-    def middle_mm(self) -> Array:
-        """Middle of the box around it, [3]."""
-        return (self.vertices_mm.min(axis=0) + self.vertices_mm.max(axis=0)) / 2.0
-
-    @cached_property
-    def surface(self) -> Any:
-        """The same as a mesh of trimesh, which knows its normals and neighbours."""
-        from trimesh import Trimesh
-
-        return Trimesh(self.vertices_mm, self.triangles, process=False)
-
-    @cached_property
-    def corners(self) -> Corners:
-        """Vertices split at creases above `CREASE_DEG`."""
-        from trimesh import Trimesh, graph
-
-        surface, vertex = self.surface, self.triangles.reshape(-1)
-        faces, ends = surface.face_adjacency, surface.face_adjacency_edges
-        # which corner of each of its two triangles is at each end of an edge, [e, 2 ends, 2]
-        is_there = self.triangles[faces][:, None] == ends[:, :, None, None]
-        corner = 3 * faces[:, None] + is_there.argmax(axis=-1)
-        is_sharp = surface.face_adjacency_angles > np.deg2rad(CREASE_DEG)
-        joined = corner[~is_sharp].reshape(-1, 2)
-        label = graph.connected_component_labels(joined, node_count=len(vertex))
-        corner_of = np.empty(label.max() + 1, np.int32)
-        corner_of[label] = vertex
-        split = Trimesh(self.vertices_mm[corner_of], label.reshape(-1, 3), process=False)
-        triangles = label.reshape(-1, 3).astype(np.int32)
-        creases = label[corner[is_sharp][..., 0]].astype(np.int32)
-        return Corners(corner_of, triangles, split.vertex_normals, creases)
-
-
-def load_part(path: str | Path, unit: str | None = None, data: bytes | None = None) -> PartMesh:
-    """Read a mesh from a file, or from its bytes: in mm, .glb in m, unless a unit is given."""
-    path = Path(path)
-    mesh, said = read_mesh(path, unit, most=MAX_PART_TRIANGLES, data=data)
-    part = PartMesh(path.stem, np.asarray(mesh.vertices), mesh.faces.astype(np.int32), unit)
-    surface = "its surface passes through itself"
-    if (count := count_crossings(part)) is None:
-        said += (f"{path}: too many triangles, or too many in one place, to tell if {surface}",)
-    elif count:
-        said += (f"{path}: {surface} ({count:,} pairs of triangles); it is taken as it is",)
-    return replace(part, warnings=said)
-
-
-def count_crossings(part: PartMesh) -> int | None:
-    """Count pairs of triangles that pass through each other along a line.
-
-    Those with a common vertex do not count. None where there are too many to look at.
-    """
-    if len(triangles := part.triangles) > MAX_FEATURE_TRIANGLES:
-        return None
-    corner, normal = part.vertices_mm[triangles], part.surface.face_normals
-    slack = TOUCHING * np.abs(corner).max()
-    low, high = (np.ascontiguousarray(end(corner, axis=1).T) for end in (np.min, np.max))
-    waiting, found, looked_at = [np.arange(len(triangles))], list[Integers](), 0
-    while waiting:
-        some = waiting.pop()
-        first, last = low[:, some], high[:, some]  # [3, n]
-        if len(some) > TOGETHER:  # part them where it saves most pairs
-            cut = (first + last).mean(axis=1, keepdims=True) / 2.0
-            is_above = last > cut + slack / 2.0
-            is_below = (first < cut - slack / 2.0) | ~is_above  # what touches is on one side
-            pairs = is_above.sum(axis=1) ** 2 + is_below.sum(axis=1) ** 2
-            if pairs[along := pairs.argmin()] < 0.8 * len(some) ** 2:
-                waiting += [some[is_above[along]], some[is_below[along]]]
-                continue
-        for rows in np.array_split(np.arange(len(some)), 1 + len(some) ** 2 // PAIRS_AT_ONCE):
-            is_near = rows[:, None] > np.arange(len(some))
-            for begin, end in zip(first, last, strict=True):
-                is_near &= begin[rows, None] + slack < end
-                is_near &= begin + slack < end[rows, None]
-            row, column = np.nonzero(is_near)
-            pair = some[np.stack([rows[row], column])]
-            for _ in pair:  # each has corners on both sides of the other's plane
-                arm = corner[pair[0]] - corner[pair[1], :1]
-                away = np.einsum("nex,nx->ne", arm, normal[pair[1]])
-                is_across = (away.max(axis=1) > slack) & (away.min(axis=1) < -slack)
-                pair = pair[::-1, is_across]
-            found.append(pair[0] * len(triangles) + pair[1])
-            looked_at += is_near.size + 200 * pair.shape[1]
-            if looked_at > MOST_PAIRS:
-                return None
-    pair = np.stack(np.divmod(np.unique(np.concatenate(found)), len(triangles)))
-    one, other = triangles[pair]
-    pair = pair[:, (one[:, :, None] != other[:, None]).all(axis=(1, 2))]
-    line = np.cross(*normal[pair])
-    line /= np.linalg.norm(line, axis=1, keepdims=True)
-    ways = pair, pair[::-1]
-    ends = [_ends(corner[one], corner[other], normal[other], line) for one, other in ways]
-    return int(np.sum(np.min(ends, axis=0)[1] - np.max(ends, axis=0)[0] > slack))
-
-
-def _ends(one: Array, other: Array, normal: Array, line: Array) -> tuple[Array, Array]:
-    """Give where a triangle begins and ends on the line where its plane meets another one's."""
-    away, at = (np.einsum("nex,nx->ne", one - other[:, :1], way) for way in (normal, line))
-    at += np.einsum("nx,nx->n", other[:, 0], line)[:, None]
-    ahead, to = np.roll(away, -1, axis=1), np.roll(at, -1, axis=1)
-    passes = (away < 0.0) != (ahead < 0.0)  # edges through the plane of the other, two of three
-    place = at + (to - at) * away / np.where(passes, away - ahead, 1.0)
-    return np.where(passes, place, np.inf).min(axis=1), np.where(passes, place, -np.inf).max(axis=1)
-
-
-def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
-    """Read a place as it is typed: ``X,Y,Z`` or ``X,Y,Z,A,B,C``."""
-    try:
-        found = tuple(parse_number(part) for part in text.split(","))
-    except ValueError:
-        found = ()
-    if len(found) not in (3, 6) or not all(abs(value) <= MAX_LENGTH_MM for value in found):
-        raise ValueError("expected three numbers in mm, or six with degrees, such as 0,0,50,0,0,90")
-    return found
+LOOKED_AT, SEEN_UM = 500, 0.5  # longest edges; errors amid them that are said
+TRIANGLES_AT_ONCE = 200_000  # what lies between needs memory, too
 
 
 @dataclass(frozen=True, kw_only=True)
-class OfPart(Analysis):
-    """A question about a part where it is clamped."""
+class Off:
+    """How far the vertices of a part are from where they should be."""
 
-    file: File = option(
-        None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
+    deviation: Statistics
+    normal: Numbers  # min_um and max_um along normals of triangles, at their corners, and U95
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part(OfPart):
+    """Show a part, a mesh, as the machine of SCENE cuts it.
+
+    The part stands where it is clamped; rotary axes stand as they do in the scene, linear axes
+    bring the tool to each vertex. Errors are those of the tool against the workpiece, in the
+    workpiece frame, actual − nominal: as they are, and placed, after the best rigid fit of all
+    vertices, as an inspector makes it. Planes, cylinders, cones and spheres are found and measured.
+    Geometry only: no forces, heat, wear or servo.
+    """
+
+    name = "part"
+    task = "measure"
+    has_table = True
+    file_help = "Part as cut: .stl, .obj, .ply or .glb."
+    file_endings = tuple(FORMATS)
+    features: File = option(
+        None, "Names and tolerances of its features, .toml", unset="all that are found"
     )
-    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
-        None,
-        "Where the part is clamped, in the workpiece frame: shift in mm and turns in degrees about"
-        " the fixed x, y, z in that order",
-        unset="that of the scene, or the middle of the working volume",
+    predistorted: bool = option(
+        False, "Write with -o the part to be asked for, so that the nominal one is cut"
     )
-    unit: Literal["mm", "cm", "m", "in"] | None = option(
-        None, "Unit of its numbers", unset="mm, of .glb m"
-    )
-    mesh: PartMesh | None = None  # one that is read already
+    tolerances: tuple[str, str] | None = None  # name and text of features that are read already
 
-    def find_mesh(self, scene: Scene) -> PartMesh:
-        """Read the mesh, or that of the scene where none is named."""
-        if self.mesh is not None:
-            return self.mesh
-        if (path := self.file or scene.part.path("file")) is None:
-            raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
-        return load_part(path, self.unit or (None if self.file else scene.part.unit or None))
-
-
-def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = None) -> PartMesh:
-    """Put a part into the workpiece frame: where told, else as the scene says, or in its middle."""
-    at = scene.part.place if place is None else (*place, 0.0, 0.0, 0.0)[:6]
-    if at is None:
-        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-        at = (*(ball_point(scene.model, stand) - mesh.middle_mm).tolist(), 0.0, 0.0, 0.0)
-    pose = transforms.placed(at[:3], at[3:])
-    return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm), place=at)
-
-
-@dataclass(frozen=True, eq=False)
-class Made:
-    """Points of the workpiece frame as the machine makes them."""
-
-    point_mm: Array  # [n, 3], nominal, w
-    coordinates: dict[str, Array]  # [n] or one for all: where the axes stand
-    error_um: Array  # [n, 3], w, actual − nominal
-    outside: NDArray[np.bool_]  # [n], beyond the travel of a linear axis; errors are continued
-
-
-def make_points(scene: Scene, point_mm: Array) -> Made:
-    """Find where the axes stand at points of w, [n, 3], mm, and what error they have there."""
-    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-    at, error = follow(scene.model, stand, point_mm), np.empty(point_mm.shape)
-    for first in range(0, len(point_mm), POINTS_AT_ONCE):
-        rows = slice(first, first + POINTS_AT_ONCE)
-        here = {name: of[rows] if np.ndim(of) else of for name, of in at.items()}
-        error[rows] = evaluate(scene, at=here, loop=Loop.RELATIVE, frame="workpiece").error_um
-    outside = ~np.broadcast_to(within_travel(scene.machine, at), len(point_mm))
-    return Made(point_mm, at, error, outside)
+    def run(self, scene: Scene, watch: Watch, /) -> "PartResult":
+        mesh = self.find_mesh(scene)
+        is_own = not (self.mesh or self.file)
+        features = self.features or (scene.part.path("features") if is_own else None)
+        tolerances = self.tolerances
+        if features and not tolerances:
+            tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
+        watch(0.2)
+        part = place_part(mesh, scene, self.place)
+        made = make_points(scene, part.vertices_mm)
+        watch(0.5)
+        is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
+        between = 0.0 if is_large else _between(scene, part, made)
+        unseen = between if between > SEEN_UM else 0.0
+        fit = partial(fit_out, made.point_mm)
+        sure = None if is_large else made_doubt(scene, made)
+        both = (made.error_um, sure), (fit(made.error_um), sure and sure.seen(fit))
+        cut, placed = _off(part, made, *both)
+        return PartResult(
+            vertices=len(mesh.vertices_mm),
+            outside=int(made.outside.sum()),
+            **vars(cut),
+            placed=placed,
+            features=() if is_large else inspect(scene, mesh, made, tolerances, sure, unseen),
+            doubt=sure and sure.doubt,
+            unseen_um=unseen,
+            part=part,
+            made=made,
+            scene=scene,
+            asked=self,
+            second_order=second_order(scene, Loop.RELATIVE),
+        )
 
 
-def point_basis(
-    scene: Scene, made: Made, keys: Sequence[str] | None = None, rows: Any = slice(None)
-) -> ErrorBasis:
-    """Give the response of points to each parameter, [K, n, 3], in w: what a slider moves."""
-    keys = scene.parameter_keys if keys is None else keys
-    at = {name: of[rows] if np.ndim(of) else of for name, of in made.coordinates.items()}
-    point = transforms.apply(branch_pose(scene.model, "workpiece", at), made.point_mm[rows])
-    view = scene.view(Loop.RELATIVE, "workpiece")
-    return build_basis(scene.model, scene.errors, keys, at, view, point)
+def _between(scene: Scene, part: PartMesh, made: Made) -> float:
+    """Give how far the errors amid the longest edges are from those of their ends, at most, µm."""
+    corner = np.take(part.vertices_mm, part.triangles, axis=0)
+    length = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).reshape(-1)
+    longest = np.argsort(-length)[:LOOKED_AT]
+    ends = np.stack([part.triangles, np.roll(part.triangles, -1, axis=1)], -1).reshape(-1, 2)[
+        longest
+    ]
+    amid = make_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
+    off = amid - made.error_um[ends].mean(axis=1)
+    return float(np.linalg.norm(off, axis=1).max())
 
 
-def made_doubt(scene: Scene, made: Made) -> FieldDoubt | None:
-    """Say how sure errors of points are; None where a scene does not say."""
-    if (doubt := find_doubt(scene, Loop.RELATIVE)) is None:
-        return None
-    point = transforms.apply(branch_pose(scene.model, "workpiece", made.coordinates), made.point_mm)
-    view = scene.view(Loop.RELATIVE, "workpiece")
-    basis = doubt.respond(scene.model, made.coordinates, view, point)
-    return combine(doubt, basis.position, made.error_um)
+def _off(part: PartMesh, made: Made, *found: tuple[Array, FieldDoubt | None]) -> Iterator[Off]:
+    from trimesh import triangles
+
+    # lowest and highest so far: how far, at which vertex, along which normal
+    spans = [[(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)] for _ in found]
+    for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
+        some = part.triangles[first : first + TRIANGLES_AT_ONCE]
+        normals, is_valid = triangles.normals(np.take(part.vertices_mm, some, axis=0))
+        corners = some[is_valid]
+        for span, (error, _) in zip(spans, found, strict=True):
+            away = np.einsum("tcx,tx->tc", np.take(error, corners, axis=0), normals)
+            for index, (choose, better) in enumerate(((np.argmin, min), (np.argmax, max))):
+                if away.size:
+                    at = int(choose(away))
+                    new = away.item(at), corners.item(at), normals[at // 3]
+                    span[index] = better(span[index], new, key=itemgetter(0))
+    for span, (error, sure) in zip(spans, found, strict=True):
+        field = ErrorField(made.point_mm, error, np.broadcast_to(np.nan, error.shape))
+        deviation = statistics(field, made.coordinates)
+        normal: dict[str, float | None] = {}
+        for name, (value, vertex, way) in zip(("min_um", "max_um"), span, strict=True):
+            normal[name] = value
+            if sure is not None:
+                normal[f"u95_{name}"] = sure.u95_along(vertex, way)
+        yield Off(deviation=sure.said_of(deviation) if sure else deviation, normal=normal)
 
 
-def fit_out(point_mm: Array, error_um: Array) -> Array:
-    """Give errors, [..., n, 3], µm, less the rigid motion of the points, [n, 3], that fits best."""
-    arm = point_mm - point_mm.mean(axis=0)
-    shift = error_um.mean(axis=-2, keepdims=True)
-    inertia = np.sum(arm * arm) * np.eye(3) - arm.T @ arm
-    # a cross product of each pair takes five times longer
-    both = np.swapaxes(error_um, -1, -2) @ arm
-    moment = (both - np.swapaxes(both, -1, -2))[..., [2, 0, 1], [1, 2, 0]]
-    # points on a line do not tell the turn about it: the smallest one counts
-    turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)
-    return error_um - shift + arm @ transforms.skew(turn)
+@dataclass(frozen=True, kw_only=True)
+class PartResult(Off, Result):
+    """A part as it is cut."""
+
+    keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
+    vertices: int
+    outside: int  # vertices beyond the travel
+    placed: Off
+    features: Sequence[FeatureResult]
+    part: PartMesh  # nominal, in the workpiece frame
+    made: Made  # its vertices
+    scene: Scene
+    asked: Part
+    unseen_um: float  # how far errors between vertices are off, at most; 0 where that is little
+
+    def doubts(self) -> Iterator[str]:
+        yield from self.part.warnings
+        if self.outside:
+            far = f"{self.outside:,} of {self.vertices:,} vertices"
+            yield f"{far} are beyond the travel; their errors are continued"
+        if self.unseen_um:
+            off = f"errors are off by up to {self.unseen_um:.1f} µm more"
+            yield f"between its vertices {off}: expected a finer mesh"
+        if (count := len(self.part.triangles)) > MAX_FEATURE_TRIANGLES:
+            most = f"up to {MAX_FEATURE_TRIANGLES:,}"
+            yield f"{count:,} triangles: features, U95 and errors amid edges: in {most}"
+
+    def blocks(self) -> Iterator[Block]:
+        x, y, z = self.deviation.max_at_mm
+        at = ", ".join(f"{value:.6g}" for value in self.part.place)
+        yield f"{self.scene.title} · {self.part.name}, {self.vertices:,} vertices"
+        yield f"  clamped at {at} mm and degrees"
+        yield f"  largest |E| {self.deviation.max_um:.2f} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
+        yield "  Geometry only: no forces, heat, wear or servo"
+        both = ("as cut", self), ("placed", self.placed)
+        ends = "min_um", "max_um"
+        rows = [
+            (word, *one.deviation.four, *(one.normal[end] for end in ends)) for word, one in both
+        ]
+        heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
+        yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
+        yield from u95_lines(self.doubt, {word: one.deviation for word, one in both})
+        for word, one in both if self.doubt else ():
+            low, high = (plus_minus(one.normal[f"u95_{end}"]) for end in ends)
+            yield f"  U95 along the normal, {word}: min {low}, max {high} µm"
+        yield features_table(self.features)
+
+    def texts(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
+        """Spell the part in its own frame and unit: as it is cut, or so that it is cut nominal."""
+        nominal, moved = self.made.point_mm, self.made.error_um * MM_PER_UM
+        for _ in range(2 * self.asked.predistorted):
+            moved = -make_points(self.scene, nominal + moved).error_um * MM_PER_UM
+        place, (unit, up) = self.part.place, FORMATS[ending]
+        own = transforms.inverse(transforms.placed(place[:3], place[3:]))
+        point = transforms.apply(own, nominal + moved)
+        if up == "y":
+            point = to_gltf(point) * MM_PER_M
+        cut = replace(self.part, vertices_mm=point / UNITS_MM[self.part.unit or unit])
+        return {"": cut.surface.export(file_type=ending[1:])}

@@ -21,11 +21,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.contributions import budget_words, explain
+from warpspace.analysis.commands.contributions import budget_words, explain
 from warpspace.analysis.description import Analysis, Result, Watch, plain
-from warpspace.analysis.doubt import FieldDoubt, combine, find_doubt, plus_minus, u95_lines
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Statistics
+from warpspace.analysis.uncertainty.propagation import (
+    FieldDoubt,
+    combine,
+    find_doubt,
+    plus_minus,
+    u95_lines,
+)
 from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
@@ -33,15 +39,15 @@ from warpspace.formats.source import MAX_LINES, spell
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
-from warpspace.parts import control
+from warpspace.parts import interpreter
 from warpspace.scene.model import Scene, check_magnitude, second_order
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.units import Array, Integers
 
 TURN_DEG, STEP_MM = 2.0, 10.0  # most that axes, and arcs, move between samples
 LEFT_UM, ROUNDS = 1e-3, 20  # of an error that is taken back; how often
 DECIMALS = 4  # of words in mm; in inches one more, in degrees two
-_MODES = {"G2", "G3", *control.CYCLES, "G90", "G91"}  # not of a corrected program
+_MODES = {"G2", "G3", *interpreter.CYCLES, "G90", "G91"}  # not of a corrected program
 _LAST = {"M0", "M1", "M2", "M5", "M9", "M30", "M60"}  # take effect when the axes have moved
 CHORD_MM = 0.01  # most that a bent path leaves the line between samples
 MOST_AT_ONCE = 50_000  # samples
@@ -105,7 +111,7 @@ def _along(error_um: Array, tangent: Array) -> Array:
     return np.sum(error_um * tangent, axis=-1, keepdims=True) * tangent
 
 
-def trace_program(read: control.ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
+def trace_program(read: interpreter.ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
     """Follow the tip of the tool over the workpiece."""
     count = count_samples(read, chord_mm)
     move = np.repeat(np.arange(len(count)), count)
@@ -118,7 +124,7 @@ def trace_program(read: control.ReadProgram, chord_mm: float = CHORD_MM) -> Tool
     return replace(found, sure=_path_doubt(read, found))
 
 
-def _path_doubt(read: control.ReadProgram, path: ToolPath) -> FieldDoubt | None:
+def _path_doubt(read: interpreter.ReadProgram, path: ToolPath) -> FieldDoubt | None:
     """Say how sure the errors along a path are; None where a scene does not say, or it is long."""
     doubt, scene = find_doubt(read.scene, Loop.RELATIVE), read.scene
     if doubt is None or len(path.line) > MOST_SURE:
@@ -127,15 +133,15 @@ def _path_doubt(read: control.ReadProgram, path: ToolPath) -> FieldDoubt | None:
     response = np.empty((len(doubt.keys), *path.error_um.shape))
     for one in np.unique(length):
         here = {name: at[length == one] for name, at in path.coordinates.items()}
-        model = control.with_length(scene.model, one)
+        model = interpreter.with_length(scene.model, one)
         response[:, length == one] = doubt.respond(model, here, view).position
     return combine(doubt, response, path.error_um, path.shares)
 
 
-def count_samples(read: control.ReadProgram, chord_mm: float) -> Integers:
+def count_samples(read: interpreter.ReadProgram, chord_mm: float) -> Integers:
     """Count the samples of each move, [m]; 0 where nothing moves."""
     is_rotary = np.array([not is_linear(name) for name in read.axes])
-    moves = read.kind != control.STAND
+    moves = read.kind != interpreter.STAND
     change = np.abs(np.diff(read.end, axis=0, prepend=read.end[:1]))
     way, turn = np.linalg.norm(change[:, ~is_rotary], axis=1), change[:, is_rotary]
     is_bent = (read.turn_rad != 0.0) | (~read.tcp & turn.any(axis=1))
@@ -154,7 +160,7 @@ def count_samples(read: control.ReadProgram, chord_mm: float) -> Integers:
 
 
 def along_moves(
-    read: control.ReadProgram, move: Integers, share: Array, shift_mm: Array | None = None
+    read: interpreter.ReadProgram, move: Integers, share: Array, shift_mm: Array | None = None
 ) -> tuple[dict[str, Array], Array, Array]:
     """Give positions of axes, tip and error at shares of moves, [n].
 
@@ -166,10 +172,10 @@ def along_moves(
     view = scene.view(Loop.RELATIVE, "workpiece")
     for tcp, length in np.unique(modes, axis=0):
         (same,) = np.nonzero((modes == (tcp, length)).all(axis=1))
-        model = control.with_length(scene.model, length)
+        model = interpreter.with_length(scene.model, length)
         for part in np.array_split(same, -(-len(same) // MOST_AT_ONCE)):
             here = {name: values[part] for name, values in found.items()}
-            here = control.axes_at(scene.model, length, here) if tcp else here
+            here = interpreter.axes_at(scene.model, length, here) if tcp else here
             if shift_mm is not None:
                 here = follow(model, here, ball_point(model, here) + shift_mm[part])
             for name, axis in scene.machine.axes.items():
@@ -198,7 +204,7 @@ class PathPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Program(control.Setup, Analysis):
+class Program(interpreter.Setup, Analysis):
     """Run a program on SCENE: the errors along its path.
 
     G-code: G0 to G3 in three planes, G17 to G21, G28, G43, G43.4, G49, G53 to G59, G80 to G83, G90,
@@ -222,7 +228,7 @@ class Program(control.Setup, Analysis):
 
     def lines(self) -> Iterable[str]:
         file = self.file or ""
-        return control.program_lines(file) if self.text is None else self.text.splitlines()
+        return interpreter.program_lines(file) if self.text is None else self.text.splitlines()
 
     def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
         if self.file is None:
@@ -230,7 +236,7 @@ class Program(control.Setup, Analysis):
                 raise OptionError("{file} is missing; expected a program")
             tcp: Any = scene.part.tcp or self.tcp
             return replace(self, file=path, tcp=tcp).run(scene, watch)
-        read = control.read_program(scene, self.lines(), self, self.file)
+        read = interpreter.read_program(scene, self.lines(), self, self.file)
         watch(0.3)
         path = trace_program(read)
         watch(0.9)
@@ -240,7 +246,7 @@ class Program(control.Setup, Analysis):
         def explained(sample: int) -> PathPoint:
             axes, length = path.axes_at(sample), float(read.length_mm[path.move[sample]])
             view = scene.view(Loop.RELATIVE, "workpiece")
-            model = control.with_length(scene.model, length)
+            model = interpreter.with_length(scene.model, length)
             parts = explain(model, scene.errors, axes, view).contributions
             ranked = sorted(parts, key=lambda part: -part.along_um)
             budget, um = {part.key: part.along_um for part in ranked}, float(path.norm_um[sample])
@@ -280,7 +286,7 @@ class ProgramResult(Result):
     across: Statistics
     worst: Sequence[PathPoint]
     line: PathPoint | None  # the end of the line asked for
-    read: control.ReadProgram
+    read: interpreter.ReadProgram
     path: ToolPath
     asked: Program
 
@@ -322,14 +328,14 @@ class ProgramResult(Result):
         yield Table(columns, rows, title)
 
 
-def corrected_places(read: control.ReadProgram, within_mm: float) -> tuple[Integers, Array]:
+def corrected_places(read: interpreter.ReadProgram, within_mm: float) -> tuple[Integers, Array]:
     """Give rows of a program, [n], and corrected places, [n, a], that its lines lead to in turn.
 
     A row comes as often as its move has pieces, all of one length. Between two places the linear
     axes stay within a distance of where they have to be. Places are those of `ReadProgram.end`.
     """
     count = np.maximum(count_samples(read, within_mm / 4.0), 1)
-    count[read.kind == control.RAPID] = 1
+    count[read.kind == interpreter.RAPID] = 1
     row, _, places = _corrected(read, count)
     linear = [read.axes.index(name) for name in following_axes(read.scene.model)]
     bend = np.linalg.norm(np.diff(places[:, linear], 2, axis=0), axis=1) / within_mm
@@ -341,7 +347,7 @@ def corrected_places(read: control.ReadProgram, within_mm: float) -> tuple[Integ
     return row[share > 0.0], places[share > 0.0]
 
 
-def _corrected(read: control.ReadProgram, count: Integers) -> tuple[Integers, Array, Array]:
+def _corrected(read: interpreter.ReadProgram, count: Integers) -> tuple[Integers, Array, Array]:
     """Give row and share of the ends of equal pieces of moves, and corrected places, [n, a]."""
     row = np.repeat(np.arange(len(count)), count + 1)
     share = (np.arange(len(row)) - np.searchsorted(row, row)) / count[row]
@@ -353,20 +359,20 @@ def _corrected(read: control.ReadProgram, count: Integers) -> tuple[Integers, Ar
         shift = -error_um / 1e3
     else:
         raise OptionError("the errors change too much from place to place to be corrected")
-    places, words = read.positions(row, share), control.words_at(read.scene.model, tip, found)
+    places, words = read.positions(row, share), interpreter.words_at(read.scene.model, tip, found)
     for name in following_axes(read.scene.model):
         places[:, read.axes.index(name)] = np.where(read.tcp[row], words[name], found[name])
     return row, share, places
 
 
-def correct_program(asked: Program, read: control.ReadProgram) -> Iterator[str]:
+def correct_program(asked: Program, read: interpreter.ReadProgram) -> Iterator[str]:
     """Give the lines of a program that leaves the nominal path of another one on this machine."""
     idle = {line: word for word, line in read.unknown.items() if " with G" in word}
     for line, word in {**read.refused, **idle}.items():
         raise OptionError(f"line {line}: {word} is not followed; expected a program that is")
     row, places = corrected_places(read, asked.within_um / 1e3)
     scene, lines, own = read.scene, [*asked.lines()], read.line[row]
-    state = control.Control(scene, asked, asked.file or "")
+    state = interpreter.Control(scene, asked, asked.file or "")
     linear = {name[0] for name in following_axes(scene.model)}
     if missing := ", ".join(linear - state.index.keys()):
         raise OptionError(f"no word moves axis {missing}; expected one axis of each letter")
@@ -382,7 +388,7 @@ def correct_program(asked: Program, read: control.ReadProgram) -> Iterator[str]:
         elif codes & {"M6", "G43", "G43.4", "G49"}:
             known -= {"Z"}
         here = np.arange(*np.searchsorted(own, [number, number + 1]))
-        moving = here[read.kind[row[here]] != control.STAND]
+        moving = here[read.kind[row[here]] != interpreter.STAND]
         if codes & {"G4", "G28", "G53"} or not (letters or len(moving)):
             kept = [word for key, word in state.tokens if key not in _MODES]
             way = ["G91"] * ("G28" in codes and not state.absolute)
@@ -410,7 +416,7 @@ def _header(scene: Scene, asked: Program) -> Iterator[str]:
 
 
 def _blocks(
-    state: control.Control, letters: Sequence[str], kinds: Integers, places: Array
+    state: interpreter.Control, letters: Sequence[str], kinds: Integers, places: Array
 ) -> Iterator[str]:
     """Write the line that a control is at as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]
@@ -420,7 +426,7 @@ def _blocks(
     rest = [word for key, word in state.tokens if key not in said]
     last = [code for code in state.codes if code in _LAST]
     for left, kind, place in zip(range(len(kinds))[::-1], kinds, places, strict=True):
-        is_rapid = kind == control.RAPID or (kind == control.STAND and state.motion == "G0")
+        is_rapid = kind == interpreter.RAPID or (kind == interpreter.STAND and state.motion == "G0")
         words = ["G0" if is_rapid else "G1"]
         for letter in letters:
             value = float(place[state.index[letter]]) - state.place(letter, 0.0)

@@ -10,6 +10,7 @@ from warpspace.analysis.description import plain
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
+from warpspace.picture.formatting import own_axes, spell_at, spell_point
 from warpspace.picture.model import (
     DIFFERENCE_LENGTH,
     Exaggeration,
@@ -19,7 +20,6 @@ from warpspace.picture.model import (
     subtract_traces,
 )
 from warpspace.picture.traces import TraceLines
-from warpspace.picture.words import own_axes, spell_at, spell_point
 from warpspace.scene.model import Scene
 
 CHANGE = "B − A"  # how a change is called, and its sign

@@ -9,10 +9,10 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.concepts import Concept, expected_um
+from warpspace.analysis.commands.concepts import Concept, expected_um
 from warpspace.analysis.description import plain
-from warpspace.analysis.doubt import SURE, FieldDoubt, field_doubt
 from warpspace.analysis.statistics import Statistics, volume_statistics
+from warpspace.analysis.uncertainty.propagation import SURE, FieldDoubt, field_doubt
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, View, placed_words, second_order_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
@@ -21,11 +21,11 @@ from warpspace.geometry.colour import SYMBOLS, ColourScale, build_scale, compone
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import EXAGGERATION
+from warpspace.picture.formatting import direction_words
 from warpspace.picture.traces import TraceLines, evaluate_traces
-from warpspace.picture.words import direction_words
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene, choose_view, evaluate, second_order
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.units import Array
 
 # Whole surface, or without an octant.

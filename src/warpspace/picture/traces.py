@@ -13,7 +13,7 @@ from warpspace.geometry.surfaces import deform
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.description import Vector
+from warpspace.machine.definition import Vector
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell_short
 

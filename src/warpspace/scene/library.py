@@ -18,16 +18,16 @@ from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, sort_
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Constant
 from warpspace.machine.curves.table import Table
-from warpspace.machine.description import BODY_FRAMES, Machine, Range, build_machine
+from warpspace.machine.definition import BODY_FRAMES, Machine, Range, build_machine
 from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run, Tolerance, ToleranceSet
 from warpspace.resources import scenes_dir
-from warpspace.scene import machines, schema
-from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
-from warpspace.scene.files import check_file, parse_toml, read_text
+from warpspace.scene import machine_library, schema
+from warpspace.scene.curve_reader import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
-from warpspace.scene.save import Notation, read_errors, turn_covariance
+from warpspace.scene.scene_writer import Notation, read_errors, turn_covariance
 from warpspace.scene.schema import Problems
+from warpspace.scene.text_files import check_file, parse_toml, read_text
 
 
 def scene_names() -> tuple[str, ...]:
@@ -116,7 +116,7 @@ def parse_scene(
     view = problems.read(schema.VIEW, "view", raw.get("view", {}))
     part = problems.read(schema.PART, "part", raw.get("part", {})) or {}
     for named in filter(part.get, ("file", "features", "program")):
-        machines.path_beside(part[named], f"part.{named}", folder, problems)
+        machine_library.path_beside(part[named], f"part.{named}", folder, problems)
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     fixed = (convention or {}).get("reference_axis") == "fixed"
     document = _Document(raw, machine, workspace, machine.reference_keys * fixed, folder, problems)
@@ -152,7 +152,7 @@ def parse_scene(
         placed=view["placed"],
         limit_um=view["limit_um"],
         description=description,
-        notes=(*scene_notes(machine, workspace, errors), *machines.body_notes(machine)),
+        notes=(*scene_notes(machine, workspace, errors), *machine_library.body_notes(machine)),
         uncertainty=uncertainty,
         covariance=turn_covariance(machine, covariance, convention["squareness"]),
         measured=measured,
@@ -166,16 +166,16 @@ def _machine(
 ) -> Machine:
     given, machine = raw.get("machine"), None
     if not isinstance(given, str):
-        machine = machines.machine_of(given, "machine", name, problems, folder=folder)
-    elif given in machines.machine_names():
-        machine = machines.load_machine(given)
+        machine = machine_library.machine_of(given, "machine", name, problems, folder=folder)
+    elif given in machine_library.machine_names():
+        machine = machine_library.load_machine(given)
     else:
         problems.add(
-            "machine", f"unknown machine{near_miss(given, machines.machine_names())}", given
+            "machine", f"unknown machine{near_miss(given, machine_library.machine_names())}", given
         )
     problems.only("", raw, SECTIONS, "key")
     if machine is not None and "bodies" in raw:
-        own = machines.read_bodies(raw["bodies"], machine, folder, problems)
+        own = machine_library.read_bodies(raw["bodies"], machine, folder, problems)
         machine = replace(machine, bodies={**machine.bodies, **own})
     return machine or STAND_IN
 
@@ -402,7 +402,7 @@ class _Document:
         raw = given.get("covariance") if isinstance(given, dict) else None
         spelled = raw if isinstance(raw, dict) else {"matrix": raw}
         if isinstance(name := spelled.get("matrix"), str):
-            path = machines.path_beside(name, where, self.folder, problems)
+            path = machine_library.path_beside(name, where, self.folder, problems)
             raw = read_npz(Path(path), where, problems) if path else None
             raw = raw and raw | spelled | {"matrix": raw.get("matrix")}
         if raw is None:

@@ -22,7 +22,7 @@ from warpspace.field.evaluate import (
 from warpspace.field.grid import DEFAULT_NODES, Grid, Workspace, build_grid
 from warpspace.kinematics.model import Coordinates, Loop, Model, complete_coordinates
 from warpspace.machine import axes
-from warpspace.machine.description import Machine, Vector
+from warpspace.machine.definition import Machine, Vector
 from warpspace.machine.errors import (
     Covariance,
     ErrorFunction,

@@ -13,7 +13,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from warpspace.exceptions import OptionError
-from warpspace.machine.description import Vector
+from warpspace.machine.definition import Vector
 from warpspace.machine.limits import MAX_NOTES, MAX_REPLACED, MAX_REPLIES
 
 KINDS = ("note", "question", "decision")

@@ -14,10 +14,10 @@ from warpspace.machine import limits
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import MISSING, Path, ValueReader
 from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME
-from warpspace.machine.description import MESH_UNITS, ORIGIN, TOOL_SHAPES, BodySource
+from warpspace.machine.definition import MESH_UNITS, ORIGIN, TOOL_SHAPES, BodySource
 from warpspace.machine.errors import RUN_DIRECTIONS, TOLERANCE_CLASSES, UNKNOWN, Run, Tolerance
-from warpspace.scene.files import location, spell_value
 from warpspace.scene.notes import KINDS, MEASURES, STATUSES, Mark, Note, Reply
+from warpspace.scene.text_files import location, spell_value
 
 Kind = Callable[[ValueReader, Any, Path], Any]
 """Checks one raw value at its place: notes what is wrong with it, or gives what it means."""

@@ -7,7 +7,7 @@ from typing import Any
 import tomli_w
 
 from warpspace.machine.axes import ErrorKind, default_keys, direction_index, is_linear, parameter
-from warpspace.machine.description import ORIGIN, Chain, Range, Vector, parse_chain
+from warpspace.machine.definition import ORIGIN, Chain, Range, Vector, parse_chain
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 

@@ -16,7 +16,7 @@ from warpspace.kinematics.model import Model
 from warpspace.kinematics.transforms import inverse, roll_pitch_yaw_deg
 from warpspace.machine import limits
 from warpspace.machine.axes import MAX_AXES, direction_index, is_axis_name, is_linear
-from warpspace.machine.description import (
+from warpspace.machine.definition import (
     Chain,
     Machine,
     Range,
@@ -25,10 +25,10 @@ from warpspace.machine.description import (
     default_travel,
 )
 from warpspace.machine.errors import ToleranceSet
-from warpspace.scene.files import read_text
 from warpspace.scene.model import Scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.starter import error_lines
+from warpspace.scene.text_files import read_text
 from warpspace.units import Array
 
 MOVING = ("revolute", "continuous", "prismatic")

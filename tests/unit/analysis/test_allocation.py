@@ -8,16 +8,16 @@ import pytest
 from scipy import special, stats
 
 import warpspace
-from warpspace.analysis.allocate import Allocate, allocate
-from warpspace.analysis.allocating import build_ensemble
-from warpspace.analysis.cases import Case, Over, Plan
-from warpspace.analysis.distribution import Distribution, build_draws, machines_needed
-from warpspace.analysis.montecarlo import montecarlo
+from warpspace.analysis.commands.allocate import Allocate, allocate
+from warpspace.analysis.sampling.cases import Case, Over, Plan
+from warpspace.analysis.sampling.distribution import Distribution, build_draws, machines_needed
+from warpspace.analysis.sampling.machine_sampling import montecarlo
+from warpspace.analysis.sampling.tolerance_search import build_ensemble
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 from warpspace.machine.errors import Tolerance, ToleranceSet
 from warpspace.scene.library import load_scene
 

@@ -8,22 +8,26 @@ import pytest
 import trimesh
 
 from warpspace import load_scene
-from warpspace.analysis.certify import Certify
-from warpspace.analysis.doubt import coverage_factor, field_doubt, find_doubt, volume_doubt
-from warpspace.analysis.line import Line
-from warpspace.analysis.reach import Reach
+from warpspace.analysis.commands.conformance import Reach
+from warpspace.analysis.commands.form import Certify
+from warpspace.analysis.commands.line import Line
 from warpspace.analysis.statistics import volume_statistics
+from warpspace.analysis.uncertainty.propagation import (
+    coverage_factor,
+    field_doubt,
+    find_doubt,
+    volume_doubt,
+)
 from warpspace.bench.base import find_test, run_test
 from warpspace.exceptions import SceneError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.errors import Covariance
-from warpspace.parts.as_cut import Part
-from warpspace.parts.clamping import Clamp
-from warpspace.parts.part import OfPart
+from warpspace.parts.clamp import Clamp
+from warpspace.parts.workpiece import OfPart, Part
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 HEAD = """[machine]
 chain = "wFXYZt"

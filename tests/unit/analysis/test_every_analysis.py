@@ -13,11 +13,11 @@ from click.testing import CliRunner
 from warpspace import load_scene
 from warpspace.analysis import Analysis, Column, Result, Table, option, register, unregister
 from warpspace.analysis.blocks import Bars, Histogram, Lines
-from warpspace.analysis.catalogue import TASKS, entries, first_line
 from warpspace.analysis.description import plain, silent
 from warpspace.analysis.options import options_of
+from warpspace.analysis.registry import TASKS, entries, first_line
 from warpspace.cli.analyses import command_of, print_blocks
-from warpspace.cli.guard import guarded
+from warpspace.cli.file_arguments import guarded
 from warpspace.exceptions import OptionError, WarpspaceError
 
 SCENES = ("dvf5000_first", "teach_squareness", "machine_printer_3d")

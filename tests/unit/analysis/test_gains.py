@@ -9,9 +9,9 @@ import pytest
 import warpspace
 from products import first
 from warpspace import evaluate, load_scene
-from warpspace.analysis.concepts import Concepts, compare_concepts, expected_um
-from warpspace.analysis.contributions import explain
-from warpspace.analysis.gains import Gain, gains_at, gains_max, mark_key_errors
+from warpspace.analysis.commands.concepts import Concepts, compare_concepts, expected_um
+from warpspace.analysis.commands.contributions import explain
+from warpspace.analysis.commands.gains import Gain, gains_at, gains_max, mark_key_errors
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.evaluate import View
 from warpspace.field.grid import build_grid

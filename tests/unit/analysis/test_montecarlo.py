@@ -13,8 +13,8 @@ from scipy import stats
 
 import warpspace
 from products import pairwise
-from warpspace.analysis import distribution as streams
-from warpspace.analysis.cases import (
+from warpspace.analysis.sampling import distribution as streams
+from warpspace.analysis.sampling.cases import (
     BLOCK,
     LEAST_BLOCKS,
     MOST_BLOCKS,
@@ -25,9 +25,13 @@ from warpspace.analysis.cases import (
     both_orders,
     choose_cylinder,
 )
-from warpspace.analysis.distribution import Distribution, Draws, Stream, build_draws
-from warpspace.analysis.montecarlo import montecarlo_each, run_in_order, sample_chunks
-from warpspace.analysis.sampled import scene_draws
+from warpspace.analysis.sampling.distribution import Distribution, Draws, Stream, build_draws
+from warpspace.analysis.sampling.machine_sampling import (
+    montecarlo_each,
+    run_in_order,
+    sample_chunks,
+)
+from warpspace.analysis.sampling.sampling_options import scene_draws
 from warpspace.exceptions import OptionError, SceneError, WorkersLostError
 from warpspace.field.evaluate import SecondOrder, View, compare_orders
 from warpspace.kinematics.chain import branch_pose

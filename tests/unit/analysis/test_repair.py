@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, minimize
 
-from warpspace.analysis import adjusting
-from warpspace.analysis.adjusting import Objective, least_rms
-from warpspace.analysis.repair import Repair, repaired
+from warpspace.analysis import adjustment_search
+from warpspace.analysis.adjustment_search import Objective, least_rms
+from warpspace.analysis.commands.adjust import Repair, repaired
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import build_grid
@@ -162,7 +162,7 @@ def test_more_adjustments_are_never_worse(objective):
 def test_sets_that_are_built_up_say_so_and_are_near_the_best(objective, monkeypatch):
     plan = Repair(objective=objective, count=3, adjustable=("all",), grid=3)
     every = plan.run(FIRST)
-    monkeypatch.setattr(adjusting, "MOST_SETS", dict.fromkeys(Objective, 21))
+    monkeypatch.setattr(adjustment_search, "MOST_SETS", dict.fromkeys(Objective, 21))
     built = plan.run(FIRST)
     assert [one.proven for one in built.repairs] == [True, False, False]
     for one, best in zip(built.repairs, every.repairs, strict=True):

@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.analysis.measured import (
-    Check,
-    check_errors,
-    shear,
-)
 from warpspace.analysis.statistics import statistics, volume_statistics
+from warpspace.analysis.tolerance_check import Check, check_errors, shear
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import build_grid

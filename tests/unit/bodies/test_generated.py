@@ -16,10 +16,10 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop, complete_coordinates
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 from warpspace.resources import assets_dir
 from warpspace.scene.library import load_scene
-from warpspace.scene.machines import load_machine, machine_names
+from warpspace.scene.machine_library import load_machine, machine_names
 from warpspace.scene.starter import starter_scene
 
 HEAD = ("S", "t")

@@ -21,7 +21,7 @@ from warpspace.field.evaluate import (
 from warpspace.field.grid import PLANES, Workspace, build_grid, build_slice, node_counts
 from warpspace.geometry.surfaces import outer_faces
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 from warpspace.machine.errors import Constant, ErrorSet, Ramp, Table
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import choose_view, evaluate_grid, grid_basis, placed_in

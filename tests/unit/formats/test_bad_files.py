@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench_scenes import scene_with
-from warpspace.analysis.doubt import find_doubt
+from warpspace.analysis.uncertainty.propagation import find_doubt
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.readings import parse_readings
 from warpspace.exceptions import SceneError

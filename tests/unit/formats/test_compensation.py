@@ -7,7 +7,7 @@ import pytest
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensate, compensate, sweep
-from warpspace.formats.compensation.wanted import build_corrector
+from warpspace.formats.compensation.corrections import build_corrector
 from warpspace.formats.kinds import fanuc_3d
 from warpspace.formats.registry import ReadOptions, formats, read_errors, recognise
 from warpspace.formats.source import source_of_text

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from warpspace.app.evaluation.budget import pick_point, pick_surface
+from warpspace.app.evaluation.point_explanation import pick_point, pick_surface
 from warpspace.geometry.colour import build_scale
 from warpspace.geometry.surfaces import (
     box_edges,

@@ -23,7 +23,7 @@ from warpspace.kinematics.model import (
     batch_shape,
     complete_coordinates,
 )
-from warpspace.machine.description import build_machine
+from warpspace.machine.definition import build_machine
 
 
 def test_tiny_rotations_are_not_rounded_away():

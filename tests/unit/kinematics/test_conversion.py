@@ -19,8 +19,8 @@ from warpspace.kinematics.conversion import (
     zero_at,
 )
 from warpspace.kinematics.model import Model
-from warpspace.machine.curves.pieces import Pieces, fit_curves
-from warpspace.machine.description import build_machine
+from warpspace.machine.curves.polynomial_pieces import Pieces, fit_curves
+from warpspace.machine.definition import build_machine
 from warpspace.machine.errors import (
     Constant,
     Directional,
@@ -32,7 +32,7 @@ from warpspace.machine.errors import (
 )
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
-from warpspace.scene.save import covered_spans
+from warpspace.scene.scene_writer import covered_spans
 
 SAME = 3e-9
 """µm and µrad: rounding of the exact chain over a metre, times a dozen products."""

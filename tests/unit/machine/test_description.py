@@ -11,7 +11,7 @@ from warpspace.machine.axes import (
     is_axis_name,
     parameter,
 )
-from warpspace.machine.description import Chain, build_machine, parse_chain
+from warpspace.machine.definition import Chain, build_machine, parse_chain
 
 
 @pytest.mark.parametrize(

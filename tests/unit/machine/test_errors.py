@@ -20,7 +20,7 @@ from warpspace.machine.errors import (
     TwoArguments,
 )
 from warpspace.scene.library import parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 SPAN = (-200.0, 200.0)
 TURN = (0.0, 360.0)

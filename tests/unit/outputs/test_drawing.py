@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from warpspace.exceptions import OptionError
-from warpspace.outputs.charts.results import result_chart
+from warpspace.outputs.charts.result_charts import result_chart
 from warpspace.outputs.drawing.canvas import Occupancy, place_label
-from warpspace.outputs.drawing.render import (
+from warpspace.outputs.drawing.off_screen import (
     Projection,
     Raster,
     fit_projection,

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from warpspace.exceptions import OutputError
-from warpspace.outputs.files import temporary_folder, temporary_prefix, write_atomically
+from warpspace.outputs.file_output import temporary_folder, temporary_prefix, write_atomically
 
 
 def test_new_file_appears_only_when_all_went_well(tmp_path):

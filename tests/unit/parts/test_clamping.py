@@ -7,9 +7,9 @@ import trimesh
 import warpspace
 from warpspace.analysis.description import silent
 from warpspace.exceptions import OptionError
-from warpspace.parts.clamping import Clamp, ClampResult
-from warpspace.parts.part import load_part, make_points, place_part
-from warpspace.parts.pieces import build_piece
+from warpspace.parts.clamp import Clamp, ClampResult
+from warpspace.parts.sample_pieces import build_piece
+from warpspace.parts.workpiece import load_part, make_points, place_part
 from warpspace.scene.library import parse_scene
 
 AXES = "X = [-200, 200]\nY = [-150, 150]\nZ = [-100, 100]"

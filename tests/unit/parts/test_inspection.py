@@ -14,7 +14,7 @@ from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import simulate
 from warpspace.exceptions import SceneError
 from warpspace.parts.inspection import Shape, features_table, find_features, fit_shape, inspect
-from warpspace.parts.part import PartMesh, fit_out, make_points, place_part
+from warpspace.parts.workpiece import PartMesh, fit_out, make_points, place_part
 
 make = trimesh.creation
 CUBE = make.box((100.0, 100.0, 100.0))

@@ -11,18 +11,11 @@ from warpspace import load_scene
 from warpspace.analysis.description import silent
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
-from warpspace.parts.as_cut import Part
-from warpspace.parts.part import (
-    fit_out,
-    load_part,
-    make_points,
-    place_part,
-    point_basis,
-)
 from warpspace.parts.program import Program
+from warpspace.parts.workpiece import Part, fit_out, load_part, make_points, place_part, point_basis
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 
 def mesh_of(mesh, ending="ply"):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.parts.control import Setup, read_program
-from warpspace.parts.part import load_part
-from warpspace.parts.pieces import ON_RING, PIECES, build_piece
+from warpspace.parts.interpreter import Setup, read_program
 from warpspace.parts.program import trace_program
+from warpspace.parts.sample_pieces import ON_RING, PIECES, build_piece
+from warpspace.parts.workpiece import load_part
 from warpspace.scene.library import parse_scene
 
 PLAIN = (

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.analysis.catalogue import verb
+from warpspace.analysis.registry import verb
 from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.parts.control import STAND, ReadProgram, Setup, read_program, with_length
+from warpspace.parts.interpreter import STAND, ReadProgram, Setup, read_program, with_length
 from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene, evaluate

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from still_scenes import still_scene
-from warpspace.analysis.concepts import Concepts, compare_concepts
+from warpspace.analysis.commands.concepts import Concepts, compare_concepts
 from warpspace.field.evaluate import evaluate_exact
+from warpspace.picture.formatting import convention_sentences, convention_words
 from warpspace.picture.model import evaluate_picture, picture_concept
 from warpspace.picture.traces import (
     evaluate_axis_motion,
@@ -16,7 +17,6 @@ from warpspace.picture.traces import (
     name_trace,
     trace_lines,
 )
-from warpspace.picture.words import convention_sentences, convention_words
 from warpspace.scene.library import load_scene, parse_scene
 
 TOOL_SIDE = """

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.analysis.convert import Target, convert_scene, field_difference
+from warpspace.analysis.commands.convert import Target, convert_scene, field_difference
 from warpspace.exceptions import SceneError, WarpspaceError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import ComponentErrors
@@ -21,7 +21,7 @@ from warpspace.machine.errors import (
 )
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
-from warpspace.scene.save import Notation, scene_to_toml
+from warpspace.scene.scene_writer import Notation, scene_to_toml
 
 DVF = 'machine = "dvf5000"\n'
 

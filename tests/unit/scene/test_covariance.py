@@ -8,11 +8,11 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 import pytest
 
-from warpspace.analysis.doubt import find_doubt
+from warpspace.analysis.uncertainty.propagation import find_doubt
 from warpspace.exceptions import SceneError
 from warpspace.machine.errors import Covariance
 from warpspace.scene.library import load_scene, parse_scene
-from warpspace.scene.save import Notation, scene_files, scene_to_toml
+from warpspace.scene.scene_writer import Notation, scene_files, scene_to_toml
 
 SCENE = """[machine]
 chain = "wFXYZt"

@@ -13,8 +13,8 @@ from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.readings import parse_table as parse_calibration
 from warpspace.exceptions import SceneError
 from warpspace.formats.registry import ReadOptions, open_upload, read_errors
-from warpspace.scene.curves import read_csv_column
-from warpspace.scene.files import CsvRows, guard_cell, parse_number, unguard_cell
+from warpspace.scene.curve_reader import read_csv_column
+from warpspace.scene.text_files import CsvRows, guard_cell, parse_number, unguard_cell
 
 Points = list[tuple[float, float]]
 Reader = Callable[[str, Path], Points]

@@ -5,9 +5,9 @@ import pytest
 
 from warpspace import evaluate
 from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
-from warpspace.scene.curves import combine_curves
+from warpspace.scene.curve_reader import combine_curves
 from warpspace.scene.library import parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 
 SPAN = (-500.0, 500.0)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_KEY_PARTS, MAX_KEYS, MAX_MARKS, MAX_NESTING, MAX_POINTS
 from warpspace.resources import assets_dir, scenes_dir
-from warpspace.scene.files import SHOWN, check_outline, parse_toml, spell_value
+from warpspace.scene.text_files import SHOWN, check_outline, parse_toml, spell_value
 
 FILES = [*scenes_dir().glob("*.toml"), *assets_dir().rglob("*.toml")]
 BARE = st.text("abcXYZ019_-", min_size=1, max_size=6)

@@ -13,7 +13,7 @@ from warpspace.bodies.schematic import build_layout
 from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.scene.library import parse_scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.starter import starter_scene, starter_text
 
 CLASSIC = [

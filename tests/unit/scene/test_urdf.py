@@ -11,7 +11,7 @@ from warpspace.exceptions import SceneError
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Model, complete_coordinates
 from warpspace.kinematics.transforms import inverse
-from warpspace.outputs.exports.urdf import build_robot
+from warpspace.outputs.exports.urdf_export import build_robot
 from warpspace.scene.library import parse_scene
 from warpspace.scene.urdf import imported_text, place_robot, read_robot
 

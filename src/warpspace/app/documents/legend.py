@@ -16,7 +16,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState
 from warpspace.field.evaluate import placed_words, second_order_words
 from warpspace.geometry.colour import ColourScale, component_values
-from warpspace.picture import words
+from warpspace.picture import formatting
 from warpspace.picture.comparison import conditions_of_both
 from warpspace.scene.model import second_order
 from warpspace.units import Array, spell_count, spell_short
@@ -139,7 +139,7 @@ def numbers_words(picture: LivePicture) -> str:
     found, sure, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
     if found is not None:
         u95 = found.statistics()
-        sure = {name: words.u95_behind(u95[f"{name}_um"]) for name in numbers}
+        sure = {name: formatting.u95_behind(u95[f"{name}_um"]) for name in numbers}
         factor = f" (k = {found.doubt.factor:.3g})"
     said = (f"{name} {number(value)}{sure[name]} µm" for name, value in numbers.items())
     return f"{change}{' · '.join(said)}{factor}"
@@ -152,8 +152,8 @@ def place_words(picture: LivePicture) -> str:
         name: float(np.broadcast_to(values, grid.shape).flat[node])
         for name, values in grid.coordinates.items()
     }
-    axes = words.own_axes(picture.drawn_state.scene, at)
-    return f"at {words.list_axes(axes)}" if axes else ""
+    axes = formatting.own_axes(picture.drawn_state.scene, at)
+    return f"at {formatting.list_axes(axes)}" if axes else ""
 
 
 def kept_words(picture: LivePicture) -> tuple[str, bool]:
@@ -179,8 +179,8 @@ def subject_words(picture: LivePicture) -> list[str]:
         found.append(f"{edited} error{'s' if edited > 1 else ''} changed")
     if excluded := len(_left_out(state)):
         found.append(f"{excluded} excluded")
-    beyond = words.beyond_words(state.active_scene(), state.loop)
-    return [*found, *words.direction_words(state.scene), *filter(None, [beyond])]
+    beyond = formatting.beyond_words(state.active_scene(), state.loop)
+    return [*found, *formatting.direction_words(state.scene), *filter(None, [beyond])]
 
 
 # --- Conditions: what a reader must know who takes a picture for all of its scene -----------------
@@ -213,8 +213,8 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Say all that a file of a picture must say; of a difference for both sides."""
 
     def of(state: AppState) -> tuple[str, ...]:
-        view = (*words.direction_words(state.scene), *placed_words(state.view()))
-        more = table_words(state), words.beyond_words(state.active_scene(), state.loop)
+        view = (*formatting.direction_words(state.scene), *placed_words(state.view()))
+        more = table_words(state), formatting.beyond_words(state.active_scene(), state.loop)
         return (*view, *state_conditions(state), *filter(None, more))
 
     if picture.is_difference and picture.compared is not None:
@@ -238,7 +238,7 @@ def range_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Say where a user has fixed the range of the colours."""
     scale = picture.scale
     fixed = picture.state.look.range_mode == "fixed"
-    return (words.range_words(scale.low, scale.high, scale.unit),) if fixed else ()
+    return (formatting.range_words(scale.low, scale.high, scale.unit),) if fixed else ()
 
 
 def look_words(picture: LivePicture) -> list[str]:
@@ -247,13 +247,13 @@ def look_words(picture: LivePicture) -> list[str]:
     size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
     nodes = spell_count(picture.field.norm_um.size)
     return [
-        f"exaggeration {words.spell_factor(picture.exaggeration)}",
+        f"exaggeration {formatting.spell_factor(picture.exaggeration)}",
         f"{both(lambda state: state.loop.value)} loop",
-        both(lambda state: words.reference_words(state.scene)),
+        both(lambda state: formatting.reference_words(state.scene)),
         *picture_conditions(picture),
         f"{machine.title}, chain {machine.chain}",
         f"{size} mm, {nodes} nodes",
-        both(lambda state: words.convention_words(state.scene)),
+        both(lambda state: formatting.convention_words(state.scene)),
         both(lambda state: "exact chain" if state.controller else "first-order model"),
         "error = actual − nominal",
     ]

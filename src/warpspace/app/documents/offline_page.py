@@ -21,7 +21,7 @@ import numpy as np
 import viser
 from markupsafe import Markup, escape
 
-from warpspace.analysis.reviewing import note_numbers, said_stale, spell_numbers, spell_place
+from warpspace.analysis.note_tables import note_numbers, said_stale, spell_numbers, spell_place
 from warpspace.app.browser.html import EMPTY, join, linked, lowered, number, rows, tag
 from warpspace.app.browser.page import script_source
 from warpspace.app.documents import legend
@@ -32,13 +32,13 @@ from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.drawing.colours import colour_levels, level_colours
 from warpspace.app.drawing.labels import axes_room_mm, note_labels, point_labels
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, Shapes, ball, light_scene
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import MIN_NODES
 from warpspace.machine.axes import parameter
-from warpspace.picture.mesh import map_mesh
+from warpspace.picture.map_mesh import map_mesh
 from warpspace.picture.model import choose_scale
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene

@@ -19,22 +19,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from urllib.parse import parse_qsl, urlencode
 
-from warpspace.app.documents.files import LONGEST_NAME, safe_name
+from warpspace.app.documents.transfers import LONGEST_NAME, safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import BEFORE, pinned_side, plain_state, scene_side
 from warpspace.app.evaluation.machine_edits import known_alike
 from warpspace.app.state.app_state import NOBODY, PRESENT, AppState, Side, start_state
-from warpspace.app.state.forms import linked_forms, with_form
+from warpspace.app.state.form_values import linked_forms, with_form
 from warpspace.app.state.leaf import Unreadable
 from warpspace.app.state.tree import leaves, set_leaf, spell_value, stored
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_NOTE_VIEW, MAX_PACKED_TEXT
 from warpspace.resources import __version__
-from warpspace.scene.files import parse_number
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
+from warpspace.scene.text_files import parse_number
 
 MARK = "# warpspace-view: "
 MAX_LINK = 5_500  # characters of a link before it is packed: servers take request lines of 8 kB

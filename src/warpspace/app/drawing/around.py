@@ -19,13 +19,13 @@ from warpspace.app.drawing.shapes import (
     lines,
     polylines,
 )
-from warpspace.app.evaluation.budget import answer, measured
-from warpspace.app.evaluation.in_box import AT_LINE
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import chosen_trace, points_on_traces
+from warpspace.app.evaluation.machine_bodies import chosen_trace, points_on_traces
+from warpspace.app.evaluation.point_explanation import answer, measured
+from warpspace.app.evaluation.scene_overlays import AT_LINE
 from warpspace.formats.source import MAX_LINES
 from warpspace.geometry.surfaces import corners, round_down
-from warpspace.picture.mesh import outline_pieces
+from warpspace.picture.map_mesh import outline_pieces
 from warpspace.units import MM_PER_UM, Array
 
 # --- Sizes, as parts of the longest edge of the box -----------------------------------------------

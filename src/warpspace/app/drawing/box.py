@@ -23,7 +23,7 @@ from warpspace.app.state.leaf import Identity
 from warpspace.bodies.gltf import Part, build_gltf
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.surfaces import box_edges, is_thin
-from warpspace.picture.mesh import (
+from warpspace.picture.map_mesh import (
     edge_pieces,
     grid_pieces,
     isoline_pieces,

@@ -9,7 +9,7 @@ from viser import ClientHandle
 from warpspace.app.drawing.labels import axes_room_mm
 from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import drawn_bodies
+from warpspace.app.evaluation.machine_bodies import drawn_bodies
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.picture import model

@@ -9,16 +9,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from warpspace.app.evaluation.budget import answer, drawn_places, measured
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import chosen_trace, drawn_bodies, tool_point
+from warpspace.app.evaluation.machine_bodies import chosen_trace, drawn_bodies, tool_point
+from warpspace.app.evaluation.point_explanation import answer, drawn_places, measured
 from warpspace.app.state.app_state import Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
 from warpspace.geometry.colour import tick_values
 from warpspace.geometry.surfaces import corners, is_thin
 from warpspace.machine.axes import is_linear, parameter
-from warpspace.picture.words import (
+from warpspace.picture.formatting import (
     length_words,
     list_axes,
     own_axes,

@@ -12,9 +12,9 @@ from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import GIZMO, around, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, Shape, Shapes, ball, lines, mesh
-from warpspace.app.evaluation.in_box import moved_place
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.machine import drawn_bodies, played_position, tool_point
+from warpspace.app.evaluation.machine_bodies import drawn_bodies, played_position, tool_point
+from warpspace.app.evaluation.scene_overlays import moved_place
 from warpspace.app.state.leaf import Identity
 from warpspace.bodies.placed import PlacedBody
 from warpspace.kinematics import transforms

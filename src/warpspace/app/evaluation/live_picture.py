@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics
-from warpspace.app.evaluation.in_box import InBox, T, bench_in_box, part_in_box, path_in_box
+from warpspace.app.evaluation.scene_overlays import InBox, T, bench_in_box, part_in_box, path_in_box
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
-from warpspace.parts.part import PartMesh
 from warpspace.parts.program import ToolPath
+from warpspace.parts.workpiece import PartMesh
 from warpspace.picture.model import Picture, choose_scale, picture_size_mm
 from warpspace.picture.traces import TraceLine, TraceLines, is_moved, name_trace
 from warpspace.units import Array

@@ -21,14 +21,14 @@ from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_typed
 from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
 from warpspace.field.grid import find_volume_axes
-from warpspace.machine import description
+from warpspace.machine import definition
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.library import load_scene, parse_scene, scene_names
-from warpspace.scene.machines import body_notes, load_machine, machine_names
+from warpspace.scene.machine_library import body_notes, load_machine, machine_names
 from warpspace.scene.model import Scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.starter import starter_scene
 from warpspace.units import MICROMETRE
 
@@ -48,7 +48,7 @@ SHOWN = 30  # characters of what was typed that a message repeats
 
 def tables_of(scene: Scene) -> Tables:
     """Give all that can be changed frame by frame."""
-    machine, fixed = scene.machine, dict.fromkeys(description.FIXED_FRAMES, description.ORIGIN)
+    machine, fixed = scene.machine, dict.fromkeys(definition.FIXED_FRAMES, definition.ORIGIN)
     offset = {name: axis.offset_mm for name, axis in machine.axes.items()}
     rotation = {name: axis.rotation_deg for name, axis in machine.axes.items()}
     return {
@@ -61,7 +61,7 @@ def tables_of(scene: Scene) -> Tables:
     }
 
 
-def own_bodies(machine: description.Machine) -> dict[str, description.BodySource]:
+def own_bodies(machine: definition.Machine) -> dict[str, definition.BodySource]:
     """Give the bodies that a description names, without those of its machine in the library."""
     known = load_machine(machine.name).bodies if machine.name in machine_names() else {}
     return {frame: source for frame, source in machine.bodies.items() if known.get(frame) != source}
@@ -77,25 +77,25 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
     guides, bodies = raw["machine"].setdefault("gantry", {}), dict(machine.bodies)
     match what, rest.split(" ", maxsplit=2):
         case "chain", _:
-            _rearrange(raw, scene, description.parse_chain(rest[:MOST_CHAIN_TEXT]))
+            _rearrange(raw, scene, definition.parse_chain(rest[:MOST_CHAIN_TEXT]))
         case "left" | "right" | "side" | "remove", [axis]:
             _rearrange(raw, scene, _moved(machine, what, axis))
         case "turn", [axis]:
             _put(raw, "direction", axis, -machine.axis(axis).direction)
         case "gantry", [axis]:
             if guides.pop(axis, None) is None:
-                across = description.default_across(machine.axis(axis).name)
+                across = definition.default_across(machine.axis(axis).name)
                 others = [one for one in machine.axes.values() if one.is_linear]
                 spans = [
                     one.travel[1] - one.travel[0]
                     for one in others
-                    if description.ACROSS[one.index] == across
+                    if definition.ACROSS[one.index] == across
                 ]
                 guides[axis] = {"span_mm": max(spans, default=START_SPAN_MM), "across": across}
         case "across", [axis]:
             _entry(tables, "span", axis)
-            taken = (guides[axis]["across"], description.ACROSS[direction_index(axis)])
-            guides[axis]["across"] = next(name for name in description.ACROSS if name not in taken)
+            taken = (guides[axis]["across"], definition.ACROSS[direction_index(axis)])
+            guides[axis]["across"] = next(name for name in definition.ACROSS if name not in taken)
         case "mesh", [frame]:
             _entry(tables, what, frame)
             del bodies[frame]
@@ -136,7 +136,7 @@ def _put(raw: Tables, key: str, frame: str, value: object) -> None:
     raw["machine"].setdefault(key, {})[frame] = value
 
 
-def _moved(machine: description.Machine, what: str, axis: str) -> description.Chain:
+def _moved(machine: definition.Machine, what: str, axis: str) -> definition.Chain:
     """Move an axis along the written chain, across the frame too; or next to it; or away."""
     places = [*reversed(machine.chain.workpiece), FRAME, *machine.chain.tool]
     at = places.index(machine.axis(axis).name) + {"left": -1, "right": 1}.get(what, 0)
@@ -145,10 +145,10 @@ def _moved(machine: description.Machine, what: str, axis: str) -> description.Ch
         at = places.index(FRAME) + (axis not in machine.chain.tool)
     if what != "remove":
         places.insert(max(at, 0), axis)
-    return description.parse_chain(f"w{''.join(places)}t")
+    return definition.parse_chain(f"w{''.join(places)}t")
 
 
-def _rearrange(raw: Tables, scene: Scene, chain: description.Chain) -> None:
+def _rearrange(raw: Tables, scene: Scene, chain: definition.Chain) -> None:
     machine = scene.machine
     raw["machine"]["chain"] = str(chain)
     spanned = find_volume_axes({a: r for a, r in scene.workspace.ranges.items() if a in chain.axes})
@@ -178,13 +178,13 @@ def _document(scene: Scene) -> Tables:
     return tomllib.loads(scene_to_toml(replace(scene, model=model, errors=ErrorSet())))
 
 
-def _read(scene: Scene, raw: Tables, like: description.Machine) -> tuple[Scene, tuple[str, ...]]:
+def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, tuple[str, ...]]:
     """Read a changed document without what belongs to axes that are gone; and say what that was.
 
     The machine is named after its frames: as the one that it is like, as that of the library with
     the same ones, or as its scene. Bodies that were made for other frames suit it no more.
     """
-    chain = description.parse_chain(raw["machine"]["chain"])
+    chain = definition.parse_chain(raw["machine"]["chain"])
     gone = {a: at for a, at in scene.workspace.positions.items() if a not in chain.axes}
     raw["convention"]["reference_axis"] = "free"  # which axis that is may have changed
     bare = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
@@ -222,12 +222,12 @@ def _without(table: Tables, axes: Collection[str]) -> Tables:
     return {key: value for key, value in kept.items() if value != {}}
 
 
-def _frames(machine: description.Machine) -> tuple[object, ...]:
+def _frames(machine: definition.Machine) -> tuple[object, ...]:
     places = [(axis.offset_mm, axis.rotation_deg) for axis in machine.axes.values()]
     return machine.chain, places, machine.fixed_mm, machine.fixed_deg
 
 
-def known_alike(machine: description.Machine) -> description.Machine | None:
+def known_alike(machine: definition.Machine) -> definition.Machine | None:
     """Find the machine of the library with the same frames, whatever their travels and ways."""
     known = map(load_machine, machine_names())
     return next((one for one in known if _frames(one) == _frames(machine)), None)
@@ -350,7 +350,7 @@ SAMPLES = 65
 ALIKE = 1e-9  # by how much two curves of amplitude 1 may differ that count as one
 
 
-def guide_errors(state: AppState, gantry: description.Gantry) -> tuple[float, float] | None:
+def guide_errors(state: AppState, gantry: definition.Gantry) -> tuple[float, float] | None:
     """Give the positioning errors of both guides, µm; None where their curves differ."""
     if not _alike(*_curves(state, gantry)):
         return None
@@ -360,7 +360,7 @@ def guide_errors(state: AppState, gantry: description.Gantry) -> tuple[float, fl
 
 
 def with_guide_error(
-    state: AppState, gantry: description.Gantry, guide: int, value_um: float
+    state: AppState, gantry: definition.Gantry, guide: int, value_um: float
 ) -> AppState:
     """Set the positioning error of one guide; the other one stays."""
     present = guide_errors(state, gantry)
@@ -377,7 +377,7 @@ def with_guide_error(
     return state
 
 
-def _curves(state: AppState, gantry: description.Gantry) -> tuple[ErrorFunction, ErrorFunction]:
+def _curves(state: AppState, gantry: definition.Gantry) -> tuple[ErrorFunction, ErrorFunction]:
     along, about = gantry.positioning_key, gantry.rotation_key
     return state.curve(along), state.curve(about)
 

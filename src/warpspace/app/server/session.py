@@ -30,15 +30,15 @@ from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.camera import focus
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.drawing.shapes import SCENE_PER_MM
-from warpspace.app.evaluation.budget import pick, pick_line, with_clicked
-from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.point_explanation import pick, pick_line, with_clicked
+from warpspace.app.panels.overlay import PointerPart, Tabs
+from warpspace.app.panels.page_panels import build_parts
+from warpspace.app.panels.panel import PAUSE_S, Context, Part, Window
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.catalogue import build_parts
-from warpspace.app.tasks.over import PointerPart, Tabs
-from warpspace.app.tasks.parts import PAUSE_S, Context, Part, Window
 from warpspace.exceptions import WarpspaceError
 
 OFTEN_S = 0.4  # between two writings of what follows often

@@ -18,7 +18,6 @@ from functools import partial
 
 import msgspec
 
-from warpspace.app.documents.files import safe_name
 from warpspace.app.documents.scene_file import (
     MAX_LINK,
     named_link,
@@ -26,12 +25,13 @@ from warpspace.app.documents.scene_file import (
     open_text,
     state_to_toml,
 )
+from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.panels.panel import Context, Part
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.parts import Context, Part
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.machine.limits import MAX_KEPT_TEXT
 from warpspace.scene.model import Scene

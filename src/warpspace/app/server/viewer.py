@@ -21,18 +21,18 @@ import viser
 
 from warpspace.app.browser.page import page_script
 from warpspace.app.browser.viser_private import connection_of, send_script_to_all, serve_with
+from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList
-from warpspace.app.documents.services import Services
 from warpspace.app.drawing.box import surface
 from warpspace.app.drawing.shapes import light_scene
-from warpspace.app.evaluation.evaluate import LiveModel
-from warpspace.app.server.doors import Access, Doors, plain_address
-from warpspace.app.server.guard import Guard, TabConnection
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.panels.panel import Context
+from warpspace.app.server.connection_guard import Guard, TabConnection
+from warpspace.app.server.request_policy import Access, Doors, plain_address
 from warpspace.app.server.session import Session
 from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
-from warpspace.app.tasks.parts import Context
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 

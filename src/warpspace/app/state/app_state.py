@@ -26,12 +26,12 @@ from warpspace.exceptions import WarpspaceError
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
-from warpspace.machine.description import Vector
+from warpspace.machine.definition import Vector
 from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, ToleranceSet
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBABILITY
-from warpspace.parts.control import program_lines
-from warpspace.parts.part import PartMesh, load_part
+from warpspace.parts.interpreter import program_lines
+from warpspace.parts.workpiece import PartMesh, load_part
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import KINDS, Mark, Note
 

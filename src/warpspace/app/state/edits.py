@@ -4,7 +4,7 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from warpspace.analysis.distribution import round_width
+from warpspace.analysis.sampling.distribution import round_width
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Span
 from warpspace.machine.axes import parameter

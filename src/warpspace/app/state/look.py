@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from warpspace.app.state.leaf import Span, described
 from warpspace.field.grid import slice_ranges
 from warpspace.machine import limits
-from warpspace.machine.description import Vector
+from warpspace.machine.definition import Vector
 from warpspace.scene.model import Scene
 from warpspace.units import spell_short
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from warpspace.app.state.leaf import MOST_TYPED, Span
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_TYPED_NUMBER
-from warpspace.picture.words import IN_R
+from warpspace.picture.formatting import IN_R
 
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _SIGNS = str.maketrans({"−": "-", "–": "-", "\u00a0": " ", "\u202f": " "})

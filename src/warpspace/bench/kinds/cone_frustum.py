@@ -16,7 +16,7 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, tool_axis
 from warpspace.kinematics.model import Model
-from warpspace.machine.description import Machine
+from warpspace.machine.definition import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 

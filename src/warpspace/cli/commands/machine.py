@@ -10,8 +10,8 @@ import click
 
 from warpspace.analysis.blocks import Block, Column, Table
 from warpspace.cli.analyses import print_blocks
-from warpspace.cli.guard import OutputFile, SceneName
-from warpspace.cli.options import (
+from warpspace.cli.file_arguments import OutputFile, SceneName
+from warpspace.cli.shared_options import (
     SCENES,
     RenamedOption,
     force_option,
@@ -31,9 +31,9 @@ from warpspace.cli.tables import echo, print_table, print_text, progress, warn
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.analysis.measured import Check, Measured
-    from warpspace.analysis.thesis import Row
+    from warpspace.analysis.tolerance_check import Check, Measured
     from warpspace.scene.model import Scene
+    from warpspace.thesis.rows import Row
 
 OWN = "own"
 CHECKED = ("id", "kind", "stale", "numbers", "now")  # what `check` tells of a note
@@ -61,7 +61,7 @@ def list_(kind: Kind | None, *, as_json: bool) -> None:
 
 def _found(kind: Kind) -> list[dict[str, str | None]]:
     from warpspace.scene.library import load_scene, scene_names
-    from warpspace.scene.machines import load_machine, machine_names, machine_picture
+    from warpspace.scene.machine_library import load_machine, machine_names, machine_picture
 
     if kind == "scenes":
         return [{"name": name, "title": load_scene(name).title} for name in scene_names()]
@@ -135,7 +135,7 @@ def check(
     affine fit to the predicted map: which plane became a rhombus.
     """
     from warpspace.analysis.description import plain
-    from warpspace.analysis.measured import measured
+    from warpspace.analysis.tolerance_check import measured
     from warpspace.scene.library import load_scene
 
     loaded = [load_scene(name) for name in scenes]
@@ -169,7 +169,7 @@ def check(
 
 
 def _check(scene: "Scene", *, as_json: bool) -> None:
-    from warpspace.analysis.reviewing import notes_table
+    from warpspace.analysis.note_tables import notes_table
     from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.model import second_order
 
@@ -207,7 +207,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 
 def notes_json(scene: "Scene") -> list[dict[str, Any]]:
     """List the notes of a scene as its file has them, and what their numbers are now."""
-    from warpspace.analysis.reviewing import note_numbers
+    from warpspace.analysis.note_tables import note_numbers
     from warpspace.scene.notes import note_to_toml, told
 
     return [
@@ -263,9 +263,9 @@ def notes(
     A note whose numbers no longer hold is marked "changed" with its number then and now.
     """
     from warpspace.analysis.blocks import table_markdown
-    from warpspace.analysis.reviewing import notes_table
-    from warpspace.scene.files import spell_row
+    from warpspace.analysis.note_tables import notes_table
     from warpspace.scene.library import load_scene
+    from warpspace.scene.text_files import spell_row
 
     loaded = load_scene(scene)
     if text is not None:
@@ -287,12 +287,12 @@ def notes(
 
 
 def _add_note(scene: "Scene", name: str, path: str, *, force: bool, **about: Any) -> "Scene":
-    from warpspace.analysis.reviewing import note_numbers
+    from warpspace.analysis.note_tables import note_numbers
     from warpspace.machine.limits import MAX_SCENE_BYTES
-    from warpspace.scene.files import read_text
     from warpspace.scene.library import parse_scene, scene_path
     from warpspace.scene.notes import Note
-    from warpspace.scene.save import spell_note
+    from warpspace.scene.scene_writer import spell_note
+    from warpspace.scene.text_files import read_text
 
     file = scene_path(name)
     if not path.endswith(".toml"):
@@ -321,7 +321,7 @@ def merge(first: str, second: str, output: str, *, force: bool) -> None:
     """
     from warpspace.scene.library import load_scene, parse_scene
     from warpspace.scene.notes import merge_notes
-    from warpspace.scene.save import scene_to_toml
+    from warpspace.scene.scene_writer import scene_to_toml
 
     a, b = load_scene(first), load_scene(second)
     merged = merge_notes(a.review, b.review)
@@ -340,7 +340,7 @@ def merge(first: str, second: str, output: str, *, force: bool) -> None:
 
 
 def laser_tracer_um(scene: "Scene") -> float | None:
-    from warpspace.analysis.thesis import MACHINES, printed_tables
+    from warpspace.thesis.rows import MACHINES, printed_tables
 
     names = [f"dvf5000_{name}" for name in MACHINES]
     if scene.name not in names:
@@ -388,7 +388,7 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     A number agrees where it lies within half of the last printed digit. Rows that do not agree say
     why. Nothing is tuned to agree.
     """
-    from warpspace.analysis.thesis import thesis as compare
+    from warpspace.thesis.rows import thesis as compare
 
     with progress("computing", silent=as_json):
         rows = compare()

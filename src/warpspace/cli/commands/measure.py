@@ -8,8 +8,8 @@ import click
 
 from warpspace.analysis.blocks import Column
 from warpspace.cli.analyses import command_of, print_blocks
-from warpspace.cli.guard import Commands, InputFile, SceneName, check_files
-from warpspace.cli.options import (
+from warpspace.cli.file_arguments import Commands, InputFile, SceneName, check_files
+from warpspace.cli.shared_options import (
     SCENES,
     force_option,
     json_option,
@@ -20,7 +20,7 @@ from warpspace.cli.options import (
 from warpspace.cli.tables import echo, print_table, print_text, progress
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_LENGTH_MM
-from warpspace.scene.files import parse_number
+from warpspace.scene.text_files import parse_number
 
 
 def _test_names() -> tuple[str, ...]:
@@ -171,7 +171,7 @@ def import_(
     their origins offsets and rotations, their shapes one mesh for each axis, written beside the
     scene. What has no place is named, here and at the top of the scene.
     """
-    from warpspace.outputs.files import check_target
+    from warpspace.outputs.file_output import check_target
 
     if formats:
         _list_formats(as_json=as_json)
@@ -201,7 +201,7 @@ def import_(
     from warpspace.formats.measured import summaries, summary_table
     from warpspace.formats.registry import ReadOptions, open_files, parse_axis_options, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
-    from warpspace.scene.machines import machine_names
+    from warpspace.scene.machine_library import machine_names
 
     scenes = [machine] if machine and machine not in machine_names() else []
     axis, names = parse_axis_options(axes)
@@ -254,7 +254,7 @@ def _import_robot(
     force: bool,
 ) -> None:
     from warpspace.bodies.own_meshes import frame_meshes
-    from warpspace.outputs.files import mesh_files, write_meshes
+    from warpspace.outputs.file_output import mesh_files, write_meshes
     from warpspace.scene.library import parse_scene
     from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
 
@@ -395,7 +395,7 @@ def piece(name: str, output: str, size: float | None, *, force: bool) -> None:
     979), plate one of nine holes. The frame of all files has its zero in the middle of the lower
     side: --place of the mesh, and work offset of the program.
     """
-    from warpspace.parts.pieces import build_piece
+    from warpspace.parts.sample_pieces import build_piece
 
     write_text(output, build_piece(name, size)[Path(output).suffix.lower()], force=force)
     echo(f"wrote {output}")

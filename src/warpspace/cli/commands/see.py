@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from warpspace.cli.analyses import print_blocks
-from warpspace.cli.guard import SceneName
-from warpspace.cli.options import (
+from warpspace.cli.file_arguments import SceneName
+from warpspace.cli.services import build_services, embed_view, tell_story
+from warpspace.cli.shared_options import (
     FIGURES,
     RenamedOption,
     component_option,
@@ -29,11 +30,10 @@ from warpspace.cli.options import (
     scene_argument,
     size_text,
 )
-from warpspace.cli.services import build_services, embed_view, tell_story
 from warpspace.cli.tables import echo, print_text, progress
 from warpspace.exceptions import OptionError, RenderError, UnknownNameError
 from warpspace.outputs.exports.formats import export_formats, write_export
-from warpspace.outputs.figures.catalogue import figure_command, figure_names
+from warpspace.outputs.figures.registry import figure_command, figure_names
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Analysis
@@ -93,7 +93,7 @@ def view(
     # Before numpy is loaded: a slider move is one short product, and threads of OpenBLAS that spin
     # for it beside a browser that draws in software make it thirty times slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from warpspace.app.server.doors import Access
+    from warpspace.app.server.request_policy import Access
     from warpspace.app.server.viewer import run_viewer
     from warpspace.bodies.own_meshes import check_meshes
     from warpspace.scene.library import load_scene, scene_names
@@ -213,8 +213,8 @@ def compare(
     and one exaggeration.
     """
     from warpspace.analysis.description import plain
-    from warpspace.analysis.doubt import u95_lines, volume_doubt
     from warpspace.analysis.statistics import statistics
+    from warpspace.analysis.uncertainty.propagation import u95_lines, volume_doubt
     from warpspace.picture.comparison import scene_change, statistics_blocks, statistics_change
     from warpspace.picture.model import evaluate_picture
 
@@ -402,7 +402,7 @@ def report(
 
 
 def _asked(name: str) -> "Analysis":
-    from warpspace.analysis.catalogue import find_analysis
+    from warpspace.analysis.registry import find_analysis
 
     try:
         return find_analysis(name)()

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from warpspace.analysis.blocks import Column, Table, number_columns
-from warpspace.cli import options
+from warpspace.cli import shared_options
 from warpspace.cli.analyses import print_blocks
 from warpspace.cli.tables import print_text, progress
 from warpspace.exceptions import OptionError
@@ -25,12 +25,12 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
 
 
 @click.command()
-@options.scene_argument()
-@options.at_option
-@options.grid_option(None)
-@options.loop_option
-@options.placed_option
-@options.direction_option
+@shared_options.scene_argument()
+@shared_options.at_option
+@shared_options.grid_option(None)
+@shared_options.loop_option
+@shared_options.placed_option
+@shared_options.direction_option
 @click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
 @click.option(
     "--frame",
@@ -39,14 +39,14 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
     show_default=True,
     help="Frame of the resulting vectors.",
 )
-@options.csv_option
-@options.output_option(
+@shared_options.csv_option
+@shared_options.output_option(
     "Write all points to this file: .parquet, .npz, .csv or, of a grid, .vts.",
     *FIELDS,
     required=False,
 )
-@options.force_option
-@options.json_option
+@shared_options.force_option
+@shared_options.json_option
 def field(
     scene: str,
     points: tuple[str, ...],
@@ -69,10 +69,15 @@ def field(
     sure its errors are, U95 of each point stands beside them, in files too.
     """
     from warpspace.analysis.description import plain
-    from warpspace.analysis.doubt import field_doubt, u95_columns, u95_lines, volume_doubt
     from warpspace.analysis.statistics import statistics, volume_statistics
+    from warpspace.analysis.uncertainty.propagation import (
+        field_doubt,
+        u95_columns,
+        u95_lines,
+        volume_doubt,
+    )
     from warpspace.field.evaluate import placed_words
-    from warpspace.picture.words import direction_words, own_axes, spell_at, spell_point
+    from warpspace.picture.formatting import direction_words, own_axes, spell_at, spell_point
     from warpspace.scene.model import choose_view, second_order
 
     if points and grid is not None:
@@ -83,12 +88,14 @@ def field(
             f"{output}: a .vts file holds a grid, --at gives points; expected {others}"
         )
     files = [path for path in (csv_path, output) if path is not None]
-    loaded = options.load_placed(scene, direction, loop, placed=placed)
+    loaded = shared_options.load_placed(scene, direction, loop, placed=placed)
     view = choose_view(loaded, loop, frame)
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
         places = axes if nodes is None else None
-        said = {} if exact else options.say_second_order(second_order(loaded, loop, at=places))
+        said = (
+            {} if exact else shared_options.say_second_order(second_order(loaded, loop, at=places))
+        )
         even = statistics(result, axes)
         u95 = {}
         if nodes is None:
@@ -117,7 +124,7 @@ def field(
             found["statistics_nodes"] = plain(even)
         if output is not None:
             size = {"output": output, "points_written": result.norm_um.size}
-            click.echo(options.spell_json({**size, **found}))
+            click.echo(shared_options.spell_json({**size, **found}))
             return
         found |= {"unknown": over.doubt.unknown} if over and over.doubt.unknown else {}
         if nodes is None and over and u95:
@@ -144,7 +151,7 @@ def field(
     print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
     print_text(f"  --at {spell_at(worst)}")
     for path in files:
-        print_text(f"  {path}: {options.size_text(path)}")
+        print_text(f"  {path}: {shared_options.size_text(path)}")
 
 
 def _evaluate(
@@ -157,14 +164,14 @@ def _evaluate(
     from warpspace.scene.model import evaluate, evaluate_grid
 
     if points:
-        typed = [options.parse_point(text, scene.machine.axes) for text in points]
+        typed = [shared_options.parse_point(text, scene.machine.axes) for text in points]
         full = [
             complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
         found = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
         for point in typed:
-            options.warn_outside_travel(scene.machine, point)
+            shared_options.warn_outside_travel(scene.machine, point)
         return axes, found, None
     nodes = DEFAULT_NODES if grid is None else grid
     built = build_grid(scene.model, scene.workspace, nodes)
@@ -201,10 +208,10 @@ def _print_json(
             {"axes": dict(zip(axes, place, strict=True)), **dict(zip(columns, row, strict=True))}
             for place, row in zip(places, numbers, strict=True)
         ]
-        click.echo((", " if start else "") + options.spell_json(rows)[1:-1], nl=False)
+        click.echo((", " if start else "") + shared_options.spell_json(rows)[1:-1], nl=False)
     click.echo(
         "]"
-        + "".join(f', "{name}": {options.spell_json(part)}' for name, part in found.items())
+        + "".join(f', "{name}": {shared_options.spell_json(part)}' for name, part in found.items())
         + "}"
     )
 

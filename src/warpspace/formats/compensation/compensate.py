@@ -8,9 +8,9 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
 from warpspace.analysis.description import Analysis, Result, Watch, plain
-from warpspace.analysis.doubt import u95_lines
 from warpspace.analysis.options import PLACED_HELP, Grammar, option
 from warpspace.analysis.statistics import Statistics
+from warpspace.analysis.uncertainty.propagation import u95_lines
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import find_placement, fit_placement
 from warpspace.field.grid import build_grid
@@ -21,12 +21,12 @@ from warpspace.formats.compensation.controller import (
     read_back,
     reversal_notes,
 )
-from warpspace.formats.compensation.wanted import Corrector, Wanted, build_corrector
+from warpspace.formats.compensation.corrections import Corrector, Wanted, build_corrector
 from warpspace.formats.registry import SIGNS, Files, Format, find_format
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
-from warpspace.scene.files import parse_whole
 from warpspace.scene.model import Scene, in_direction, placed_in
+from warpspace.scene.text_files import parse_whole
 from warpspace.units import Array
 
 NODES = 28  # nodes per axis that what is left is evaluated at: between the points of usual tables
@@ -155,7 +155,7 @@ class Compensate(Analysis):
 class Compensation(BeforeAfter, Result):
     """A compensation and what it leaves."""
 
-    drawn_by: ClassVar[str] = "warpspace.outputs.charts.results:compensation_chart"
+    drawn_by: ClassVar[str] = "warpspace.outputs.charts.result_charts:compensation_chart"
     format: Format
     files: Mapping[str, str]  # texts by what is added to the name of the file
     points: Mapping[str, int]  # points of the table per axis

@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.analysis.doubt import FieldDoubt, field_doubt
 from warpspace.analysis.statistics import Statistics, volume_statistics
+from warpspace.analysis.uncertainty.propagation import FieldDoubt, field_doubt
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, fit_placement
 from warpspace.field.grid import Grid, build_grid
-from warpspace.formats.compensation.wanted import Corrector, Moved, Wanted
+from warpspace.formats.compensation.corrections import Corrector, Moved, Wanted
 from warpspace.formats.registry import Files, Format, Reading, ReadOptions
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.formats import measured
-from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.compensation.corrections import Wanted
 from warpspace.formats.registry import Files, Format, ReadOptions, described
 from warpspace.formats.source import (
     DEG_PER,
@@ -24,7 +24,7 @@ from warpspace.formats.source import (
 )
 from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
-from warpspace.scene.files import CsvRows, unguard_cell
+from warpspace.scene.text_files import CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"

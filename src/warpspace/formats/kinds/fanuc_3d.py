@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.compensation.corrections import Wanted
 from warpspace.formats.registry import CORRECTION, Files, Format, ReadOptions, described, has
 from warpspace.formats.source import MM_PER, Source
 from warpspace.formats.terms import Grid3, Tables

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.compensation.corrections import Wanted
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described
 from warpspace.formats.source import Place, Source
 from warpspace.formats.terms import HELD, Line, Tables

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.formats.compensation.wanted import AXES, Wanted
+from warpspace.formats.compensation.corrections import AXES, Wanted
 from warpspace.formats.registry import Files, Format, ReadOptions, described, has
 from warpspace.formats.source import Source, shown, spell
 from warpspace.formats.terms import HELD, Affine, Line, Tables

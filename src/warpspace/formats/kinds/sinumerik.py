@@ -21,7 +21,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import shares
-from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.compensation.corrections import Wanted
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described, has
 from warpspace.formats.source import Place, Source, shown, spell
 from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.formats.compensation.wanted import AXES, Wanted
+from warpspace.formats.compensation.corrections import AXES, Wanted
 from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
 from warpspace.formats.registry import Files, Format, ReadOptions, described, has
 from warpspace.formats.source import Place, Source, spell

@@ -21,7 +21,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats import measured
-from warpspace.formats.compensation.wanted import Wanted
+from warpspace.formats.compensation.corrections import Wanted
 from warpspace.formats.registry import Files, Format, ReadOptions, described
 from warpspace.formats.source import Place, Source, spell
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.curves.curve import ErrorFunction
-from warpspace.machine.curves.pieces import Pieces
+from warpspace.machine.curves.polynomial_pieces import Pieces
 from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.plugins import Registry

@@ -21,7 +21,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.textpath import text_to_path
 
-from warpspace.outputs.drawing.render import Rect, resample
+from warpspace.outputs.drawing.off_screen import Rect, resample
 from warpspace.outputs.drawing.settings import FONT, PRINTED_FACTOR, SIZES, Theme, factor
 from warpspace.units import Array
 

@@ -18,7 +18,7 @@ from warpspace.outputs.drawing.canvas import (
     draw_leader,
     write_label,
 )
-from warpspace.outputs.drawing.render import (
+from warpspace.outputs.drawing.off_screen import (
     Body,
     Projection,
     Raster,

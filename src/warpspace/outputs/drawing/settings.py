@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any, Final
 
-from warpspace.analysis.concepts import Concepts
+from warpspace.analysis.commands.concepts import Concepts
 from warpspace.exceptions import OptionError
 from warpspace.geometry.colour import COMPONENTS
 from warpspace.machine.limits import MAX_FIGURE_AREA_PX as LARGEST_AREA
@@ -18,7 +18,7 @@ from warpspace.machine.limits import MAX_FIGURE_SIDE_PX as LARGEST_SIDE
 from warpspace.machine.limits import MIN_FIGURE_PX as SMALLEST_SIZE
 from warpspace.machine.limits import RANGE_TOP
 from warpspace.picture import model
-from warpspace.picture.words import range_words
+from warpspace.picture.formatting import range_words
 from warpspace.scene.model import Scene
 
 REFERENCE_SIZE: Final = (1600, 1200)

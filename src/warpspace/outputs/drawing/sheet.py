@@ -14,16 +14,16 @@ from warpspace.geometry.colour import LEVELS, ColourScale
 from warpspace.geometry.surfaces import round_down
 from warpspace.machine.axes import parameter
 from warpspace.outputs.drawing.canvas import Canvas
-from warpspace.outputs.drawing.render import Projection, Raster, Rect
+from warpspace.outputs.drawing.off_screen import Projection, Raster, Rect
 from warpspace.outputs.drawing.settings import SIZES, FigureSettings, Theme
-from warpspace.picture.model import Picture, ScenePicture
-from warpspace.picture.words import (
+from warpspace.picture.formatting import (
     LOOP_WORDS,
     TIMES,
     convention_words,
     reference_words,
     spell_factor,
 )
+from warpspace.picture.model import Picture, ScenePicture
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, spell_short

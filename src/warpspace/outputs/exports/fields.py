@@ -14,10 +14,10 @@ from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import DIMENSIONS, cut, pieces
 from warpspace.machine.axes import is_linear
-from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.file_output import check_target, write_atomically
 from warpspace.picture.model import ScenePicture
 from warpspace.resources import __version__
-from warpspace.scene.files import guard_cell, spell_row
+from warpspace.scene.text_files import guard_cell, spell_row
 from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 
 if TYPE_CHECKING:

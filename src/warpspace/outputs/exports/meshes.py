@@ -13,8 +13,8 @@ from warpspace.geometry import surfaces
 from warpspace.geometry.colour import srgb_to_linear
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.exports.fields import structured_grid
-from warpspace.outputs.files import write_atomically
-from warpspace.picture.mesh import thick_nodes
+from warpspace.outputs.file_output import write_atomically
+from warpspace.picture.map_mesh import thick_nodes
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture
 from warpspace.picture.traces import TraceLine, trace_lines
 from warpspace.scene.model import Scene, grid_basis

@@ -1,1 +1,1 @@
-"""One module a figure; `warpspace.outputs.figures.catalogue` lists them."""
+"""One module a figure; `warpspace.outputs.figures.registry` lists them."""

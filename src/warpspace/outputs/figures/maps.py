@@ -16,7 +16,7 @@ from warpspace.geometry.colour import ColourScale
 from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import TOOL_AXIS
 from warpspace.machine.axes import is_linear
-from warpspace.outputs.drawing import map3d, render
+from warpspace.outputs.drawing import map3d, off_screen
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for
 from warpspace.outputs.drawing.sheet import (
@@ -30,8 +30,8 @@ from warpspace.outputs.drawing.sheet import (
     scene_facts,
     start_sheet,
 )
+from warpspace.picture.formatting import list_axes, quantity_words, spell_coordinate, spell_factor
 from warpspace.picture.model import Picture, ScenePicture, Slice, map_faces, view_words
-from warpspace.picture.words import list_axes, quantity_words, spell_coordinate, spell_factor
 from warpspace.scene.model import Scene
 from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array, spell, spell_short
 
@@ -162,7 +162,9 @@ def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
     return found
 
 
-def _cells(canvas: Canvas, rect: render.Rect, slices: Sequence[Slice]) -> dict[str, render.Rect]:
+def _cells(
+    canvas: Canvas, rect: off_screen.Rect, slices: Sequence[Slice]
+) -> dict[str, off_screen.Rect]:
     spans = {part.axis: np.ptp(part.grid.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
     x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
     left, bottom, right, top = rect
@@ -179,27 +181,27 @@ def _cells(canvas: Canvas, rect: render.Rect, slices: Sequence[Slice]) -> dict[s
 
 
 def _draw_key(
-    canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: render.Rect
+    canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: off_screen.Rect
 ) -> None:
     inset = canvas.px(46.0)
     room = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
     nodes = picture.grid.nominal_mm.reshape(-1, 3)
-    projection = render.fit_projection("iso", nodes, room)
-    bodies: list[render.Body] = []
+    projection = off_screen.fit_projection("iso", nodes, room)
+    bodies: list[off_screen.Body] = []
     creases: list[Array] = []
     for part in slices:
         faces = surfaces.outer_faces(part.shape)
         bodies += map3d.surface_bodies(replace(part, exaggeration=0.0), faces)
         points = part.grid.nominal_mm.reshape(-1, 3)
         creases += [points[line] for line in surfaces.crease_lines(faces, part.shape)]
-    raster = render.render_bodies(bodies, projection)
+    raster = off_screen.render_bodies(bodies, projection)
     if raster is not None:
         map3d.draw_raster(canvas, raster)
     theme = canvas.theme
-    seen, _ = render.split_visible(creases, projection, raster)
+    seen, _ = off_screen.split_visible(creases, projection, raster)
     canvas.lines(seen, width=SIZES.thin, colour=theme.grid, zorder=2.0)
     edges = (nodes[edge] for edge in surfaces.box_edges(picture.grid.shape))
-    seen, hidden = render.split_visible(edges, projection, raster)
+    seen, hidden = off_screen.split_visible(edges, projection, raster)
     canvas.lines(seen, width=SIZES.thin, colour=theme.ghost, dashes=map3d.GHOST_DASHES)
     canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=map3d.GHOST_DASHES)
     canvas.text(

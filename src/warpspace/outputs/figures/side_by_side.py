@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.analysis.concepts import LETTERS, Concept, compare_concepts
-from warpspace.analysis.repair import Repair, RepairResult
+from warpspace.analysis.commands.adjust import Repair, RepairResult
+from warpspace.analysis.commands.concepts import LETTERS, Concept, compare_concepts
 from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.drawing.canvas import Canvas
 from warpspace.outputs.drawing.map3d import draw_map, draw_maps_alike
-from warpspace.outputs.drawing.render import Rect, fit_projection
+from warpspace.outputs.drawing.off_screen import Rect, fit_projection
 from warpspace.outputs.drawing.settings import SIZES, FigureSettings, evaluate_for, share_colours
 from warpspace.outputs.drawing.sheet import (
     Drawing,
@@ -27,7 +27,7 @@ from warpspace.outputs.drawing.sheet import (
     scene_facts,
     start_sheet,
 )
-from warpspace.outputs.figures.machine import draw_bodies
+from warpspace.outputs.figures.machine_figures import draw_bodies
 from warpspace.outputs.figures.maps import EVERY, isoline_words
 from warpspace.picture.comparison import (
     CHANGE,
@@ -37,8 +37,8 @@ from warpspace.picture.comparison import (
     share_exaggeration,
     statistics_change,
 )
+from warpspace.picture.formatting import LOOP_WORDS, tolerance_words
 from warpspace.picture.model import ScenePicture, picture_concept, view_words
-from warpspace.picture.words import LOOP_WORDS, tolerance_words
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell, spell_count, spell_short, spell_signed
 

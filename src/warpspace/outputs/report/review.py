@@ -5,25 +5,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.analysis.adjusting import Objective
+from warpspace.analysis.adjustment_search import Objective
 from warpspace.analysis.blocks import Column, Mark, Table, number_columns
-from warpspace.analysis.cases import LIMIT_OVER, Over, Plan
-from warpspace.analysis.contributions import Explanation, Shares, explain
+from warpspace.analysis.commands.adjust import Repair, RepairResult
+from warpspace.analysis.commands.contributions import Explanation, Shares, explain
+from warpspace.analysis.commands.gains import Gains
+from warpspace.analysis.commands.montecarlo import Machines
 from warpspace.analysis.description import Analysis, Result, silent
-from warpspace.analysis.distribution import choose_distribution
-from warpspace.analysis.doubt import SURE, FieldDoubt, volume_doubt
-from warpspace.analysis.gains import Gains
-from warpspace.analysis.machines import Machines
-from warpspace.analysis.repair import Repair, RepairResult
+from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, Plan
+from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.statistics import Statistics, share_below
+from warpspace.analysis.uncertainty.propagation import SURE, FieldDoubt, volume_doubt
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
-from warpspace.outputs.report.render import Block, Cards, Items, Text
+from warpspace.outputs.report.templating import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
+from warpspace.picture.formatting import TIMES, list_axes, own_axes, spell_in_r, u95_behind
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
-from warpspace.picture.words import TIMES, list_axes, own_axes, spell_in_r, u95_behind
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import spell, spell_short, spell_signed
 

@@ -13,19 +13,28 @@ import numpy as np
 
 from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Mark, Table, number_columns
 from warpspace.analysis.blocks import Block as AnyBlock
-from warpspace.analysis.concepts import Concepts
+from warpspace.analysis.commands.concepts import Concepts
 from warpspace.analysis.description import Result, silent
-from warpspace.analysis.distribution import choose_distribution
-from warpspace.analysis.doubt import u95_lines
-from warpspace.analysis.reviewing import notes_table
+from warpspace.analysis.note_tables import notes_table
+from warpspace.analysis.sampling.distribution import choose_distribution
+from warpspace.analysis.uncertainty.propagation import u95_lines
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
-from warpspace.outputs.figures.catalogue import figure_kinds
-from warpspace.outputs.files import check_target, write_atomically
+from warpspace.outputs.figures.registry import figure_kinds
+from warpspace.outputs.file_output import check_target, write_atomically
 from warpspace.outputs.processes import FigureWorker
-from warpspace.outputs.report.render import (
+from warpspace.outputs.report.review import (
+    ReportSettings,
+    Review,
+    Reviewed,
+    build_review,
+    first_page,
+    given,
+    share_pictures,
+)
+from warpspace.outputs.report.templating import (
     Block,
     Embedded,
     Items,
@@ -37,19 +46,8 @@ from warpspace.outputs.report.render import (
     render_pdf,
     report_time,
 )
-from warpspace.outputs.report.review import (
-    ReportSettings,
-    Review,
-    Reviewed,
-    build_review,
-    first_page,
-    given,
-    share_pictures,
-)
 from warpspace.picture.comparison import statistics_blocks
-from warpspace.picture.model import ScenePicture
-from warpspace.picture.traces import trace_lines
-from warpspace.picture.words import (
+from warpspace.picture.formatting import (
     convention_sentences,
     list_axes,
     own_axes,
@@ -57,14 +55,16 @@ from warpspace.picture.words import (
     spell_factor,
     spell_point,
 )
+from warpspace.picture.model import ScenePicture
+from warpspace.picture.traces import trace_lines
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
-from warpspace.scene.save import scene_to_toml
+from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.units import spell, spell_short, spell_signed
 
 HEIGHT_PX = 400
 OTHER_PX = {"comparison": 490, "slices": 490, "error-curves": 490, "concepts": 490, "repair": 490}
-CHART = "warpspace.outputs.charts.blocks:chart_figure"
+CHART = "warpspace.outputs.charts.block_charts:chart_figure"
 LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they are drawn
 Chart = Bars | Lines | Histogram
 Drawn = Callable[[], Block]

@@ -1,0 +1,433 @@
+"""What to repair: which errors to adjust, and to what, so that the volume gets better."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from dataclasses import field as attribute
+from typing import ClassVar
+
+import numpy as np
+
+from warpspace.analysis.adjustment_search import Objective, Search, Volume
+from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
+from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
+from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
+from warpspace.analysis.statistics import Numbers, Summary, volume_statistics
+from warpspace.analysis.uncertainty.propagation import (
+    FieldDoubt,
+    field_doubt,
+    find_doubt,
+    plus_minus,
+    u95_lines,
+)
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import ErrorBasis, View, amplitudes_of, placed_words
+from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import Parameter, parameter
+from warpspace.machine.limits import MAX_ERROR, MAX_TEXT, MIN_HALF_WIDTH, REPAIR_COUNT, REPAIR_NODES
+from warpspace.scene.model import Scene, evaluate_grid, grid_basis, second_order
+from warpspace.units import Array, spell, spell_short
+
+DEFAULT_LIMIT = 200.0  # µm or µrad by which an error may be changed, unless somebody says otherwise
+MOST_BARS, MOST_VALUES = 14, 3  # errors in a chart, and values beside a bar
+FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Best(Summary):
+    """The whole volume with one error at its best value."""
+
+    keys: ClassVar[tuple[str, ...]] = ("value", *FOUR)
+    value: float  # µm or µrad; within its limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """One error alone: left out, or at its best value, with all others as they are."""
+
+    keys: ClassVar[tuple[str, ...]] = ("key", "unit", "present", "left_out", "best")
+    key: str
+    present: float  # µm or µrad
+    left_out: Summary
+    best: Best
+    sure: Numbers = attribute(default_factory=dict[str, float | None])
+
+    @property
+    def parameter(self) -> Parameter:
+        return parameter(self.key)
+
+    @property
+    def unit(self) -> str:
+        return self.parameter.unit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdjustedSet(Summary):
+    """The best set of so many adjustments, and the whole volume with it."""
+
+    keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact")
+    adjust: Mapping[str, float]  # µm or µrad; new values by key
+    # whether all sets of this size were compared; else the set was built up and improved by
+    # swapping its members
+    proven: bool
+    exact: Summary | None  # by the exact chain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repair(Analysis):
+    """Find which errors of SCENE to adjust, and to what.
+
+    For each error stands what leaving it out, and what its best value, gives for the whole volume
+    with all other errors as they are. Then follow the best sets of one, two, three … adjustments.
+    RMS is made smallest by weighted least squares, max as a convex problem, to within 0.0001 µm.
+    Model: first order; the sets found are evaluated again with the exact chain. Each node of the
+    grid weighs its share of the volume.
+    """
+
+    name = "repair"
+    task = "improve"
+    doing = "searching"
+    has_chart = True
+    makes_scenes = True
+    scene_help = "Write the scene with the last set listed applied"
+    loop: Loop | None = option(None, LOOP_HELP, unset="tool; relative with --placed")
+    placed: bool = option(False, PLACED_HELP)
+    objective: Objective = option(
+        Objective.RMS,
+        "What is made as small as possible over the volume: RMS or largest |E|",
+        words={"rms": "RMS of the whole volume", "max": "largest |E| of the volume"},
+    )
+    count: int = option(
+        3,
+        "The best sets of one up to this many adjustments",
+        low=REPAIR_COUNT[0],
+        high=REPAIR_COUNT[1],
+    )
+    adjustable: Keys = option(
+        (),
+        "Errors that may be adjusted; of a curve its amplitude is (compensation)",
+        unset="squareness and alignment: the constant errors",
+    )
+    limit: Limits = option(
+        (),
+        "By how much one error, or each, may be changed, in µm or µrad",
+        unset=f"±{DEFAULT_LIMIT:g}",
+    )
+    grid: int = option(
+        DEFAULT_NODES,
+        "Nodes per axis of the working volume",
+        low=REPAIR_NODES[0],
+        high=REPAIR_NODES[1],
+    )
+
+    @property
+    def seen_loop(self) -> Loop:
+        return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
+
+    def seen(self, scene: Scene) -> tuple[Scene, View]:
+        if self.placed and self.seen_loop is not Loop.RELATIVE:
+            raise OptionError(
+                f"{{placed}}: the {self.loop} loop does not show where the workpiece lies;"
+                f" expected loop {Loop.RELATIVE}"
+            )
+        scene = replace(scene, placed=True) if self.placed else scene
+        return scene, scene.view(self.seen_loop)
+
+    def run(self, scene: Scene, watch: Watch = silent, /) -> "RepairResult":
+        scene, view = self.seen(scene)
+        nodes = build_grid(scene.model, scene.workspace, self.grid)
+        basis = grid_basis(scene, nodes, view, self.included(scene))
+        values = amplitudes_of(scene.errors, basis.keys)
+        found = find_repairs(basis, nodes, values, self, scene, watch)
+        exact = [
+            volume_statistics(evaluate_grid(change.scene, nodes, view, exact=True), nodes)
+            for change in found.changes()
+        ]
+        sets = [
+            replace(one, exact=Summary(*numbers.four))
+            for one, numbers in zip(found.repairs, exact, strict=True)
+        ]
+        left_out = second_order(scene, self.seen_loop)
+        found = replace(found, repairs=tuple(sets), second_order=left_out)
+        error = basis.evaluate(values, orientation=False).error_um
+        at = nodes.coordinates, view, nodes.point_mm, nodes.weights
+        doubt = field_doubt(scene, error, *at)
+        return found if doubt is None else _with_doubt(found, doubt, basis)
+
+    def included(self, scene: Scene) -> Sequence[str]:
+        return scene.parameter_keys
+
+    def limit_of(self, key: str) -> float:
+        """Give the largest change of one error, µm or µrad."""
+        limits = dict(self.limit)
+        return limits.get(key, limits.get(ALL, DEFAULT_LIMIT))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepairResult(Result):
+    """What repairs a machine."""
+
+    keys = ("objective", "before", "errors", "adjustable", "repairs", "all_sets_compared")
+    no_change = "there is nothing to adjust in this loop"
+    asked: Repair
+    scene: Scene
+    before: Summary
+    # every error that is not zero and acts in the loop; the one whose best value helps the
+    # objective most comes first
+    errors: tuple[Effect, ...]
+    # the best sets of one, two, three … adjustments; none where no point is off
+    repairs: tuple[AdjustedSet, ...]
+    adjustable: Mapping[str, float]  # largest change of each error that was tried, µm or µrad
+    present: Mapping[str, float]  # value of each of them now, µm or µrad
+
+    @property
+    def objective(self) -> Objective:
+        return self.asked.objective
+
+    @property
+    def all_sets_compared(self) -> list[bool]:
+        return [one.proven for one in self.repairs]
+
+    def changes(self) -> Sequence[Change]:
+        return [
+            Change(f"after repair: {_values(one)}", repaired(self.scene, one.adjust))
+            for one in self.repairs
+        ]
+
+    def blocks(self) -> Iterator[Block]:
+        smallest = f"smallest {self._objective_words}"
+        yield " · ".join((self.scene.title, *self._where, smallest))
+        mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
+        yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
+        yield from u95_lines(find_doubt(self.scene, self.asked.seen_loop), {"": self.before})
+        columns = (
+            Column("key", leads=True),
+            Column("now", ".4g"),
+            Column("unit"),
+            *number_columns(("left out: mean", "RMS", "max"), unit="µm"),
+            Column("best value", ".1f"),
+            *number_columns(("then: mean", "RMS", "max"), unit="µm"),
+        )
+        rows = [
+            (one.key, one.present, one.unit, *one.left_out.three, one.best.value, *one.best.three)
+            for one in self.errors
+        ]
+        yield Table(
+            columns,
+            rows,
+            title="Each error alone, all others as they are:",
+            empty="  all errors that act in this loop are zero",
+        )
+        yield from self._set_blocks()
+        for one in self.errors:
+            if (share := one.best.sure.get("probability")) is not None:
+                now = f"{one.key} {one.present:.4g} {plus_minus(one.sure['u95_present'], '.3g')}"
+                yield f"  {now} {one.unit}: best value {one.best.value:.1f} helps with {share:.1%}"
+        yield self.bars()
+
+    @property
+    def _where(self) -> tuple[str, ...]:
+        loop = self.asked.seen_loop
+        return f"{loop} loop", *placed_words(self.scene.view(loop))
+
+    @property
+    def _objective_words(self) -> str:
+        return "largest |E|" if self.objective is Objective.MAX else "RMS |E|"
+
+    def _set_blocks(self) -> Iterator[Block]:
+        if not self.before.max_um:
+            yield "The error is zero everywhere in this loop: there is nothing to repair."
+            return
+        if not self.repairs:
+            yield "No squareness or alignment acts in this loop; other errors can be adjusted."
+            return
+        columns = (
+            Column("set", "d", leads=True),
+            *number_columns(("mean", "RMS", "P95", "max"), unit="µm"),
+            Column("adjust", wraps=True),
+        )
+        rows = [(len(one.adjust), *one.four, self._adjustments(one)) for one in self.repairs]
+        yield Table(columns, rows, title="Best sets of adjustments:")
+        if len(set(self.adjustable.values())) == 1:
+            said = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
+        else:
+            each = (f"{key} ±{limit:g}" for key, limit in self.adjustable.items())
+            said = f"by at most {', '.join(each)}"
+        yield f"  adjusted: {', '.join(self.adjustable)}; {said}"
+        sizes = [str(len(one.adjust)) for one in self.repairs if not one.proven]
+        yield (
+            "  all sets compared"
+            if not sizes
+            else f"  sets of {', '.join(sizes)}: too many to compare all; built up one by one, with"
+            " members swapped as long as that helped"
+        )
+        name = f"{self.objective}_um"
+        exact = [
+            f"set {len(one.adjust)}: {value:.3f} µm ({round(value - first, 3) + 0.0:+.3f})"
+            for one in self.repairs
+            if one.exact is not None
+            for value, first in ((getattr(one.exact, name), getattr(one, name)),)
+        ]
+        if exact:
+            words = f"{self._objective_words} by the exact chain (exact − first order)"
+            yield f"  {words}: {', '.join(exact)}"
+
+    def _adjustments(self, one: AdjustedSet) -> str:
+        return ", ".join(
+            f"{key} {self.present[key]:.4g} → {value:.4g} {parameter(key).unit}"
+            for key, value in one.adjust.items()
+        )
+
+    def bars(self) -> Bars:
+        errors, sets = self.errors[:MOST_BARS], self.repairs
+        none = [None] * len(sets), [None] * len(errors)
+        panels = tuple(
+            Panel(
+                f"{name.partition('_')[0].replace('rms', 'RMS')} |E|, before {before:.1f} µm",
+                (
+                    Series([*(getattr(e.left_out, name) for e in errors), *none[0]], form=".1f"),
+                    Series(
+                        [*(getattr(e.best, name) for e in errors), *none[0]], role="key", form=".1f"
+                    ),
+                    Series([*none[1], *(getattr(s, name) for s in sets)], role="set", form=".1f"),
+                ),
+                unit="µm",
+                before=before,
+            )
+            for name, before in zip(("mean_um", "rms_um", "max_um"), self.before.three, strict=True)
+        )
+        rows = [
+            f"{one.parameter.name}  {one.key}  {spell_short(one.present)} →"
+            f" {spell(one.best.value)} {one.unit}"
+            for one in errors
+        ]
+        where = (self.scene.machine.title, *self._where, f"{self.asked.grid} nodes per axis")
+        return Bars(
+            f"Repair · {self.scene.title}",
+            " · ".join(where),
+            [*rows, *map(_values, sets)],
+            panels,
+            legend=(
+                ("before", "before"),
+                ("this error left out", "plain"),
+                ("this error at its best value", "key"),
+                ("best set of adjustments", "set"),
+            ),
+        )
+
+
+def repaired(scene: Scene, adjust: Mapping[str, float]) -> Scene:
+    errors = scene.errors
+    for key, value in adjust.items():
+        errors = errors.with_amplitude(key, value, scene.axis_span(parameter(key).axis))
+    return replace(scene, title=f"{scene.title}, repaired"[:MAX_TEXT], errors=errors)
+
+
+def find_repairs(
+    basis: ErrorBasis,
+    grid: Grid,
+    amplitudes: Array,
+    asked: Repair,
+    scene: Scene,
+    watch: Watch = silent,
+) -> RepairResult:
+    volume = Volume(basis, grid, amplitudes)
+    candidates = _candidates(volume, asked)
+    limits = np.array([asked.limit_of(key) for key in basis.keys])
+    low = np.maximum(-limits, -MAX_ERROR - amplitudes)
+    high = np.minimum(limits, MAX_ERROR - amplitudes)
+    bounds = np.column_stack([np.minimum(low, 0.0), np.maximum(high, 0.0)])
+    off = bool(np.any(volume.error_um))
+    count = asked.count
+    sets: list[AdjustedSet] = []
+    search = Search(volume, asked.objective, bounds)
+    for found, proven in search.best_sets(candidates if off else (), count):
+        values = amplitudes[list(found.indices)] + found.change
+        adjust = {basis.keys[i]: float(v) for i, v in zip(found.indices, values, strict=True)}
+        numbers = volume.statistics(volume.changed(found.indices, values))
+        sets.append(AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=None))
+        watch(len(sets) / (count + 1))
+    errors = [_effect(search, index) for index in volume.acting if amplitudes[index] != 0.0]
+    wanted = f"{asked.objective}_um"
+    keys = [basis.keys[index] for index in candidates]
+    return RepairResult(
+        asked=asked,
+        scene=scene,
+        before=Summary(*volume.statistics(amplitudes).four),
+        errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
+        repairs=tuple(sets),
+        adjustable={key: asked.limit_of(key) for key in keys},
+        present={key: float(amplitudes[i]) for key, i in zip(keys, candidates, strict=True)},
+    )
+
+
+def _with_doubt(found: RepairResult, before: FieldDoubt, basis: ErrorBasis) -> RepairResult:
+    def sure(adjust: Mapping[str, float]) -> Numbers:
+        values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
+        after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
+        helps = {"probability": before.falls(after, f"{found.objective}_um")} if adjust else {}
+        return {**after.said_of(found.before).sure, **helps}
+
+    def sure_effect(one: Effect) -> Effect:
+        best = replace(one.best, sure=sure({one.key: one.best.value}))
+        return replace(one, best=best, sure={"u95_present": before.doubt.u95_of(one.key)})
+
+    return replace(
+        found,
+        before=replace(found.before, sure=sure({})),
+        errors=tuple(map(sure_effect, found.errors)),
+        repairs=tuple(replace(one, sure=sure(one.adjust)) for one in found.repairs),
+    )
+
+
+def _candidates(volume: Volume, asked: Repair) -> tuple[int, ...]:
+    keys = volume.basis.keys
+    acting = [keys[index] for index in volume.acting]
+    if ALL in asked.adjustable:
+        places = volume.acting
+    elif not asked.adjustable:
+        places = tuple(i for i in volume.acting if parameter(keys[i]).is_constant)
+    else:
+        for key in asked.adjustable:
+            if key not in acting:
+                parameter(key)
+                raise OptionError(
+                    f"{{adjustable}} {key}: it moves no point in this loop; expected some of"
+                    f" {', '.join(acting) or 'none'}"
+                )
+        places = tuple(sorted({keys.index(key) for key in asked.adjustable}))
+    tried = [keys[index] for index in places]
+    for key, limit in asked.limit:
+        if key not in (ALL, *tried):
+            raise OptionError(
+                f"{{limit}} of {key}: it is not among the errors that are adjusted"
+                f" ({', '.join(tried) or 'none'})"
+            )
+        if not MIN_HALF_WIDTH <= limit <= MAX_ERROR:
+            raise OptionError(
+                f"{{limit}} of {'all errors' if key == ALL else key}: ±{limit:g}; expected"
+                f" {MIN_HALF_WIDTH:g} to {MAX_ERROR:g} µm or µrad"
+            )
+    return places
+
+
+def _effect(search: Search, index: int) -> Effect:
+    volume = search.volume
+    indices, present = (index,), float(volume.amplitudes[index])
+    found = search.least(indices)
+    best = np.array([present]) + (np.zeros(1) if found is None else found.change)
+    out, then = (
+        volume.statistics(volume.changed(indices, values)).four for values in (np.zeros(1), best)
+    )
+    return Effect(
+        key=volume.basis.keys[index],
+        present=present,
+        left_out=Summary(*out),
+        best=Best(*then, value=float(best[0])),
+    )
+
+
+def _values(one: AdjustedSet) -> str:
+    if len(one.adjust) > MOST_VALUES:
+        return f"{len(one.adjust)} adjusted: {', '.join(one.adjust)}"
+    return ", ".join(f"{key} → {spell(value)}" for key, value in one.adjust.items())

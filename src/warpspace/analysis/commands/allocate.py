@@ -1,0 +1,376 @@
+"""The widest tolerances that keep a limit of |E| with a given probability."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.description import Change, Result, Watch, counting
+from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
+from warpspace.analysis.sampling import tolerance_search
+from warpspace.analysis.sampling.cases import Case, Over, both_orders
+from warpspace.analysis.sampling.distribution import Draws, Probability, machines_needed
+from warpspace.analysis.sampling.machine_sampling import montecarlo, sample_chunks
+from warpspace.analysis.sampling.sampling_options import KeptLimit
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.field.evaluate import compare_orders
+from warpspace.machine.axes import parameter
+from warpspace.machine.limits import COST, LIMIT_UM, MAX_HALF_WIDTH, PROBABILITY
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+DIGITS = 3
+"""Significant digits of an allocated half width; it is rounded down, so that the limit is kept."""
+NO_EFFECT = 1e-18  # mean squared gain, µm² per µm² or µrad², below which a parameter moves no point
+TRIES, NARROWER = 5, 0.99
+"""Rounding changes the proportions a little: should the limit then fail, all are narrowed again."""
+EXACT_MACHINES = 2000  # machines of which the answer is verified with the exact chain
+SEARCHED, WIDENED, CHECKED = 0.4, 0.2, 0.4
+"""Shares of the work: the search, the scale on new machines, the checks before and after."""
+Progress = Callable[[float], object]
+"""Called with the share of the work that was done since the last call."""
+
+
+def read_costs(text: str, _scene: Scene) -> tuple[tuple[str, float], ...]:
+    return tuple(read_numbers(text, "KEY=NUMBER", "EA0Z=4,EXX=0.5").items())
+
+
+Fixed: TypeAlias = Annotated[tuple[str, ...], Grammar("KEY,…", read_keys, many=True)]
+Costs: TypeAlias = Annotated[
+    tuple[tuple[str, float], ...], Grammar("KEY=NUMBER,…", read_costs, many=True)
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Allocate(KeptLimit):
+    """Find the widest tolerances that keep a limit of |E|.
+
+    Of the machines drawn from the new tolerances of SCENE the wanted share keeps |E| ≤ LIMIT, at
+    the least cost: a half width w of an error costs 1/w, or what --cost says over w. A tolerance of
+    0 holds its error and stays 0; centres stay; half widths are rounded down to three digits and at
+    most 1000 µm or µrad. The limit is kept everywhere in the volume, unless --over says otherwise,
+    and by so many of the machines that the lower end of the 95 % interval (Wilson) is the wanted
+    share. `warpspace montecarlo FILE --limit LIMIT --over max` has the same figure; another
+    --seed has other machines.
+    """
+
+    name = "allocate"
+    task = "design"
+    doing = "allocating"
+    makes_scenes = True
+    scene_help = "Scene file to write with the new tolerances"
+    limit_um: float = option(
+        100.0,
+        "Largest |E| accepted",
+        unit="µm",
+        low=LIMIT_UM[0],
+        high=LIMIT_UM[1],
+        flag="--limit",
+        former=("--limit-um", "--spec-um"),
+        required=True,
+    )
+    probability: float = option(
+        0.95,
+        "Share of the machines that has to keep the limit",
+        low=PROBABILITY[0],
+        high=PROBABILITY[1],
+    )
+    costs: Costs = option(
+        (),
+        "Cost of an error's tolerance, 1 if not given: a half width w costs NUMBER/w",
+        flag="--cost",
+    )
+    fixed: Fixed = option((), "Errors whose tolerance stays as it is")
+
+    def run(self, scene: Scene, watch: Watch, /) -> "AllocateResult":
+        case = self.case(scene, self.plan_of(self.limit_um))
+        return replace(allocate(case, self, counting(watch, 1.0)), scene=scene)
+
+    def check_keys(self, known: Sequence[str]) -> None:
+        for key in (*dict(self.costs), *self.fixed):
+            if key not in known:
+                raise UnknownNameError("error parameter", key, known)
+        for key, cost in self.costs:
+            if not COST[0] <= cost <= COST[1]:
+                raise OptionError(
+                    f"{{costs}} of {key}: {cost:g}; expected {COST[0]:g} to {COST[1]:g}"
+                )
+        if both := sorted({*self.fixed}.intersection(dict(self.costs))):
+            raise OptionError(f"{both[0]}: has a cost and is fixed; expected one of both")
+
+
+class Exact(NamedTuple):
+    """An allocation verified with the exact chain, on some of the machines."""
+
+    machines: int
+    probability: float
+    first_order: float  # probability on the same machines
+
+    def words(self) -> str:
+        change = f"{100.0 * (self.probability - self.first_order):+.2f}"
+        beside = f"{change} % against" if float(change) else "as many as to"
+        return (
+            f"exact chain: {100.0 * self.probability:.2f} % of {self.machines:,} of these machines,"
+            f" {beside} the first order"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllocateResult(Result):
+    """Tolerances that keep a limit, and how sure that is."""
+
+    asked: Allocate
+    scene: Scene | None = None
+    draws: Draws  # the tolerances before
+    half_width: Array  # [K], µm or µrad; after, in the order of `draws.keys`
+    free: NDArray[np.bool_]  # [K]; which of them were allocated
+    # of keeping the limit, on the same machines, with its 95 % confidence interval (Wilson)
+    before: Probability
+    after: Probability
+    cost_before: float  # Σ cost/w over the allocated tolerances; infinite where one was zero
+    cost_after: float
+    samples: int  # of these machines
+    seed: int
+    exact: Exact
+    widest: float  # µm or µrad; largest half width that is given
+
+    @property
+    def tolerances(self) -> dict[str, float]:
+        """Half width by parameter, µm or µrad, of those that were allocated."""
+        widths = zip(self.draws.keys, self.half_width, self.free, strict=True)
+        return {key: float(width) for key, width, free in widths if free}
+
+    @property
+    def at_widest(self) -> tuple[str, ...]:
+        """Parameters that got the largest half width there is."""
+        return tuple(key for key, width in self.tolerances.items() if width >= self.widest)
+
+    def as_plain(self) -> dict[str, Any]:
+        asked = self.asked
+        return {
+            "limit_um": asked.limit_um,
+            "wanted": asked.probability,
+            "loop": str(asked.loop),
+            "over": asked.over,
+            "distribution": str(asked.drawn),
+            "tolerances": dict(zip(self.draws.keys, self.half_width.tolist(), strict=True)),
+            "allocated": list(self.tolerances),
+            "probability": self.after.probability,
+            "low": self.after.low,
+            "high": self.after.high,
+            "probability_before": self.before.probability,
+            "cost": self.cost_after,
+            "cost_before": self.cost_before,
+            "samples": self.samples,
+            "seed": self.seed,
+            "exact": self.exact._asdict(),
+        }
+
+    def changes(self) -> Sequence[Change]:
+        if self.scene is None:
+            return ()
+        tolerances = self.scene.tolerances.with_half_widths(self.tolerances)
+        return [Change("tolerances allocated", replace(self.scene, tolerances=tolerances))]
+
+    def blocks(self) -> Iterator[Block]:
+        asked, draws = self.asked, self.draws
+        title = () if self.scene is None else (self.scene.title,)
+        yield " · ".join(
+            (*title, f"{asked.loop} loop", str(asked.drawn), f"evaluated {asked.where}")
+        )
+        columns = (
+            Column("key", leads=True),
+            Column("error", wraps=True),
+            *number_columns(("before ±", "after ±"), "g"),
+            Column("unit"),
+            Column("note", wraps=True),
+        )
+        widths = zip(draws.keys, draws.half_width, self.half_width, self.free, strict=True)
+        yield Table(
+            columns,
+            [
+                (
+                    key, parameter(key).name, float(before), float(after), parameter(key).unit,
+                    self._note(key, zero=before == 0.0, free=bool(free)),
+                )
+                for key, before, after, free in widths
+            ],
+        )  # fmt: skip
+        yield (
+            f"  |E| ≤ {asked.limit_um:g} µm before: {100.0 * self.before.probability:.2f} % of the"
+            f" machines, cost {self.cost_before:.3g}"
+        )
+        yield (
+            f"  |E| ≤ {asked.limit_um:g} µm after: {100.0 * self.after.probability:.2f} % of the"
+            f" machines, 95 % interval {100.0 * self.after.low:.2f} …"
+            f" {100.0 * self.after.high:.2f} %, cost {self.cost_after:.3g}"
+            f" ({self.samples:,} machines)"
+        )
+        yield f"  {self.exact.words()}"
+
+    def _note(self, key: str, *, zero: bool, free: bool) -> str:
+        if not free:
+            return "fixed" if key in self.asked.fixed else "zero" if zero else "no effect"
+        if key in self.at_widest:
+            return "the widest there is"
+        cost = dict(self.asked.costs).get(key)
+        return "" if cost is None else f"cost {cost:g}"
+
+
+def allocate(
+    case: Case,
+    asked: Allocate,
+    report: Progress = lambda _: None,
+    widest: float = MAX_HALF_WIDTH,
+) -> AllocateResult:
+    """Find the tolerances of least cost that keep a limit with a probability."""
+    asked.check_keys(case.model.machine.allowed_keys)
+    draws, plan = case.draws, replace(case.plan, spec_um=asked.limit_um)
+    plan.check()
+    if plan.over == Over.MEAN:
+        raise OptionError("{over} mean: expected sampled or max")
+    if plan.over == Over.MAX:
+        tolerance_search.refuse_many_points(case.view.loop)
+    needed = machines_needed(plan.samples, asked.probability)
+    if needed > plan.samples:
+        raise OptionError(
+            f"{{samples}}: {plan.samples:,} machines are too few to show that"
+            f" {100.0 * asked.probability:g} % keep a limit (lower end of the 95 % interval)"
+        )
+    case = replace(case, plan=plan)
+    # the search has machines of its own
+    seed = int(np.random.SeedSequence((plan.seed, 1)).generate_state(1)[0])
+    few = replace(plan, samples=tolerance_search.SAMPLES, seed=seed)
+    task = _task(draws, asked, tolerance_search.build_ensemble(replace(case, plan=few)), widest)
+    steps: list[None] = []
+
+    def step() -> None:
+        steps.append(None)
+        report(SEARCHED / tolerance_search.MOST_STEPS)
+
+    found = tolerance_search.search_widths(task, step)
+    report(SEARCHED * (1.0 - len(steps) / tolerance_search.MOST_STEPS))
+    scale = _new_scales(case, asked.limit_um, needed / plan.samples, report)
+    found = None if found is None else tolerance_search.scaled(task, found, scale)
+
+    def probability(half: Array, share: float) -> Probability:
+        drawn = replace(case, draws=replace(draws, half_width=half))
+        result = montecarlo(drawn, lambda count: report(share * count / plan.samples))
+        assert result.probability is not None  # noqa: S101 - the plan has a limit
+        return result.probability
+
+    if found is None:
+        raise OptionError(_why_not(task))
+    before = probability(draws.half_width, CHECKED / 2.0)
+    half_width = np.where(task.free, round_down(found), draws.half_width)
+    after = probability(half_width, CHECKED / 2.0)
+    for _ in range(TRIES):
+        if after.low >= asked.probability:
+            break
+        half_width = np.where(task.free, round_down(NARROWER * half_width), draws.half_width)
+        after = probability(half_width, 0.0)
+    else:
+        raise OptionError(_why_not(task))
+    orders = both_orders(replace(case, draws=replace(draws, half_width=half_width)), EXACT_MACHINES)
+    first, exact = (
+        float(np.mean(np.linalg.norm(each, axis=-1).max(axis=-1) <= asked.limit_um))
+        for each in orders
+    )
+    return AllocateResult(
+        asked=asked,
+        draws=draws,
+        half_width=half_width,
+        free=task.free,
+        before=before,
+        after=after,
+        cost_before=task.spent(draws.half_width),
+        cost_after=task.spent(half_width),
+        samples=plan.samples,
+        seed=plan.seed,
+        exact=Exact(len(orders[0]), exact, first),
+        widest=widest,
+        second_order=compare_orders(*orders),
+    )
+
+
+def round_down(widths: Array) -> Array:
+    """Round positive numbers down to `DIGITS` significant digits; what is rounded already stays."""
+    found = np.zeros_like(widths)
+    for index, width in enumerate(widths):
+        if width > 0.0:
+            places = DIGITS - 1 - math.floor(math.log10(width))
+            nearest = round(float(width), places)
+            step = 10.0**-places
+            found[index] = nearest if nearest <= width else round(nearest - step, places)
+    return found
+
+
+def _task(
+    draws: Draws, asked: Allocate, ensemble: tolerance_search.Ensemble, widest: float
+) -> tolerance_search.Task:
+    moves = ensemble.mean_square_gain > NO_EFFECT
+    fixed = np.array([key in asked.fixed for key in draws.keys])
+    free = moves & (draws.half_width > 0.0) & ~fixed
+    if not free.any():
+        raise OptionError(
+            "nothing to allocate: every tolerance is fixed, zero, or without effect on the error in"
+            " this loop; expected one or more that are free"
+        )
+    costs = dict(asked.costs)
+    return tolerance_search.Task(
+        ensemble,
+        draws.centre,
+        draws.half_width,
+        free,
+        np.array([costs.get(key, 1.0) for key in draws.keys]),
+        asked.limit_um,
+        asked.probability,
+        widest,
+    )
+
+
+def _new_scales(
+    case: Case, limit_um: float, share: float, report: Progress
+) -> tolerance_search.ScaleOf:
+    draws, common = case.draws, None
+    if case.plan.over == Over.MAX:
+        common = case.responses(case.common_places())
+
+    def scale(half_width: Array, moving: NDArray[np.bool_]) -> float | None:
+        drawn = replace(draws, half_width=half_width)
+
+        def chunk(rng: np.random.Generator, count: int) -> Array:
+            amplitudes = drawn.draw(rng, count)
+            base = np.where(moving, draws.centre, amplitudes)
+            move = amplitudes - base
+            if common is not None:
+                return tolerance_search.scales_within(base @ common, move @ common, limit_um)
+            gains = case.responses(case.site.random(rng, count))
+            base_um = np.einsum("nk,ckn->cn", base, gains)
+            return tolerance_search.scales_within(
+                base_um, np.einsum("nk,ckn->cn", move, gains), limit_um
+            )
+
+        found: list[Array] = []
+        for part in sample_chunks(chunk, case.plan):
+            found.append(part)
+            report(WIDENED * len(part) / case.plan.samples)
+        return tolerance_search.largest_scale(np.concatenate(found), share)
+
+    return scale
+
+
+def _why_not(task: tolerance_search.Task) -> str:
+    held = np.where(task.free, 0.0, task.half_width)
+    norm = task.ensemble.norm_um(task.centre, held)
+    share = float(np.mean(norm <= task.limit_um))
+    return (
+        f"no tolerance, however narrow, keeps {task.limit_um:g} µm on"
+        f" {100.0 * task.probability:g} % of the machines: with all free ones at zero,"
+        f" {100.0 * share:.1f} % keep it; expected a larger limit, a smaller probability, fewer"
+        " fixed tolerances, or centres nearer to zero"
+    )

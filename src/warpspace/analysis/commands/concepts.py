@@ -1,0 +1,230 @@
+"""Several machines side by side with the same tolerances, to choose between concepts."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from string import ascii_uppercase
+from typing import Any
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.commands.contributions import Share, SharesResult, variance_contributions
+from warpspace.analysis.commands.montecarlo import sampled_second_order
+from warpspace.analysis.description import Result, Watch, counting
+from warpspace.analysis.options import option
+from warpspace.analysis.sampling.machine_sampling import MonteCarlo, Progress, montecarlo
+from warpspace.analysis.sampling.sampling_options import KeptLimit
+from warpspace.exceptions import SceneError
+from warpspace.field.evaluate import build_basis
+from warpspace.field.grid import Grid
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
+from warpspace.machine.errors import TOLERANCE_CLASSES, ErrorSet, ToleranceSet
+from warpspace.machine.limits import LIMIT_UM, MOST_CONCEPTS
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+THREE = ("mean", "P95", "max")
+NAMED = 3  # errors that are named of each machine
+LETTERS = ascii_uppercase[:MOST_CONCEPTS]  # what the machines are called, in their order
+
+
+@dataclass(frozen=True, slots=True)
+class Concept:
+    """One machine among others."""
+
+    scene: Scene  # with the tolerances that were taken, its errors absolute
+    sampled: MonteCarlo  # |E| of machines within tolerance
+    # what each tolerance adds to the variance of E, the largest first
+    shares: SharesResult
+
+    @property
+    def leading(self) -> tuple[Share, ...]:
+        return self.shares.rows[:NAMED]
+
+    @property
+    def said(self) -> dict[str, Any]:
+        sampled, kept = self.sampled, self.sampled.probability
+        return {
+            "scene": self.scene.name,
+            "title": self.scene.title,
+            "chain": str(self.scene.machine.chain),
+            "mean_um": sampled.mean_um,
+            "p95_um": sampled.p95_um,
+            "max_um": sampled.max_um,
+            "probability": None if kept is None else kept.probability,
+            "low": None if kept is None else kept.low,
+            "high": None if kept is None else kept.high,
+            "rms_um": self.shares.rms_um,
+            "errors": [
+                {
+                    "key": row.key,
+                    "name": parameter(row.key).name,
+                    "half_width": row.half_width,
+                    "unit": row.unit,
+                    "share": row.share,
+                }
+                for row in self.leading
+            ],
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Concepts(KeptLimit):
+    """Compare machines before one of them is built.
+
+    Machines of each SCENE are drawn from the same tolerances: those of the first one for
+    translations, rotations and squarenesses. Printed are mean, 95 % and largest |E|, how many
+    machines keep the limit, and the three errors that add most to the variance of E. Errors are
+    absolute: no point is held still, whatever a scene says. `warpspace montecarlo` and
+    `warpspace contributions` give more of each machine.
+    """
+
+    name = "concepts"
+    task = "design"
+    scenes = (1, MOST_CONCEPTS)
+    doing = "sampling"
+    has_table = True
+    loop: Loop = option(
+        Loop.RELATIVE,
+        "Tool relative to workpiece, so that axes count on either side; or one of both alone",
+    )
+    limit_um: float | None = option(
+        None,
+        "Of |E|, to say how likely it is kept",
+        unit="µm",
+        low=LIMIT_UM[0],
+        high=LIMIT_UM[1],
+        flag="--limit",
+        former=("--limit-um", "--spec-um"),
+    )
+    own_tolerances: bool = option(
+        False, "Each scene with its own tolerances instead of those of the first one by class"
+    )
+
+    def run(self, scene: Scene, watch: Watch, /) -> "ConceptsResult":
+        return self.run_all((scene,), watch)
+
+    def run_all(self, scenes: Sequence[Scene], watch: Watch, /) -> "ConceptsResult":
+        progress = counting(watch, self.samples * len(scenes))
+        found = compare_concepts(scenes, self, progress=progress)
+        left_out = sampled_second_order(*((one.scene, one.sampled) for one in found))
+        return ConceptsResult(asked=self, concepts=found, second_order=left_out)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConceptsResult(Result):
+    """Machines side by side."""
+
+    asked: Concepts
+    concepts: tuple[Concept, ...]
+
+    def as_plain(self) -> dict[str, Any]:
+        asked = self.asked
+        default = dict(self.concepts[0].scene.tolerances.default)
+        return {
+            "loop": str(asked.loop),
+            "over": asked.over,
+            "distribution": str(asked.drawn),
+            "samples": asked.samples,
+            "seed": asked.seed,
+            "limit_um": asked.limit_um,
+            "own_tolerances": asked.own_tolerances,
+            "tolerances": None if asked.own_tolerances else default,
+            "concepts": [concept.said for concept in self.concepts],
+        }
+
+    def blocks(self) -> Iterator[Block]:
+        asked, first = self.asked, self.concepts[0].scene
+        default = ", ".join(f"{name} ±{v:g}" for name, v in first.tolerances.default.items())
+        tolerances = f"the tolerances of {first.name}: {default} (µm, µrad)"
+        if asked.own_tolerances:
+            tolerances = "each with its own tolerances"
+        words = f"{asked.loop} loop · evaluated {asked.where} · {asked.drawn}"
+        yield f"{words} · {tolerances}"
+        lettered = zip(LETTERS, self.concepts, strict=False)
+        yield Table(self._columns(), [self._row(*one) for one in lettered])
+        means = [concept.sampled.mean_um for concept in self.concepts]
+        if len(set(means)) > 1:
+            yield f"  {LETTERS[means.index(min(means))]} has the smallest mean, {min(means):.2f} µm"
+
+    def _columns(self) -> tuple[Column, ...]:
+        limit = self.asked.limit_um
+        ranks = range(1, NAMED + 1)
+        named = [name for rank in ranks for name in (f"error_{rank}", f"error_{rank}_share")]
+        return (
+            Column("", leads=True),
+            Column("scene", leads=True, key="scene"),
+            Column(key="title", shows=False),
+            Column("chain", key="chain"),
+            Column(key="loop", shows=False),
+            *number_columns(THREE, unit="µm", keys=[f"{name.lower()}_um" for name in THREE]),
+            Column(key="limit_um", shows=False),
+            Column(key="probability", shows=False),
+            Column(f"≤ {limit or 0.0:g} µm", ".2f", "%", shows=limit is not None),
+            Column("matter most", unit="share of the variance", wraps=True),
+            *(Column(key=name, shows=False) for name in named),
+        )
+
+    def _row(self, letter: str, concept: Concept) -> tuple[Any, ...]:
+        sampled, kept, scene = concept.sampled, concept.sampled.probability, concept.scene
+        leading = [value for row in concept.leading for value in (row.key, row.share)]
+        return (
+            letter,
+            scene.name,
+            scene.title,
+            str(scene.machine.chain),
+            str(sampled.view.loop),
+            *(sampled.mean_um, sampled.p95_um, sampled.max_um),
+            None if kept is None else kept.spec_um,
+            None if kept is None else kept.probability,
+            None if kept is None else 100.0 * kept.probability,
+            ", ".join(f"{row.key} {100.0 * row.share:.0f} %" for row in concept.leading),
+            *leading,
+            *[None] * (2 * NAMED - len(leading)),
+        )
+
+
+def compare_concepts(
+    scenes: Sequence[Scene],
+    asked: Concepts | None = None,
+    *,
+    progress: Progress | None = None,
+) -> tuple[Concept, ...]:
+    asked = asked or Concepts()
+    found: list[Concept] = []
+    for scene in with_equal_tolerances(scenes, own=asked.own_tolerances):
+        case = asked.case(scene, asked.plan_of(asked.limit_um))
+        if not case.draws.variance.any():
+            problem = f"tolerances: none of the {asked.loop} loop has a width; expected one above 0"
+            raise SceneError(scene.name, [problem])
+        found.append(Concept(scene, montecarlo(case, progress), variance_contributions(case)))
+    return tuple(found)
+
+
+def with_equal_tolerances(scenes: Sequence[Scene], *, own: bool = False) -> tuple[Scene, ...]:
+    """Give scenes the tolerances of the first one by class, and no point held still."""
+    absolute = [replace(scene, reference=None, placed=False) for scene in scenes]
+    if own or not scenes:
+        return tuple(absolute)
+    default = scenes[0].tolerances.default
+    needed = {parameter(key).tolerance_class for scene in scenes for key in scene.parameter_keys}
+    if missing := [name for name in TOLERANCE_CLASSES if name in needed and name not in default]:
+        problem = (
+            f"tolerances.default has no {', '.join(missing)}; expected a half width for each class,"
+            " which all machines then have (--own-tolerances takes those of each scene)"
+        )
+        raise SceneError(scenes[0].name, [problem])
+    equal = ToleranceSet(dict(default))
+    return tuple(replace(scene, tolerances=equal) for scene in absolute)
+
+
+def expected_um(concept: Concept, grid: Grid) -> Array:
+    """Compute the RMS of |E| of machines within tolerance at each node, [nx, ny, nz], µm."""
+    draws, view = concept.sampled.draws, concept.sampled.view
+    basis = build_basis(
+        concept.scene.model, ErrorSet(), draws.keys, grid.coordinates, view, grid.point_mm
+    )
+    square = np.einsum("k,k...c->...", draws.variance, basis.position**2)
+    middle = np.einsum("k,k...c->...c", draws.centre, basis.position)
+    return np.broadcast_to(np.sqrt(square + np.sum(middle**2, axis=-1)), grid.shape)

@@ -1,0 +1,163 @@
+"""Which part of the volume keeps a limit: its share, and the largest box that does."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import LOOP_HELP, option
+from warpspace.analysis.statistics import share_below, share_within
+from warpspace.analysis.uncertainty.propagation import field_doubt, plus_minus
+from warpspace.exceptions import OptionError
+from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import is_linear
+from warpspace.machine.limits import MAX_ERROR
+from warpspace.scene.model import Scene, choose_view, evaluate_grid
+from warpspace.units import Array
+
+SHARES = (0.25, 0.5, 0.75, 1.0)  # parts of the volume whose limit the table says
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reach(Analysis):
+    """Say which part of the volume of SCENE keeps a limit.
+
+    The volume is cut into boxes between the nodes of a grid; a box keeps the limit if all its
+    corners do. Said are the share of the volume, the largest box of axis ranges that keeps it
+    everywhere, and the limits that parts of the volume keep.
+    """
+
+    name = "reach"
+    task = "understand"
+    has_table = True
+    limit_um: float = option(
+        40.0, "Largest |E| accepted", unit="µm", low=0.001, high=MAX_ERROR, flag="--limit"
+    )
+    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    nodes: int = option(21, "Nodes per axis of the working volume", low=2, high=61, flag="--grid")
+
+    def run(self, scene: Scene, watch: Watch, /) -> "ReachResult":
+        grid = build_grid(scene.model, scene.workspace, self.nodes)
+        view = choose_view(scene, self.loop)
+        field = evaluate_grid(scene, grid, view)
+        watch(0.3)
+        axes = scene.workspace.volume_axes
+        if not any(axes):
+            raise OptionError("{limit_um}: the working volume of the scene is a point")
+        keeps = field.norm_um <= self.limit_um
+        ranges = scene.workspace.ranges
+        lengths = [float(np.ptp(ranges[axis])) if axis else 0.0 for axis in axes]
+        found = largest_box(keeps, lengths)
+        watch(0.9)
+        box = None
+        if found is not None:
+            box = {
+                axis: _span(ranges[axis], ends, count)
+                for axis, ends, count in zip(axes, found, keeps.shape, strict=True)
+                if axis
+            }
+        sure = field_doubt(scene, field.error_um, grid.coordinates, view, grid.point_mm)
+
+        def ask(error_um: Array) -> Array:
+            moved = replace(field, error_um=error_um)
+            keeps = (share_within(moved, part) for part in SHARES)
+            return np.array([100.0 * share_below(moved, self.limit_um), *keeps])
+
+        percent, *keeps_um = ask(field.error_um).tolist()
+        u95, *u95_um = sure.through(ask) if sure else [None] * (1 + len(SHARES))
+        names = [f"{part:.0%}" for part in SHARES]
+        told = {"u95_percent": u95, "u95_keeps_um": dict(zip(names, u95_um, strict=True))}
+        return ReachResult(
+            limit_um=self.limit_um,
+            percent=percent,
+            box=box,
+            keeps_um=dict(zip(names, keeps_um, strict=True)),
+            sure=told if sure else {},
+            doubt=sure and sure.doubt,
+            title=scene.title,
+            ranges={axis: ranges[axis] for axis in axes if axis},
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachResult(Result):
+    """The part of a volume that keeps a limit."""
+
+    keys = ("limit_um", "percent", "box", "keeps_um")
+    limit_um: float
+    percent: float  # of the volume
+    box: Mapping[str, tuple[float, float]] | None  # axis ranges, mm or degrees
+    keeps_um: Mapping[str, float]  # limit by part of the volume
+    sure: Mapping[str, Any]  # U95 of percent and of these
+    title: str
+    ranges: Mapping[str, tuple[float, float]]
+
+    def blocks(self) -> Iterator[Block]:
+        about = f" {plus_minus(self.sure['u95_percent'], '.1f')}" if self.sure else ""
+        share = f"{self.percent:.1f}{about} %"
+        yield f"{self.title} · {share} of the volume within {self.limit_um:g} µm"
+        if self.box is None:
+            yield "  no box between nodes of the grid keeps the limit"
+        else:
+            columns = (
+                Column("axis", leads=True, key="axis"),
+                *number_columns(("from", "to"), ".1f", keys=("from", "to")),
+                Column("of", ".0f", "%", key="percent_of_range"),
+                Column("unit", key="unit"),
+            )
+            rows = [
+                (axis, low, high, 100.0 * (high - low) / float(np.ptp(self.ranges[axis])),
+                 "mm" if is_linear(axis) else "°")
+                for axis, (low, high) in self.box.items()
+            ]  # fmt: skip
+            yield Table(columns, rows, title="Largest box that keeps it everywhere:")
+        columns = (Column("of the volume", leads=True), Column("keeps", ".2f", "µm"))
+        rows = [*self.keeps_um.items()]
+        if self.sure:
+            columns += (Column("U95", unit="µm"),)
+            rows = [(*row, plus_minus(self.sure["u95_keeps_um"][row[0]])) for row in rows]
+        yield Table(columns, rows, title="What parts of the volume keep:")
+
+
+def largest_box(
+    keeps: NDArray[np.bool_], lengths: list[float]
+) -> tuple[tuple[int, int], ...] | None:
+    """Find the largest box whose nodes all keep a limit, [x, y, z]: first and last node an axis."""
+    best, found = 0.0, None
+    steps = [length / max(count - 1, 1) for length, count in zip(lengths, keeps.shape, strict=True)]
+    pairs = [[(i, j) for i in range(n) for j in range(i + (n > 1), n)] for n in keeps.shape]
+    for x in pairs[0]:
+        slab = np.all(keeps[x[0] : x[1] + 1], axis=0)
+        for y in pairs[1]:
+            size = _extent(x, steps[0]) * _extent(y, steps[1])
+            if size * max(lengths[2], 1.0) <= best:
+                continue
+            z = _longest_run(np.all(slab[y[0] : y[1] + 1], axis=0))
+            if z is not None and size * _extent(z, steps[2]) > best:
+                best, found = size * _extent(z, steps[2]), (x, y, z)
+    return found
+
+
+def _longest_run(row: NDArray[np.bool_]) -> tuple[int, int] | None:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], row, [False]]).astype(np.int8)))
+    starts, ends = edges[::2], edges[1::2] - 1
+    if not len(starts):
+        return None
+    longest = int(np.argmax(ends - starts))
+    run = int(starts[longest]), int(ends[longest])
+    return run if run[1] > run[0] or len(row) == 1 else None
+
+
+def _extent(ends: tuple[int, int], step: float) -> float:
+    return (ends[1] - ends[0]) * step or 1.0
+
+
+def _span(ends: tuple[float, float], nodes: tuple[int, int], count: int) -> tuple[float, float]:
+    low, high = ends
+    first, last = (low + (high - low) * node / max(count - 1, 1) for node in nodes)
+    return first, last

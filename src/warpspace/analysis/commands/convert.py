@@ -1,0 +1,268 @@
+"""The errors of a scene in another convention: the same field from other numbers."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import Grammar, option, typed_word
+from warpspace.exceptions import OptionError, near_miss
+from warpspace.kinematics.conversion import (
+    ReferenceLine,
+    SquarenessSign,
+    convert_order,
+    convert_reference_line,
+    held_by_constants,
+    held_by_view,
+    zero_at,
+)
+from warpspace.kinematics.model import ComponentErrors, complete_coordinates
+from warpspace.machine.axes import parameter
+from warpspace.machine.limits import MAX_LENGTH_MM
+from warpspace.scene.library import parse_scene
+from warpspace.scene.model import Scene, evaluate
+from warpspace.scene.scene_writer import (
+    Notation,
+    covered_spans,
+    over_ranges,
+    scene_to_toml,
+    write_errors,
+)
+from warpspace.scene.text_files import parse_number
+
+FORMS = {
+    "component_errors": "after_motion or before_motion, or by axis: rotary:before_motion,X:…",
+    "straightness": "end_point, least_squares or minimum_zone, or by axis: X:least_squares,…",
+    "zero_at": "positions of axes: X:0,Y:-225",
+    "reference": "constants, or the point that is held: X:0,Y:0,Z:-280",
+    "measuring_line": "points in the frames of axes in mm, x/y/z: X:0/150/-80,…",
+    "squareness": "right_hand, over_90 or under_90",
+}
+MAX_SHOWN = 40
+SEED, PROOFS = 0, 500  # of the positions at which both fields are compared, and their number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convert(Analysis):
+    """Write the errors of SCENE in another convention.
+
+    The field stays the same: the file is read again, and the exact fields of both are compared at
+    500 places of the travel, whose largest difference is printed. What cannot be converted exactly
+    is refused.
+    """
+
+    name = "convert"
+    task = "measure"
+    doing = "converting"
+    file_help = "Scene file to write: .toml."
+    file_endings = (".toml",)
+    needs_file = True
+    wishes: Annotated[tuple[str, ...], Grammar("CONVENTION=VALUE", typed_word, each=True)] = option(
+        (), "; ".join(f"{name}={form}" for name, form in FORMS.items()), flag="--to", required=True
+    )
+
+    def run(self, scene: Scene, _watch: Watch, /) -> "ConvertResult":
+        return convert_scene(scene, self.target(scene), self.wishes)
+
+    def target(self, scene: Scene) -> "Target":
+        target = Target()
+        for wish in self.wishes:
+            name, equals, text = (part.strip() for part in wish.partition("="))
+            if not equals or name not in FORMS:
+                hint = near_miss(name, FORMS) or f"; expected one of {', '.join(FORMS)}"
+                raise OptionError(f"{{wishes}} {wish!r}: unknown convention {name!r}{hint}")
+            try:
+                target = _with(target, scene, name, text)
+            except ValueError:
+                expected = f"expected {FORMS[name]}"
+                raise OptionError(f"{{wishes}} {wish!r} cannot be read; {expected}") from None
+        return target
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Conventions to write a scene in; what is left out stays as it is."""
+
+    # axis to "after_motion" or "before_motion"
+    component_errors: Mapping[str, str] = field(default_factory=dict[str, str])
+    # linear axis to "end_point", "least_squares" or "minimum_zone"
+    straightness: Mapping[str, str] = field(default_factory=dict[str, str])
+    # mm or degrees; axis to the position at which its component errors are zero
+    zero_at: Mapping[str, float] = field(default_factory=dict[str, float])
+    # or "constants", or None; the point whose error is zero: held by the view at these axis
+    # positions, or by location constants in place of the scene's view
+    reference: Mapping[str, float] | str | None = None
+    # sign of squareness and measuring lines that the numbers are written with
+    notation: Notation = field(default_factory=Notation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConvertResult(Result):
+    """A scene in another convention."""
+
+    keys = ("largest_um", "largest_urad", "changed", "notes")
+    wishes: tuple[str, ...]
+    before: Scene
+    scene: Scene  # equal to what a reader of the text gets
+    text: str  # the scene file
+    # largest difference of the exact fields, position in µm and orientation in µrad
+    largest_um: float
+    largest_urad: float
+    # µm or µrad; amplitude of each error as it was and as it is written, by key; zero where it is
+    # not there
+    changed: Mapping[str, tuple[float, float]]
+    notes: tuple[str, ...]  # what could not be taken along
+
+    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
+        wishes = "; ".join(self.wishes)
+        head = f"# Converted from {self.before.name} by warpspace convert: {wishes}\n"
+        return {"": head + self.text}
+
+    def as_plain(self) -> dict[str, Any]:
+        return {
+            "largest_um": self.largest_um,
+            "largest_urad": self.largest_urad,
+            "changed": {key: {"from": a, "to": b} for key, (a, b) in self.changed.items()},
+            "notes": list(self.notes),
+        }
+
+    def blocks(self) -> Iterator[Block]:
+        count = len(self.changed)
+        yield f"{self.before.title}: {count} error{'' if count == 1 else 's'} written otherwise"
+        columns = (
+            Column("error", leads=True),
+            Column("unit"),
+            *number_columns(("was", "is written"), ".4g", "largest"),
+        )
+        shown = list(self.changed.items())[:MAX_SHOWN]
+        yield Table(columns, [(key, parameter(key).unit, a, b) for key, (a, b) in shown])
+        if count > MAX_SHOWN:
+            yield f"  and {count - MAX_SHOWN} more; --json lists them all"
+        yield from (f"  {note}" for note in self.notes)
+        yield (
+            f"  exact fields differ by at most {self.largest_um:.1e} µm and"
+            f" {self.largest_urad:.1e} µrad (500 places of the travel, read again from the file)"
+        )
+
+
+def convert_scene(scene: Scene, target: Target, wishes: tuple[str, ...] = ()) -> ConvertResult:
+    """Write the errors of a scene in other conventions, in the order of the fields of `Target`."""
+    named = (target.component_errors, target.straightness, target.zero_at)
+    for table in (*named, target.notation.measuring_line_mm):
+        for axis in table:
+            scene.machine.axis(axis)
+    spans = covered_spans(scene.model, scene.workspace)
+    model, errors = convert_order(scene.model, scene.errors, spans, target.component_errors)
+    errors = convert_reference_line(model, errors, spans, target.straightness)
+    errors = zero_at(model, errors, spans, target.zero_at)
+    other = replace(scene, model=model, errors=over_ranges(errors, model, scene.workspace))
+    if target.reference is not None:
+        other = _with_reference(other, target.reference)
+    left = tuple(
+        key
+        for key in scene.measured
+        if scene.errors.functions.get(key) != other.errors.functions.get(key)
+    )
+    measured = {key: one for key, one in scene.measured.items() if key not in left}
+    other = replace(other, measured=measured)
+    text = scene_to_toml(other, target.notation)
+    read = parse_scene(text, scene.name, "the converted scene")
+    gone = f"readings of {', '.join(left)} are left out: they are of other curves"
+    notes = (gone,) if left else ()
+    written = write_errors(other, target.notation)
+    amplitudes = {
+        key: (scene.errors.amplitude(key), written.amplitude(key))
+        for key in dict.fromkeys((*scene.errors, *written))
+        if scene.errors.functions.get(key) != written.functions.get(key)
+    }
+    largest_um, largest_urad = field_difference(scene, read)
+    return ConvertResult(
+        wishes=wishes,
+        before=scene,
+        scene=read,
+        text=text,
+        largest_um=largest_um,
+        largest_urad=largest_urad,
+        changed=amplitudes,
+        notes=notes,
+    )
+
+
+def _with_reference(scene: Scene, reference: Mapping[str, float] | str) -> Scene:
+    if not isinstance(reference, str):
+        at = {**scene.workspace.positions, **reference}
+        place = complete_coordinates(scene.machine, at)
+        return replace(
+            scene, errors=held_by_view(scene.model, scene.errors, place), reference=dict(reference)
+        )
+    if reference != "constants":
+        raise OptionError(f"reference {reference!r}; expected constants, or axis positions")
+    if scene.reference is None:
+        raise OptionError("the scene holds no point still; expected a reference in its [view]")
+    place = complete_coordinates(scene.machine, {**scene.workspace.positions, **scene.reference})
+    held = held_by_constants(scene.model, scene.errors, place)
+    return replace(scene, errors=over_ranges(held, scene.model, scene.workspace), reference=None)
+
+
+def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
+    random = np.random.default_rng(SEED)
+    spans = covered_spans(one.model, one.workspace)
+    at = {axis: random.uniform(*span, PROOFS) for axis, span in spans.items()}
+    loops = ("tool", "workpiece", "relative") if one.reference == other.reference else ("tool",)
+    position, tilt = 0.0, 0.0
+    for loop in loops:
+        here, there = (evaluate(scene, at=at, loop=loop, exact=True) for scene in (one, other))
+        change = here - there
+        position = max(position, float(np.abs(change.error_um).max()))
+        tilt = max(tilt, float(np.abs(change.orientation_urad).max()))
+    return position, tilt
+
+
+def _with(target: Target, scene: Scene, name: str, text: str) -> Target:
+
+    def by_axis(read: Callable[[str], object], kinds: str = "all") -> dict[str, Any]:
+        found: dict[str, object] = {}
+        for part in text.split(","):
+            axis, colon, value = (word.strip() for word in part.rpartition(":"))
+            found |= _choose_axes(scene, axis if colon else "all", read(value), kinds)
+        return found
+
+    if name == "component_errors":
+        return replace(target, component_errors=by_axis(ComponentErrors))
+    if name == "straightness":
+        return replace(target, straightness=by_axis(ReferenceLine, "linear"))
+    if name == "squareness":
+        return replace(target, notation=replace(target.notation, squareness=SquarenessSign(text)))
+    if name == "reference" and text == "constants":
+        return replace(target, reference=text)
+    if ":" not in text:
+        raise ValueError(text)
+    if name == "zero_at":
+        return replace(target, zero_at=by_axis(lambda value: _numbers(value, 1)[0]))
+    if name == "reference":
+        return replace(target, reference=by_axis(lambda value: _numbers(value, 1)[0]))
+    places = by_axis(lambda value: _numbers(value, 3))
+    return replace(target, notation=replace(target.notation, measuring_line_mm=places))
+
+
+def _numbers(text: str, count: int) -> tuple[float, ...]:
+    found = tuple(parse_number(part) for part in text.split("/"))
+    if len(found) != count or not all(abs(value) <= MAX_LENGTH_MM for value in found):
+        raise ValueError(text)
+    return found
+
+
+def _choose_axes(scene: Scene, text: str, value: object, kinds: str) -> dict[str, object]:
+    axes = scene.machine.axes
+    groups = {
+        "all": [name for name in axes if kinds == "all" or axes[name].is_linear],
+        "linear": [name for name in axes if axes[name].is_linear],
+        "rotary": [name for name in axes if not axes[name].is_linear],
+    }
+    if text not in groups and text not in axes:
+        known = ", ".join((*axes, *groups))
+        raise OptionError(f"--to {text!r}: no such axis; expected one of {known}")
+    return dict.fromkeys(groups.get(text, [text]), value)

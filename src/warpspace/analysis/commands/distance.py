@@ -1,0 +1,157 @@
+"""Distance between two points and the angle at a third: nominal, actual, and how they differ."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from dataclasses import field as attribute
+from typing import Any
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.commands.line import Between
+from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
+from warpspace.analysis.uncertainty.propagation import field_doubt, plus_minus
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.model import Coordinates, Loop
+from warpspace.scene.model import Scene, placed_in
+from warpspace.units import MINUS, UM_PER_MM, URAD_PER_RAD, Array
+
+RIGHT_RAD = 1e-6  # a nominal angle this close to 90° is a right one: its deviation is a squareness
+
+
+@dataclass(frozen=True, kw_only=True)
+class Distance(Between):
+    """Measure between points of SCENE: distance, angle.
+
+    Points are where the axes stand, by default the ends of the diagonal of the working volume.
+    They are taken as the workpiece sees them, and so are the directions x, y, z: as on a part that
+    a coordinate measuring machine measures. Difference is actual − nominal. With a corner also the
+    angle there between the edges to both points; positive where it is wider than nominal.
+    """
+
+    name = "distance"
+    task = "understand"
+    has_table = True
+    corner: Place = option((), "Point whose angle between both edges is measured", unset="no angle")
+    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    placed: bool = option(False, "Leave out where the workpiece lies; of the relative loop")
+    exact: bool = option(False, "The exact chain instead of the first order")
+
+    def run(self, scene: Scene, watch: Watch, /) -> "DistanceResult":
+        scene = placed_in(scene, self.loop, placed=self.placed)
+        at = self.places(scene, self.corner)
+        point = nominal_point(scene.model, Loop.TOOL, at)  # in any loop, as over the grid
+        solve = evaluate_exact if self.exact else evaluate_first_order
+        field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
+        watch(1.0)
+        found = self.between(scene, at, field)
+        sure = field_doubt(scene, field.error_um, at, scene.view(self.loop), point)
+        if sure is None:
+            return found
+
+        def ask(error_um: Array) -> Array:
+            off = self.between(scene, at, replace(field, error_um=error_um))
+            return np.array([off.difference_um, off.deviation_urad or 0.0, *off.along_um])
+
+        distance, angle, *along = sure.through(ask)
+        told = {"u95_difference_um": distance, "u95_along_um": along}
+        return replace(found, sure=told | ({"u95_deviation_urad": angle} if self.corner else {}))
+
+    def between(self, scene: Scene, at: Coordinates, field: ErrorField) -> "DistanceResult":
+        """Measure between points, [n], of a field in R."""
+        to_workpiece = transforms.inverse(branch_pose(scene.model, "workpiece", at))
+        nominal = transforms.apply(to_workpiece, field.nominal_mm)
+        error = transforms.rotate(to_workpiece[..., :3, :3], field.error_um)
+        start, end, *corner = np.stack([nominal, nominal + error / UM_PER_MM], axis=1)
+        distance = np.linalg.norm(end - start, axis=-1)
+        angle = _angles_rad(start - corner[0], end - corner[0]) if corner else None
+        return DistanceResult(
+            at=tuple(dict(zip(at, one, strict=True)) for one in np.transpose([*at.values()])),
+            nominal_mm=nominal,
+            error_um=error,
+            distance_mm=distance,
+            difference_um=float(distance[1] - distance[0]) * UM_PER_MM,
+            along_mm=nominal[1] - nominal[0],
+            along_um=error[1] - error[0],
+            angle_deg=None if angle is None else np.rad2deg(angle),
+            deviation_urad=None if angle is None else float(angle[1] - angle[0]) * URAD_PER_RAD,
+            is_squareness=angle is not None and bool(abs(angle[0] - np.pi / 2.0) < RIGHT_RAD),
+            title=f"{scene.title} · {self.loop} loop",
+        )
+
+
+def _angles_rad(first: Array, second: Array) -> Array:
+    if not first[0].any() or not second[0].any():
+        raise OptionError("{corner} is an end of an edge; expected a third point")
+    across = np.linalg.norm(np.cross(first, second), axis=-1)
+    return np.arctan2(across, (first * second).sum(axis=-1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistanceResult(Result):
+    """Distance, its parts along x, y and z, and the angle at the corner where there is one."""
+
+    keys = (
+        "at", "nominal_mm", "error_um", "distance_mm", "difference_um", "along_mm", "along_um",
+        "angle_deg", "deviation_urad", "is_squareness",
+    )  # fmt: skip
+    at: tuple[Mapping[str, float], ...]  # start, end and corner, mm or degrees
+    nominal_mm: Array  # [n, 3], in the workpiece frame
+    error_um: Array  # [n, 3], in the workpiece frame
+    distance_mm: Array  # [2], nominal and actual
+    difference_um: float
+    along_mm: Array  # [3], from start to end, nominal
+    along_um: Array  # [3], what the errors add to it
+    # [2], nominal and actual, from the edge to start to the edge to end; None without a corner
+    angle_deg: Array | None
+    deviation_urad: float | None
+    is_squareness: bool
+    title: str
+    sure: Mapping[str, Any] = attribute(default_factory=dict[str, Any])  # U95 of what differs
+
+    def words(self) -> list[str]:
+        """Say it in short: the distance, its parts, and the angle where there is one."""
+        nominal, actual = self.distance_mm
+        parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", self.along_um, strict=True))
+        words = [
+            f"{nominal:.3f} → {actual:.3f} mm, {self.difference_um:+.1f} µm",
+            f"{'  '.join(parts)} µm",
+        ]
+        if self.angle_deg is not None:
+            nominal, actual = self.angle_deg
+            words.append(f"angle {nominal:.4f} → {actual:.4f}°, {self.deviation_urad:+.1f} µrad")
+        return [one.replace("-", MINUS) for one in words]
+
+    def blocks(self) -> Iterator[Block]:
+        start, end, *_ = (place_words(place) for place in self.at)
+        yield f"{self.title} · from {start} to {end}"
+        nominal_mm = (self.distance_mm[0], *self.along_mm)
+        added_um = (self.difference_um, *self.along_um)
+        names = ("distance", "along x", "along y", "along z")
+        rows = [
+            (name, float(mm), float(mm + um / UM_PER_MM), float(um))
+            for name, mm, um in zip(names, nominal_mm, added_um, strict=True)
+        ]
+        if self.sure:
+            u95 = self.sure["u95_difference_um"], *self.sure["u95_along_um"]
+            rows = [(*row, plus_minus(one)) for row, one in zip(rows, u95, strict=True)]
+        columns = (
+            Column(key="of", leads=True),
+            *number_columns(("nominal", "actual"), ".4f", "mm", ("nominal_mm", "actual_mm")),
+            Column("difference", "+.2f", "µm", key="difference_um"),
+            *([Column("U95", unit="µm", key="u95_um")] if self.sure else []),
+        )
+        yield Table(columns, rows)
+        if self.angle_deg is not None:
+            nominal, actual = self.angle_deg
+            kind = "squareness" if self.is_squareness else "deviation"
+            angle = f" {plus_minus(self.sure['u95_deviation_urad'])}" if self.sure else ""
+            yield f"angle at {place_words(self.at[2])}: {nominal:.6f}° → {actual:.6f}°"
+            yield (
+                f"  {kind} of the edge to {end} against the edge to {start}:"
+                f" {self.deviation_urad:+.2f} µrad{angle}; positive is wider"
+            )

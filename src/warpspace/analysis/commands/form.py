@@ -1,0 +1,166 @@
+"""Flatness, straightness and squareness of the bent volume: what an inspector would certify."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import combinations, product
+from typing import ClassVar
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Table
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import LOOP_HELP, option
+from warpspace.analysis.statistics import Numbers
+from warpspace.analysis.uncertainty.propagation import field_doubt, plus_minus
+from warpspace.exceptions import OptionError
+from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import is_linear
+from warpspace.scene.model import Scene, choose_view, evaluate_grid
+from warpspace.units import Array
+
+PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """One form deviation of one plane or line."""
+
+    keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit")
+    kind: str  # "flatness", "straightness" or "squareness"
+    of: str  # "XY", "X in y", "X to Y"
+    at: str  # where the other axes stand
+    value: float
+    unit: str
+    sure: Numbers = field(default_factory=dict[str, float | None])  # u95, where that is stated
+
+
+@dataclass(frozen=True, kw_only=True)
+class Certify(Analysis):
+    """Certify flatness, straightness, squareness of SCENE.
+
+    What an inspector would find on a part that the bent volume is copied to. Flatness and
+    straightness are the widths of the zone between two parallel planes or lines that
+    holds all points (minimum zone, ISO 12780 and 12781). Squareness is that of the least-squares
+    lines through the middle of the volume, positive where their angle is above 90°.
+    """
+
+    name = "certify"
+    task = "understand"
+    has_table = True
+    nodes: int = option(11, "Nodes per axis of the working volume", low=3, high=41, flag="--grid")
+    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+
+    def run(self, scene: Scene, watch: Watch, /) -> "CertifyResult":
+        grid = build_grid(scene.model, scene.workspace, self.nodes)
+        axes = grid.axes
+        if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
+            raise OptionError("certify: expected a working volume with two or three linear axes")
+        view = choose_view(scene, self.loop)
+        error = evaluate_grid(scene, grid, view).error_um
+        found, asked = [*_deviations(axes, grid.nominal_mm, error)], 1
+        sure = field_doubt(scene, error, grid.coordinates, view, grid.point_mm)
+        count = 2 * (1 + len(sure.doubt.keys)) if sure else 1
+        watch(1 / count)
+        if sure is None:
+            return CertifyResult(deviations=tuple(found), title=scene.title)
+
+        def ask(error_um: Array) -> Array:
+            nonlocal asked
+            watch((asked := asked + 1) / count)
+            return np.array([one.value for one in _deviations(axes, grid.nominal_mm, error_um)])
+
+        each = zip(found, sure.through(ask), strict=True)
+        told = tuple(replace(one, sure={"u95": u95}) for one, u95 in each)
+        return CertifyResult(deviations=told, title=scene.title, doubt=sure.doubt)
+
+
+def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[Deviation]:
+    moving = [i for i, axis in enumerate(axes) if axis]
+    for third in moving:
+        yield from _flatness(axes, nominal, error, [i for i in moving if i != third], third)
+    for axis in moving:
+        yield from _straightness(axes, nominal, error, moving, axis)
+    yield from (_squareness(axes, nominal, error, *pair) for pair in combinations(moving, 2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CertifyResult(Result):
+    """Form deviations of the bent volume."""
+
+    keys = ("deviations",)
+    deviations: tuple[Deviation, ...]
+    title: str
+
+    def blocks(self) -> Iterator[Block]:
+        yield f"{self.title} · form of the bent volume"
+        columns = (
+            *(Column(name, key=name, leads=name != "at") for name in Deviation.keys[:3]),
+            Column("value", ".2f", key="value"),
+            *([Column("U95"), Column(key="u95", shows=False)] if self.doubt else ()),
+            Column("unit", key="unit"),
+        )
+        rows = [
+            (d.kind, d.of, d.at, d.value, *([plus_minus(u95), u95] if self.doubt else ()), d.unit)
+            for d in self.deviations
+            for u95 in [d.sure.get("u95")]
+        ]
+        yield Table(columns, rows)
+
+
+def zone_width(deviation: Array, *places: Array) -> float:
+    """Width of the narrowest zone d − (a + Σ bᵢ·xᵢ) that holds all points, [n]."""
+    from scipy.optimize import linprog
+
+    centred = ((place - place.mean()) / (float(np.ptp(place)) or 1.0) for place in places)
+    design = np.column_stack([np.ones(deviation.size), *centred])
+    half = np.ones((deviation.size, 1))
+    bounds = [(None, None)] * design.shape[1] + [(0.0, None)]
+    matrix = np.block([[design, -half], [-design, -half]])
+    limits = np.concatenate([deviation, -deviation])
+    found = linprog([0.0] * design.shape[1] + [1.0], matrix, limits, bounds=bounds)
+    return 2.0 * float(found.x[-1])
+
+
+def _flatness(
+    axes: tuple[str, ...], nominal: Array, error: Array, plane: list[int], third: int
+) -> Iterator[Deviation]:
+    name = "".join(axes[i] for i in plane)
+    for word, share in PLACES.items():
+        index = round(share * (error.shape[third] - 1))
+        flat, places = (np.take(part, index, third) for part in (error[..., third], nominal))
+        width = zone_width(flat.ravel(), *(places[..., i].ravel() for i in plane))
+        at = f"{axes[third]} {np.take(nominal, index, third)[..., third].mean():.6g} mm ({word})"
+        yield Deviation("flatness", name, at, width, "µm")
+
+
+def _straightness(
+    axes: tuple[str, ...], nominal: Array, error: Array, moving: list[int], axis: int
+) -> Iterator[Deviation]:
+    others = [i for i in moving if i != axis]
+    for across in others:
+        widths: dict[str, float] = {}
+        for places in product(PLACES.items(), repeat=len(others)):
+            index: list[slice | int] = [slice(None) if i == axis else 0 for i in range(3)]
+            for i, (_, share) in zip(others, places, strict=True):
+                index[i] = round(share * (error.shape[i] - 1))
+            line = tuple(index)
+            at = ", ".join(f"{axes[i]} {word}" for i, (word, _) in zip(others, places, strict=True))
+            widths[at] = zone_width(error[line][:, across], nominal[line][:, axis])
+        worst = max(widths, key=lambda at: widths[at])
+        name = f"{axes[axis]} in {'xyz'[across]}"
+        yield Deviation("straightness", name, f"worst of lines: {worst}", widths[worst], "µm")
+
+
+def _squareness(
+    axes: tuple[str, ...], nominal: Array, error: Array, first: int, second: int
+) -> Deviation:
+    slope = 0.0
+    for axis, across in ((first, second), (second, first)):
+        index = tuple(
+            slice(None) if i == axis else (n - 1) // 2 for i, n in enumerate(error.shape[:3])
+        )
+        fit = np.polynomial.polynomial.polyfit(nominal[index][:, axis], error[index][:, across], 1)
+        slope += 1e3 * float(fit[1])  # µm over mm is mrad
+    name = f"{axes[second]} to {axes[first]}"
+    return Deviation("squareness", name, "through the middle", -slope, "µrad")

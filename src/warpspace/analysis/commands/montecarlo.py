@@ -1,0 +1,459 @@
+"""Machines within tolerance: the distribution of their |E|."""
+
+import math
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from itertools import islice, product
+from math import prod
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_columns
+from warpspace.analysis.description import Result, Watch, counting, plain
+from warpspace.analysis.options import Grammar, option
+from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Over, both_orders
+from warpspace.analysis.sampling.machine_sampling import MonteCarlo, Progress, Take, montecarlo_each
+from warpspace.analysis.sampling.sampling_options import SampledMachines
+from warpspace.exceptions import OptionError, UnknownNameError
+from warpspace.field.evaluate import SecondOrder, compare_orders
+from warpspace.machine.errors import TOLERANCE_CLASSES
+from warpspace.machine.limits import MAX_ERROR, MIN_HALF_WIDTH, SWEEP_CASES
+from warpspace.scene.model import Scene
+from warpspace.scene.text_files import parse_number, parse_whole
+
+NUMBERS = {
+    "mean": "mean_um", "RMS": "rms_um", "median": "median_um", "P95": "p95_um", "P99": "p99_um",
+    "max": "max_um",
+}  # fmt: skip
+PRINTED = 200  # rows that are printed
+WHERE = {Over.SAMPLED: "at one random point", Over.MAX: "everywhere", Over.MEAN: "in the mean"}
+WHAT = {
+    Over.SAMPLED: "|E| at one random point each",
+    Over.MAX: "largest |E| of each",
+    Over.MEAN: "mean |E| of each",
+}
+
+
+def read_steps(text: str, _scene: Scene) -> tuple[str, tuple[float, ...]]:
+    key, _, values = text.partition("=")
+    try:
+        if ":" in values:
+            low, high, number = values.split(":")
+            count = parse_whole(number) if parse_whole(number) <= SWEEP_CASES else 0
+            found = np.linspace(parse_number(low), parse_number(high), count).tolist()
+        else:
+            found = [parse_number(value) for value in values.split(",")]
+    except ValueError:
+        found = []
+    if not (key.strip() and found):
+        raise ValueError(
+            f"expected KEY=FROM:TO:N with N from 1 to {SWEEP_CASES:,}, or KEY=NUMBER,…, for"
+            " instance EAX=5:20:4 or rotation=10,20"
+        )
+    return key.strip(), tuple(found)
+
+
+Steps: TypeAlias = Annotated[
+    tuple[tuple[str, tuple[float, ...]], ...], Grammar("KEY=FROM:TO:N", read_steps, each=True)
+]
+
+
+@dataclass(frozen=True, slots=True)
+class SweepPoint:
+    """One scene with one choice of half widths."""
+
+    scene: Scene  # with the tolerances that were taken
+    half_widths: Mapping[str, float]  # µm or µrad; those that are swept, by key or class
+    sampled: MonteCarlo
+
+    @property
+    def row(self) -> dict[str, Any]:
+        sampled, kept = self.sampled, self.sampled.probability
+        return {
+            "scene": self.scene.name,
+            "title": self.scene.title,
+            **self.half_widths,
+            "samples": sampled.plan.samples,
+            "seed": sampled.plan.seed,
+            **{name: getattr(sampled, name) for name in NUMBERS.values()},
+            "spec_um": None if kept is None else kept.spec_um,
+            "probability": None if kept is None else kept.probability,
+            "probability_low": None if kept is None else kept.low,
+            "probability_high": None if kept is None else kept.high,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Machines(SampledMachines):
+    """Show how large |E| gets on machines within tolerance.
+
+    Machines are sampled from the tolerances of each SCENE (a folder stands for the scenes in it;
+    several are printed as a table); |E| is the length of the error in µm.
+    Each parameter is drawn once per machine and holds everywhere; a component error is the value it
+    has at the point looked at. Tool and relative loop: points uniform in the working volume, rotary
+    axes at their place in the scene. Workpiece loop: points uniform in the volume of the largest
+    workpiece, its rotary axes uniform over their travel.
+
+    With --tolerance there is a row for every combination of half widths, of the same seed, so that
+    rows differ by their tolerances only.
+
+    Quantiles are exact up to a million samples; beyond, from a histogram with steps of 0.002 %. The
+    numbers of a seed are the same on any number of workers, processes or machines of a cluster.
+    """
+
+    name = "montecarlo"
+    task = "design"
+    scenes = (1, None)
+    doing = "sampling"
+    has_chart = True
+    chart_help = "histogram"
+    over: Over = option(
+        Over.SAMPLED,
+        "|E| at one random point per machine, or its largest or mean over a machine's points",
+    )
+    grid: int = option(DEFAULT_NODES, "Nodes per axis for --over max|mean", low=2, high=101)
+    limit_um: float | None = option(
+        None,
+        "Of |E|, to say how likely a machine keeps it",
+        unit="µm",
+        low=0.0,
+        flag="--limit",
+        former=("--spec-um", "--limit-um"),
+    )
+    tolerance: Steps = option(
+        (),
+        "Half widths of a parameter, or of the class translation, rotation or squareness, in µm or"
+        " µrad: N of them in equal steps, or a list as in EXX=5,10,20",
+    )
+    rows: bool = option(
+        False, "A row for each scene, as --tolerance gives for each combination of half widths"
+    )
+
+    def run(self, scene: Scene, watch: Watch, /) -> "MachinesResult":
+        return self.run_all((scene,), watch)
+
+    def run_all(
+        self,
+        scenes: Sequence[Scene],
+        watch: Watch,
+        /,
+        *,
+        executor: Executor | None = None,
+        workers: int | None = None,
+        progress: Progress | None = None,
+        take: Take | None = None,
+    ) -> "MachinesResult":
+        self.check_against(len(scenes))
+        counted = counting(watch, self.machines(len(scenes)))
+
+        def advance(count: int) -> None:
+            counted(count)
+            if progress is not None:
+                progress(count)
+
+        points = self.points(
+            scenes, executor=executor, workers=workers, progress=advance, take=take
+        )
+        first = next(points)
+        widest, kept, rows = first, [first], [first.row] if self.in_rows else []
+        for point in points:
+            if self.in_rows:
+                rows.append(point.row)
+            else:
+                kept.append(point)
+            if point.sampled.max_um > widest.sampled.max_um:
+                widest = point
+        return MachinesResult(
+            asked=self,
+            points=tuple(kept),
+            rows=tuple(rows),
+            second_order=sampled_second_order((widest.scene, widest.sampled)),
+        )
+
+    @property
+    def in_rows(self) -> bool:
+        return self.rows or bool(self.tolerance)
+
+    def machines(self, scenes: int) -> int:
+        return self.samples * scenes * prod(len(values) for _, values in self.tolerance)
+
+    def check_against(self, scenes: int) -> None:
+        steps = dict(self.tolerance)
+        for key, _ in self.tolerance[len(steps) - 1 :] if len(steps) < len(self.tolerance) else ():
+            raise OptionError(f"{{tolerance}}: {key} is given twice")
+        for key, values in steps.items():
+            if not values:
+                raise OptionError(f"{{tolerance}} {key}: no half width; expected one at least")
+            for value in values:
+                if not (value == 0.0 or MIN_HALF_WIDTH <= value <= MAX_ERROR):
+                    raise OptionError(
+                        f"{{tolerance}} {key}: half width {value:g}; expected 0, or"
+                        f" {MIN_HALF_WIDTH:g} to {MAX_ERROR:g} µm or µrad"
+                    )
+        if (count := self.machines(scenes) // self.samples) > SWEEP_CASES:
+            what = "combinations" if steps else "rows"
+            raise OptionError(f"{count:,} {what}; expected at most {SWEEP_CASES:,}")
+
+    def points(
+        self,
+        scenes: Iterable[Scene],
+        *,
+        executor: Executor | None = None,
+        workers: int | None = None,
+        progress: Progress | None = None,
+        take: Take | None = None,
+    ) -> "Iterator[SweepPoint]":
+        """Sample scene by scene, taken as they are needed; the last half width changes first."""
+        plan = replace(self.plan(self.over, self.limit_um, self.grid), workers=workers)
+        plan.check()
+        steps = dict(self.tolerance)
+        waiting: deque[tuple[Scene, Mapping[str, float]]] = deque()
+
+        def cases() -> Iterator[Case]:
+            for scene in scenes:
+                for values in product(*steps.values()):
+                    point = dict(zip(steps, values, strict=True))
+                    chosen = with_half_widths(scene, point)
+                    waiting.append((chosen, point))
+                    yield self.case(chosen, plan)
+
+        for sampled in montecarlo_each(
+            cases(), workers=workers, executor=executor, progress=progress, take=take
+        ):
+            yield SweepPoint(*waiting.popleft(), sampled)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MachinesResult(Result):
+    """The distribution of |E| of the machines of one scene or several."""
+
+    keys = (
+        "samples", "seed", "distribution", "loop", "over", "mean_um", "mode_um", "median_um",
+        "p95_um", "p99_um", "max_um", "histogram",
+    )  # fmt: skip
+    asked: Machines
+    points: tuple[SweepPoint, ...]  # of each scene; of many rows only the first
+    rows: tuple[Mapping[str, Any], ...]  # for each combination, where these were asked for
+
+    def __getattr__(self, name: str) -> Any:
+        """Give a number of the first scene, for instance `mean_um`; see `MonteCarlo`."""
+        if name.startswith("_") or name == "points":
+            raise AttributeError(name)
+        return getattr(self.points[0].sampled, name)
+
+    def as_plain(self) -> dict[str, Any]:
+        asked = self.asked
+        if asked.in_rows:
+            return {"tolerances": plain(dict(asked.tolerance)), "rows": [*self.rows]}
+        if len(self.points) == 1:
+            return _numbers(self.points[0].sampled)
+        each = [
+            {"scene": one.scene.name, "title": one.scene.title, **_numbers(one.sampled)}
+            for one in self.points
+        ]
+        return {"scenes": each}
+
+    def blocks(self) -> Iterator[Block]:
+        first = self.points[0]
+        if self.asked.in_rows or len(self.points) > 1:
+            yield from self._several()
+        else:
+            yield from self._one(first.scene, first.sampled)
+
+    def _several(self) -> Iterator[Block]:
+        asked, first = self.asked, self.points[0].sampled
+        if asked.in_rows:
+            yield (
+                f"{asked.loop} loop · {asked.samples:,} machines a row, {asked.over} ·"
+                f" {first.draws.distribution} · seed {asked.seed}"
+            )
+        else:
+            yield self._words(first)
+        rows: Sequence[Mapping[str, Any]] = self.rows or [point.row for point in self.points]
+        swept = [key for key, _ in asked.tolerance]
+        limit = number_columns(
+            () if asked.limit_um is None else (f"≤ {asked.limit_um:g} µm",), unit="%"
+        )
+        columns = (
+            Column("scene", leads=True),
+            *(Column(key, "g", "±") for key in swept),
+            *number_columns(NUMBERS, unit="µm"),
+            *limit,
+        )
+        names = ("scene", *swept, *NUMBERS.values())
+        yield Table(
+            columns,
+            [
+                (*(row[name] for name in names), *(100.0 * row["probability"] for _ in limit))
+                for row in islice(rows, PRINTED)
+            ],
+        )
+        if (left := len(rows) - PRINTED) > 0:
+            yield f"… and {left:,} {'rows' if asked.in_rows else 'scenes'} more"
+
+    def _one(self, scene: Scene, found: MonteCarlo) -> Iterator[Block]:
+        from warpspace.analysis.commands.contributions import expected_square
+
+        asked = self.asked
+        told = self._words(found)
+        yield f"{scene.title} · {told}"
+        yield (
+            f"  mean {found.mean_um:.2f}, mode {found.mode_um:.1f}, median {found.median_um:.2f},"
+            f" P95 {found.p95_um:.2f}, P99 {found.p99_um:.2f}, max {found.max_um:.2f} µm"
+        )
+        printed = printed_um(scene, found)
+        if asked.over is Over.SAMPLED:
+            variance, offset = expected_square(case_of(scene, found))
+            yield (
+                f"  RMS  {found.rms_um:.2f} µm sampled, {math.sqrt(variance.sum() + offset):.2f} µm"
+                " from trace(J Σ Jᵀ) without sampling"
+            )
+        if printed is not None:
+            yield f"  the thesis prints {printed:g} µm (table 4-8; see `warpspace thesis`)"
+        if (kept := found.probability) is not None:
+            yield (
+                f"  |E| ≤ {kept.spec_um:g} µm {WHERE[asked.over]}: {100.0 * kept.probability:.2f} %"
+                f" of the machines, 95 % interval {100.0 * kept.low:.2f} … {100.0 * kept.high:.2f}"
+                " %"
+            )
+        draws = found.draws
+        held = [k for k, width in zip(draws.keys, draws.half_width, strict=True) if width == 0.0]
+        count = len(draws.keys) - len(held)
+        note = f"; held at their centre: {', '.join(held)}" if held else ""
+        yield f"  {count} parameters drawn{note}"
+        if not found.exact_quantiles:
+            yield "  quantiles to 0.002 % of their value"
+        yield sampled_histogram(found, scene.title, told, printed)
+
+    def _words(self, found: MonteCarlo) -> str:
+        asked, drawn = self.asked, str(found.draws.distribution)
+        if drawn == "normal":
+            drawn = "normal, 3σ = half width" + (", clipped" if found.draws.clip else "")
+        return (
+            f"{asked.loop} loop · {asked.samples:,} machines, {WHAT[asked.over]} · {drawn} · seed"
+            f" {asked.seed}"
+        )
+
+
+def _numbers(found: MonteCarlo) -> dict[str, Any]:
+    plan, names = found.plan, MachinesResult.keys[5:]
+    kept = {} if found.probability is None else {"specification": found.probability}
+    return plain(
+        {
+            "samples": plan.samples,
+            "seed": plan.seed,
+            "distribution": found.draws.distribution,
+            "loop": found.view.loop,
+            "over": plan.over,
+            **{name: getattr(found, name) for name in names},
+            **kept,
+        }
+    )
+
+
+def sampled_histogram(
+    found: MonteCarlo, title: str, subtitle: str, printed: float | None = None
+) -> Histogram:
+    edges, kept = found.histogram.edges_um, found.probability
+    marks = [("mode", found.mode_um), ("mean", found.mean_um), ("P95", found.p95_um)]
+    return Histogram(
+        title,
+        subtitle,
+        "volumetric error |E|, µm",
+        f"machines per {edges[1] - edges[0]:g} µm, %",
+        edges,
+        100.0 * found.histogram.counts / found.plan.samples,
+        (*marks, *([] if printed is None else [("thesis", printed)])),
+        found.plan.spec_um,
+        ()
+        if kept is None
+        else (
+            f"{100.0 * kept.probability:.2f} % of the machines\nstay within {kept.spec_um:g} µm",
+            f"95 % interval {100.0 * kept.low:.2f} … {100.0 * kept.high:.2f} %",
+        ),
+    )
+
+
+def printed_um(scene: Scene, found: MonteCarlo) -> float | None:
+    from warpspace.thesis.rows import printed_tables
+
+    name = f"{found.view.loop}_{scene.name.removeprefix('dvf5000_')}"
+    printed = printed_tables()["table_4_8"]["predicted"].get(name)
+    here = scene.machine.name == "dvf5000" and scene.name.startswith("dvf5000_")
+    return float(printed) if printed and here and found.plan.over == Over.SAMPLED else None
+
+
+def sampled_second_order(*found: tuple[Scene, MonteCarlo]) -> SecondOrder:
+    """Compare first order and exact chain on machines drawn for the scene with the largest |E|."""
+    return compare_orders(*both_orders(case_of(*max(found, key=lambda one: one[1].max_um))))
+
+
+def case_of(scene: Scene, found: MonteCarlo) -> Case:
+    return Case(scene.model, found.draws, scene.workspace, found.view, found.plan)
+
+
+def sweep(
+    scenes: Iterable[Scene],
+    half_widths: Mapping[str, Sequence[float]] | None = None,
+    *,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    take: Take | None = None,
+    **options: Any,
+) -> Iterator[SweepPoint]:
+    """Sample machines of many scenes, with every combination of some half widths.
+
+    Parameters
+    ----------
+    scenes : iterable of Scene
+        Taken as they are needed.
+    half_widths : mapping of str to sequence of float, µm or µrad, optional
+        For a parameter key, or for a class (translation, rotation, squareness); parameters with a
+        tolerance of their own are not touched by that of their class. None: as the scenes are.
+    workers : int, optional
+        Threads, or tasks of the executor at a time; the numbers do not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Does the work instead of threads: a pool of processes, or a cluster's.
+    progress, take : callable, optional
+        Called with the number of machines done since the last call; with the number of a case and
+        |E| of its next machines, in order.
+    options
+        Of `montecarlo`. Every point has the same seed, so that points differ by their half widths
+        and not by chance.
+
+    Yields
+    ------
+    SweepPoint
+        Scene by scene; of the half widths, the last one changes first.
+
+    Raises
+    ------
+    SceneError
+        If a scene has no tolerances, or not for every parameter.
+    OptionError, UnknownNameError
+        If an argument is out of range, or a scene has no such parameter.
+    """
+    steps = tuple((key, tuple(values)) for key, values in (half_widths or {}).items())
+    asked = Machines(tolerance=steps, **options)
+    asked.check_against(1)
+    yield from asked.points(
+        scenes, workers=workers, executor=executor, progress=progress, take=take
+    )
+
+
+def with_half_widths(scene: Scene, half_widths: Mapping[str, float]) -> Scene:
+    if not half_widths:
+        return scene
+    tolerances = scene.tolerances
+    classes = {key: value for key, value in half_widths.items() if key in TOLERANCE_CLASSES}
+    own = {key: value for key, value in half_widths.items() if key not in classes}
+    for key in own:
+        if key not in scene.machine.allowed_keys:
+            known = (*scene.parameter_keys, *TOLERANCE_CLASSES)
+            raise UnknownNameError("parameter or tolerance class", key, known)
+    tolerances = replace(tolerances, default={**tolerances.default, **classes})
+    return replace(scene, tolerances=tolerances.with_half_widths(own))

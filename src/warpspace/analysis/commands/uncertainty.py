@@ -1,0 +1,174 @@
+"""How sure the map of a machine is, whether it keeps its limit, and what makes it unsure."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from warpspace.analysis.blocks import Block, Column, Table, number_columns
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import LOOP_HELP, option, place_words
+from warpspace.analysis.statistics import P95, Statistics, volume_statistics
+from warpspace.analysis.uncertainty.propagation import (
+    COVERED,
+    NAMES,
+    FieldDoubt,
+    plus_minus,
+    volume_doubt,
+)
+from warpspace.field.grid import build_grid
+from warpspace.kinematics.model import Loop
+from warpspace.machine.axes import parameter
+from warpspace.machine.errors import Covariance
+from warpspace.machine.limits import MAX_ERROR
+from warpspace.scene.model import Scene, choose_view, evaluate_grid
+from warpspace.units import Array
+
+MOSTLY = 50.0  # percent of the volume
+MOST_SHARES = 10  # errors that the table of the largest shares has
+UNSTATED = "the scene does not state how sure its errors are; expected [uncertainty]"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trust(Analysis):
+    """Say how sure the map of SCENE is.
+
+    U95 of mean, RMS, P95 and max of |E| from what the scene states of the uncertainty of its
+    errors; the probability that the machine keeps a limit, at its worst point and everywhere, by
+    machines drawn from that; how much of the map is significant, |E| above its own U95; which part
+    lies beyond the positions that were measured; and which errors the uncertainty comes from.
+    """
+
+    name = "trust"
+    task = "understand"
+    doing = "drawing machines"
+    has_table = True
+    limit_um: float | None = option(
+        None, "Largest |E| accepted", unit="µm", low=0.001, high=MAX_ERROR, flag="--limit",
+        unset="that of the scene",
+    )  # fmt: skip
+    verify: bool = option(False, "Monte Carlo beside the linear propagation")
+    loop: Loop = option(Loop.TOOL, LOOP_HELP)
+    nodes: int = option(11, "Nodes per axis of the working volume", low=2, high=21, flag="--grid")
+    samples: int = option(10_000, "How many machines are drawn", low=100, high=1_000_000)
+    seed: int = option(0, "Of the random numbers", low=0, high=2**63 - 1)
+
+    def run(self, scene: Scene, watch: Watch, /) -> "TrustResult":
+        view = choose_view(scene, self.loop)
+        grid = build_grid(scene.model, scene.workspace, self.nodes)
+        found = volume_doubt(scene, view, self.nodes)
+        limit = scene.limit_um if self.limit_um is None else self.limit_um
+        statistics = volume_statistics(evaluate_grid(scene, grid, view), grid)
+        beyond = (scene.covariance or Covariance((), ())).outside(grid.coordinates, grid.shape)
+        result = TrustResult(
+            limit_um=limit,
+            statistics=found.said_of(statistics) if found else statistics,
+            never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
+            k=found and found.doubt.factor,
+            unknown=found.doubt.unknown if found else [*scene.errors],
+            remarks=tuple(found.doubt.remarks()) if found else (UNSTATED,),
+            title=f"{scene.title} · {self.loop} loop",
+        )
+        if found is None or not found.doubt.is_known:
+            return result
+        above = found.norm_um > found.u95_norm_um
+        significant = 100.0 * float(grid.weights[above].sum())
+        result = replace(result, significant_percent=significant, shares=_shares(found))
+        if limit is None and not self.verify:
+            return result
+        worst, drawn = int(np.argmax(found.norm_um)), list[Array]()
+        for norm in found.machines(self.samples, self.seed):
+            others = _three(norm, grid.weights.reshape(-1)) if self.verify else ()
+            drawn.append(np.stack([norm[:, worst], *others, norm.max(axis=1)]))
+            watch(min(sum(part.shape[1] for part in drawn) / self.samples, 1.0))
+        at_worst, *numbers = np.concatenate(drawn, axis=1)
+        return replace(
+            result,
+            probability_worst=limit and float(np.mean(at_worst <= limit)),
+            probability_everywhere=limit and float(np.mean(numbers[-1] <= limit)),
+            montecarlo=dict(zip(NAMES, map(_spread, numbers), strict=True)) if self.verify else {},
+        )
+
+
+def _three(norm: Array, weights: Array) -> tuple[Array, Array, Array]:
+    """Give mean, RMS and P95 of machines, [n] each, from their |E|, [n, N]."""
+    order = np.argsort(norm, axis=1)
+    place = np.argmax(np.cumsum(weights[order], axis=1) >= P95, axis=1)
+    p95 = norm[range(len(norm)), order[range(len(norm)), place]]
+    return norm @ weights, np.sqrt(norm**2 @ weights), p95
+
+
+def _spread(drawn: Array) -> Mapping[str, float]:
+    low, high = np.quantile(drawn, (0.5 - COVERED / 2.0, 0.5 + COVERED / 2.0))
+    return {"mean_um": float(drawn.mean()), "u95_um": float(high - low) / 2.0}
+
+
+def _shares(found: FieldDoubt) -> list[Mapping[str, Any]]:
+    mean, _, _, largest = found.gradients
+    of_mean, doubt = found.parts_of(mean), found.doubt
+    u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))
+    return [
+        {"key": key, "u": float(u[key]), "percent_of_max": 100.0 * part,
+         "percent_of_mean": 100.0 * of_mean[key]}
+        for key, part in found.parts_of(largest).items()
+    ]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrustResult(Result):
+    """How sure a map is; None is not known, or was not asked for."""
+
+    keys = (
+        "limit_um", "statistics", "k", "unknown", "probability_worst", "probability_everywhere",
+        "significant_percent", "never_measured_percent", "shares", "montecarlo",
+    )  # fmt: skip
+    limit_um: float | None
+    statistics: Statistics  # of |E| over the volume
+    probability_worst: float | None = None  # that the limit is kept where |E| is largest
+    probability_everywhere: float | None = None
+    significant_percent: float | None = None  # of the volume, where |E| is above its U95
+    never_measured_percent: float  # of the volume, beyond the positions of the data
+    montecarlo: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    k: float | None  # U95 / u
+    unknown: Sequence[str]  # errors of which nobody says how sure they are
+    shares: Sequence[Mapping[str, Any]] = ()  # in the variances of largest and mean |E|
+    remarks: tuple[str, ...]
+    title: str
+
+    def blocks(self) -> Iterator[Block]:
+        yield self.title + (f" · U95 with k = {self.k:.3g}" if self.k else "")
+        drawn = self.montecarlo
+        columns = (
+            Column("|E|", leads=True, key="of"),
+            Column("value", ".2f", "µm", key="value_um"),
+            Column("U95", unit="µm"),
+            Column(key="u95_um", shows=False),
+            *number_columns(("Monte Carlo: mean", "U95") if drawn else (), unit="µm"),
+            *number_columns(("difference",) if drawn else (), "+.1f", "%"),
+        )
+        rows: list[tuple[Any, ...]] = []
+        for name, words in NAMES.items():
+            u95, more = self.statistics.sure.get(f"u95_{name}"), [*drawn.get(name, {}).values()]
+            more += [100.0 * (more[1] / u95 - 1.0) if u95 else None] if more else []
+            rows.append((words, getattr(self.statistics, name), plus_minus(u95), u95, *more))
+        yield Table(columns, rows)
+        yield from (f"  {words}" for words in self.remarks)
+        if self.probability_worst is not None and self.probability_everywhere is not None:
+            yield (
+                f"  |E| ≤ {self.limit_um:g} µm with {100.0 * self.probability_worst:.1f} % at the"
+                f" worst point, {place_words(self.statistics.max_at_axes)};"
+                f" with {100.0 * self.probability_everywhere:.1f} % everywhere"
+            )
+        if self.significant_percent is not None:
+            yield f"  |E| is above its own U95 in {self.significant_percent:.1f} % of the volume"
+            if self.significant_percent < MOSTLY:
+                yield "  below it the first order is not enough: --verify says how much more it is"
+        if self.never_measured_percent:
+            yield f"  {self.never_measured_percent:.1f} % of the volume was never measured"
+        numbers = Column("u", ".3g"), *number_columns(("of max", "of mean"), ".1f", "%")
+        each = (one.values() for one in self.shares[:MOST_SHARES])
+        rows = [(key, parameter(key).unit, *three) for key, *three in each]
+        if rows:
+            title = "Where it comes from, in shares of the variance:"
+            yield Table((Column("error", leads=True), Column("unit"), *numbers), rows, title)

@@ -1,0 +1,144 @@
+"""The analyses there are: one line here, one file each; plug-ins register theirs.
+
+Nothing is imported before an analysis is asked for, so that the list costs nothing.
+"""
+
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from warpspace.exceptions import UnknownNameError
+from warpspace.plugins import load_plugins
+
+if TYPE_CHECKING:
+    from warpspace.analysis.description import Analysis, Result, Task, Watch
+    from warpspace.scene.model import Scene
+
+TASKS: "dict[Task, str]" = {
+    "see": "See",
+    "understand": "Understand",
+    "measure": "Measure",
+    "improve": "Improve",
+    "design": "Design",
+    "machine": "Scenes and machines",
+}
+"""What the commands of a task are listed under."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What the list says of an analysis: the first line of its docstring, and where it is."""
+
+    name: str
+    task: "Task"
+    sentence: str
+    place: str = ""  # module:Class
+
+    def load(self) -> "type[Analysis]":
+        return resolve_name(self.place) if self.place else _ADDED[self.name]
+
+
+R_co = TypeVar("R_co", bound="Result", covariant=True)
+
+
+class Verb(Protocol[R_co]):
+    """An analysis as a function: ``warpspace.NAME(scene, **options)``."""
+
+    def __call__(self, *scenes: "Scene", watch: "Watch" = ..., **options: Any) -> R_co:
+        """Answer it; options are those of its command: ``at={"X": 0}``, ``over_travel=True``."""
+        ...
+
+
+_ADDED: "dict[str, type[Analysis]]" = {}
+_BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
+    ("gains", "understand", "analysis.commands.gains:Gains",
+     "Rank the error parameters of SCENE by their gain."),
+    ("line", "understand", "analysis.commands.line:Line",
+     "Follow the error of SCENE along a straight line."),
+    ("distance", "understand", "analysis.commands.distance:Distance",
+     "Measure between points of SCENE: distance, angle."),
+    ("reach", "understand", "analysis.commands.conformance:Reach",
+     "Say which part of the volume of SCENE keeps a limit."),
+    ("trust", "understand", "analysis.commands.uncertainty:Trust",
+     "Say how sure the map of SCENE is."),
+    ("certify", "understand", "analysis.commands.form:Certify",
+     "Certify flatness, straightness, squareness of SCENE."),
+    ("repair", "improve", "analysis.commands.adjust:Repair",
+     "Find which errors of SCENE to adjust, and to what."),
+    ("convert", "measure", "analysis.commands.convert:Convert",
+     "Write the errors of SCENE in another convention."),
+    ("calibrate", "measure", "calibration.calibrate:Calibrate",
+     "Find the errors of the machine of SCENE in measured data."),
+    ("part", "measure", "parts.part:Part",
+     "Show a part, a mesh, as the machine of SCENE cuts it."),
+    ("program", "measure", "parts.program:Program",
+     "Run a program on SCENE: the errors along its path."),
+    ("clamp", "improve", "parts.clamp:Clamp",
+     "Find where to clamp a part on the machine of SCENE."),
+    ("compensate", "improve", "formats.compensation.compensate:Compensate",
+     "Write a table of compensation, and say what it leaves."),
+    ("montecarlo", "design", "analysis.commands.montecarlo:Machines",
+     "Show how large |E| gets on machines within tolerance."),
+    ("allocate", "design", "analysis.commands.allocate:Allocate",
+     "Find the widest tolerances that keep a limit of |E|."),
+    ("concepts", "design", "analysis.commands.concepts:Concepts",
+     "Compare machines before one of them is built."),
+    ("contributions", "design", "analysis.commands.contributions:Shares",
+     "Show which tolerances the volumetric error comes from."),
+)  # fmt: skip
+_ENTRIES = {
+    name: Entry(name, task, sentence, f"warpspace.{place}")
+    for name, task, place, sentence in _BUNDLED
+}
+
+
+def register(kind: "type[Analysis]") -> None:
+    """Add an analysis; it then is a command, a page and a section of the report."""
+    if kind.name in _ENTRIES:
+        raise ValueError(f"an analysis {kind.name!r} is there already")
+    _ADDED[kind.name] = kind
+    _ENTRIES[kind.name] = Entry(kind.name, kind.task, first_line(kind))
+
+
+def unregister(name: str) -> None:
+    del _ADDED[name], _ENTRIES[name]
+
+
+def first_line(kind: "type[Analysis]") -> str:
+    return (kind.__doc__ or "").partition("\n")[0]
+
+
+def entries() -> tuple[Entry, ...]:
+    """List all analyses without importing any."""
+    load_plugins()
+    return tuple(_ENTRIES.values())
+
+
+def find_analysis(name: str) -> "type[Analysis]":
+    load_plugins()
+    if name not in _ENTRIES:
+        raise UnknownNameError("analysis", name, _ENTRIES)
+    return _ENTRIES[name].load()
+
+
+def verb(name: str) -> "Verb[Result]":
+    from warpspace.analysis.description import silent
+    from warpspace.analysis.options import options_of
+
+    kind = find_analysis(name)
+    names = {one.name: one.name for one in options_of(kind)}
+    for one in options_of(kind):
+        names |= {flag.strip("-").replace("-", "_"): one.name for flag in one.former}
+    of_run = kind.run_all.__kwdefaults__ or {}
+
+    def answer(*scenes: "Scene", watch: "Watch" = silent, **options: Any) -> "Result":
+        for given in options:
+            if given not in names and given not in of_run:
+                raise UnknownNameError(f"option of {name}", given, [*names, *of_run])
+        asked = kind(**{names[one]: options[one] for one in options if one in names})
+        others = {one: value for one, value in options.items() if one in of_run}
+        return asked.run_all(scenes, watch, **others)
+
+    answer.__name__ = answer.__qualname__ = name
+    answer.__doc__ = kind.__doc__
+    return answer

@@ -1,0 +1,1 @@
+"""Uncertainty of errors, propagated to points, statistics and results."""

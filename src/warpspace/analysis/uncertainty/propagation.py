@@ -1,0 +1,461 @@
+"""How sure numbers are: the covariance of a machine's errors, carried to points and statistics.
+
+An error of a scene is sure by its standard uncertainty at points of its axis (``[uncertainty]``,
+errors independent of each other), or by the covariance of amplitudes that a calibration found. To
+first order a result f moves by its gradient g per unit of the amplitudes, so that its variance is
+gᵀ C g (ISO/IEC Guide 98-3, 5.2). U95 = k · u, k being Student's t for 95.45 %: 2 for infinite
+degrees of freedom (ibid., table G.2; ISO 230-9 takes k = 2).
+
+An error that a scene gives without saying how sure it is, is *unknown*: so is all that it moves.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+
+from warpspace.analysis.sampling.distribution import loop_axes
+from warpspace.analysis.statistics import P95, Summary
+from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
+from warpspace.field.grid import DEFAULT_NODES, build_grid, cut, pieces
+from warpspace.kinematics.model import Coordinates, Loop, Model
+from warpspace.machine.axes import parameter
+from warpspace.machine.errors import Covariance, ErrorFunction, ErrorSet, Table
+from warpspace.scene.model import Scene, evaluate_grid
+from warpspace.units import Array
+
+NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
+SURE = 0.95  # least probability of what is said of a limit (ISO 14253-1)
+COVERED = 0.9545  # of a normal distribution, within two standard deviations
+NEAR = 0.01  # part of the points that tells how their 95th percentile moves
+MOST_DRAWN = 2_000_000  # |E| of machines that are held at a time
+SAMPLES = 17  # points that a mode along an axis is drawn through
+S = TypeVar("S", bound=Summary)
+Layer: TypeAlias = tuple[ErrorSet, tuple[str, ...]]
+
+
+@lru_cache(maxsize=256)
+def coverage_factor(freedom: float) -> float:
+    """Give k of U95 = k · u: 2 for infinite degrees of freedom."""
+    if np.isinf(freedom):
+        return 2.0
+    from scipy.stats import t
+
+    return float(t.ppf(0.5 + COVERED / 2.0, max(freedom, 1.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """How sure the errors of a scene are, through one loop."""
+
+    layers: tuple[Layer, ...]  # curves that are not sure; their amplitudes play no part
+    covariance: Array  # [K, K], µm and µrad; of the amplitudes, one layer behind the other
+    freedoms: Array  # [K], degrees of freedom
+    unknown: tuple[str, ...]  # errors of which nobody says how sure they are
+    undetermined: tuple[str, ...] = ()  # of the unknown: what a calibration left open
+    lack_of_fit: float = 0.0  # that it saw
+
+    @cached_property
+    def keys(self) -> tuple[str, ...]:
+        """Keys of the amplitudes, (K,); one may come twice."""
+        return tuple(key for _, keys in self.layers for key in keys)
+
+    def respond(
+        self, model: Model, at: Coordinates, view: View, point_mm: Array | None = None
+    ) -> ErrorBasis:
+        """Give how errors of points respond to the amplitudes."""
+        bases = [build_basis(model, *layer, at, view, point_mm) for layer in self.layers]
+        both = zip(*((one.position, one.orientation) for one in bases), strict=True)
+        return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, both))
+
+    @cached_property
+    def freedom(self) -> float:
+        """Degrees of freedom that all have, else infinite; `expanded` counts each by its own."""
+        return float(self.freedoms[0]) if len({*self.freedoms.tolist()}) == 1 else np.inf
+
+    @property
+    def factor(self) -> float:
+        return coverage_factor(self.freedom)
+
+    @cached_property
+    def factors(self) -> Array:
+        """U95 / u by the degrees of freedom of each, [K]."""
+        return np.array([coverage_factor(one) for one in self.freedoms.tolist()])
+
+    @cached_property
+    def expanded(self) -> Array:
+        """Covariance times the factors: U95 of what grows by g is the root of g · this · g."""
+        return self.covariance * np.outer(self.factors, self.factors)
+
+    @property
+    def is_known(self) -> bool:
+        return not (self.unknown or self.undetermined)
+
+    @cached_property
+    def root(self) -> Array:
+        """Independent changes of the amplitudes, [K, M], of one standard uncertainty each."""
+        width = np.sqrt(np.diagonal(self.covariance))
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(width, width))
+        return width[:, None] * vectors * _root(values)
+
+    def u95_of(self, key: str) -> float | None:
+        """Give U95 of the amplitude of one error; None where it is not stated."""
+        at = self.keys.index(key) if key in self.keys else None
+        return None if at is None else float(self.expanded[at, at]) ** 0.5
+
+    def within(self, value: Array | float, u95: Array | float, low: float, high: float) -> Array:
+        """Give the probability that numbers lie between two, by their U95."""
+        from scipy.stats import t
+
+        unit = np.maximum(u95, 1e-12) / self.factor
+        below, above = (t.cdf((end - value) / unit, self.freedom) for end in (low, high))
+        return above - below
+
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom."""
+        found = rng.standard_normal((count, len(self.keys))) @ self.root.T
+        for freedom in {*self.freedoms.tolist()} - {np.inf}:
+            found[:, self.freedoms == freedom] *= np.sqrt(
+                freedom / rng.chisquare(freedom, (count, 1))
+            )
+        return found
+
+    def through(self, ask: Callable[[Array], Array]) -> list[float | None]:
+        """Give U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
+
+        Notes
+        -----
+        Half the difference of what one standard uncertainty up and down gives (ISO/IEC Guide 98-3,
+        5.1.3, note 2), or where both go the same way, as at the least of a width, their RMS.
+        """
+        present = ask(np.zeros(len(self.keys)))
+        if not self.is_known:
+            return [None] * len(present)
+        steps = [(ask(way), ask(-way)) for way in (self.root * self.factors[:, None]).T]
+        variance = np.sum((np.array(steps).reshape(-1, len(present)) - present) ** 2, axis=0) / 2.0
+        return _root(variance).tolist()
+
+    def remarks(self) -> Iterator[str]:
+        """Say what is not stated, and what the data did not determine."""
+        if unstated := [key for key in self.unknown if key not in self.undetermined]:
+            yield (
+                f"uncertainty not stated of {', '.join(unstated)}: it is unknown wherever they"
+                " act, not zero"
+            )
+        if self.undetermined:
+            names = ", ".join(self.undetermined)
+            yield f"the readings did not determine {names}: unknown wherever they act"
+        if self.lack_of_fit:
+            yield (
+                f"the calibration missed something: its residuals were {self.lack_of_fit:.1f} times"
+                " what its readings scatter; U95 does not contain that"
+            )
+
+
+def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
+    """Collect how sure the errors of a scene are; None where it says nothing of that."""
+    joint, alone = scene.covariance, scene.uncertainty
+    if joint is None and not alone:
+        return None
+    axes, together = loop_axes(scene.model, loop), () if joint is None else joint.keys
+    first = {key: scene.errors.functions[key] for key in together if key in scene.errors}
+    second: dict[str, ErrorFunction] = {}
+    for key, curve in alone.items():
+        first[key], *rest = _modes(key, curve)
+        second |= dict.fromkeys((key,), *rest) if rest else {}
+    keys = tuple(key for key in (*together, *alone) if parameter(key).axis in axes)
+    more = tuple(key for key in second if key in keys)
+    layers = (ErrorSet(first), keys), (ErrorSet(second), more)
+    width = [first[key].amplitude if key in alone else 0.0 for key in keys]
+    covariance = np.diag([one**2 for one in (*width, *(second[key].amplitude for key in more))])
+    freedoms = np.full(len(covariance), np.inf)
+    if joint is not None:
+        own = [key for key in keys if key in together]
+        rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
+        covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
+        freedoms[rows] = joint.freedom
+    known = joint or Covariance((), ())
+    undetermined = tuple(key for key in known.undetermined if parameter(key).axis in axes)
+    acting = (
+        key for key in scene.errors if parameter(key).axis in axes and key not in undetermined
+    )
+    unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
+    every = *unknown, *undetermined
+    return Doubt(layers, covariance, freedoms, every, undetermined, known.lack_of_fit)
+
+
+def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
+    """Give what an error varies by whose points along its axis are as sure as a curve says.
+
+    u · cos φ and u · sin φ, φ from 0 at one end to 90° at the other: near points vary together, the
+    ends by themselves, so that widths and differences along the axis are not sure either.
+    """
+    low, high = curve.span
+    if parameter(key).is_constant or low == high:
+        return (curve,)
+    at = np.unique([*curve.kinks, *np.linspace(low, high, SAMPLES)])
+    phase = 0.5 * np.pi * np.clip((at - low) / (high - low), 0.0, 1.0)
+    parts = (curve.evaluate(at) * way for way in (np.cos(phase), np.sin(phase)))
+    return tuple(Table(curve.span, tuple(zip(at.tolist(), u.tolist(), strict=True))) for u in parts)
+
+
+def _root(variance: Array) -> Array:
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class FieldDoubt:
+    """How sure the errors of points are; `replace` error_um where only these change."""
+
+    doubt: Doubt
+    response: Array  # [K, ..., 3], of the position errors to what is not sure
+    expanded_um2: Array  # [..., 3, 3]: U95 along a unit vector v is the root of v · this · v
+    error_um: Array  # [..., 3], position errors
+    shares: Array | None = None  # of the points in statistics, their sum is 1; None for equal ones
+    turning: Array | None = None  # [K, ..., 3], response of the orientation errors
+
+    @cached_property
+    def norm_um(self) -> Array:
+        return np.linalg.norm(self.error_um, axis=-1)
+
+    @cached_property
+    def covariance_um2(self) -> Array:
+        """Covariance of the position errors, [..., 3, 3]."""
+        if len({*self.doubt.factors.tolist()}) == 1:  # no second product on each slider move
+            return self.expanded_um2 / self.doubt.factor**2
+        return _carry(self.doubt.covariance, self.response)
+
+    @property
+    def u_norm_um(self) -> Array:
+        """Standard uncertainty of |E|, [...]."""
+        return self._along(self.covariance_um2)
+
+    @property
+    def u95_um(self) -> Array:
+        """U95 of the components of position errors, [..., 3]."""
+        return _root(np.diagonal(self.expanded_um2, axis1=-2, axis2=-1))
+
+    @cached_property
+    def u95_norm_um(self) -> Array:
+        """U95 of |E|, [...]; where that is zero, of the vector."""
+        return self._along(self.expanded_um2)
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """U95 of position errors, of their length and of orientation errors, by name."""
+        turning = np.zeros_like(self.response) if self.turning is None else self.turning
+        square = np.sum(turning * np.tensordot(self.doubt.expanded, turning, 1), axis=0)
+        return {
+            "u95_um": self.u95_um,
+            "u95_norm_um": self.u95_norm_um,
+            "u95_orientation_urad": _root(square),
+        }
+
+    @cached_property
+    def direction(self) -> Array:
+        """Unit vectors along the position errors, [..., 3]; zero where there is none."""
+        length = self.norm_um[..., None]
+        return self.error_um / np.where(length > 0.0, length, 1.0)
+
+    def _along(self, square: Array) -> Array:
+        way = self.direction
+        turned = np.einsum("...ij,...i->...j", square, way)
+        variance = np.einsum("...j,...j->...", turned, way)
+        if (none := self.norm_um == 0.0).any():
+            variance = np.where(none, np.trace(square, axis1=-2, axis2=-1), variance)
+        return _root(variance)
+
+    def u95_along(self, point: int, way: Array) -> float | None:
+        """Give U95 of the error of a point by its number, along a unit vector, [3]."""
+        square = self.expanded_um2.reshape(-1, 3, 3)[point]
+        return float(_root(way @ square @ way)) if self.doubt.is_known else None
+
+    def u95_at(self, point: int) -> float | None:
+        """Give U95 of |E| at a point by its number; None where it is unknown."""
+        return self.u95_norm_um.item(point) if self.doubt.is_known else None
+
+    def u95(self, gradient: Array) -> float:
+        """Give U95 of a number by its growth per unit of each amplitude, [K]."""
+        return float(_root(gradient @ self.doubt.expanded @ gradient))
+
+    def through(self, ask: Callable[[Array], Array]) -> list[float | None]:
+        """Give U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
+        return self.doubt.through(
+            lambda change: ask(self.error_um + np.tensordot(change, self.response, 1))
+        )
+
+    def parts_of(self, gradient: Array) -> dict[str, float]:
+        """Split the variance of a number into shares of errors, the largest first.
+
+        They add up to one; a share is below zero where a correlation makes the variance smaller.
+        """
+        parts = gradient * (self.doubt.covariance @ gradient)
+        found = dict.fromkeys(self.doubt.keys, 0.0)
+        for key, part in zip(self.doubt.keys, (parts / (parts.sum() or 1.0)).tolist(), strict=True):
+            found[key] += part
+        return dict(sorted(found.items(), key=lambda one: -abs(one[1])))
+
+    def keeps(self, limit_um: float) -> Array:
+        """Give the probability that |E| is within a limit at each point, [...].
+
+        |E|² is a quadratic form; a gamma distribution of its mean and variance stands for it.
+        """
+        from scipy.special import gammainc
+
+        square = self.norm_um**2
+        spread = np.trace(self.covariance_um2, axis1=-2, axis2=-1)
+        pairs = np.sum(self.covariance_um2**2, axis=(-2, -1))
+        mean, variance = square + spread, 2.0 * pairs + 4.0 * square * self.u_norm_um**2
+        per = mean / np.maximum(variance, 1e-300)
+        sharp = (self.norm_um <= limit_um).astype(float)
+        return np.where(variance > 1e-12 * mean**2, gammainc(mean * per, limit_um**2 * per), sharp)
+
+    def statistics(self) -> dict[str, float | None]:
+        """Give U95 of mean, RMS, P95 and max of |E| by their keys; None where it is unknown.
+
+        Points without an error count by U95 of their vector.
+        """
+        if not self.doubt.is_known:
+            return dict.fromkeys(NAMES)
+        u95 = [self.u95(gradient) for gradient in self.gradients]
+        if (none := self.norm_um.reshape(-1) == 0.0).any():
+            more = self.counts[:, none] @ self.u95_norm_um.reshape(-1)[none]
+            u95 = np.add(u95, more).tolist()
+        return dict(zip(NAMES, u95, strict=True))
+
+    def said_of(self, numbers: S) -> S:
+        """Say U95 beside statistics of the field."""
+        u95 = {f"u95_{name}": value for name, value in self.statistics().items()}
+        return replace(numbers, sure=u95)
+
+    @cached_property
+    def weights(self) -> Array:
+        size = self.norm_um.size
+        return np.full(size, 1.0 / size) if self.shares is None else self.shares.reshape(-1)
+
+    def seen(self, linear: Callable[[Array], Array]) -> "FieldDoubt":
+        """Give the same of what a linear function makes of position errors, [..., n, 3]."""
+        return combine(self.doubt, linear(self.response), linear(self.error_um), self.shares)
+
+    @cached_property
+    def counts(self) -> Array:
+        """How much |E| of each point counts in mean, RMS, P95 and max, [4, N]."""
+        norm, weights = self.norm_um.reshape(-1), self.weights
+        order = np.argsort(norm)
+        place = np.cumsum(weights[order])
+        near, largest = np.zeros((2, norm.size))
+        chosen = order[np.abs(place - P95) <= max(NEAR, 1.5 / norm.size)]
+        near[chosen] = weights[chosen] / max(weights[chosen].sum(), 1e-300)
+        largest[np.argmax(norm if norm.any() else self.u95_norm_um)] = 1.0
+        rms = float(np.sqrt(weights @ norm**2))
+        return np.stack([weights, weights * norm / rms if rms else weights, near, largest])
+
+    @cached_property
+    def gradients(self) -> Array:
+        """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
+        response, found = self.response.reshape(-1, self.norm_um.size, 3), list[Array]()
+        way = self.direction.reshape(-1, 3)
+        for count in self.counts:
+            few = np.flatnonzero(count) if not count.all() else slice(None)  # tell P95 and max
+            own = (count[few, None] * way[few]).reshape(-1)
+            found.append(response[:, few].reshape(len(response), own.size) @ own)
+        return np.stack(found)
+
+    def falls(self, after: "FieldDoubt", name: str) -> float | None:
+        """Give the probability that RMS or max of |E| is smaller with other errors of the points.
+
+        Squares are compared: that of the RMS is linear in what is not sure, however large that is.
+        """
+        if not self.doubt.is_known:
+            return None
+        squares, ways = np.zeros(2), list[Array]()
+        for index, one in enumerate((self, after)):
+            square = one.norm_um.reshape(-1) ** 2
+            squares[index] = square.max() if name == "max_um" else self.weights @ square
+            ways.append(2.0 * squares[index] ** 0.5 * one.gradients[[*NAMES].index(name)])
+        way, fall = ways[1] - ways[0], float(squares[0] - squares[1])
+        return float(self.doubt.within(fall, self.u95(way), 0.0, np.inf))
+
+    def machines(self, count: int, seed: int) -> Iterator[Array]:
+        """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""
+        rng, points = np.random.default_rng(seed), self.norm_um.size
+        gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
+        present = self.error_um.reshape(points, 3).T
+        for start in range(0, count, step := max(1, MOST_DRAWN // points)):
+            change = self.doubt.draw(rng, min(step, count - start))
+            parts = (change @ gain + own for gain, own in zip(gains, present, strict=True))
+            yield np.sqrt(sum(part**2 for part in parts))
+
+
+def field_doubt(
+    scene: Scene,
+    error_um: Array,
+    at: Coordinates,
+    view: View,
+    point_mm: Array | None = None,
+    shares: Array | None = None,
+) -> FieldDoubt | None:
+    """Say how sure a field of a scene is; None where the scene says nothing of that."""
+    doubt = find_doubt(scene, view.loop)
+    return doubt and _field_doubt(doubt, scene.model, error_um, at, view, point_mm, shares)
+
+
+def _field_doubt(
+    doubt: Doubt, model: Model, error_um: Array, at: Coordinates, view: View,
+    point_mm: Array | None, shares: Array | None = None,
+) -> FieldDoubt:  # fmt: skip
+    basis = doubt.respond(model, at, view, point_mm)
+    return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
+
+
+def u95_columns(
+    scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
+) -> dict[str, Array]:
+    """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
+    shape, found, doubt = field.norm_um.shape, dict[str, Array](), find_doubt(scene, view.loop)
+    if doubt is None or not doubt.is_known:
+        return found
+    point_mm = None if point_mm is None else np.broadcast_to(point_mm, (*shape, 3))
+    for piece in pieces(shape):
+        here = {name: cut(np.asarray(values), piece) for name, values in at.items()}
+        point = None if point_mm is None else point_mm[piece]
+        one = _field_doubt(doubt, scene.model, field.error_um[piece], here, view, point)
+        for name, values in one.columns.items():
+            whole = found.setdefault(name, np.empty(shape + values.shape[len(shape) :]))
+            whole[piece] = values
+    return found
+
+
+def combine(
+    doubt: Doubt, response: Array, error_um: Array, shares: Array | None = None
+) -> FieldDoubt:
+    """Carry how sure errors are to points, by the response of these, [K, ..., 3]."""
+    return FieldDoubt(doubt, response, _carry(doubt.expanded, response), error_um, shares)
+
+
+def _carry(covariance: Array, response: Array) -> Array:
+    turned = np.tensordot(covariance, response, 1)
+    return np.einsum("k...i,k...j->...ij", response, turned)
+
+
+def volume_doubt(scene: Scene, view: View, nodes: int = DEFAULT_NODES) -> FieldDoubt | None:
+    """Say how sure the errors over the working volume are; None where a scene does not say."""
+    grid = build_grid(scene.model, scene.workspace, min(nodes, DEFAULT_NODES))
+    error = evaluate_grid(scene, grid, view).error_um
+    return field_doubt(scene, error, grid.coordinates, view, grid.point_mm, grid.weights)
+
+
+def u95_lines(doubt: Doubt | None, named: Mapping[str, Summary]) -> Iterator[str]:
+    """Say U95 of mean, RMS, P95 and max by what they are of, and what is not stated."""
+    if doubt is None:
+        return
+    for of, one in named.items():
+        each = (f"{word} {plus_minus(one.sure[f'u95_{name}'])}" for name, word in NAMES.items())
+        yield f"  U95{of and f', {of}'} (k = {doubt.factor:.3g}): {', '.join(each)} µm"
+    yield from (f"  {words}" for words in doubt.remarks())
+
+
+def plus_minus(u95: float | None, form: str = ".2f") -> str:
+    return f"± {'?' if u95 is None else format(u95, form)}"

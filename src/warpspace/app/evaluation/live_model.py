@@ -1,0 +1,202 @@
+"""From a state to the picture of it: numpy only, no browser.
+
+Grids and first-order responses are kept, since they change only with the scene, the density, the
+rotary positions and the loop; a slider move is then one matrix-vector product.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeAlias, TypeVar
+
+import numpy as np
+
+from warpspace.analysis.sampling.distribution import loop_axes
+from warpspace.analysis.uncertainty.propagation import FieldDoubt, field_doubt
+from warpspace.app.evaluation.cache import Cache
+from warpspace.app.evaluation.compare import compare_pictures
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.leaf import Identity
+from warpspace.app.state.look import slice_positions
+from warpspace.field.evaluate import ErrorBasis, ErrorField, build_basis
+from warpspace.field.grid import Grid, build_grid, build_slice
+from warpspace.geometry.colour import ColourScale
+from warpspace.machine.axes import parameter
+from warpspace.picture import model
+from warpspace.picture.traces import TraceGroup, TraceLines, build_traces
+from warpspace.scene.model import grid_basis
+from warpspace.units import Array
+
+CACHE_BYTES = 400_000_000
+KEPT = 0.27  # place of the colour of what keeps the limit, on the scale of signed values
+TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
+T = TypeVar("T")
+Responding: TypeAlias = tuple[T, ErrorBasis]
+"""A grid, or traces of rotary axes, and its first-order response."""
+Response: TypeAlias = tuple[Responding[Grid], tuple[Responding[TraceGroup], ...]]
+
+
+class LiveModel:
+    """Turns states into pictures; one for all sessions, usable from any thread."""
+
+    def __init__(self) -> None:
+        self._kept: Cache[Any] = Cache(CACHE_BYTES)
+
+    def evaluate(self, state: AppState) -> LivePicture:
+        if state.comparison.b is not None:
+            return compare_pictures(self._single, state)
+        return self._single(state)
+
+    def _single(self, state: AppState) -> LivePicture:
+        rotary = state.rotary
+        key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
+        response: Response = self._kept.get(key, lambda: _build(state), _size)
+        (grid, basis), traces = response
+        field = self._field(state, grid, basis)
+        size = model.picture_size_mm(state.scene, grid)
+        factor = model.choose_exaggeration(
+            state.exaggeration, None, float(field.norm_um.max()), size
+        )
+        uncertainty, quantity = self._uncertainty(state, grid, field), state.look.quantity
+        if quantity == "uncertainty" and not (uncertainty and uncertainty.doubt.is_known):
+            quantity = "position"
+        common: dict[str, Any] = {
+            "view": state.view(),
+            "exaggeration": factor,
+            "component": state.component,
+            "quantity": quantity,
+            "significant": state.look.significant,
+        }
+        if state.look.pass_fail and (state.component, quantity) == ("norm", "position"):
+            common["limit_um"] = state.specification.limit_um
+        volume = model.Picture(**common, grid=grid, field=field, uncertainty=uncertainty)
+        common["colours"] = _chosen_colours(state, volume, basis)
+        return LivePicture(
+            **common,
+            grid=grid,
+            field=field,
+            uncertainty=uncertainty,
+            cut=state.look.surface == "cut",
+            slices=tuple(
+                model.Slice(
+                    **common,
+                    grid=plane,
+                    axis=axis,
+                    position_mm=at,
+                    field=on_plane,
+                    uncertainty=self._uncertainty(state, plane, on_plane),
+                )
+                for axis, at, plane, on_plane in self._slices(state)
+            ),
+            state=state,
+            traces=tuple(
+                TraceLines(group, own.nominal_mm, self._field(state, group, own).error_um, factor)
+                for group, own in traces
+            ),
+        )
+
+    def _uncertainty(self, state: AppState, grid: Grid, field: ErrorField) -> FieldDoubt | None:
+        """Say how sure errors over a grid are; a slider that is moved keeps its covariance."""
+        scene = state.scene
+        if scene.covariance is None and not scene.uncertainty:
+            return None
+
+        def build() -> FieldDoubt | None:  # something is stated
+            return field_doubt(scene, field.error_um, grid.coordinates, state.view(), grid.point_mm)
+
+        key = "uncertainty", Identity(grid), _place(state)
+        found: FieldDoubt = self._kept.get(key, build, lambda one: 3 * one.response.nbytes)
+        axes, known = loop_axes(scene.model, state.loop), found.doubt.keys
+        acting = (key for key, value in state.active.items() if value and key not in known)
+        unknown = [key for key in acting if parameter(key).axis in axes]
+        doubt = replace(found.doubt, unknown=tuple(unknown))
+        return replace(found, doubt=doubt, error_um=field.error_um, shares=grid.weights)
+
+    def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
+        scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
+
+        def build(axis: str, at: float) -> Responding[Grid]:
+            plane = build_slice(scene.model, workspace, axis, at, state.nodes)
+            return plane, grid_basis(scene, plane, state.view())
+
+        if state.look.surface == "slices":
+            for axis, at in slice_positions(scene, state.look, state.machine).items():
+                key = _place(state), axis, at
+                held = self._kept.get(key, partial(build, axis, at), lambda one: _size((one, ())))
+                yield axis, at, held[0], self._field(state, *held)
+
+    def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
+        """Evaluate a grid or traces: to first order, or what a table of compensation leaves.
+
+        What does not depend on the errors (what the controller adds, where the axes stand then) is
+        kept; a slider move is then one evaluation of the exact chain.
+        """
+        controller, scene = state.controller, state.scene
+        on_trace = isinstance(of, TraceGroup)
+        if controller is None:
+            amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
+            return basis.evaluate(amplitudes, orientation=state.look.tilts and not on_trace)
+        loop, point_mm = (of.loop, of.nominal_mm) if on_trace else (state.loop, None)
+        held = tuple((scene.reference or {}).items()), tuple(state.positions.items())
+        key = Identity(controller), Identity(of), Identity(scene.model), held, loop, state.seen
+        now = state.active_scene()
+        kept = self._kept.get(
+            key,
+            lambda: controller.at(of.coordinates, of.nominal_mm, now, loop, point_mm),
+            lambda found: found.nbytes,
+        )
+        return kept.field(now.errors)
+
+
+def _place(state: AppState) -> tuple[object, ...]:
+    return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.seen
+
+
+def _size(held: Response) -> int:
+    return sum(one.position.nbytes + one.orientation.nbytes for _, one in (held[0], *held[1]))
+
+
+def _build(state: AppState) -> Response:
+    scene = state.scene
+    grid = build_grid(scene.model, scene.workspace.moved(state.positions), state.nodes)
+    positions = {**scene.workspace.positions, **state.positions}
+    points = state.rotary.points_mm(scene)
+    groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)
+    given = scene.model, scene.errors, scene.parameter_keys
+    traces = tuple(
+        (one, build_basis(*given, one.coordinates, state.view(one.loop), one.nominal_mm))
+        for one in groups
+    )
+    return (grid, grid_basis(scene, grid, state.view())), traces
+
+
+@dataclass(frozen=True)
+class PassFail(ColourScale):
+    """Two colours: what keeps a limit, and what does not."""
+
+    limit: float = 0.0
+
+    def fraction(self, values: Array) -> Array:
+        return np.where(np.asarray(values) > self.limit, 1.0 - KEPT, KEPT)
+
+    @property
+    def ticks(self) -> tuple[float, ...]:
+        return (self.low, self.limit, self.high)
+
+
+def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -> ColourScale:
+    """Give the colours that a user has chosen: fixed, shared, or with round ends."""
+    quantity, component, look = volume.quantity, state.component, state.look
+    field, values = volume.field, volume.values
+    if look.pass_fail and quantity == "position" and component == "norm":
+        scale, limit = model.choose_scale([values], component), state.specification.limit_um
+        top = max(scale.high, limit)
+        return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
+    if look.range_mode == "shared" and quantity != "uncertainty":
+        opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
+        both = (model.coloured_error(one, quantity) for one in (field, opened))
+        lengths = [np.linalg.norm(error, axis=-1) for error in both]
+        return model.choose_scale(lengths, component, quantity)
+    end = look.range_top if look.range_mode == "fixed" else None
+    return model.choose_scale([values], component, quantity, end=end)

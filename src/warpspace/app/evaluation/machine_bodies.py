@@ -1,0 +1,112 @@
+"""The machine of a picture: its bodies, its tool point, and the rotary axis that is played."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.point_explanation import drawn_field
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.look import linear_positions
+from warpspace.bodies.placed import PlacedBody, place_bodies
+from warpspace.geometry.surfaces import deform
+from warpspace.kinematics.chain import nominal_point
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.units import Array
+
+HERE: Mapping[str, float] = {}
+
+
+def standing(state: AppState, at: Mapping[str, float] = HERE) -> tuple[dict[str, float], Array]:
+    """Tell where all axes stand, mm and degrees, some of them elsewhere; and the tool point."""
+    scene = state.scene
+    linear = linear_positions(scene, state.machine)
+    stands = {**scene.workspace.positions, **linear, **state.positions, **at}
+    axes = {name: float(stands.get(name, 0.0)) for name in scene.machine.axes}
+    coordinates = complete_coordinates(scene.machine, axes)
+    return axes, nominal_point(scene.model, Loop.TOOL, coordinates)
+
+
+def drawn_bodies(
+    picture: LivePicture, turned: Mapping[str, float] = HERE, *, nominal: bool = False
+) -> tuple[PlacedBody, ...]:
+    """Place the bodies of a picture's machine, bent where that is chosen.
+
+    While an axis is turned its table is drawn also where the machine is not.
+    """
+    state, scene = picture.state, picture.state.scene
+    positions, _ = standing(state, turned)
+    factor = picture.exaggeration if state.machine.bent and not nominal else 0.0
+    only = None if state.machine.shown or nominal else _turning_frames(state)
+    return place_bodies(
+        scene, state.view(), factor, only, amplitudes=state.active, positions=positions
+    )
+
+
+def tool_point(picture: LivePicture) -> tuple[Array, Array]:
+    """Find the tool point in the deformed grid, [3], mm, and its error, [3], µm."""
+    state = picture.state
+    axes, nominal = standing(state)
+    _, field = drawn_field(state, complete_coordinates(state.scene.machine, axes))
+    return deform(nominal, field.error_um, picture.exaggeration), field.error_um
+
+
+# --- Which axis is played, where traced points are meanwhile, which trace is looked at ------------
+
+
+def _turning_frames(state: AppState) -> tuple[str, ...]:
+    """List the rotary axes next to the workpiece, or to the tool, and the frame behind them."""
+    for side, end in (("workpiece", "w"), ("tool", "t")):
+        rotary = [axis.name for axis in state.scene.machine.branch(side) if not axis.is_linear]
+        if rotary:
+            return (*rotary, end)
+    return ()
+
+
+def played_axis(state: AppState) -> str | None:
+    """Name the rotary axis next to the workpiece, or to the tool; None where there is none."""
+    return next(iter(_turning_frames(state)[-2:]), None)
+
+
+def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
+    """Give the played axis' position after an angle, degrees, kept within its travel.
+
+    An axis that cannot go round swings to and fro over its travel.
+    """
+    axis = played_axis(state)
+    if axis is None:
+        return {}
+    low, high = state.scene.machine.axes[axis].travel
+    start, span = state.positions.get(axis, low) - low, high - low
+    if span >= 360.0:
+        return {axis: low + (start + angle_deg) % 360.0}
+    swing = (start + 2.0 * span * angle_deg / 360.0) % (2.0 * span)
+    return {axis: low + min(swing, 2.0 * span - swing)}
+
+
+def points_on_traces(picture: LivePicture, position: Mapping[str, float]) -> tuple[Array, Array]:
+    """Find where the traced points are at a position of the played axis, [n, 3] each, mm."""
+    found: list[Array] = []
+    for lines in picture.traces:
+        for number, trace in enumerate(lines.group.traces):
+            if trace.axis in position:
+                sweep, at = lines.group.coordinates[trace.axis][number], position[trace.axis]
+                both = np.concatenate([lines.nominal_mm[number], lines.actual_mm[number]], axis=1)
+                found.append(np.array([np.interp(at, sweep, column) for column in both.T]))
+    points = np.reshape(found, (-1, 6))
+    return points[:, :3], points[:, 3:]
+
+
+def chosen_trace(picture: LivePicture) -> str:
+    """Name the trace that is looked at, as long as an error moves it; empty where none does."""
+    state, moved = picture.state, picture.moved_traces
+    if state.rotary.chosen in moved:
+        return state.rotary.chosen
+    played = played_axis(state)
+
+    def rank(name: str) -> tuple[bool, bool]:
+        trace = moved[name].trace
+        stands = all(state.positions.get(axis) == at for axis, at in trace.at.items())
+        return trace.axis != played, not stands
+
+    return min(moved, key=rank, default="")

@@ -1,0 +1,293 @@
+"""Why a point is where it is: which point a click means, and what its error is made of."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.analysis.commands.contributions import Contribution, Explanation, explain
+from warpspace.analysis.commands.distance import Distance, DistanceResult
+from warpspace.analysis.uncertainty.propagation import FieldDoubt, field_doubt
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import AppState, Picked
+from warpspace.app.state.form_values import option_values, read_form, with_form
+from warpspace.app.state.leaf import Identity
+from warpspace.exceptions import WarpspaceError
+from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
+from warpspace.field.grid import seen_from_workpiece
+from warpspace.geometry.surfaces import deform
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose, nominal_point
+from warpspace.kinematics.model import Coordinates, Loop
+from warpspace.machine.axes import is_linear
+from warpspace.picture.formatting import spell_at
+from warpspace.picture.map_mesh import solid_map
+from warpspace.picture.traces import is_moved
+from warpspace.units import Array
+
+TOLERANCE_RAD = 0.0032  # how far a click may pass a trace: about seven pixels of the usual view
+BETWEEN = 5  # places looked at between two samples of a trace: one degree apart
+REACH_MM = 1e7  # rays from farther away than this come from no camera
+PARALLEL = 1e-12
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A picked point explained, as it is drawn."""
+
+    at: Mapping[str, float]  # mm or degrees; positions of all axes
+    loop: Loop
+    explanation: Explanation
+    # [3]; from R to where things are drawn, on machines whose linear axes carry the workpiece
+    shift_mm: Array
+    drawn_mm: Array  # [3]; where the displaced point is drawn
+    # [3]; the error that it is drawn with: the one explained, or what a table leaves of it
+    drawn_um: Array
+    uncertainty: FieldDoubt | None  # of the error that is explained; None where nothing is stated
+
+    @property
+    def is_corrected(self) -> bool:
+        """Whether a table corrects the point that is drawn."""
+        return not np.array_equal(self.drawn_um, self.explanation.error_um)
+
+    @property
+    def length_um(self) -> float:
+        """Length of the error that is explained."""
+        return float(np.linalg.norm(self.explanation.error_um))
+
+    @cached_property
+    def ranked(self) -> list[Contribution]:
+        """What it is made of, the largest part along the error first."""
+        return sorted(self.explanation.contributions, key=lambda part: -abs(part.along_um))
+
+
+def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Picked, Array] | None:
+    """Find the point of a drawn trace or surface that a ray meets, and where it is drawn, [3]."""
+    ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
+    if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
+        return None
+    length = float(np.linalg.norm(ray[3:]))
+    if length == 0.0:
+        return None
+    origin, unit = ray[:3], ray[3:] / length
+    traces = _on_traces(picture, origin, unit) if picture.state.shown.traces else ()
+    found = [*traces, *_on_surfaces(picture, origin, unit)]
+    if not found:
+        return None
+    picked, distance = min(found, key=lambda one: one[1])
+    return picked, origin + distance * unit
+
+
+def pick_worst(picture: LivePicture) -> Picked:
+    """Give the node whose position error is largest in what is drawn."""
+    found = picture.statistics.max_at_axes
+    return Picked(
+        {name: at for name, at in found.items() if is_linear(name) or name in picture.grid.axes}
+    )
+
+
+def _on_surfaces(
+    picture: LivePicture, origin: Array, unit: Array
+) -> Iterator[tuple[Picked, float]]:
+    for one in picture.slices or (picture,):
+        points, triangles, node_of = solid_map(one)
+        hit = pick_surface(origin, unit, points, triangles)
+        if hit is not None:
+            nodes, grid = node_of[hit.vertices], one.grid
+            at = {
+                name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ hit.weights)
+                for name, values in grid.coordinates.items()
+                if is_linear(name) or name in grid.axes
+            }
+            yield Picked(at), hit.distance
+
+
+def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tuple[Picked, float]]:
+    for lines in picture.traces:
+        drawn = [number for number, line in enumerate(lines.each()) if is_moved(line)]
+        dense = _denser(lines.actual_mm[drawn])
+        found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
+        if found is None:
+            continue
+        row, sample = divmod(found[0], dense.shape[1])
+        number, shape = drawn[row], lines.actual_mm.shape[:2]
+        at = {
+            name: float(_denser(np.broadcast_to(values, shape)[..., None])[number, sample, 0])
+            for name, values in lines.group.coordinates.items()
+        }
+        yield Picked(at, lines.group.loop, lines.group.traces[number].point_mm), found[1]
+
+
+def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int | None:
+    """Find the line of the program whose drawn path a ray passes."""
+    path = picture.path
+    if path is None or not direction.any():
+        return None
+    found = pick_point(origin_mm, direction, path.drawn_mm(picture.exaggeration), TOLERANCE_RAD)
+    return None if found is None else int(path.of.line[found[0]])
+
+
+def _denser(samples: Array) -> Array:
+    count = samples.shape[1]
+    place = np.linspace(0.0, count - 1.0, (count - 1) * BETWEEN + 1)
+    first = np.minimum(place.astype(int), count - 2)
+    part = (place - first)[:, None]
+    return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
+
+
+def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
+    """Explain the error of a picked point."""
+    scene, model = state.active_scene(), state.scene.model
+    stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
+    at = {name: stands.get(name, 0.0) for name in model.machine.axes}
+    coordinates = {name: np.asarray(value) for name, value in at.items()}
+    loop = picked.loop or state.loop
+    if picked.point_mm is None:
+        point = nominal_point(model, Loop.TOOL, coordinates)
+        volume = state.scene.workspace.moved(state.positions)
+        shift = seen_from_workpiece(model, coordinates, volume, point) - point
+    else:
+        side = "workpiece" if loop is Loop.WORKPIECE else "tool"
+        pose = branch_pose(model, side, coordinates)
+        point, shift = transforms.apply(pose, np.asarray(picked.point_mm)), np.zeros(3)
+    found = explain(model, scene.errors, coordinates, state.view(loop), point)
+    drawn_um = found.error_um
+    if state.controller is not None:
+        nominal = found.nominal_mm
+        drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
+    drawn, view = deform(found.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
+    sure = field_doubt(scene, found.error_um, coordinates, view, found.nominal_mm)
+    return Answer(at, loop, found, shift, drawn, drawn_um, sure)
+
+
+def drawn_places(
+    state: AppState, points: Sequence[Mapping[str, float]], exaggeration: float
+) -> Array:
+    """Tell where points of the surface are drawn, [n, 3], mm; all at once, as a drag needs it."""
+    stands = {**state.scene.workspace.positions, **state.positions}
+    at = {
+        name: np.array([one.get(name, stands.get(name, 0.0)) for one in points])
+        for name in state.scene.machine.axes
+    }
+    seen, field = drawn_field(state, at)
+    return deform(seen, field.error_um, exaggeration)
+
+
+def drawn_field(
+    state: AppState, at: Coordinates, *, exact: bool = False
+) -> tuple[Array, ErrorField]:
+    """Tell where points of the surface are drawn without errors, and evaluate them in R, [n]."""
+    scene, model, loop = state.active_scene(), state.scene.model, state.loop
+    nominal = nominal_point(model, Loop.TOOL, at)
+    seen = seen_from_workpiece(model, at, scene.workspace, nominal)
+    if state.controller is not None:
+        return seen, state.controller.field(at, nominal, scene, loop, nominal)
+    solve = evaluate_exact if exact else evaluate_first_order
+    return seen, solve(model, scene.errors, at, state.view(), nominal)
+
+
+def with_picked(state: AppState, picked: Picked | None) -> AppState:
+    """Ask about a point, or about none; the chosen contribution stays while there is a point."""
+    return replace(state, picked=picked, lever=state.lever if picked else "")
+
+
+# --- A distance between points of the map ---------------------------------------------------------
+
+POINTS = {
+    f"{Distance.name}.start": "Click the first point on the map.",
+    f"{Distance.name}.end": "Click the second point.",
+    f"{Distance.name}.corner": "Click the corner of an angle, or stop.",
+}
+"""What asks for the points of a distance, by form, in turn; an empty form waits for a click."""
+
+
+def awaited(state: AppState) -> str:
+    """Give the form of the point that the next click sets; empty where a click asks why."""
+    page = state.page
+    is_open = Distance.name in page.open and page.task == Distance.task and not page.notes
+    return next((one for one in POINTS if is_open and state.forms.get(one) == ""), "")
+
+
+def with_clicked(state: AppState, picked: Picked) -> AppState:
+    """Take a click on the drawing: a point that is waited for, else one that is asked about."""
+    point = awaited(state)
+    if not point:
+        return with_picked(state, picked)
+    if picked.point_mm is not None:
+        return state.noted("a trace was clicked; click a point of the map")
+    return with_form(state, point, spell_at(picked.at))
+
+
+def measured(picture: LivePicture) -> tuple[DistanceResult, Array, Array] | None:
+    """Measure between the points that were chosen; None where there are not two.
+
+    With the result where start, end and corner are drawn, [n, 3], without errors and displaced.
+    """
+    return None if picture.is_difference else _measured(Identity(picture))
+
+
+@lru_cache(maxsize=1)  # lines and words of one picture ask; it keeps the picture
+def _measured(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
+    picture: LivePicture = of.thing
+    state, told = picture.drawn_state, option_values(picture.state, Distance.name)
+    scene = state.active_scene()
+    try:
+        asked = replace(read_form(Distance, Distance.options(), told, scene), loop=state.loop)
+        if not (asked.start and asked.end):
+            return None
+        at = asked.places(scene, asked.corner)
+        seen, field = drawn_field(state, at, exact=asked.exact)
+        found = asked.between(scene, at, field)
+    except WarpspaceError:  # said in its section
+        return None
+    return found, seen, deform(seen, field.error_um, picture.exaggeration)
+
+
+# --- Where a ray from the eye meets a surface or passes a line ------------------------------------
+
+
+class Hit(NamedTuple):
+    """Where a ray meets a surface."""
+
+    vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
+    # [3]; barycentric weights of the point in it; they interpolate anything given per vertex
+    weights: Array
+    distance: float  # along the ray, in lengths of its direction
+
+
+def pick_surface(
+    origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
+) -> Hit | None:
+    """Find the first triangle, [T, 3], that a ray meets.
+
+    Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
+    """
+    a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+    edges = np.stack([b - a, c - a, np.broadcast_to(-direction, a.shape)], axis=-1)
+    edges[np.abs(np.linalg.det(edges)) < PARALLEL] = np.nan
+    u, v, distance = np.linalg.solve(edges, (origin - a)[..., None])[..., 0].T
+    inside = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0)
+    if not inside.any():
+        return None
+    at = int(np.argmin(np.where(inside, distance, np.inf)))
+    return Hit(triangles[at], np.array([1.0 - u[at] - v[at], u[at], v[at]]), float(distance[at]))
+
+
+def pick_point(
+    origin: Array, direction: Array, points: Array, tolerance: float
+) -> tuple[int, float] | None:
+    """Find the point, [M, 3], that a ray passes most closely, as seen from its origin.
+
+    Its number, and its distance along the ray; None where none lies within a tolerance, rad.
+    """
+    if len(points) == 0:
+        return None
+    unit, sight = direction / np.linalg.norm(direction), points - origin
+    along = sight @ unit
+    aside = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
+    angle = np.where(along > 0.0, np.arctan2(aside, np.maximum(along, PARALLEL)), np.inf)
+    nearest = int(np.argmin(angle))
+    return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None

@@ -1,0 +1,177 @@
+"""What stands in the box: a part, and paths of a program and of a standard test.
+
+Responses are kept; a slider move is a product.
+"""
+
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.app.evaluation.cache import Cache
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.form_values import TEST, option_values, read_form
+from warpspace.app.state.leaf import Identity
+from warpspace.bench.base import BenchTest, bench_names, find_test
+from warpspace.bench.plan import Plan, respond_sites
+from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.field.grid import seen_from_workpiece
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.parts.interpreter import read_program
+from warpspace.parts.program import Program, ToolPath, trace_program
+from warpspace.parts.workpiece import Made, PartMesh, make_points, place_part, point_basis
+from warpspace.scene.model import Scene
+from warpspace.units import MM_PER_UM, Array
+
+AT_LINE = "program.at_line"  # the form that names a line of the program
+MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app draws
+MOST_SITES = 20_000  # places of one test
+PIECE = 20_000  # points that are worked on at once: what lies between needs memory, too
+T = TypeVar("T")
+_KEPT: Cache[Any] = Cache(400_000_000)
+
+
+@dataclass(frozen=True, eq=False)
+class InBox(Generic[T]):
+    """Points of a part, or of a path, as they are drawn; numbers of 4 bytes are enough for it."""
+
+    of: T  # in the workpiece frame
+    pose: Array  # [4, 4]; of that frame as drawn
+    at: NDArray[Any]  # points at the corners of a part, [W], or at both ends of pieces of a path
+    coordinates: Mapping[str, Array]  # [n], or one for all: where the axes stand
+    point_mm: Array  # [n, 3]; in R, where they are made
+    outside: NDArray[np.bool_]  # [n]; beyond the travel
+    turn: Array  # [4, 4] or [n, 4, 4]; from there to where they are drawn
+    nominal_mm: NDArray[Any]  # [n, 3]; as drawn
+    response: NDArray[Any]  # [K, n * 3], µm per µm or µrad
+    error_um: NDArray[Any]  # [n, 3]; of the tool against the workpiece
+
+    def drawn_mm(self, exaggeration: float) -> NDArray[Any]:
+        """Give where the points are, [n, 3], exaggerated."""
+        return self.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
+
+    def with_errors(self, state: AppState) -> "InBox[T]":
+        """Evaluate it to first order, or what a table of compensation leaves."""
+        controller, scene, point = state.controller, state.active_scene(), self.point_mm
+        if controller is None:
+            amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
+            return replace(self, error_um=(amplitudes @ self.response).reshape(-1, 3))
+        kept = _KEPT.get(
+            (Identity(controller), Identity(self)),
+            lambda: controller.at(self.coordinates, point, scene, Loop.RELATIVE, point),
+            lambda found: found.nbytes,
+        )
+        error = transforms.rotate(self.turn[..., :3, :3], kept.field(scene.errors).error_um)
+        return replace(self, error_um=error.astype(np.float32))
+
+
+def _in_box(
+    state: AppState, own: tuple[Hashable, ...], build: Callable[[Scene], InBox[T]]
+) -> InBox[T] | None:
+    """Give something with the errors of a state; None where it cannot be made."""
+    key = Identity(state.scene), tuple(state.positions.items()), state.placed, own
+    try:
+        found: InBox[T] = _KEPT.get(
+            key, lambda: build(state.standing), lambda found: found.response.nbytes
+        )
+        return found.with_errors(state)
+    except WarpspaceError:  # its section says it
+        return None
+
+
+def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> InBox[T]:
+    count, keys = len(made.point_mm), scene.parameter_keys
+    if count > MOST_POINTS:
+        raise OptionError(f"{count:,} points; expected at most {MOST_POINTS:,} in the app")
+    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+    pose = np.asarray(branch_pose(scene.model, "workpiece", stand))
+    response = np.empty((len(keys), count, 3), np.float32)
+    for rows in np.array_split(np.arange(count), -(-count // PIECE) or 1):
+        response[:, rows] = point_basis(scene, made, rows=rows).position @ pose[:3, :3].T
+    nominal = transforms.apply(pose, made.point_mm).astype(np.float32)
+    here = branch_pose(scene.model, "workpiece", made.coordinates)
+    point, turn = transforms.apply(here, made.point_mm), (pose @ transforms.inverse(here))
+    flat = response.reshape(len(keys), -1)
+    return InBox(of, pose, at, made.coordinates, point, made.outside, turn, nominal, flat, nominal)
+
+
+# --- A part ---------------------------------------------------------------------------------------
+
+
+def part_in_box(state: AppState) -> InBox[PartMesh] | None:
+    """Give the part as it is cut; None where there is none, or it cannot be clamped."""
+    mesh, wanted = state.part.mesh, state.part.place
+    if mesh is None or not state.part.shown:
+        return None
+
+    def clamp(scene: Scene) -> InBox[PartMesh]:
+        part = place_part(mesh, scene, wanted)
+        return _respond(scene, part, make_points(scene, part.vertices_mm), part.corners.corner_of)
+
+    return _in_box(state, (Identity(mesh), wanted), clamp)
+
+
+def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
+    """Give the place of a part whose middle is to stand so, [4, 4], in the workpiece frame."""
+    own = transforms.placed(part.place[:3], part.place[3:])
+    pose = stand @ transforms.translation(-part.middle_mm) @ own
+    angles = transforms.roll_pitch_yaw_deg(pose[:3, :3])
+    return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())
+
+
+# --- Paths ----------------------------------------------------------------------------------------
+
+
+def path_in_box(state: AppState) -> InBox[ToolPath] | None:
+    """Give the path of the program; None where there is none, or it cannot be followed."""
+    text, told = state.part.program, option_values(state, Program.name) | {"at_line": ""}
+    if text is None:
+        return None
+
+    def trace(scene: Scene) -> InBox[ToolPath]:
+        asked = read_form(Program, Program.options(), told, scene)
+        read = read_program(scene, text.splitlines(), asked, state.part.program_name)
+        path = trace_program(read)
+        made = Made(path.tip_mm, path.coordinates, path.error_um, path.outside)
+        ends = np.flatnonzero(path.step_mm.any(axis=1))
+        return _respond(scene, path, made, np.stack([ends - 1, ends], axis=1))
+
+    return _in_box(state, (text, *sorted(told.items())), trace)
+
+
+def chosen_test(state: AppState) -> type[BenchTest] | None:
+    name = state.forms.get(TEST, "")
+    return find_test(name) if name in bench_names() else None
+
+
+def plan_test(test: BenchTest, scene: Scene) -> Plan:
+    """Lay the path of a test on a machine."""
+    plan = test.plan(scene)
+    if len(plan.point_mm) > MOST_SITES:
+        raise OptionError(
+            f"{len(plan.point_mm):,} places; expected at most {MOST_SITES:,} in the app"
+        )
+    return plan
+
+
+def bench_in_box(state: AppState) -> InBox[type[BenchTest]] | None:
+    """Give the path of the chosen test; None where none is drawn, or it cannot be run."""
+    kind, told = chosen_test(state), option_values(state, TEST)
+    if kind is None or told.get("path") == "0":
+        return None
+
+    def lay(scene: Scene) -> InBox[type[BenchTest]]:
+        plan = plan_test(read_form(kind, kind.settings(), told, scene), scene)
+        at, point = plan.coordinates, plan.point_mm
+        nominal = seen_from_workpiece(scene.model, at, scene.workspace, point)
+        response = respond_sites(scene, plan, scene.parameter_keys).reshape(-1, point.size)
+        pieces = np.concatenate([np.stack([rows[:-1], rows[1:]], 1) for rows in plan.path])
+        still, inside = np.eye(4), np.zeros(len(point), bool)
+        return InBox(kind, still, pieces, at, point, inside, still, nominal, response, nominal)
+
+    without = replace(state, controller=None)  # a test is of the machine as it is
+    return _in_box(without, (kind, *sorted(told.items())), lay)

@@ -1,0 +1,307 @@
+"""Files of a page: scenes and data that are opened; scenes, links, pictures, exports, reports."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from warpspace.analysis.description import Result
+from warpspace.app.browser.html import button, choice, field, join, tag, text_box
+from warpspace.app.browser.incoming import index_of
+from warpspace.app.documents import scene_file, transfers
+from warpspace.app.documents.offline_page import build_offline_html, build_story_html
+from warpspace.app.evaluation.compare import drawn_tables, without_table
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.panels.form_controls import setting
+from warpspace.app.panels.panel import Context, Job, Jobs, Window, actions
+from warpspace.app.state.app_state import AppState, Comparison
+from warpspace.exceptions import OptionError
+from warpspace.formats.registry import formats
+from warpspace.scene.notes import story
+
+RENDER_TIMEOUT_S = 30.0
+VIEW_PX = 64, 4096
+Write = Callable[[LivePicture, Job], bytes]
+PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
+
+
+def accepted_endings() -> str:
+    """List the endings of files that can be given to the page."""
+    own = (".toml", ".urdf", *(end for ends in transfers.IN_BOX.values() for end in ends))
+    endings = dict.fromkeys((*own, *(end for one in formats() for end in one.endings)))
+    return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
+
+
+class JobWindow(Window):
+    """A window that makes files, one at a time, with its progress and a way to cancel."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._jobs = Jobs(self, self.renew, context.page.report)
+
+    def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
+        """Make a file of what is drawn beside the session, and have the browser save it."""
+        drawn = self.context.shown
+        if drawn is None:
+            return
+
+        def work(job: Job) -> None:
+            picture = drawn if as_drawn else without_tables(drawn)
+            content = write(picture, job)
+            if not job.is_set():
+                self.context.save_file(f"{transfers.file_stem(picture)}{ending}", content)
+
+        if not self._jobs.start(name, work):
+            self.context.notify(
+                "One file at a time", "Wait for the other one, or cancel it", "warning"
+            )
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "cancel":
+            self._jobs.cancel()
+        return state
+
+
+class FilesWindow(JobWindow):
+    """Save and export; opening files and links goes this way too."""
+
+    name, title = "files", "Save and export"
+
+    def body(self, picture: LivePicture) -> Markup:
+        services = self.context.services
+        figures = {"": "as the drawing is coloured"}
+        figures |= {one: one.replace("-", " ") for one, _ in services.figures}
+        kinds = choice("state:set.page.figure", picture.state.page.figure, figures)
+        exports = (
+            button(f"{end[1:].upper()}", "files:export", end, hint=words)
+            for end, words in services.exports
+        )
+        link = (
+            tag("h3", "Link"),
+            tag("p", "This app asks for a token. A link without it opens for those who have the"
+                " token; a link with it lets whoever has the link use this app."),
+            actions(button("Copy link", "files:share", "plain"),
+                    button("Copy link with token", "files:share", "token")),
+        )  # fmt: skip
+        return join((
+            tag("h3", "Scene"),
+            tag("p", "Errors, tolerances and machine as they are now, with view and camera."),
+            actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
+            *(link if services.token else ()),
+            tag("h3", "Picture"), tag("p", transfers.exported_words(picture), class_="ws-quiet"),
+            actions(button("Save what is on the screen (PNG)", "files:view")),
+            field("Figure", kinds, "state:set.page.figure"),
+            actions(button("Save figure (PNG)", "files:figure")),
+            tag("h3", "Export"),
+            actions(button("Interactive page (HTML)", "files:page",
+                           hint="One file that needs no network"),
+                    *((button("Story (HTML)", "files:story", hint="Its steps in such a file"),)
+                      if story(picture.state.review) else ()), *exports),
+            self._jobs.html(),
+        ))  # fmt: skip
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        services = self.context.services
+        if word == "share" and services.token and not value:
+            return replace(state, page=replace(state.page, window=self.name))
+        doing: dict[str, Callable[[], None]] = {
+            "file": partial(self._open, value),
+            "save": self._save,
+            "share": partial(self._share, with_token=value == "token"),
+            "link": partial(self._follow, value),
+            "figure": self._draw,
+            "view": self._view,
+            "page": self._page,
+            "story": self._story,
+            "export": partial(self._export, value),
+        }
+        if word in doing:
+            self.context.act(doing[word])
+        return super().take(state, word, value)
+
+    # --- what is opened --------------------------------------------------------------------------
+
+    def _open(self, value: str) -> None:
+        told = value.partition("\n")[2].partition("\n")[0].lower()
+        if part := next(
+            (part for part, ends in transfers.IN_BOX.items() if told.endswith(ends)), ""
+        ):
+            self.context.send(f"{part}:file", value)
+            return
+        name, content = transfers.read_upload(value)
+        notes, is_robot = list[str](), b"<robot" in content[:4096]
+        if is_robot:
+            text, notes = transfers.robot_text(name, content)
+        elif name.lower().endswith(".toml"):
+            text = transfers.upload_text(content, name)
+        else:
+            self.context.offer_import(name, content)
+            return
+        opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
+        whole = is_robot or scene_file.settings_of(text) != ""
+        self.context.show_opened(opened, camera, whole=whole)
+        self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
+
+    def _follow(self, word: str) -> None:
+        opened = scene_file.open_link(transfers.unpack(word), self.context.scenes.fixed)
+        self.context.show_opened(*opened)
+
+    # --- what is saved ---------------------------------------------------------------------------
+
+    def _save(self) -> None:
+        state, camera = self.context.state, self.context.camera.remember()
+        text = self._alone_if_large(lambda one: scene_file.state_to_toml(one, camera))
+        self.context.save_file(f"{transfers.safe_name(state.scene.name)}.toml", text)
+
+    def _share(self, *, with_token: bool) -> None:
+        context = self.context
+        scenes, camera = context.scenes.fixed, context.camera.remember()
+
+        def write(state: AppState) -> str:
+            try:
+                return scene_file.state_to_link(state, camera, scenes)
+            except OptionError as error:
+                if not state.review:
+                    raise
+                # notes are in the scene file; what is on the screen is what a link is for
+                link = scene_file.state_to_link(replace(state, review=()), camera, scenes)
+                context.notify("Without the notes", str(error), "warning")
+                return link
+
+        link = self._alone_if_large(write)
+        token = context.services.token if with_token else None
+        edited = len(context.state.changed_keys)
+        edits = f" {edited} changed error{'s' if edited > 1 else ''}," if edited else ""
+        compared = " the comparison," if context.state.comparison.b is not None else ""
+        held = f"the scene {context.state.scene.title},{edits}{compared} view and camera"
+        warned = " Whoever has it can use this app." if token else ""
+        context.page.call("share", transfers.pack(link), token, f"It holds {held}.{warned}")
+        context.client.flush()
+
+    def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
+        state = without_table(self.context.state)
+        try:
+            return write(state)
+        except OptionError as error:
+            if state.comparison == Comparison():
+                raise
+            text = write(replace(state, comparison=Comparison()))
+            self.context.notify("Without the comparison", str(error), "warning")
+            return text
+
+    def _draw(self) -> None:
+        draw, kind = self.context.services.draw_figure, self.context.state.page.figure
+        kind = kind if kind in dict(self.context.services.figures) else ""
+        ending = f"_{kind or 'figure'}.png"
+        self.make("Figure", ending, lambda picture, job: draw(picture, kind, job))
+
+    def _view(self) -> None:
+        client, camera = self.context.client, self.context.camera
+
+        def draw(picture: LivePicture, job: Job) -> bytes:
+            seen = client.camera
+            height, width = np.clip((seen.image_height, seen.image_width), *VIEW_PX).tolist()
+            pixels: Any = client.get_render(
+                height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
+            )
+            return self.context.services.draw_view(picture, pixels, camera.remember(), job)
+
+        self.make("Picture of the screen", "_view.png", draw, as_drawn=True)
+
+    def _page(self) -> None:
+        toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
+        build = partial(build_offline_html, provenance=toml, camera=self.context.camera.remember())
+        self.make("Page", ".html", lambda picture, _: build(picture).encode(), as_drawn=True)
+
+    def _story(self) -> None:
+        toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
+        about = without_table(self.context.state), toml, self.context.scenes.fixed
+        self.make("Story", "_story.html", lambda *_: build_story_html(*about).encode(),
+                  as_drawn=True)  # fmt: skip
+
+    def _export(self, ending: str) -> None:
+        services = self.context.services
+        if ending in dict(services.exports):
+            self.make(ending[1:].upper(), ending,
+                      lambda picture, _: services.write_export(picture, ending))  # fmt: skip
+
+
+def without_tables(picture: LivePicture) -> LivePicture:
+    """Give a picture without the tables of a controller, which files do not hold."""
+    if not drawn_tables(picture.state):
+        return picture
+    return PLAIN.evaluate(without_table(picture.state))
+
+
+# --- The report -----------------------------------------------------------------------------------
+
+ALWAYS = (
+    "the verdict with the limit, and the error map",
+    "statistics, sections and slices of the volume",
+    "the contribution of each error at the worst point",
+    "the adjustments that help most",
+    "errors, tolerances, and the errors that the tolerances allow",
+    "error gains, conventions, provenance",
+)
+
+
+class ReportWindow(JobWindow):
+    name, title = "report", "Report"
+
+    def body(self, picture: LivePicture) -> Markup:
+        found = picture.compared
+        subject = (
+            f"It compares A, {found.titles[0]}, with B, {found.titles[1]}."
+            if found is not None and transfers.has_sheet(picture)
+            else f"It is about {picture.title}, as drawn now."
+        )
+        limit = f"{picture.state.specification.limit_um:g} µm"
+        put = [
+            tag("li", join((f"{title} ", button("remove", "report:remove", index, kind="link"))))
+            for index, (title, _) in enumerate(self.context.reported)
+        ]
+        # the notes beside it may ask for the same name
+        author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
+        hint = "More results are added with the button “Add to report” below each of them."
+        return join((
+            tag("p", f"{subject} Limit: {limit}."),
+            field("Author", author, "report.author"),
+            setting(picture.state, "page.questions"),
+            actions(button("Write HTML", "report:write", ".html", kind="main",
+                           hint="One page with a rotatable view; needs no network"),
+                    button("Write PDF", "report:write", ".pdf", hint="For paper")),
+            self._jobs.html(),
+            tag("h3", "Contents"),
+            tag("ul", join((*(tag("li", words) for words in ALWAYS), *put))),
+            tag("p", hint, class_="ws-quiet"),
+        ))  # fmt: skip
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "remove":
+            index = index_of(value, len(self.context.reported))
+            if index is not None:
+                del self.context.reported[index]
+                self.context.act(self.renew)
+        elif word == "write" and value in (".html", ".pdf"):
+            self.context.act(partial(self._write, value))
+        return super().take(state, word, value)
+
+    def _write(self, ending: str) -> None:
+        results: dict[str, Result] = {}
+        for index, (title, found) in enumerate(self.context.reported):
+            results[f"{title} ({index + 1})" if title in results else title] = found
+        page = self.context.state.page
+        questions = tuple(filter(None, map(str.strip, page.questions.splitlines())))
+        about = page.author.strip(), questions, results, ending
+
+        def write(picture: LivePicture, job: Job) -> bytes:
+            content, missing = self.context.services.write_report(picture, *about, job)
+            if missing and not job.is_set():
+                self.context.notify("Some figures are missing", "\n".join(missing), "warning")
+            return content
+
+        self.make("Report", f"_report{ending}", write)

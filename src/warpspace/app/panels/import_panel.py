@@ -1,0 +1,231 @@
+"""Import of measured errors: what files bring and replace, and the error before and after."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, Literal
+
+import numpy as np
+from markupsafe import Markup
+
+from warpspace.analysis.blocks import Block, Curve, Lines, Style
+from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
+from warpspace.analysis.options import Grammar, Option, option, typed_word
+from warpspace.analysis.registry import Entry
+from warpspace.app.browser.html import EMPTY, tag, upload_button
+from warpspace.app.panels.block_html import details_html
+from warpspace.app.panels.file_dialogs import accepted_endings
+from warpspace.app.panels.measurement import FilesPart, Held
+from warpspace.app.panels.panel import Context
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.form_values import read_form
+from warpspace.exceptions import WarpspaceError
+from warpspace.formats import registry
+from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summary_table
+from warpspace.formats.source import Source
+from warpspace.formats.to_scene import ImportedScene, into_scene
+from warpspace.machine.axes import is_linear, parameter
+from warpspace.machine.limits import MAX_UPLOAD_BYTES
+from warpspace.scene.model import Scene
+from warpspace.units import Array
+
+NAME = "import"
+MOST_FILES = 16  # that are read together
+MOST_CURVES, MOST_POINTS = 12, 400
+SIGNS = {
+    "error": "errors, which the controller subtracts",
+    "correction": "corrections, which the controller adds",
+}
+WAYS = {FORWARD: "forward", BACKWARD: "backward", BOTH: "mean"}
+OPTIONS = {"--axis": "“Axis”", "--sign": "“Sign”", "--variant": "“Variant”", "--format": "“Format”"}
+OFFERED = (
+    "Measured errors or a controller's table; what changes is shown before it is applied."
+    " Files can also be dropped on the page."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Import(Analysis):
+    """Read measured errors, or a controller's table, into SCENE."""
+
+    name = NAME
+    task = "measure"
+    doing = "reading"
+    makes_scenes = True
+    format: str | None = option(None, "To be chosen if it is recognised wrongly or not at all")
+    axis: Annotated[str, Grammar("X, or AX1=X AX2=Y", typed_word)] = option(
+        "",
+        "X: the axis, if the files name none. AX1=X: what a name in the files means; several"
+        " separated by blanks",
+    )
+    sign: Literal["error", "correction"] | None = option(
+        None, "Whether a table holds errors or corrections", unset="as the manual says", words=SIGNS
+    )
+    variant: str | None = option(None, "Published variant of the format", unset="usual one")
+    sources: tuple[Source, ...] = ()
+
+    def run(self, scene: Scene, _watch: Watch, /) -> "ImportResult":
+        axis, names = registry.parse_axis_options(
+            [word for word in re.split(r"[\s,;]+", self.axis) if word]
+        )
+        options = registry.ReadOptions(
+            scene.machine, axis, names, self.sign or "", self.variant or ""
+        )
+        reading = registry.read_errors(self.sources, options, self.format or "")
+        files = ", ".join(source.name for source in self.sources)
+        made = into_scene(reading, scene, scene.title, files)
+        return ImportResult(files=files, before=scene, reading=reading, made=made)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportResult(Result):
+    """What files bring."""
+
+    files: str
+    before: Scene
+    reading: registry.Reading
+    made: ImportedScene
+
+    def changes(self) -> Sequence[Change]:
+        return (Change(self.files, self.made.scene),)
+
+    def blocks(self) -> Iterator[Block]:
+        found = self.reading.found
+        units = ", ".join(found.units).replace("um", "µm").replace("urad", "µrad")
+        yield f"{self.reading.format.title} from {self.files}, in {units}."
+        old = [key for key in found.keys if self.before.errors.amplitude(key)]
+        new = [key for key in found.keys if key not in old]
+        said = [f"replaces {', '.join(old)}"] if old else []
+        said += [f"adds {', '.join(new)}"] if new else []
+        yield f"It {' and '.join(said) or 'holds no errors'}."
+        yield summary_table(found)
+        for one in found.series[:MOST_CURVES]:
+            row, place = parameter(one.key), "mm" if is_linear(parameter(one.key).axis) else "°"
+            title, curves = f"{one.key} {row.name}", tuple(_curves(one))
+            yield Lines("lines", title, f"{row.axis} [{place}]", f"[{row.unit}]", curves)
+
+    def doubts(self) -> Iterator[str]:
+        found, kept = self.reading.found, f"kept from {self.before.name}:"
+        for one in (*found.assumed, *found.notes, *self.made.notes):
+            if not one.startswith("replaced: "):
+                yield _without_options(one.replace(kept, "unchanged:"))
+        if (left := len(found.series) - MOST_CURVES) > 0:
+            yield f"{left} more curves are not drawn"
+
+
+def _curves(one: Series) -> Iterator[Curve]:
+    at = np.array(one.positions)
+    thin = slice(None, None, max(1, len(at) // MOST_POINTS))
+
+    def curve(words: str, values: Array, way: int, style: Style) -> Curve:
+        held = np.isfinite(values)
+        return Curve(words, at[held][thin], values[held][thin], list(WAYS).index(way), style)
+
+    means = [(way, mean) for way in WAYS if (mean := one.mean(way)) is not None]
+    yield from (curve(WAYS[way], mean, way, "line") for way, mean in means)
+    if len(one.runs) > len(means):
+        yield from (curve("", np.array(run.values), run.direction, "dots") for run in one.runs)
+
+
+def _without_options(text: str) -> str:
+    """Name the controls of the page in place of the options of a command."""
+    for flag, words in OPTIONS.items():
+        text = text.replace(flag, words)
+    return text
+
+
+# --- The section ----------------------------------------------------------------------------------
+
+
+class ImportPart(FilesPart):
+    """Files that are read together, what they do not say, and what they bring."""
+
+    def __init__(self, context: Context) -> None:
+        words = "Measured errors, or a controller's table"
+        super().__init__(context, Entry(NAME, "measure", words, f"{__name__}:Import"))
+        context.offer_import = self.received
+
+    def shown_options(self, state: AppState) -> Sequence[Option]:
+        """Leave out what the format has no choice of."""
+        if not self._files:
+            return ()
+        found = {one.name: one for one in self.options()}
+        names = {one.name: one.title for one in registry.formats()}
+        own = self._recognised()
+        first = own.title if own is not None else "none, choose one"
+        found["format"] = replace(
+            found["format"], choices=tuple(names), words=names, unset=f"recognised: {first}"
+        )
+        chosen = self.values(state).get("format")
+        kind = registry.find_format(chosen) if chosen in names else own
+        if kind is None or kind.tables is None:
+            del found["sign"]
+        if kind is None or not kind.variants:
+            del found["variant"]
+        else:
+            found["variant"] = replace(found["variant"], choices=kind.variants)
+        return list(found.values())
+
+    def _recognised(self) -> registry.Format | None:
+        try:
+            return registry.recognise([one.content for one in self._files])
+        except WarpspaceError:  # none that is known, or several
+            return None
+
+    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
+        asked = read_form(Import, self.shown_options(state), values, scenes[0])
+        return replace(asked, sources=tuple(one.content for one in self._files))
+
+    def is_quick(self, state: AppState) -> bool:
+        return True
+
+    def before_result(self, state: AppState) -> Markup:
+        kind = "" if self._files else "main"
+        upload = upload_button(
+            "Import a file", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind=kind,
+            hint="Several that belong together may follow each other",
+        )  # fmt: skip
+        words = EMPTY if self._files else tag("p", OFFERED)
+        return words + self.files_html() + tag("div", upload, class_="ws-actions")
+
+    def result_html(self, found: Result) -> Markup:
+        return details_html(one for one in found.blocks() if not isinstance(one, str))
+
+    def actions(self, found: Result, *, stale: bool) -> Markup:
+        return EMPTY
+
+    def received(self, name: str, content: bytes) -> None:
+        """Take a file, with those that are there where they belong together.
+
+        Alone it is kept also where it cannot be read yet: the section asks for what it does not
+        say, or another file comes to it.
+        """
+        own, before, problem = Held(name, registry.open_upload(name, content)), self._files, None
+        is_applied = self._applied[-1:] == (before,)
+        held = () if is_applied else tuple(one for one in before if one.name != name)
+        state, keeps = self.context.state, False
+        scene = state.active_scene()
+        for keeps in (True, False) if 0 < len(held) < MOST_FILES else (False,):
+            self._files = (*held, own) if keeps else (own,)
+            try:
+                self.ask(state, self.values(state) if keeps else {}, [scene]).run(scene, silent)
+                break
+            except WarpspaceError as error:
+                problem = error
+        else:
+            if held and problem is not None:
+                self._files = before
+                raise problem
+        self.context.post(partial(_unfolded, keeps=keeps))
+        self.renew()
+
+    def problem_html(self, state: AppState) -> Markup:
+        return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before
+
+
+def _unfolded(state: AppState, *, keeps: bool) -> AppState:
+    """Show the section; what was said of other files is forgotten."""
+    page = replace(state.page, task="measure", open=state.page.open | {NAME}, window="")
+    forms = {k: v for k, v in state.forms.items() if keeps or not k.startswith(f"{NAME}.")}
+    return replace(state, page=page, forms=forms)

@@ -1,0 +1,364 @@
+"""Measuring: standard tests that follow the errors, and calibrations out of uploaded readings."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from warpspace.analysis.blocks import Lines, Table
+from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.options import Option
+from warpspace.analysis.registry import Entry
+from warpspace.app.browser.html import (
+    EMPTY,
+    button,
+    choice,
+    join,
+    number,
+    rows,
+    switch,
+    tag,
+    text_box,
+    upload_button,
+)
+from warpspace.app.browser.html import field as labelled
+from warpspace.app.browser.incoming import index_of
+from warpspace.app.browser.page import error_words
+from warpspace.app.documents.transfers import read_upload, upload_text
+from warpspace.app.drawing.around import residuals
+from warpspace.app.drawing.shapes import Nodes, Shapes
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
+from warpspace.app.panels.analysis_panel import AnalysisPart, Question
+from warpspace.app.panels.block_html import block_html, details_html
+from warpspace.app.panels.panel import Context
+from warpspace.app.state import edits
+from warpspace.app.state.app_state import AppState
+from warpspace.app.state.form_values import TEST, read_form, with_form
+from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
+from warpspace.bench.data import parse_table as parse_test
+from warpspace.calibration.calibrate import Calibrate
+from warpspace.calibration.calibration_result import Calibration
+from warpspace.calibration.readings import bundled_data, find_data, parse_readings, parse_table
+from warpspace.calibration.registry import KINDS, RENAMED, test_kinds
+from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.scene.model import Scene
+from warpspace.units import UM_PER_MM, Array
+
+MOST_BYTES = 2 * 2**20  # of a file of readings
+WHAT = "CSV file of readings"
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A file that a page has sent."""
+
+    name: str  # never a path
+    content: Any = field(repr=False)  # its text, or what was made of it
+    words: str = ""  # what it was read as
+    kind: str | None = None  # as chosen; None for what its columns tell
+    count: int = 0  # readings
+
+
+class FilesPart(AnalysisPart):
+    """An analysis of files that a page has sent."""
+
+    most_bytes, what = MOST_BYTES, WHAT
+
+    def __init__(self, context: Context, entry: Entry) -> None:
+        super().__init__(context, entry)
+        self._files: tuple[Held, ...] = ()
+        self._trouble = ""
+
+    def question(self, state: AppState) -> Question:
+        return (*super().question(state), self._files)
+
+    def is_ready(self, state: AppState) -> bool:
+        return bool(self._files)
+
+    def received(self, name: str, content: bytes) -> None:
+        raise NotImplementedError
+
+    def files_html(self) -> Markup:
+        """List the files, and say why the last one is not among them."""
+        lines = [
+            (tag("span", one.name) + tag("small", f" {one.words}"),
+             button("✕", f"{self.name}:remove", at, kind="link", aria_label=f"Remove {one.name}"))
+            for at, one in enumerate(self._files)
+        ]  # fmt: skip
+        problem = tag("p", self._trouble, class_="ws-problem", role="alert")
+        return join(((problem if self._trouble else EMPTY), rows(lines) if lines else EMPTY))
+
+    def upload_html(self, words: str) -> Markup:
+        hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
+        upload = upload_button(words, self.name, MOST_BYTES, ".csv", hint=hint)
+        return tag("div", upload, class_="ws-actions")
+
+    def attempt(self, action: Callable[[], None]) -> None:
+        """Do something in the session; what it raises is said above the files."""
+
+        def attempted() -> None:
+            self._trouble = ""
+            try:
+                action()
+            except WarpspaceError as error:
+                self._trouble = error_words(error)
+            self.renew()
+
+        self.context.act(attempted)
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "file":
+            self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
+        elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
+            self._files = (*self._files[:at], *self._files[at + 1 :])
+            self.context.act(self.renew)
+        else:
+            return super().take(state, word, value)
+        return state
+
+
+# --- Standard tests -------------------------------------------------------------------------------
+
+
+class TestsPart(FilesPart):
+    """A standard test on the model as it would be on the machine, its path drawn in the box."""
+
+    __test__ = False
+    at_once = True
+
+    def __init__(self, context: Context) -> None:
+        words = "A test by its standard, on the model as it would be on the machine"
+        super().__init__(context, Entry(TEST, "measure", words))
+        self.title = "Standard tests"
+
+    @property
+    def kind(self) -> type[BenchTest]:
+        return chosen_test(self.context.state) or BenchTest
+
+    def question(self, state: AppState) -> Question:
+        return (*super().question(state), state.forms.get(TEST))
+
+    def is_ready(self, state: AppState) -> bool:
+        return chosen_test(state) is not None
+
+    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+        return (self.question(picture.drawn_state), picture.is_difference)
+
+    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
+        asked: Any = super().ask(state, values, scenes)
+        plan_test(asked, scenes[0])
+        for one in self._files:
+            table = parse_test(one.content, asked.data_columns(scenes[0]), one.name)
+            asked = replace(asked, data=table)
+        return asked
+
+    def body(self, picture: LivePicture) -> Markup:
+        state, kind = picture.drawn_state, chosen_test(picture.drawn_state)
+        tests = [find_test(name) for name in bench_names()]
+        names = {"": "Choose a test …"} | {
+            one.name: f"{one.title} ({one.standard})" for one in tests
+        }
+        chosen = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
+        if kind is None:
+            return chosen
+        told = tag("p", "A difference of two machines cannot be tested: show A or B.",
+                   class_="ws-problem", role="alert")  # fmt: skip
+        columns = ",".join(column.name for column in kind.columns)
+        about = join(tag("p", one) for one in (kind.words, f"Columns of a file: {columns}"))
+        return join((
+            chosen, told if picture.is_difference else self._body(state), self.files_html(),
+            EMPTY if self._files else self.upload_html("Measured readings …"),
+            switch("test:path", "Path in the box", on=state.forms.get("test.path") != "0",
+                   hint="Nominal in grey, actual in colour, exaggerated as the box is"),
+            tag("details", tag("summary", "Procedure") + tag("div", about), class_="ws-details",
+                data_key="test.procedure"),
+        ))  # fmt: skip
+
+    def headline(self, found: Result) -> Markup:
+        assert isinstance(found, BenchResult)  # noqa: S101 - of a test
+        rms = found.rms_difference
+        apart = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
+        return apart + tag("p", found.model.plan.place, class_="ws-tiny")
+
+    def result_html(self, found: Result) -> Markup:
+        return join(map(block_html, (*found.blocks_of(Lines), *found.blocks_of(Table))))
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "choose" and value in ("", *bench_names()):
+            self._answer, self._files, self._trouble = None, (), ""
+            kept = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
+            state = replace(state, forms=kept | ({TEST: value} if value else {}))
+            return edits.with_sight(state, inside=bool(value))
+        if word == "path":
+            return with_form(state, "test.path", value)
+        return super().take(state, word, value)
+
+    def received(self, name: str, content: bytes) -> None:
+        self._files = (Held(name, upload_text(content, name, WHAT)),)
+
+
+# --- Calibration ----------------------------------------------------------------------------------
+
+MOST_FILES, MOST_READINGS = 6, 5_000
+"""Files of a page, and readings in all of them: what a fit needs of memory goes with it."""
+LONGEST_KIND = 200
+MOST_NAMED = 12  # doubtful errors and notes that are listed
+ARROWS = {"": "none", "before": "before", "after": "after"}
+TURNED = "No arrows: a rotary axis carries the workpiece, which the box does not turn with."
+DOUBTS = (("in part", "Determined only in part"), ("no", "Not determined, kept"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrateTexts(Calibrate):
+    """A calibration out of texts of files."""
+
+    files: tuple[Held, ...] = ()
+
+    def run(self, scene: Scene, watch: Watch, /) -> Calibration:
+        sets = [
+            parse_readings(one.content, one.name, scene, one.kind, self.frame) for one in self.files
+        ]
+        return self.find(scene, sets, (), lambda: watch(0.0))
+
+
+def take_file(scene: Scene, text: str, name: str, kind: str | None, others: Sequence[Held]) -> Held:
+    """Take in the text of a file beside those that are there."""
+    if len(others) >= MOST_FILES:
+        raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
+    known = {one.name for one in others}
+    numbered = (f"{name} {count}" for count in range(2, MOST_FILES + 2))
+    unlike = next(one for one in (name, *numbered) if one not in known)
+    lines = text.count("\n")
+    if kind is None or kind in KINDS:
+        lines = len(parse_table(text, unlike))
+    if lines > MOST_READINGS - sum(one.count for one in others):
+        raise OptionError(
+            f"{name} has {lines:,} readings; expected at most {MOST_READINGS:,} in all files"
+        )
+    readings = parse_readings(text, unlike, scene, kind)
+    words = f"{_kind_words(readings.kind)}, {len(readings)}"
+    return Held(unlike, text, words, kind, len(readings))
+
+
+class CalibratePart(FilesPart):
+    """Readings of a page, what is fitted, and residuals as arrows in the box."""
+
+    def __init__(self, context: Context, entry: Entry) -> None:
+        super().__init__(context, entry)
+        self._kind_of_next, self._arrows = "", ""
+        self._drawn: Nodes | None = None
+
+    def options(self) -> Sequence[Option]:
+        return [one for one in super().options() if one.name != "kinds"]  # each file has its own
+
+    def defaults(self, state: AppState) -> Mapping[str, str]:
+        return {**super().defaults(state), "next_count": "3"}
+
+    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
+        asked = read_form(CalibrateTexts, self.options(), values, scenes[0])
+        return replace(asked, files=self._files)
+
+    def before_result(self, state: AppState) -> Markup:
+        words = "CSV files of readings give the errors of this machine."
+        bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
+        kinds = {"": "recognised from its columns"}
+        kinds |= {name: _kind_words(name) for name in (*KINDS, *test_kinds())}
+        name, _, options = self._kind_of_next.partition(":")
+        return join((
+            self.files_html(), EMPTY if self._files else tag("p", words, class_="ws-quiet"),
+            self.upload_html("Add readings …"),
+            choice("calibrate:bundled", "", bundled, label="Bundled readings"),
+            labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
+                     hint="Kind of readings that are added next"),
+            text_box("calibrate:test-options", options, label="Options of the test",
+                     placeholder="plane=XZ:radius=150") if name in test_kinds() else EMPTY,
+        ))  # fmt: skip
+
+    def headline(self, found: Result) -> Markup:
+        assert isinstance(found, Calibration)  # noqa: S101 - of this analysis
+        before, after = UM_PER_MM * found.rms_before_mm, UM_PER_MM * found.rms_after_mm
+        count = sum(len(one.readings) for one in found.fitted)
+        parts = [tag("p", join((f"RMS of {count} residuals: {number(before)} → ",
+                                tag("b", f"{number(after)} µm"))))]  # fmt: skip
+        for told, words in DOUBTS:
+            keys = [one.key for one in found.parameters if one.told == told]
+            if keys:
+                more = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
+                names = ", ".join(keys[:MOST_NAMED])
+                parts.append(tag("p", f"{words}: {names}{more}", class_="ws-quiet"))
+        notes = (note.replace("--", "") for note in found.notes[:MOST_NAMED])
+        return join((*parts, *(tag("p", note, class_="ws-doubt") for note in notes)))
+
+    def result_html(self, found: Result) -> Markup:
+        blocks = list(found.blocks())
+        shown = [next(one for one in blocks if isinstance(one, Lines))]
+        shown += [one for one in blocks if isinstance(one, Table) and len(one.columns) == 4]
+        arrows = labelled("Arrows in the box", choice("calibrate:arrows", self._arrows, ARROWS),
+                          "calibrate:arrows",
+                          hint="Observed − predicted at each reading, exaggerated")  # fmt: skip
+        words = tag("p", self._arrow_words(), class_="ws-tiny")
+        rest = details_html(one for one in blocks if one not in shown)
+        return join((arrows, words, *map(block_html, shown), rest))
+
+    def take(self, state: AppState, word: str, value: str) -> AppState:
+        if word == "kind":
+            self._kind_of_next = value if value in (*KINDS, *test_kinds()) else ""
+        elif word == "test-options":
+            name = self._kind_of_next.partition(":")[0]
+            self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
+        elif word == "bundled" and value in bundled_data():
+            self.attempt(partial(self.received, value, find_data(value).read_bytes()))
+        elif word == "arrows":
+            self._arrows = value if value in ARROWS else ""
+            state = edits.with_sight(state, inside=bool(self._arrows))
+        else:
+            return super().take(state, word, value)
+        self.context.act(self.renew)
+        return state
+
+    def received(self, name: str, content: bytes) -> None:
+        text = upload_text(content, name, WHAT)
+        scene, kind = self.context.state.active_scene(), self._kind_of_next or None
+        self._files = (*self._files, take_file(scene, text, name, kind, self._files))
+
+    # --- arrows ----------------------------------------------------------------------------------
+
+    def _arrow_words(self) -> str:
+        picture, found, words = self.context.shown, None, ""
+        shapes: Shapes = {}
+        if self._answer and self.question(self.context.state) in (self._answer[0], self._applied):
+            found = self._answer[1]
+        if self._arrows and picture is not None and isinstance(found, Calibration):
+            words, before = TURNED, self._arrows == "before"
+            if all(axis.is_linear for axis in found.scene.machine.branch("workpiece")):
+                feet, vectors = arrows_of(found, before=before)
+                shapes, factor = residuals(feet, vectors, picture.size_mm, before=before)
+                words = f"Residuals {self._arrows}, drawn × {factor:g}"
+                words = words if factor else "No arrows: none of these readings is a vector."
+        if shapes or self._drawn is not None:
+            self._drawn = self._drawn or Nodes(self.context.client.scene)
+            self._drawn.draw(shapes)
+        return words
+
+
+def arrows_of(found: Calibration, *, before: bool) -> tuple[Array, Array]:
+    """Give foot and residual of each reading that is a vector, [n, 3] mm and [n, 3] mm."""
+    feet: list[Array] = [np.zeros((0, 3))]
+    vectors: list[Array] = [np.zeros((0, 3))]
+    for group in found.fitted:
+        lines = group.before_mm if before else group.after_mm
+        if lines.shape[1] == 3:
+            feet.append(group.readings.nominal_mm)
+            vectors.append(lines)
+    return np.concatenate(feet), np.concatenate(vectors)
+
+
+def _kind_words(kind: str) -> str:
+    name, _, _ = kind.partition(":")
+    if name in KINDS:
+        return KINDS[name].words
+    return find_test(RENAMED.get(name, name)).title if name in test_kinds() else name

@@ -1,0 +1,171 @@
+"""Puts the app's checks and limits around viser's server: each request, connection and message."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode
+from websockets.http11 import Request, Response
+
+from warpspace.app.browser.incoming import Events, read_message
+from warpspace.app.server.request_policy import Doors, Refusal, plain_address
+
+logger = logging.getLogger(__name__)
+HEADERS = {
+    "X-Frame-Options": "DENY",
+    # viser's page is one file of scripts and styles; it unpacks itself, runs the scripts it is sent
+    # and starts workers of its own. What another server sends would run as the app's own.
+    "Content-Security-Policy": "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval'"
+    " blob:; worker-src 'self' blob:; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:;"
+    " font-src 'self' data:; connect-src 'self' data: blob:; object-src 'none'; base-uri 'none';"
+    " form-action 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "same-origin",
+}
+"""Sent with each answer: no other page may show the app inside itself, or learn its address."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much is taken at once."""
+
+    sessions: int = 64  # tabs that are open at the same time
+    # largest message of a page: a picture of the view. A file has 15.5 MB at most.
+    message_bytes: int = 16 * 2**20
+    messages_per_second: float = 400.0  # of one connection, on average; a page sends 50
+    burst: int = 2000  # messages that may come at once
+
+
+LIMITS = Limits()
+FAREWELL_S = 0.5  # how long a page may take to close its connection; some read nothing any more
+MOST_EARLY = 4  # messages of a page that are kept until its session is there
+
+
+class Rate:
+    """Counts messages against a rate that may be exceeded for a moment."""
+
+    def __init__(
+        self, per_second: float, burst: int, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._per_second, self._burst, self._clock = per_second, burst, clock
+        self._left, self._last = float(burst), clock()
+
+    def take(self) -> bool:
+        """Count a message; False where it is one too many."""
+        now = self._clock()
+        self._left = min(self._burst, self._left + (now - self._last) * self._per_second)
+        self._last = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+class Guard:
+    """Checks each request before viser answers it, and limits each connection."""
+
+    def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
+        self.limits, self._doors = limits, doors
+        self._logged: set[str] = set()
+
+    def warn(self, kind: str, text: str, who: object) -> None:
+        """Log a refusal, if it is the first of its kind: nobody can fill the log."""
+        if kind not in self._logged:
+            self._logged.add(kind)
+            logger.warning("refused %s: %s (further ones are not logged)", who, text)
+
+    def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
+        """Give the options that a server of `websockets` starts with, from those viser has."""
+
+        def process_request(connection: ServerConnection, request: Request) -> Any:
+            refusal = self._check(connection, request)
+            if refusal is None:
+                return theirs["process_request"](connection, request)
+            self.warn(refusal.kind, refusal.text, connection.remote_address)
+            return connection.respond(refusal.status, refusal.text + "\n")
+
+        def process_response(_: ServerConnection, request: Request, response: Response) -> None:
+            response.headers.update(HEADERS)
+            if response.status_code < HTTPStatus.BAD_REQUEST:
+                cookie = self._doors.cookie(request)
+                if cookie is not None:
+                    response.headers["Set-Cookie"] = cookie
+
+        def create_connection(*args: Any, **kwargs: Any) -> TabConnection:
+            connection = TabConnection(*args, **kwargs)
+            connection.start(self)
+            return connection
+
+        return {
+            **theirs,
+            "process_request": process_request,
+            "process_response": process_response,
+            "create_connection": create_connection,
+            "max_size": self.limits.message_bytes,
+            "close_timeout": FAREWELL_S,
+        }
+
+    def _check(self, connection: ServerConnection, request: Request) -> Refusal | None:
+        refusal = self._doors.check(request, plain_address(str(connection.local_address[0])))
+        most = self.limits.sessions
+        if refusal is not None or len(connection.server.connections) < most:
+            return refusal
+        return Refusal(
+            "sessions",
+            f"{most} tabs have the app open, which is all it takes at once: close one and try"
+            " again.",
+            HTTPStatus.SERVICE_UNAVAILABLE,
+        )
+
+
+class TabConnection(ServerConnection):
+    """A websocket that reads what a page says, and is closed with a reason when that is too much.
+
+    What the page's own scripts say goes to its session; viser gets the rest of what may be said.
+    """
+
+    def start(self, guard: Guard) -> None:
+        self._guard = guard
+        self._rate = Rate(guard.limits.messages_per_second, guard.limits.burst)
+        self._closing: asyncio.Task[None] | None = None
+        self._early: list[Events] = []
+        self._take: Callable[[Events], None] | None = None
+
+    def listen(self, take: Callable[[Events], None]) -> None:
+        """Have somebody take what the page's scripts say, and have said so far."""
+        self._take = take
+        for said in self._early:
+            take(said)
+
+    async def recv(self, decode: bool | None = None) -> Any:
+        """Receive the next message for viser."""
+        while True:
+            try:
+                raw = await super().recv(decode)
+            except ConnectionClosed as closed:
+                if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
+                    words = f"a message too large, {closed.sent}"
+                    self._guard.warn("size", words, self.remote_address)
+                raise
+            if self._closing is not None:
+                continue  # until the other side has closed as well
+            if not self._rate.take():
+                words = f"more than {self._guard.limits.messages_per_second:g} messages a second"
+                self._guard.warn("rate", words, self.remote_address)
+                closing = self.close(CloseCode.POLICY_VIOLATION, words)
+                self._closing = asyncio.ensure_future(closing)
+                continue
+            message = read_message(raw)
+            if not isinstance(message, Events):
+                if message is not None:
+                    return raw
+            elif self._take is not None:
+                self._take(message)
+            elif len(self._early) < MOST_EARLY:
+                self._early.append(message)

@@ -1,0 +1,301 @@
+"""Arguments and options that several commands share."""
+
+import json
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+from click.core import ParameterSource
+
+from warpspace.cli.file_arguments import OutputFile, SceneName
+from warpspace.cli.tables import escape_json, progress, warn
+from warpspace.exceptions import OptionError
+from warpspace.scene.text_files import parse_number, parse_whole
+
+if TYPE_CHECKING:
+    from warpspace.field.evaluate import SecondOrder
+    from warpspace.machine.definition import Machine
+    from warpspace.outputs.drawing.settings import FigureSettings
+    from warpspace.scene.model import Scene
+
+
+class RenamedOption(click.Option):
+    """An option with the flags it had before, which no help text lists."""
+
+    def __init__(self, *declared: Any, former: tuple[str, ...] = (), **traits: Any) -> None:
+        super().__init__(*declared, **traits)
+        self.former = former
+
+    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
+        listed = self.opts
+        self.opts = [*listed, *self.former]
+        try:
+            super().add_to_parser(parser, ctx)
+        finally:
+            self.opts = listed
+
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+LOOPS = ("tool", "workpiece", "relative")
+DIRECTIONS = ("mean", "forward", "backward", "difference")
+SECOND_ORDER = "warpspace.second_order"
+"""Where the context of a command keeps what its JSON object says of the second order."""
+COMPONENTS = ("norm", "x", "y", "z")
+
+
+def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:
+    return click.argument(name, type=SceneName(), **kwargs)
+
+
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="Print exactly one JSON object on stdout."
+)
+
+
+def placed_loop(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """Look at the relative loop where the placement is fitted out and no loop was given."""
+    given = ctx.get_parameter_source(param.name or "") is not ParameterSource.DEFAULT
+    return "relative" if ctx.params.get("placed") and not given else value
+
+
+placed_option = click.option(
+    "--placed",
+    is_flag=True,
+    is_eager=True,
+    help="Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
+    " for the least RMS over the working volume. Looks at the relative loop.",
+)
+loop_option = click.option(
+    "--loop",
+    type=click.Choice(LOOPS),
+    default="tool",
+    show_default=True,
+    callback=placed_loop,
+    help="Structural loop: tool point, workpiece point, or tool relative to workpiece.",
+)
+direction_option = click.option(
+    "--direction",
+    type=click.Choice(DIRECTIONS),
+    help="Direction of travel for errors that depend on it: their mean, forward, backward, or the"
+    " difference forward − backward, which maps the reversal.  [what the scene says]",
+)
+component_option = click.option(
+    "--component",
+    type=click.Choice(COMPONENTS),
+    default="norm",
+    show_default=True,
+    help="What the colours show: the length |E| of the error, or one signed component, in µm.",
+)
+
+
+def read_exaggeration(
+    _ctx: click.Context, _param: click.Parameter, text: str | None
+) -> float | Literal["auto"] | None:
+    if text is None:
+        return None
+    if text.strip().lower() == "auto":
+        return "auto"
+    try:
+        return parse_number(text)
+    except ValueError:
+        expected = "expected auto or a number above 0"
+        raise OptionError(f"--exaggeration {text!r}; {expected}") from None
+
+
+exaggeration_option = click.option(
+    "--exaggeration",
+    metavar="auto|N",
+    callback=read_exaggeration,
+    help="Display factor of displacements: a number, or auto for a round one that suits the scene."
+    "  [what the scene says]",
+)
+at_option = click.option(
+    "--at",
+    "points",
+    multiple=True,
+    metavar="X=..,Y=..",
+    help="Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480. Repeatable. Axes left"
+    " out stand at their place in the scene (the middle of a range).",
+)
+
+
+def grid_option(default: int | None = 21, of: str = "of the working volume") -> Decorator:
+    unsaid = "" if default else "  [21]"
+    return click.option(
+        "--grid",
+        type=int,
+        default=default,
+        show_default=default is not None,
+        help=f"Nodes per axis {of}, 2 to 101.{unsaid}",
+    )
+
+
+def parse_point(text: str, axes: Collection[str]) -> dict[str, float]:
+    from warpspace.analysis.options import read_place
+
+    try:
+        return read_place(text, axes)
+    except ValueError as error:
+        raise OptionError(f"--at {text!r}: {error}") from None
+
+
+def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
+    from warpspace.analysis.options import outside_travel
+
+    warn(*(f"--at {words}" for words in outside_travel(machine, point)))
+
+
+def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = False) -> "Scene":
+    """Load a scene as it is looked at: for a direction of travel, the workpiece placed or not."""
+    from warpspace.scene.library import load_scene
+    from warpspace.scene.model import in_direction, placed_in
+
+    return placed_in(in_direction(load_scene(name), direction), loop, placed=placed)
+
+
+def say_first_order(loop: str, *scenes: "Scene") -> None:
+    from warpspace.scene.model import second_order
+
+    say_second_order(*(second_order(scene, loop) for scene in scenes))
+
+
+def say_second_order(*found: "SecondOrder") -> dict[str, float]:
+    """Warn where first-order numbers are not enough; the JSON object carries it in any case."""
+    from warpspace.field.evaluate import second_order_words
+
+    warn(*second_order_words(*found))
+    said = click.get_current_context().meta[SECOND_ORDER] = {
+        "second_order_um": max(one.um for one in found)
+    }
+    return said
+
+
+def print_json(value: Mapping[str, object]) -> None:
+    """Print one JSON object; numbers that are not finite are refused rather than misspelt."""
+    context = click.get_current_context(silent=True)
+    click.echo(spell_json({**value, **(context.meta.get(SECOND_ORDER, {}) if context else {})}))
+
+
+def spell_json(value: object) -> str:
+    """Spell a value as JSON; numbers that are not finite are refused rather than misspelt."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, default=datetime.isoformat)
+    return escape_json(text)
+
+
+FIGURES = (".png", ".svg", ".pdf")
+ROWS = (".parquet", ".csv")
+SCENES = (".toml",)
+
+force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
+csv_option = click.option(
+    "--csv", "csv_path", type=OutputFile(".csv"), help="Write the numbers to this CSV file."
+)
+
+
+def output_option(
+    help_text: str,
+    *endings: str,
+    added: Callable[[], Iterable[str]] = tuple,
+    required: bool = True,
+) -> Decorator:
+    """Add the option --output, of a file with one of some endings, or any."""
+    kind = OutputFile(*endings, added=added)
+    return click.option(
+        "-o", "--output", metavar="FILE", required=required, type=kind, help=help_text
+    )
+
+
+def plot_option(what: str) -> Decorator:
+    help_text = f"Draw the {what} into this file: .png, .svg or .pdf."
+    return click.option("--plot", type=OutputFile(*FIGURES), help=help_text)
+
+
+def write_text(path: str | Path, text: str | bytes, *, force: bool) -> None:
+    from warpspace.outputs.file_output import write_atomically
+
+    with write_atomically(path, overwrite=force) as temporary:
+        temporary.write_bytes(text.encode() if isinstance(text, str) else text)
+
+
+def size_text(path: str) -> str:
+    return f"{Path(path).stat().st_size / 1e6:.2f} MB"
+
+
+VIEWS = ("iso", "front", "right", "top")
+
+
+def read_size(
+    _ctx: click.Context, _param: click.Parameter, text: str | None
+) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    width, _, height = text.lower().replace("×", "x").partition("x")
+    try:
+        return parse_whole(width), parse_whole(height)
+    except ValueError:
+        raise OptionError(
+            f"--size {text!r} cannot be read; expected WIDTHxHEIGHT in px, for instance 1600x1200"
+        ) from None
+
+
+def size_option(default: str | None, about: str) -> Decorator:
+    return click.option(
+        "--size", default=default, show_default=default is not None, metavar="WxH",
+        callback=read_size, help=about,
+    )  # fmt: skip
+
+
+def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator:
+    options = (
+        component_option,
+        exaggeration_option,
+        click.option(
+            "--view",
+            type=click.Choice(VIEWS),
+            default="iso",
+            show_default=True,
+            help="Where the camera stands.",
+        ),
+        size_option(size, f"Width and height of the picture in px.{sizes}"),
+        loop_option,
+        placed_option,
+        direction_option,
+        grid_option(),
+        click.option("--dark", is_flag=True, help="Light ink on a dark ground."),
+        force_option,
+    )
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+def figure_settings(*, grid: int, **options: Any) -> "FigureSettings":
+    from warpspace.field.grid import node_counts
+    from warpspace.outputs.drawing.settings import FigureSettings
+
+    node_counts(grid)
+    return FigureSettings(grid=grid, **options)
+
+
+def draw_figure_file(
+    name: str,
+    scenes: "Sequence[Scene]",
+    settings: "FigureSettings",
+    target: str,
+    *,
+    force: bool,
+    silent: bool = False,
+) -> None:
+    from warpspace.outputs.figure_files import write_figure
+    from warpspace.outputs.processes import LEAST_MB
+    from warpspace.resources import check_address_space
+
+    check_address_space(LEAST_MB, "drawing")
+    with progress("drawing", silent=silent):
+        write_figure(target, name, scenes, settings, force=force)

@@ -1,0 +1,121 @@
+"""Charts as figures of the catalogue: gains, Monte Carlo, circular test, rotary axes."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from warpspace.analysis.commands.gains import Gains
+from warpspace.analysis.commands.montecarlo import Machines, sampled_histogram
+from warpspace.analysis.description import silent
+from warpspace.analysis.sampling.cases import Plan
+from warpspace.analysis.sampling.machine_sampling import montecarlo
+from warpspace.bench.base import run_test
+from warpspace.bench.kinds.circular import Circular
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import placed_words
+from warpspace.kinematics.model import Loop
+from warpspace.outputs.charts.block_charts import (
+    bars_chart,
+    charts_sheet,
+    histogram_chart,
+    on_ground,
+)
+from warpspace.outputs.charts.result_charts import bench_chart
+from warpspace.outputs.drawing.settings import FONT, FigureSettings
+from warpspace.outputs.drawing.sheet import LOOP_WORDS, Drawing, metadata
+from warpspace.picture import traces
+from warpspace.resources import __version__
+from warpspace.scene.model import Scene, choose_view
+from warpspace.units import spell_count
+
+
+def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
+    scene = scenes[0]
+    bars = Gains(loop=Loop(settings.loop), over_travel=True).run(scene, silent).bars()
+    title = f"Error gains: {scene.machine.title}"
+    where = f"{_loop(scene, settings)} · largest absolute gains over the travel"
+    chart = replace(bars, title=title, subtitle=where)
+    return _draw("gains", title, scene, settings, bars_chart, chart)
+
+
+def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
+    scene = scenes[0]
+    found = montecarlo(Machines(loop=Loop(settings.loop)).case(scene, Plan()))
+    title = f"Machines within tolerance: {scene.title}"
+    loop = " · ".join((_loop(scene, settings), *placed_words(found.view)))
+    what = (
+        f"{loop} · {spell_count(found.plan.samples)} machines, one random point each ·"
+        f" {found.draws.distribution} over the tolerances · seed {found.plan.seed}"
+    )
+    histogram = sampled_histogram(found, title, what)
+    return _draw("montecarlo", title, scene, settings, histogram_chart, histogram)
+
+
+def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
+    scene = scenes[0]
+    found = run_test(scene, Circular(plane="XY", radius_mm=150.0))
+    title = f"Circular test: {scene.title}"
+    return _draw("ballbar", title, scene, settings, bench_chart, found, title)
+
+
+def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
+    scene = scenes[0]
+    chosen = first_lines(scene)
+    if not chosen:
+        raise OptionError(
+            f"figure 'rotary': {scene.name} has no traces; expected a machine with a rotary axis"
+            " and points in [points_mm] traces"
+        )
+    charts = [
+        traces.motion_lines(traces.name_trace(line.trace), motion, part)
+        for line in chosen
+        if (motion := traces.evaluate_axis_motion(scene, line)) is not None
+        for part in motion.motions
+    ]
+    title = f"Error motions of the rotary axes: {scene.title}"
+    what = (
+        "ISO 230-7 · over the position of the axis, at the height of the point and in its"
+        " direction, which turns with it"
+    )
+    for name in (traces.name_trace(line.trace) for line in chosen):
+        if not any(chart.title.startswith(name) for chart in charts):
+            what += f" · {name}: the point lies on the axis"
+    return _draw("rotary", title, scene, settings, charts_sheet, charts, title, what, 3)
+
+
+def first_lines(scene: Scene) -> list[traces.TraceLine]:
+    stands = scene.workspace.positions
+    found: dict[str, traces.TraceLine] = {}
+    for line in traces.trace_lines(traces.evaluate_traces(scene, 1.0)):
+        here = all(stands.get(axis, 0.0) == at for axis, at in line.trace.at.items())
+        if here:
+            found.setdefault(line.trace.axis, line)
+    return list(found.values())
+
+
+def _loop(scene: Scene, settings: FigureSettings) -> str:
+    return LOOP_WORDS[choose_view(scene, settings.loop).loop]
+
+
+def _draw(
+    name: str,
+    title: str,
+    scene: Scene,
+    settings: FigureSettings,
+    draw: Callable[..., Figure],
+    *shown: Any,
+) -> Drawing:
+    with on_ground(settings.theme):
+        figure = draw(*shown)
+    width, height = figure.get_size_inches()
+    dpi = settings.size[0] / width
+    figure.set_size_inches(round(width * dpi) / dpi, round(height * dpi) / dpi)
+    figure.set_dpi(dpi)
+    figure.text(
+        1.0 - 0.12 / width, 0.08 / height, f"warpspace {__version__} · scene {scene.name}",
+        size=6.5, color=settings.theme.muted, ha="right", va="bottom", family=[FONT],
+        parse_math=False,
+    )  # fmt: skip
+    return Drawing(figure, title, metadata(title, [scene], settings, 1.0, name))

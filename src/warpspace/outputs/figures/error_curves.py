@@ -1,0 +1,169 @@
+"""Error curves along each axis with tolerance bands, and the constant errors beside them."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from warpspace.analysis.blocks import Band, Bars, Curve, Lines, Panel, Series, Style
+from warpspace.machine.axes import axis_order, parameter
+from warpspace.machine.definition import Axis
+from warpspace.machine.errors import BACKWARD, Tolerance
+from warpspace.outputs.charts.block_charts import draw_beside, draw_lines, on_ground, style
+from warpspace.outputs.drawing.canvas import POINTS_PER_PX
+from warpspace.outputs.drawing.settings import SIZES, FigureSettings
+from warpspace.outputs.drawing.sheet import Drawing, reference_words, start_sheet
+from warpspace.scene.model import Scene
+from warpspace.units import MICROMETRE, MICRORADIAN, Array
+
+SAMPLES = 361
+FEW_READINGS = 5000  # readings that are drawn at most, evenly picked from all
+BAND = 5
+"""Colour of a tolerance that several errors of a chart share; one of its own has its error's."""
+KINDS = (("XYZ", MICROMETRE, "translation"), ("ABC", MICRORADIAN, "rotation"))
+Errors = tuple[Axis, str, str, str]
+"""An axis, the letters of the errors of one kind, their unit and the kind."""
+
+
+def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+    scene = scenes[0]
+    shown = _shown(scene)
+    facts = [
+        f"{scene.machine.title}, chain {scene.machine.chain}",
+        "component errors over the range of each axis, constant errors at the right",
+        "strokes: tolerance of a constant error" if scene.tolerances else "",
+        reference_words(scene) if scene.reference else "",
+        _left_out_words(scene, shown),
+    ]
+    title = f"Errors along the axes: {scene.title}"
+    sheet = start_sheet(
+        "error-curves", settings, title, [fact for fact in facts if fact], scenes, [],
+        exact=exact, panel=False,
+    )  # fmt: skip
+    canvas = sheet.canvas
+    left, bottom, right, top = sheet.content
+    bars = _constants(scene)
+    split = left + (0.68 if bars else 1.0) * (right - left)
+    columns = 1 if len(shown) < 3 else 2
+    row = (top - bottom) / max(math.ceil(len(shown) / columns), 1)
+    column = (split - left) / columns
+    text = SIZES.text if settings.printed else SIZES.small
+    size = canvas.px(text) * POINTS_PER_PX
+    width, height = canvas.width, canvas.height
+    with on_ground(settings.theme), style():
+        for number, errors in enumerate(shown):
+            line, side = divmod(number, columns)
+            low = top - (line + 1) * row
+            box = ((left + side * column) / width, low / height, column / width, row / height)
+            draw_lines(canvas.figure, _chart(scene, *errors), box, size)
+        if bars:
+            box = (split / width, bottom / height, (right - split) / width, (top - bottom) / height)
+            draw_beside(canvas.figure, bars, box, size)
+    if not shown:
+        words = "No component error: every one is zero along its axis."
+        text, small = canvas.fit(words, split - left, SIZES.heading)
+        canvas.text((left + split) / 2.0, (bottom + top) / 2.0, text, size=small, ha="center")
+    return sheet.finish(1.0)
+
+
+def _keys(axis: Axis, letters: str) -> list[str]:
+    return [f"E{letter}{axis.name}" for letter in letters]
+
+
+def _shown(scene: Scene) -> list[Errors]:
+    every = [(axis, *kind) for axis in scene.machine.axes.values() for kind in KINDS]
+
+    def is_given(key: str) -> bool:
+        own = key in scene.errors and scene.errors.amplitude(key) != 0.0
+        return own or key in scene.measured
+
+    given = [one for one in every if any(map(is_given, _keys(*one[:2])))]
+    return given or [
+        one
+        for one in every
+        if any(_has_width(scene.tolerances.get(key)) for key in _keys(*one[:2]))
+    ]
+
+
+def _has_width(tolerance: Tolerance | None) -> bool:
+    return tolerance is not None and tolerance.half_width > 0.0
+
+
+def _left_out_words(scene: Scene, shown: Sequence[Errors]) -> str:
+    drawn = {(axis.name, kind) for axis, _, _, kind in shown}
+    missing = [
+        f"{kind}s of {', '.join(names)}"
+        for _, _, kind in KINDS
+        if (names := [name for name in scene.machine.axes if (name, kind) not in drawn])
+    ]
+    return f"zero: {'; '.join(missing)}" if missing and shown else ""
+
+
+def _chart(scene: Scene, axis: Axis, letters: str, unit: str, kind: str) -> Lines:
+    low, high = scene.workspace.ranges.get(axis.name, axis.travel)
+    if low == high:
+        low, high = axis.travel
+    at = np.linspace(low, high, SAMPLES)
+    curves: list[Curve] = []
+    bands: list[Band] = []
+    shared: dict[Tolerance, list[int]] = {}
+    for colour, key in enumerate(_keys(axis, letters)):
+        curves += _curves(scene, key, at, colour)
+        if key in scene.uncertainty:
+            middle, half = scene.errors.evaluate(key, at), scene.uncertainty[key].evaluate(at)
+            words = f"{key} ± standard uncertainty"
+            bands.append(Band(words, at, middle - half, middle + half, colour))
+        if (tolerance := scene.tolerances.get(key)) is not None:
+            shared.setdefault(tolerance, []).append(colour)
+    for tolerance, colours in shared.items():
+        ends = np.array([low, high])
+        least, most = (
+            np.full(2, tolerance.centre + sign * tolerance.half_width) for sign in (-1.0, 1.0)
+        )
+        own = colours[0] if len(colours) == 1 else BAND
+        bands.append(Band(f"± {tolerance.half_width:g} {unit} tolerance", ends, least, most, own))
+    title = f"{kind} of {axis.name}  [{unit}]"
+    return Lines("lines", title, f"{axis.name} [{axis.unit}]", "", tuple(curves), tuple(bands))
+
+
+def _curves(scene: Scene, key: str, at: Array, colour: int) -> list[Curve]:
+    function = scene.errors.functions.get(key)
+    if function is None or scene.errors.amplitude(key) == 0.0:
+        found = [Curve(f"{key}: zero", at, np.zeros_like(at), colour, "thin")]
+    else:
+        found = [Curve(key, at, scene.errors.evaluate(key, at), colour)]
+        if len(function.lines) > 1:
+            found = []
+            for number, (words, line) in enumerate(function.lines):
+                first = words.startswith("forward") or not (number or words.startswith("back"))
+                kind: Style = "line" if first else "dashed"
+                found.append(Curve(f"{key} {words}", at, line.evaluate(at), colour, kind))
+    if key in scene.measured:
+        for way, points in scene.measured[key].scatter.items():
+            step = max(1, -(-len(points) // FEW_READINGS))
+            words = f"{key} read {'backward' if way == BACKWARD else ''}".strip()
+            found.append(Curve(words, points[::step, 0], points[::step, 1], colour, "dots"))
+    return found
+
+
+def _constants(scene: Scene) -> Bars | None:
+    keys = [
+        key
+        for key in scene.parameter_keys
+        if parameter(key).is_constant
+        and (scene.errors.amplitude(key) != 0.0 or _has_width(scene.tolerances.get(key)))
+    ]
+    keys.sort(key=lambda key: (not parameter(key).is_rotation, axis_order(parameter(key).axis)))
+    if not keys:
+        return None
+    limits = [scene.tolerances.get(key) for key in keys]
+    ends = [
+        Series([one and one.centre + sign * one.half_width for one in limits], as_mark=True)
+        for sign in (-1.0, 1.0)
+    ]
+    values = Series([scene.errors.amplitude(key) for key in keys], role="key")
+    title = "constant errors"
+    return Bars(
+        title, "", [f"{key} [{parameter(key).unit}]" for key in keys],
+        (Panel(title, (values, *ends), "µm or µrad", signed=True),),
+    )  # fmt: skip

@@ -1,0 +1,422 @@
+"""A program as a control runs it: words of G-code, and the moves that they come to.
+
+**Words** are axis positions plus the active offset; after G53 they are axis positions. A tool of
+length L reaches L beyond the scene's tool point, against the tool axis: tip = tool point − L · tool
+axis in the tool frame. G43 H moves Z by +L, so that the tip is at the programmed Z while rotary
+axes are at zero. A change of length or offset moves nothing by itself.
+
+**Without tool centre point** (TCP) all axes go in proportion, arcs are arcs of axis positions,
+and rotary axes swing the tip. **With it** (G43.4 to G49) X, Y, Z are the tip on the workpiece: the
+point of the workpiece frame where the tip is with these words at rotary axes zero. The tip then
+runs along lines and arcs of the workpiece, rotary axes turn in proportion, linear axes follow.
+
+The path begins where straight blocks have named all linear axes, or feed one that was named before:
+nobody knows where the others stood.
+G28 goes to axis positions zero, or to the end of the travel that is nearest.
+"""
+
+import re
+from array import array
+from cmath import phase
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import ceil, copysign, sqrt, tau
+from pathlib import Path
+from typing import Annotated, Literal, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.analysis.options import Grammar, option, read_numbers
+from warpspace.bench.placing import ball_point, follow
+from warpspace.exceptions import SceneError
+from warpspace.formats.source import MAX_LINE, MAX_LINES
+from warpspace.kinematics.model import Model, complete_coordinates
+from warpspace.machine.axes import is_linear
+from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM, MAX_PATH_POINTS, MAX_PROGRAM_BYTES
+from warpspace.scene.model import Scene
+from warpspace.scene.text_files import check_file
+from warpspace.units import Array, Integers
+
+MM_PER_INCH, MAX_TOOL_MM = 25.4, 1e4  # the latter of offsets, too
+SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
+FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
+STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in other words
+PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
+CYCLES = "G81", "G82", "G83"
+_IDLE = {"G2": "L", "G3": "L", **dict.fromkeys(CYCLES, "IJ")}  # letters that count nothing there
+MOST_SAID = 1000  # words that are listed as not understood
+SHOWN = 40  # characters of a word that a message shows
+WORD = re.compile(
+    r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=]|E\d)"  # a letter and its number
+    r"|\([^()]*\)|;.*"  # comments
+    r"|(\S[^\s(;]*)",  # anything else
+    re.IGNORECASE,
+)
+_SKIP = re.compile(r"(N\s*\d+\s*)?(/[/\d]*\s*)(.*)", re.IGNORECASE)
+_TITLE = re.compile(r"%?\s*<?[O:]\s*\d+>?\s*(\([^()]*\)\s*)*", re.IGNORECASE)  # number of a program
+_CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
+_AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
+_MODAL: Mapping[str, tuple[str, object]] = {
+    **{code: ("motion", code) for code in ("G0", "G1", "G2", "G3", *CYCLES)},
+    "G80": ("motion", "G0"),
+    "G17": ("across", 2), "G18": ("across", 1), "G19": ("across", 0),
+    "G20": ("unit_mm", MM_PER_INCH), "G21": ("unit_mm", 1.0),
+    "G90": ("absolute", True), "G91": ("absolute", False),
+    "G93": ("inverse_time", True), "G94": ("inverse_time", False), "G95": ("inverse_time", False),
+    "G98": ("to_initial", True), "G99": ("to_initial", False),
+    **{code: ("system", code) for code in ("G54", "G55", "G56", "G57", "G58", "G59")},
+}  # fmt: skip
+_OTHER = "4 9 15 28 40 43 43.4 49 50 53 61 61.1 64 67 69 91.1 96 97"
+_UNDERSTOOD = _MODAL.keys() | {f"G{number}" for number in _OTHER.split()}
+_BENDING = (
+    "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 27 29 30 31 33 33.1 34 37 38.2"
+    " 38.3 38.4 38.5 41 41.1 42 42.1 43.1 43.2 43.5 47 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65"
+    " 66 68 68.2 68.3 70 72 73 74 76 84 85 86 87 88 89 90.1 92 150 154"
+)
+REFUSED = {"M96", "M97", "M98", "M99", "M198"} | {
+    f"G{number}" for number in (*_BENDING.split(), *range(110, 130))
+}
+"""Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
+
+
+def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
+    found = read_numbers(text, "G54X=position and H1=length", "G54X=10,H1=85.5")
+    for name, value in found.items():
+        if abs(value) > MAX_TOOL_MM:
+            raise ValueError(f"{name}={value:g}; expected at most ±{MAX_TOOL_MM:g}")
+        if not re.fullmatch(rf"G5[4-9]({'|'.join(scene.machine.axes)})|H\d+", name):
+            raise ValueError(f"{name}; expected G54 to G59 with an axis of the machine, or H1")
+    return tuple(found.items())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setup:
+    """What is set on a control before a program runs."""
+
+    tcp: Literal["program", "always", "never"] = option(
+        "program", "Tool centre point: switched by G43.4 and G49, or on or off throughout"
+    )
+    length_mm: float = option(
+        0.0, "Length of the tool beyond the tool point of the scene", unit="mm",
+        low=-MAX_TOOL_MM, high=MAX_TOOL_MM,
+    )  # fmt: skip
+    offset: Annotated[
+        tuple[tuple[str, float], ...], Grammar("G54X=..,H1=..", _offsets, many=True)
+    ] = option(
+        (), "Positions of axes where words of a work offset are zero, and lengths of tools by H",
+        unset="at axes zero; --length for all tools",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ReadProgram:
+    """Moves of a program, one a row; each begins where the one before it ends."""
+
+    scene: Scene
+    axes: tuple[str, ...]  # of its machine, [a]
+    line: Integers  # [m], of the file, from 1; 0 for where the axes stand at first
+    kind: Integers  # [m]; STAND, RAPID, FEED or ARC
+    tcp: NDArray[np.bool_]  # [m]
+    across: Integers  # [m]; direction 0 to 2 about which an arc turns
+    length_mm: Array  # [m], of the tool
+    turn_rad: Array  # [m]; of an arc, positive counter-clockwise seen against that direction
+    centre_mm: NDArray[np.complex128]  # [m]; of an arc, along the two axes of its `PLANES`
+    # [m, a], mm and degrees; axis positions. With TCP those of the linear axes bring the scene's
+    # tool point to where the tip is while rotary axes are at zero: see `upright`
+    end: Array
+    refused: Mapping[int, str]  # words by their line; the path ends before the first of them
+    unknown: Mapping[str, int]  # words that are not understood, to their first line
+    blocks: int  # lines that move an axis
+
+    def positions(self, move: Integers, share: Array) -> Array:
+        """Give the positions of axes, as `end` has them, at shares of moves, [n, a]."""
+        start, end = self.end[np.maximum(move - 1, 0)], self.end[move]
+        at = start + share[:, None] * (end - start)
+        (arc,) = np.nonzero(self.turn_rad[move])
+        move, share = move[arc], share[arc]
+        columns = [[self.axes.index(x) if x in self.axes else 0 for x in names] for names in PLANES]
+        rows, plane = arc[:, None], np.array(columns)[self.across[move]]
+        centre = self.centre_mm[move]
+        first, last = (places[rows, plane] @ [1.0, 1j] - centre for places in (start, end))
+        grown = 1.0 + share * (np.abs(last / first) - 1.0)
+        place = centre + first * grown * np.exp(1j * share * self.turn_rad[move])
+        at[rows, plane] = np.stack([place.real, place.imag], axis=-1)
+        return at
+
+
+def with_length(model: Model, length_mm: float) -> Model:
+    """Give a model whose tool point is the tip of a tool of this length."""
+    x, y, z = model.tool_point_mm
+    return replace(model, tool_point_mm=(x, y, z - length_mm))
+
+
+def upright(words: Mapping[str, Array]) -> dict[str, Array]:
+    """Give where the axes stand at words of a program with TCP, were its rotary axes at zero."""
+    return {name: at if is_linear(name) else np.zeros(()) for name, at in words.items()}
+
+
+def axes_at(model: Model, length_mm: float, words: Mapping[str, Array]) -> dict[str, Array]:
+    """Give where the axes stand at words of a program with TCP."""
+    return follow(with_length(model, length_mm), words, ball_point(model, upright(words)))
+
+
+def words_at(model: Model, tip_mm: Array, axes: Mapping[str, Array]) -> dict[str, Array]:
+    """Give the words of a program with TCP that lead the tip to a place, rotary axes to theirs."""
+    words = follow(model, upright(axes), tip_mm)
+    return {name: words[name] if is_linear(name) else at for name, at in axes.items()}
+
+
+def program_lines(path: str | Path) -> Iterator[str]:
+    """Read the lines of a program one by one; bytes that are no UTF-8 stand in comments."""
+    check_file(Path(path), MAX_PROGRAM_BYTES, str(path))
+    try:
+        with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
+            yield from iter(lambda: file.readline(MAX_LINE + 1), "")
+    except OSError as error:
+        raise SceneError(str(path), [f"cannot be read: {error.strerror or error}"]) from None
+
+
+def read_program(
+    scene: Scene, lines: Iterable[str], setup: Setup | None = None, name: str = "program"
+) -> ReadProgram:
+    """Run the lines of a program on the control of a machine; a `SceneError` names its line."""
+    control = Control(scene, setup or Setup(), name)
+    for _ in control.run(lines):
+        pass
+    rows = np.frombuffer(control.rows).reshape(-1, control.width)
+    line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
+    kind[: control.first] = STAND
+    return ReadProgram(
+        scene, control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
+        rows[:, 6] + 1j * rows[:, 7], rows[:, 8:], control.refused, control.unknown,
+        len(np.unique(line[kind != STAND])),
+    )  # fmt: skip
+
+
+class Control:
+    """Modal words of a control, where its axes stand, and the words of the line that it is at."""
+
+    def __init__(self, scene: Scene, setup: Setup, name: str) -> None:
+        self.scene, self.setup, self.name = scene, setup, name
+        self.line, self.codes, self.words = 0, list[str](), dict[str, float]()
+        # spelled words and comments of a line by code or letter, and what skips it: "/"
+        self.tokens, self.skip = list[tuple[str, str]](), ""
+        self.refused, self.unknown = dict[int, str](), dict[str, int]()
+        self.offset = dict(setup.offset)
+        self.names = tuple(scene.machine.axes)
+        first = [axis[0] for axis in self.names]
+        self.index = {x: first.index(x) for x in first if first.count(x) == 1}
+        self.motion, self.system, self.across, self.unit_mm = "G0", "G54", 2, 1.0
+        self.absolute, self.to_initial, self.inverse_time = True, True, False
+        self.is_compensated, self.has_blocks = False, False
+        self.unnamed = {i for i, axis in enumerate(self.names) if is_linear(axis)}
+        self.first = 0  # row that the path begins with
+        self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
+        self.rows, self.width = array("d"), 8 + len(self.names)
+        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+        self.at = [float(stand[axis]) for axis in self.names]
+        self.tcp, self.length_mm = False, setup.length_mm
+        self.record(STAND)
+        self.switch(tcp=setup.tcp == "always", length_mm=setup.length_mm)
+
+    def run(self, lines: Iterable[str]) -> Iterator[str]:
+        """Do what lines say, and give them one by one, up to the first word that is refused."""
+        for line, raw in enumerate(lines, start=1):
+            self.line, self.codes, self.words, self.tokens = line, [], {}, []
+            self.skip, text = "", raw.strip()
+            if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MOST_SAID:
+                most = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MOST_SAID:,} other words"
+                self.fail(f"is no program in G-code; expected at most {most}")
+            if text.startswith("%") and self.has_blocks:
+                return
+            if skipped := _SKIP.fullmatch(text):
+                self.unknown.setdefault("/", line)
+                self.skip, text = skipped[2], (skipped[1] or "") + skipped[3]
+            if self.has_blocks or not _TITLE.fullmatch(text):
+                for found in WORD.finditer(text.lstrip("%")):
+                    self.take(found)
+            if {"G5", "G5.1"} & {*self.codes} and {"X", "Y", "Z"} & self.words.keys():
+                self.refused[line] = "G5"  # a spline; without a place a look-ahead
+            self.has_blocks = self.has_blocks or bool(self.codes or self.words)
+            if not self.refused:
+                self.move()
+                yield raw
+            if {"M2", "M30"} & {*self.codes} or len(self.refused) > MOST_SAID:
+                return
+
+    def take(self, found: re.Match[str]) -> None:
+        """Take in a word or comment; where one is refused only others that are count."""
+        letter, number, other = ((group or "").upper() for group in found.groups())
+        value, is_code = float(number or 0.0), letter in {"G", "M"}
+        word = f"{letter}{value:g}" if is_code else (letter + number + other)[:SHOWN]
+        self.tokens.append((word if is_code else letter, found[0]))
+        if letter == "O" or word in REFUSED or (other and _CONTROL_FLOW.match(other)):
+            self.refused.setdefault(self.line, word)
+        elif is_code:
+            self.codes.append(word)
+            if (letter == "G" and word not in _UNDERSTOOD) or word in {"M128", "M129"}:
+                self.unknown.setdefault(word, self.line)
+        elif letter == "E" or (word[:2].isalpha() and len(word) > 1):
+            self.unknown.setdefault(word, self.line)
+        elif other and not self.refused:  # behind one may be a language that is not read
+            end = "the end of the comment" if word.startswith("(") else "a letter and a number"
+            self.fail(f"{word!r}; expected {end}")
+        elif letter in self.words and not self.refused:
+            self.fail(f"{word}; expected {letter} once in a line")
+        elif abs(value) > MAX_LENGTH_MM and letter in _POSITIONS:
+            self.fail(f"{word}; expected at most ±{MAX_LENGTH_MM:g} mm or degrees")
+        elif letter:
+            self.words[letter] = value
+
+    def fail(self, problem: str) -> NoReturn:
+        raise SceneError(self.name, [f"line {self.line}: {problem}"])
+
+    def move(self) -> None:
+        """Do what the words of a line say."""
+        words, once = self.words, ""
+        for code in self.codes:
+            if code in _MODAL:
+                setattr(self, *_MODAL[code])
+            elif code in {"G43", "G43.4", "G49"}:
+                self.compensate(code)
+            elif code in {"G4", "G28", "G53"}:
+                once = code
+        self.cycle = self.cycle if self.motion in CYCLES else {}
+        letters = set[str]() if once == "G4" else words.keys() & _AXES  # X is a time there
+        for letter in letters - self.index.keys():
+            known = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
+            self.fail(f"{letter}{words[letter]:g}; expected {known}")
+        idle = self.words.keys() & set(_IDLE.get(self.motion, "IJKLR") if letters else "L")
+        for letter in idle:
+            self.unknown.setdefault(f"{letter} with {once or self.motion}", self.line)
+        if once == "G28":
+            if letters and any(self.at[index] != at for index, at in self.target().items()):
+                self.line_to(self.target(), RAPID)
+            axes, indices = self.scene.machine.axes, [self.index[x] for x in letters or self.index]
+            home = {i: float(np.clip(0.0, *axes[self.names[i]].travel)) for i in indices}
+            self.line_to(home, RAPID, bare=True)
+        elif once == "G53" and letters:
+            self.line_to({self.index[letter]: self.value(letter) for letter in letters}, bare=True)
+        elif self.motion in {"G2", "G3"}:
+            if letters or words.keys() & set("IJKR"):
+                self.arc_to(self.target())
+        elif letters and self.motion in CYCLES:
+            self.drill()
+        elif letters:
+            self.line_to(self.target())
+
+    def compensate(self, code: str) -> None:
+        length, self.is_compensated = self.length_mm, code != "G49"
+        if self.is_compensated:
+            number = f"H{self.words.get('H', 0.0):g}"
+            if not (length := self.offset.get(number, self.setup.length_mm)):
+                self.unknown.setdefault(f"{number} without a length", self.line)
+        by_word = code == "G43.4" and self.setup.tcp == "program"
+        self.switch(tcp=by_word or self.setup.tcp == "always", length_mm=length)
+
+    def switch(self, *, tcp: bool, length_mm: float) -> None:
+        """Say where the axes stand in the words of another mode; nothing moves."""
+        if (tcp or self.tcp) and (tcp, length_mm) != (self.tcp, self.length_mm):
+            at = {axis: np.asarray(q) for axis, q in zip(self.names, self.at, strict=True)}
+            model = self.scene.model
+            if self.tcp:
+                at = axes_at(model, self.length_mm, at)
+            if tcp:
+                at = words_at(model, ball_point(with_length(model, length_mm), at), at)
+            self.at, self.tcp, self.length_mm = [*map(float, at.values())], tcp, length_mm
+            self.record(STAND)
+        self.length_mm = length_mm
+
+    def record(self, kind: int, turn: float = 0.0, centre: complex = 0j) -> None:
+        if len(self.rows) > MAX_PATH_POINTS * self.width:
+            self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
+        mode = self.line, kind, self.tcp, self.across, self.length_mm
+        self.rows.extend((*mode, turn, centre.real, centre.imag, *self.at))
+
+    def value(self, letter: str) -> float:
+        """Give the number of a word in mm, degrees or seconds."""
+        return self.words[letter] * (1.0 if letter in "ABCP" else self.unit_mm)
+
+    def place(self, letter: str, value: float) -> float:
+        """Give the position of an axis of an absolute word, mm or degrees."""
+        is_longer = letter == "Z" and self.is_compensated and not self.tcp
+        shift = self.offset.get(self.system + letter, 0.0)
+        return value + shift + (self.length_mm if is_longer else 0.0)
+
+    def target(self) -> dict[int, float]:
+        """Give where the words of the line lead, by number of the axis."""
+        to: dict[int, float] = {}
+        for letter in self.words.keys() & self.index.keys():
+            value, index = self.value(letter), self.index[letter]
+            to[index] = self.place(letter, value) if self.absolute else self.at[index] + value
+        return to
+
+    def line_to(self, to: Mapping[int, float], kind: int = STAND, *, bare: bool = False) -> None:
+        """Go to positions of some axes: bare ones, or places of the tip with TCP."""
+        tcp = self.tcp
+        self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
+        before, self.at = self.at, [to.get(index, at) for index, at in enumerate(self.at)]
+        kind = kind or (RAPID if self.motion == "G0" else FEED)
+        if not self.first or self.unnamed & to.keys():
+            self.unnamed -= to.keys()
+            self.record(STAND)
+            self.first = len(self.rows) // self.width
+        elif before == self.at:
+            kind = STAND
+        elif kind == FEED:  # from here on it is cut
+            self.unnamed.clear()
+        self.record(kind)
+        self.switch(tcp=tcp, length_mm=self.length_mm)
+
+    def arc_to(self, to: Mapping[int, float]) -> None:
+        names, centres, words = PLANES[self.across], CENTRES[self.across], self.words
+        if not set(names) <= self.index.keys():
+            self.fail(f"an arc in {names}; expected axes of {self.scene.machine.chain}")
+        start = complex(*(self.at[self.index[x]] for x in names))
+        self.at = [to.get(index, at) for index, at in enumerate(self.at)]
+        self.unnamed.clear()
+        end = complex(*(self.at[self.index[x]] for x in names))
+        sense = 1.0 if self.motion == "G3" else -1.0
+        if "R" in words:  # of the longer arc where it is negative
+            radius, half = self.value("R"), (end - start) / 2.0
+            if not half or abs(half) - abs(radius) > max(SLACK_MM, SLACK * abs(half)):
+                chord = f"a chord of {2.0 * abs(half):.4f} mm, above 0"
+                self.fail(f"R{words['R']:g}; expected a radius for an arc of {chord}")
+            height = sqrt(max(0.0, radius * radius - abs(half) ** 2))
+            centre = start + half + copysign(sense, sense * radius) * height * 1j * half / abs(half)
+        elif words.keys() & {*centres}:
+            centre = start + self.unit_mm * complex(*(words.get(x, 0.0) for x in centres))
+        else:
+            self.fail(f"{self.motion} without I, J, K or R")
+        radius, other = abs(start - centre), abs(end - centre)
+        if not radius or abs(radius - other) > max(SLACK_MM, SLACK * radius):
+            self.fail(f"{self.motion}: radii {radius:.4f} and {other:.4f} mm; expected one radius")
+        turn = sense * phase((end - centre) / (start - centre))
+        more = max(ceil(words.get("P", 1.0)), 1) - (turn > FULL_TURN_RAD)  # P: turns begun
+        self.record(ARC, sense * (turn + more * tau), centre)
+
+    def drill(self) -> None:
+        """Drill at the place of the line, K or L times: R plane, depth, in pecks of Q with G83."""
+        deep = "XYZ"[self.across]
+        self.cycle |= {x: self.value(x) for x in {deep, "R", "Q", "P"} & self.words.keys()}
+        if deep not in self.index or not {deep, "R"} <= self.cycle.keys():
+            self.fail(f"{self.motion} without {deep} and R")
+        index, repeats = self.index[deep], self.words.get("K", self.words.get("L", 1.0))
+        initial = self.cycle.setdefault("initial", self.at[index])
+        clear = initial + self.cycle["R"]
+        bottom = clear + self.cycle[deep]
+        if self.absolute:
+            clear, bottom = (self.place(deep, self.cycle[letter]) for letter in ("R", deep))
+        peck = abs(self.cycle.get("Q", 0.0)) if self.motion == "G83" else clear - bottom or 1.0
+        if bottom > clear or peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
+            wanted = f"a depth below R, in up to {MAX_CYCLE:,} pecks of Q above 0"
+            self.fail(f"{self.motion} from {clear:g} to {bottom:g} mm; expected {wanted}")
+        for _ in range(min(int(repeats), MAX_PATH_POINTS)):
+            self.line_to({index: max(clear, self.at[index])}, RAPID)
+            self.line_to({**self.target(), index: self.at[index]}, RAPID)
+            for number in range(ceil((clear - bottom) / peck)):
+                self.line_to({index: clear}, RAPID)
+                self.line_to({index: clear - number * peck}, RAPID)
+                self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)
+            self.line_to({index: max(initial, clear) if self.to_initial else clear}, RAPID)

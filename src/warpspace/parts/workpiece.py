@@ -1,0 +1,263 @@
+"""A part as the machine makes it: a mesh in the workpiece frame, moved by the relative error.
+
+The error of a point is that of the tool against the workpiece, in the workpiece frame w, where the
+linear axes bring the tool to the point and the rotary axes stand as they do in the scene. The part
+as cut is the nominal one plus that error. Geometry only: no forces, heat, wear or servo.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.analysis.description import Analysis
+from warpspace.analysis.options import File, Grammar, option
+from warpspace.analysis.uncertainty.propagation import FieldDoubt, combine, find_doubt
+from warpspace.bench.placing import ball_point, follow, within_travel
+from warpspace.bodies.mesh import CREASE_DEG
+from warpspace.bodies.own_meshes import read_mesh
+from warpspace.exceptions import OptionError
+from warpspace.field.evaluate import ErrorBasis, build_basis
+from warpspace.kinematics import transforms
+from warpspace.kinematics.chain import branch_pose
+from warpspace.kinematics.model import Loop, complete_coordinates
+from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_LENGTH_MM, MAX_PART_TRIANGLES
+from warpspace.scene.model import Scene, evaluate
+from warpspace.scene.text_files import parse_number
+from warpspace.units import Array, Integers
+
+POINTS_AT_ONCE, PAIRS_AT_ONCE = 50_000, 500_000  # what lies between needs memory, too
+TOUCHING = 1e-5  # share of the largest coordinate up to which triangles only touch others
+TOGETHER, MOST_PAIRS = 100, 2e8  # triangles that are not parted any more; pairs that are looked at
+
+
+class Corners(NamedTuple):
+    """Vertices once for each smooth face that they belong to, so that creases stay sharp."""
+
+    corner_of: NDArray[np.int32]  # [W], number of the vertex of each corner
+    triangles: NDArray[np.int32]  # [T, 3], numbers of corners
+    normals: Array  # [W, 3], unit vectors; zero where all triangles are slivers
+    creases: NDArray[np.int32]  # [S, 2], corners at the ends of the edges where smooth faces meet
+
+
+@dataclass(frozen=True, eq=False)
+class PartMesh:
+    """A closed surface, vertices merged, its triangles counter-clockwise seen from outside."""
+
+    name: str
+    vertices_mm: Array  # [V, 3]
+    triangles: NDArray[np.int32]  # [T, 3]
+    unit: str | None = None  # of the numbers in its file; None for that of the format
+    warnings: tuple[str, ...] = ()  # open, inverted, crooked: shown and said
+    place: tuple[float, ...] = (0.0,) * 6  # where it is clamped, mm and degrees
+
+    @cached_property
+    def middle_mm(self) -> Array:
+        """Middle of the box around it, [3]."""
+        return (self.vertices_mm.min(axis=0) + self.vertices_mm.max(axis=0)) / 2.0
+
+    @cached_property
+    def surface(self) -> Any:
+        """The same as a mesh of trimesh, which knows its normals and neighbours."""
+        from trimesh import Trimesh
+
+        return Trimesh(self.vertices_mm, self.triangles, process=False)
+
+    @cached_property
+    def corners(self) -> Corners:
+        """Vertices split at creases above `CREASE_DEG`."""
+        from trimesh import Trimesh, graph
+
+        surface, vertex = self.surface, self.triangles.reshape(-1)
+        faces, ends = surface.face_adjacency, surface.face_adjacency_edges
+        # which corner of each of its two triangles is at each end of an edge, [e, 2 ends, 2]
+        is_there = self.triangles[faces][:, None] == ends[:, :, None, None]
+        corner = 3 * faces[:, None] + is_there.argmax(axis=-1)
+        is_sharp = surface.face_adjacency_angles > np.deg2rad(CREASE_DEG)
+        joined = corner[~is_sharp].reshape(-1, 2)
+        label = graph.connected_component_labels(joined, node_count=len(vertex))
+        corner_of = np.empty(label.max() + 1, np.int32)
+        corner_of[label] = vertex
+        split = Trimesh(self.vertices_mm[corner_of], label.reshape(-1, 3), process=False)
+        triangles = label.reshape(-1, 3).astype(np.int32)
+        creases = label[corner[is_sharp][..., 0]].astype(np.int32)
+        return Corners(corner_of, triangles, split.vertex_normals, creases)
+
+
+def load_part(path: str | Path, unit: str | None = None, data: bytes | None = None) -> PartMesh:
+    """Read a mesh from a file, or from its bytes: in mm, .glb in m, unless a unit is given."""
+    path = Path(path)
+    mesh, said = read_mesh(path, unit, most=MAX_PART_TRIANGLES, data=data)
+    part = PartMesh(path.stem, np.asarray(mesh.vertices), mesh.faces.astype(np.int32), unit)
+    surface = "its surface passes through itself"
+    if (count := count_crossings(part)) is None:
+        said += (f"{path}: too many triangles, or too many in one place, to tell if {surface}",)
+    elif count:
+        said += (f"{path}: {surface} ({count:,} pairs of triangles); it is taken as it is",)
+    return replace(part, warnings=said)
+
+
+def count_crossings(part: PartMesh) -> int | None:
+    """Count pairs of triangles that pass through each other along a line.
+
+    Those with a common vertex do not count. None where there are too many to look at.
+    """
+    if len(triangles := part.triangles) > MAX_FEATURE_TRIANGLES:
+        return None
+    corner, normal = part.vertices_mm[triangles], part.surface.face_normals
+    slack = TOUCHING * np.abs(corner).max()
+    low, high = (np.ascontiguousarray(end(corner, axis=1).T) for end in (np.min, np.max))
+    waiting, found, looked_at = [np.arange(len(triangles))], list[Integers](), 0
+    while waiting:
+        some = waiting.pop()
+        first, last = low[:, some], high[:, some]  # [3, n]
+        if len(some) > TOGETHER:  # part them where it saves most pairs
+            cut = (first + last).mean(axis=1, keepdims=True) / 2.0
+            is_above = last > cut + slack / 2.0
+            is_below = (first < cut - slack / 2.0) | ~is_above  # what touches is on one side
+            pairs = is_above.sum(axis=1) ** 2 + is_below.sum(axis=1) ** 2
+            if pairs[along := pairs.argmin()] < 0.8 * len(some) ** 2:
+                waiting += [some[is_above[along]], some[is_below[along]]]
+                continue
+        for rows in np.array_split(np.arange(len(some)), 1 + len(some) ** 2 // PAIRS_AT_ONCE):
+            is_near = rows[:, None] > np.arange(len(some))
+            for begin, end in zip(first, last, strict=True):
+                is_near &= begin[rows, None] + slack < end
+                is_near &= begin + slack < end[rows, None]
+            row, column = np.nonzero(is_near)
+            pair = some[np.stack([rows[row], column])]
+            for _ in pair:  # each has corners on both sides of the other's plane
+                arm = corner[pair[0]] - corner[pair[1], :1]
+                away = np.einsum("nex,nx->ne", arm, normal[pair[1]])
+                is_across = (away.max(axis=1) > slack) & (away.min(axis=1) < -slack)
+                pair = pair[::-1, is_across]
+            found.append(pair[0] * len(triangles) + pair[1])
+            looked_at += is_near.size + 200 * pair.shape[1]
+            if looked_at > MOST_PAIRS:
+                return None
+    pair = np.stack(np.divmod(np.unique(np.concatenate(found)), len(triangles)))
+    one, other = triangles[pair]
+    pair = pair[:, (one[:, :, None] != other[:, None]).all(axis=(1, 2))]
+    line = np.cross(*normal[pair])
+    line /= np.linalg.norm(line, axis=1, keepdims=True)
+    ways = pair, pair[::-1]
+    ends = [_ends(corner[one], corner[other], normal[other], line) for one, other in ways]
+    return int(np.sum(np.min(ends, axis=0)[1] - np.max(ends, axis=0)[0] > slack))
+
+
+def _ends(one: Array, other: Array, normal: Array, line: Array) -> tuple[Array, Array]:
+    """Give where a triangle begins and ends on the line where its plane meets another one's."""
+    away, at = (np.einsum("nex,nx->ne", one - other[:, :1], way) for way in (normal, line))
+    at += np.einsum("nx,nx->n", other[:, 0], line)[:, None]
+    ahead, to = np.roll(away, -1, axis=1), np.roll(at, -1, axis=1)
+    passes = (away < 0.0) != (ahead < 0.0)  # edges through the plane of the other, two of three
+    place = at + (to - at) * away / np.where(passes, away - ahead, 1.0)
+    return np.where(passes, place, np.inf).min(axis=1), np.where(passes, place, -np.inf).max(axis=1)
+
+
+def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
+    """Read a place as it is typed: ``X,Y,Z`` or ``X,Y,Z,A,B,C``."""
+    try:
+        found = tuple(parse_number(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) not in (3, 6) or not all(abs(value) <= MAX_LENGTH_MM for value in found):
+        raise ValueError("expected three numbers in mm, or six with degrees, such as 0,0,50,0,0,90")
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class OfPart(Analysis):
+    """A question about a part where it is clamped."""
+
+    file: File = option(
+        None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
+    )
+    place: Annotated[tuple[float, ...] | None, Grammar("X,Y,Z[,A,B,C]", read_place)] = option(
+        None,
+        "Where the part is clamped, in the workpiece frame: shift in mm and turns in degrees about"
+        " the fixed x, y, z in that order",
+        unset="that of the scene, or the middle of the working volume",
+    )
+    unit: Literal["mm", "cm", "m", "in"] | None = option(
+        None, "Unit of its numbers", unset="mm, of .glb m"
+    )
+    mesh: PartMesh | None = None  # one that is read already
+
+    def find_mesh(self, scene: Scene) -> PartMesh:
+        """Read the mesh, or that of the scene where none is named."""
+        if self.mesh is not None:
+            return self.mesh
+        if (path := self.file or scene.part.path("file")) is None:
+            raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
+        return load_part(path, self.unit or (None if self.file else scene.part.unit or None))
+
+
+def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = None) -> PartMesh:
+    """Put a part into the workpiece frame: where told, else as the scene says, or in its middle."""
+    at = scene.part.place if place is None else (*place, 0.0, 0.0, 0.0)[:6]
+    if at is None:
+        stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+        at = (*(ball_point(scene.model, stand) - mesh.middle_mm).tolist(), 0.0, 0.0, 0.0)
+    pose = transforms.placed(at[:3], at[3:])
+    return replace(mesh, vertices_mm=transforms.apply(pose, mesh.vertices_mm), place=at)
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """Points of the workpiece frame as the machine makes them."""
+
+    point_mm: Array  # [n, 3], nominal, w
+    coordinates: dict[str, Array]  # [n] or one for all: where the axes stand
+    error_um: Array  # [n, 3], w, actual − nominal
+    outside: NDArray[np.bool_]  # [n], beyond the travel of a linear axis; errors are continued
+
+
+def make_points(scene: Scene, point_mm: Array) -> Made:
+    """Find where the axes stand at points of w, [n, 3], mm, and what error they have there."""
+    stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
+    at, error = follow(scene.model, stand, point_mm), np.empty(point_mm.shape)
+    for first in range(0, len(point_mm), POINTS_AT_ONCE):
+        rows = slice(first, first + POINTS_AT_ONCE)
+        here = {name: of[rows] if np.ndim(of) else of for name, of in at.items()}
+        error[rows] = evaluate(scene, at=here, loop=Loop.RELATIVE, frame="workpiece").error_um
+    outside = ~np.broadcast_to(within_travel(scene.machine, at), len(point_mm))
+    return Made(point_mm, at, error, outside)
+
+
+def point_basis(
+    scene: Scene, made: Made, keys: Sequence[str] | None = None, rows: Any = slice(None)
+) -> ErrorBasis:
+    """Give the response of points to each parameter, [K, n, 3], in w: what a slider moves."""
+    keys = scene.parameter_keys if keys is None else keys
+    at = {name: of[rows] if np.ndim(of) else of for name, of in made.coordinates.items()}
+    point = transforms.apply(branch_pose(scene.model, "workpiece", at), made.point_mm[rows])
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    return build_basis(scene.model, scene.errors, keys, at, view, point)
+
+
+def made_doubt(scene: Scene, made: Made) -> FieldDoubt | None:
+    """Say how sure errors of points are; None where a scene does not say."""
+    if (doubt := find_doubt(scene, Loop.RELATIVE)) is None:
+        return None
+    point = transforms.apply(branch_pose(scene.model, "workpiece", made.coordinates), made.point_mm)
+    view = scene.view(Loop.RELATIVE, "workpiece")
+    basis = doubt.respond(scene.model, made.coordinates, view, point)
+    return combine(doubt, basis.position, made.error_um)
+
+
+def fit_out(point_mm: Array, error_um: Array) -> Array:
+    """Give errors, [..., n, 3], µm, less the rigid motion of the points, [n, 3], that fits best."""
+    arm = point_mm - point_mm.mean(axis=0)
+    shift = error_um.mean(axis=-2, keepdims=True)
+    inertia = np.sum(arm * arm) * np.eye(3) - arm.T @ arm
+    # a cross product of each pair takes five times longer
+    both = np.swapaxes(error_um, -1, -2) @ arm
+    moment = (both - np.swapaxes(both, -1, -2))[..., [2, 0, 1], [1, 2, 0]]
+    # points on a line do not tell the turn about it: the smallest one counts
+    turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)
+    return error_um - shift + arm @ transforms.skew(turn)

@@ -1,0 +1,300 @@
+"""From the raw value of an error in a scene file to its curve; each kind of curve reads its own."""
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TypeVar, cast
+
+import numpy as np
+
+from warpspace.exceptions import OptionError, SceneError, near_miss
+from warpspace.machine import limits
+from warpspace.machine.curves.curve import MISSING, ErrorFunction, Points, ValueReader, is_number
+from warpspace.machine.curves.registry import find_form, spell_forms
+from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
+from warpspace.machine.curves.table import Table, TwoArguments
+from warpspace.machine.definition import Gantry, default_across
+from warpspace.machine.errors import RUN_DIRECTIONS, UNKNOWN, Run
+from warpspace.scene import text_files
+from warpspace.scene.schema import Problems
+from warpspace.units import Array
+
+Weights = tuple[float, float]
+MOST_SAMPLES = 20_001
+CLOSE = 1e-5  # largest deviation of a sampled sum half way between its points, by its largest value
+
+
+def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> ErrorFunction:
+    span = first.span
+    for one, other, weight in ((first, second, weights[0]), (second, first, weights[1])):
+        if isinstance(other, Constant) and other.value == 0.0:
+            return one.scaled(weight)
+    if isinstance(first, Directional) or isinstance(second, Directional):
+        there, back = (
+            combine_curves(_way(first, way), _way(second, way), weights)
+            for way in ("forward", "backward")
+        )
+        return Directional(span, there, back)
+    if isinstance(first, TwoArguments) or isinstance(second, TwoArguments):
+        return _surface(first, second, weights)
+    match first, second:
+        case (Constant(), Constant()) | (Ramp(), Ramp()) if first.span == second.span:
+            return replace(first, value=weights[0] * first.value + weights[1] * second.value)
+        case ((Constant() | Ramp() | Poly()), (Constant() | Ramp() | Poly())):
+            parts = [
+                weight * np.array(_coefficients(curve))
+                for curve, weight in ((first, weights[0]), (second, weights[1]))
+            ]
+            return Poly(span, tuple(np.polynomial.polynomial.polyadd(*parts).tolist()))
+        case ((Constant() | Harmonics()), (Constant() | Harmonics())):
+            terms = _terms(first, second, weights)
+            if len(terms) <= limits.MAX_TERMS:
+                return Harmonics(span, terms)
+        case ((Constant() | Table()), (Constant() | Table())):
+            at = np.union1d(first.kinks, second.kinks)
+            if len(at) <= limits.MAX_POINTS:
+                return _table(first, second, weights, at)
+        case _:
+            pass
+    return _sampled(first, second, weights)
+
+
+def _way(curve: ErrorFunction, way: str) -> ErrorFunction:
+    return getattr(curve, way) if isinstance(curve, Directional) else curve
+
+
+def _surface(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> TwoArguments:
+    surfaces = [curve for curve in (first, second) if isinstance(curve, TwoArguments)]
+    axes = surfaces[0].axes
+    if any(surface.axes != axes for surface in surfaces):
+        one, other = (surface.axes[1] for surface in surfaces)
+        raise OptionError(f"guides depend on {one} and on {other}; expected one second axis")
+    zero = Constant(first.span)
+    plain = [
+        curve
+        if isinstance(curve, TwoArguments | Constant | Table)
+        else _sampled(curve, zero, (1.0, 0.0))
+        for curve in (first, second)
+    ]
+    own = np.unique(np.concatenate([np.array(curve.kinks) for curve in plain]))
+    other = np.unique(np.concatenate([np.array(one.positions[1]) for one in surfaces]))
+    if len(own) * len(other) > limits.MAX_POINTS:
+        raise OptionError(
+            f"guides need {len(own) * len(other):,} points; at most {limits.MAX_POINTS:,}"
+        )
+    at = {axes[0]: own[:, None], axes[1]: other}
+    total = sum(
+        weight * np.broadcast_to(curve.evaluate_at(axes[0], at), (len(own), len(other)))
+        for weight, curve in zip(weights, plain, strict=True)
+    )
+    positions = (tuple(own.tolist()), tuple(other.tolist()))
+    return TwoArguments(first.span, axes, positions, tuple(map(tuple, np.asarray(total).tolist())))
+
+
+def _coefficients(curve: Constant | Ramp | Poly) -> tuple[float, ...]:
+    if isinstance(curve, Constant):
+        return (curve.value,)
+    if isinstance(curve, Poly):
+        return curve.coefficients
+    low, high = curve.span
+    slope = curve.value / (high - low)
+    return (-slope * low, slope)
+
+
+def _terms(
+    first: Constant | Harmonics, second: Constant | Harmonics, weights: Weights
+) -> tuple[tuple[float, float, float], ...]:
+    found: dict[tuple[float, float], float] = {}
+    for curve, weight in zip((first, second), weights, strict=True):
+        own = ((0.0, curve.value, 0.0),) if isinstance(curve, Constant) else curve.terms
+        for order, amplitude, phase in own:
+            place = (order, phase)
+            found[place] = found.get(place, 0.0) + weight * amplitude
+    return tuple((order, value, phase) for (order, phase), value in found.items())
+
+
+def _table(first: ErrorFunction, second: ErrorFunction, weights: Weights, at: Array) -> Table:
+    value = weights[0] * first.evaluate(at) + weights[1] * second.evaluate(at)
+    return Table(first.span, tuple(zip(at.tolist(), value.tolist(), strict=True)))
+
+
+def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> Table:
+    kinks = [q for q in (*first.kinks, *second.kinks) if first.span[0] < q < first.span[1]]
+    count = 65
+    while True:
+        at = np.union1d(np.linspace(*first.span, count), kinks[: limits.MAX_POINTS - MOST_SAMPLES])
+        found = _table(first, second, weights, at)
+        between = (at[1:] + at[:-1]) / 2.0
+        exact = weights[0] * first.evaluate(between) + weights[1] * second.evaluate(between)
+        largest = max(float(np.abs(exact).max()), abs(found.amplitude))
+        off = float(np.abs(exact - found.evaluate(between)).max())
+        if off <= CLOSE * largest or count >= MOST_SAMPLES:
+            return found
+        count = min(2 * count - 1, MOST_SAMPLES)
+
+
+GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
+RUN, DIRECTION = "run", "direction"  # columns that a file of runs may have
+T = TypeVar("T")
+
+
+def read_csv_column(path: Path, column: str) -> list[tuple[float, float]]:
+    """Read positions (mm or degrees, ascending, first column) and a named column (µm or µrad)."""
+    return _read_csv(path, lambda rows: _points(rows, column))
+
+
+def read_csv_runs(path: Path, column: str) -> tuple[Run, ...]:
+    """Read the runs of one error, a row a reading; ``run`` and ``direction`` tell them apart."""
+    return _read_csv(path, lambda rows: _runs(rows, column))
+
+
+def _read_csv(path: Path, read: Callable[[text_files.CsvRows], T]) -> T:
+    source = str(path)
+    text_files.check_file(path, limits.MAX_CSV_BYTES, source)
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = text_files.CsvRows(file, source, limits.MAX_POINTS)
+            found = read(rows)
+            rows.check()
+            return found
+    except UnicodeDecodeError:
+        text_files.read_text(path, limits.MAX_CSV_BYTES)  # names the byte
+        raise
+    except OSError as error:
+        raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
+
+
+def _column(rows: text_files.CsvRows, column: str) -> int:
+    behind = rows.header[1:]
+    if behind.count(column) == 1:
+        return behind.index(column) + 1
+    found = "stands there twice" if column in behind else "not found"
+    hint = "" if column in behind else near_miss(column, behind)
+    raise SceneError(rows.source, [f"column {column!r} {found}{hint}"])
+
+
+def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
+    points: list[tuple[float, float]] = []
+    index = _column(rows, column) if rows.header else 0
+    for line, row in rows:
+        position, value = (rows.number(row[at], line, limit=limits.MAX_ERROR) for at in (0, index))
+        if points and position <= points[-1][0]:
+            found = f"position {position:g} after {points[-1][0]:g}"
+            rows.note(f"line {line}: {found}; expected ascending positions")
+        points.append((position, value))
+    if not points and not rows.problems:
+        rows.note("has 0 rows below the header; expected a header and at least one row")
+    return points
+
+
+def _runs(rows: text_files.CsvRows, column: str) -> tuple[Run, ...]:
+    value_at = _column(rows, column)
+    run_at, way_at = (
+        rows.header.index(name) if name in rows.header else None for name in (RUN, DIRECTION)
+    )
+    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    for line, row in rows:
+        way = UNKNOWN if way_at is None else text_files.unguard_cell(row[way_at])
+        if way not in RUN_DIRECTIONS:
+            rows.note(
+                f"line {line}: direction {text_files.spell_value(way)}; expected +, - or nothing"
+            )
+        position = rows.number(row[0], line, limit=limits.MAX_LENGTH_MM)
+        value = rows.number(row[value_at], line, limit=limits.MAX_ERROR)
+        run = "" if run_at is None else text_files.unguard_cell(row[run_at])
+        found.setdefault((run, way), []).append((position, value))
+        if len(found) > limits.MAX_RUNS:
+            raise SceneError(
+                rows.source, [f"has more than {limits.MAX_RUNS} runs; expected at most so many"]
+            )
+    if not found and not rows.problems:
+        rows.note("has 0 rows below the header; expected at least one")
+    return tuple(Run(way, tuple(points)) for (_, way), points in found.items())
+
+
+@dataclass(frozen=True)
+class CurveReader:
+    """Reads curves of the errors of one axis."""
+
+    problems: Problems
+    span: tuple[float, float]
+    axis: str = ""
+    axes: Collection[str] = ()
+    folder: Path | None = None  # where CSV files are; None where they are not read
+
+    def read(self, raw: object, where: str, *, constant: bool = False) -> ErrorFunction | None:
+        before = len(self.problems.lines)
+        curve = self._read(raw, where, constant)
+        if constant and not is_number(raw) and len(self.problems.lines) == before:
+            self.problems.add(where, "is constant along its axis; expected a number", raw)
+        return curve if len(self.problems.lines) == before else None
+
+    def _read(self, raw: object, where: str, constant: bool) -> ErrorFunction | None:
+        if raw is MISSING:
+            self.problems.add(where, "is missing")
+            return None
+        reader = ValueReader(
+            # a constant must be a number: the file that a table names need not be read
+            (lambda _file, _column: ()) if constant else self.folder and self._csv_points,
+            axis=self.axis,
+            axes=self.axes,
+            curve=lambda inner, path: self._read(inner, text_files.location(where, path), constant),
+        )
+        table = cast("dict[str, object]", raw) if isinstance(raw, dict) else {}
+        if is_number(raw):
+            curve, form = Constant.read(raw, self.span, reader), ()
+        elif found := find_form(table):
+            kind, form = found
+            curve = kind.read({**dict.fromkeys(form, MISSING), **table}, self.span, reader)
+        else:
+            self.problems.add(where, f"expected {spell_forms()}", raw)
+            return None
+        self.problems.take(where, reader)
+        self.problems.only(where, table, form, "key")
+        return curve
+
+    def _csv_points(self, file: str, column: str) -> Points:
+        return read_csv_column(cast("Path", self.folder) / file, column)
+
+    def guides(
+        self,
+        key: str,
+        raw: dict[str, object],
+        where: str,
+        gantry: Gantry | None,
+        given: Collection[str],
+    ) -> dict[str, ErrorFunction]:
+        """Read ``{ guides = [CURVE, CURVE] }`` of a gantry: a mean, and a rotation."""
+        axis, problems = self.axis, self.problems
+        if gantry is None:
+            # The rest is checked all the same, with a distance that plays no part.
+            expected = f"[machine.gantry] {axis} = {{ span_mm = 1800 }} (a linear axis)"
+            problems.add(where, f"guides need the distance between them; expected {expected}")
+            gantry = Gantry(axis, 1000.0, default_across(axis))
+        if key != gantry.positioning_key:
+            expected = f"expected guides in {gantry.positioning_key}, the positioning of {axis}"
+            problems.add(where, expected, raw)
+            return {}
+        if gantry.rotation_key in given:
+            found = f"follows from the guides of {key}; expected one of the two"
+            problems.add(f"errors.{gantry.rotation_key}", found)
+        problems.only(where, raw, (GUIDES,), "key")
+        pair = raw[GUIDES]
+        entries = cast("list[object]", pair) if isinstance(pair, list) else []
+        if len(entries) != 2:
+            problems.add(f"{where}.{GUIDES}", "expected [first guide, second guide]", pair)
+            return {}
+        first, second = (
+            self.read(entry, f"{where}.{GUIDES}[{index}]") for index, entry in enumerate(entries)
+        )
+        if first is None or second is None:
+            return {}
+        weight = gantry.rotation_weight
+        try:
+            return {
+                key: combine_curves(first, second, (0.5, 0.5)),
+                gantry.rotation_key: combine_curves(first, second, (-weight, weight)),
+            }
+        except OptionError as error:
+            problems.add(where, str(error))
+            return {}

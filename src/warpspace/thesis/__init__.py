@@ -1,0 +1,1 @@
+"""The reference example: printed and computed numbers of the thesis."""
