@@ -11,7 +11,7 @@ import time
 
 import warpspace
 from warpspace.analysis.commands.montecarlo import sweep
-from warpspace.analysis.sampling.cases import BLOCK, MOST_BLOCKS, Case, Plan, sample_blocks
+from warpspace.analysis.sampling.cases import BLOCK, MOST_BLOCKS, Case, SamplingPlan, sample_blocks
 from warpspace.analysis.sampling.machine_sampling import montecarlo_each
 from warpspace.analysis.sampling.sampling_options import scene_draws
 
@@ -26,7 +26,7 @@ def case(scene: warpspace.Scene, over: str, samples: int) -> Case:
     """Build a case of the tool loop."""
     view = scene.view()
     draws = scene_draws(scene, view.loop, "uniform", clip=False)
-    return Case(scene.model, draws, scene.workspace, view, Plan(samples, over=over))
+    return Case(scene.model, draws, scene.workspace, view, SamplingPlan(samples, over=over))
 
 
 def main() -> None:

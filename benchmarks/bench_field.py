@@ -10,7 +10,7 @@ from timing import best
 from warpspace import evaluate, load_scene
 from warpspace.field.grid import build_grid
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import Constant, ErrorSet, Table
+from warpspace.machine.errors import Constant, ErrorSet, TableCurve
 from warpspace.scene.model import Scene
 
 NODES = 101
@@ -26,7 +26,7 @@ def with_errors(scene: Scene, count: int) -> Scene:
     functions = {
         key: Constant((-500.0, 500.0), 7.0)
         if parameter(key).is_constant
-        else Table((-500.0, 500.0), CURVE)
+        else TableCurve((-500.0, 500.0), CURVE)
         for key in spread
     }
     return replace(scene, errors=ErrorSet(functions))

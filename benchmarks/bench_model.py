@@ -8,7 +8,7 @@ from timing import best, in_turns
 
 from warpspace import load_scene
 from warpspace.analysis.statistics import volume_statistics
-from warpspace.analysis.uncertainty.propagation import volume_doubt
+from warpspace.analysis.uncertainty.propagation import volume_uncertainty
 from warpspace.field.evaluate import ErrorBasis, amplitudes_of
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
@@ -35,7 +35,7 @@ def sure_move() -> Row:
     rows = tuple(map(tuple, (half @ half.T).tolist()))
     scene = replace(bare, errors=errors, covariance=Covariance(keys, rows))
     grid = build_grid(scene.model, scene.workspace, NODES)
-    basis, found = grid_basis(scene, grid), volume_doubt(scene, scene.view(), NODES)
+    basis, found = grid_basis(scene, grid), volume_uncertainty(scene, scene.view(), NODES)
     values = rng.standard_normal(len(basis.keys))
     moved = basis.evaluate(values).error_um
 

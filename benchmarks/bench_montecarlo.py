@@ -7,7 +7,7 @@ from timing import best, in_turns, python
 
 import warpspace
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
-from warpspace.analysis.sampling.cases import Plan, Site, node_gains, reduce_nodes
+from warpspace.analysis.sampling.cases import SamplingPlan, Site, node_gains, reduce_nodes
 from warpspace.analysis.sampling.distribution import build_draws, loop_keys
 from warpspace.analysis.sampling.machine_sampling import sample_chunks
 from warpspace.field.evaluate import View
@@ -51,7 +51,7 @@ def measure() -> Section:
     def engine(over: str) -> None:
         for _ in sample_chunks(
             lambda rng, count: reduce_nodes(draws.draw(rng, count), gains, over),
-            Plan(samples=MACHINES),
+            SamplingPlan(samples=MACHINES),
         ):
             pass
 

@@ -10,7 +10,7 @@ from table import Growth, Row, Section
 from timing import best
 
 from warpspace import load_scene
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.parts.workpiece import Part, load_part, make_points, point_basis
 
 AROUND = 1000  # vertices of a million
@@ -46,16 +46,18 @@ def measure() -> Section:
         files = [Path(folder) / f"{around}.ply" for around in GROWING]
         for around, path in zip(GROWING, files, strict=True):
             ball(around).export(path)
-        costs = [best(lambda: Part(file=str(path)).run(scene, silent), 3) for path in files]  # noqa: B023
+        costs = [
+            best(lambda: Part(file=str(path)).run(scene, ignore_progress), 3) for path in files
+        ]
         files.append(files[-1].with_suffix(".stl"))
         ball(AROUND).export(files[-1])
-        costs.append(best(lambda: Part(file=str(files[-1])).run(scene, silent), 3))
+        costs.append(best(lambda: Part(file=str(files[-1])).run(scene, ignore_progress), 3))
         rows = list[Row]()
         for path, cost in zip(files[-2:], costs[-2:], strict=True):
             of, beside = path.suffix[1:].upper(), "reading and copying it"
             copied = best(lambda: trimesh.load_mesh(path, process=False).copy(), 3)  # noqa: B023
             tracemalloc.start()
-            made = Part(file=str(path)).run(scene, silent).part
+            made = Part(file=str(path)).run(scene, ignore_progress).part
             most = tracemalloc.get_traced_memory()[1] / MEGABYTE
             tracemalloc.stop()
             own = (made.vertices_mm.nbytes + made.triangles.nbytes) / MEGABYTE

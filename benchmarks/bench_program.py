@@ -5,7 +5,7 @@ from table import Growth, Row, Section
 from timing import best
 
 from warpspace import load_scene
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.parts.interpreter import Setup, read_program
 from warpspace.parts.program import Program, trace_program
 
@@ -52,7 +52,7 @@ def measure() -> Section:
     costs = [best(lambda: trace(text), 3) for text in texts]  # noqa: B023
     growth = [Growth("program, tool centre point", "blocks", [*map(float, GROWING)], costs)]
     asked = [Program(file="x", text=program(blocks)) for blocks in MENDED]
-    ran = [one.run(scene, silent) for one in asked]
+    ran = [one.run(scene, ignore_progress) for one in asked]
     costs = [best(one.texts, 2) for one in ran]
     growth.append(Growth("program mended", "blocks", [*map(float, MENDED)], costs))
     words = (

@@ -22,7 +22,7 @@ from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_bodies import tool_point
 from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.evaluation.point_explanation import measured, pick_worst, with_picked
-from warpspace.app.panels.analysis_panel import Answer
+from warpspace.app.panels.analysis_panel import AnalysisOutcome
 from warpspace.app.panels.conventions import with_reference
 from warpspace.app.panels.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
@@ -192,7 +192,7 @@ def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
 def shown(part, state, found):
     """Give what the section says of a table that was computed."""
     part._asked = part.question(state)
-    part._answer = Answer(part._asked, found)
+    part._answer = AnalysisOutcome(part._asked, found)
     return section(part, state)
 
 

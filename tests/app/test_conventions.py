@@ -28,7 +28,7 @@ from warpspace.field.grid import Workspace
 from warpspace.kinematics.model import Loop, Model
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.definition import build_machine
-from warpspace.machine.errors import Constant, ErrorSet, Ramp, Table
+from warpspace.machine.errors import Constant, ErrorSet, Ramp, TableCurve
 from warpspace.picture.map_mesh import edge_pieces
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import Scene, evaluate
@@ -177,7 +177,7 @@ VOLUME = Workspace({"X": SPAN, "Y": (0.0, 0.0), "Z": (0.0, 0.0)})
         ("EB0Z", Constant(SPAN, 10.0), {"squareness=over_90": 6.0}, "squareness=under_90"),
         ("EA0Z", Constant(SPAN, 10.0), {"squareness=under_90": 6.0}, "squareness=over_90"),
         # a tilt is lost with the reference line
-        ("EYX", Table(SPAN, ((-100.0, 0.0), (100.0, 8.0))),
+        ("EYX", TableCurve(SPAN, ((-100.0, 0.0), (100.0, 8.0))),
          dict.fromkeys(("end_point", "least_squares", "minimum_zone"), 4.0), "measuring_line"),
         ("EXX", Ramp(SPAN, 6.0), {"zero_at": 3.0}, "end_point"),
     ],

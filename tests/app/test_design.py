@@ -8,7 +8,7 @@ import pytest
 import warpspace
 from app.parts import answer_of, lone_part, section, wait
 from warpspace import load_scene
-from warpspace.analysis.commands.adjust import Repair
+from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
 from warpspace.app.documents.output_services import Services
 from warpspace.app.panels.design import (
@@ -51,7 +51,7 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     state = replace(START, forms={"repair.objective": "rms", "repair.grid": "9"})
     ran(part, state)
     found = part._answer.found
-    said = Repair(grid=9).run(FIRST, lambda _: None)
+    said = Adjust(grid=9).run(FIRST, lambda _: None)
     assert [one.adjust for one in found.repairs] == [one.adjust for one in said.repairs]
     assert part.offered(found) == [0, 1]  # of sets of one, two and three
     shown = section(part, state)

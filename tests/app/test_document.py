@@ -53,7 +53,7 @@ from warpspace.app.state import edits
 from warpspace.app.state.app_state import Comparison, Side, start_state
 from warpspace.app.state.tree import leaves, put
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
-from warpspace.machine.errors import Ramp, Table
+from warpspace.machine.errors import Ramp, TableCurve
 from warpspace.machine.limits import MAX_ERROR, MAX_PACKED_TEXT
 from warpspace.scene.library import load_scene, scene_names
 
@@ -65,7 +65,7 @@ CAMERA = CameraMemory((10.0, -20.0, 12.0), (0.0, 0.5, 1.5), (0.0, 0.0, 1.0), 0.3
 @pytest.mark.parametrize("way", ["file", "link"])
 def test_conventions_curves_camera_and_what_is_compared_come_back_identical(way):
     # what no other machine knows by name is stored with its content
-    curve = Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 8.0), (275.0, -2.0)))
+    curve = TableCurve((-275.0, 275.0), ((-275.0, 0.0), (0.0, 8.0), (275.0, -2.0)))
     pinned = with_pin(with_choice(edits.with_curve(START, "EXX", curve), "direction C=-1"))
     opened = replace(SECOND, name="shop floor", title="Shop floor, machine 7")
     compared = with_sides(pinned, scene_side(opened), pinned.comparison.a).comparison
@@ -208,7 +208,9 @@ def edited():
     [
         edited(),
         with_pin(edited()).with_amplitude("EXX", 1.0),
-        edits.with_curve(edited(), "EYX", Table((-275.0, 275.0), ((-275.0, 1.0), (0.0, -3.0)))),
+        edits.with_curve(
+            edited(), "EYX", TableCurve((-275.0, 275.0), ((-275.0, 1.0), (0.0, -3.0)))
+        ),
     ],
     ids=["known scene", "comparison", "edited curve"],
 )

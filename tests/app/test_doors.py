@@ -21,7 +21,7 @@ from reliability import doors
 from reliability.doors import GUESSES, HOSTS, ORIGINS, PATHS, TOKEN, UPGRADE
 from warpspace.app.server import connection_guard, viewer
 from warpspace.app.server.connection_guard import Limits, Rate
-from warpspace.app.server.request_policy import Access, Doors, Place, read_place
+from warpspace.app.server.request_policy import Access, HostPort, RequestPolicy, read_place
 from warpspace.app.server.viewer import Viewer, served_names
 from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
@@ -177,7 +177,7 @@ def test_a_proxy_is_allowed(guarded):
 
 
 def test_all_addresses_of_a_machine_are_served_but_not_all_names():
-    served_here = Doors(served_names("0.0.0.0", "0.0.0.0"), 8080, everywhere=True)
+    served_here = RequestPolicy(served_names("0.0.0.0", "0.0.0.0"), 8080, everywhere=True)
     served = ("localhost:8080", "192.0.2.7", f"{socket.gethostname()}:8080")
     for host in (*served, "evil.example", "192.0.2.8"):
         refused = served_here.check(Request("/", Headers(Host=host)), "192.0.2.7")
@@ -193,8 +193,8 @@ def test_one_address_of_a_machine_is_served_under_its_name(monkeypatch):
 
 
 def test_places():
-    assert read_place("[::ffff:127.0.0.1]:80") == Place("127.0.0.1", 80)
-    assert read_place("Review.Example:8443") == Place("review.example", 8443)
+    assert read_place("[::ffff:127.0.0.1]:80") == HostPort("127.0.0.1", 80)
+    assert read_place("Review.Example:8443") == HostPort("review.example", 8443)
     for text in ("", "a b", "a/b", "[zz]", "a:", "a:b", "x@y", "a\0"):
         assert read_place(text) is None
 

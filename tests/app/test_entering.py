@@ -14,7 +14,7 @@ from warpspace.app.state.tree import toggled
 from warpspace.app.state.typed_numbers import read_typed, spell_typed
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.registry import curve_kind
-from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
+from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, TableCurve
 
 START = start_state(load_scene("dvf5000_first"), nodes=7)
 SPAN = (-275.0, 275.0)
@@ -62,19 +62,19 @@ def test_a_box_spells_what_it_reads_back(value):
 def test_harmonics_become_a_table_of_the_same_shape(order):
     span = (0.0, 360.0)
     wave = Harmonics(span, ((order, 4.0, 30.0), (1.0, 1.0, 0.0)))
-    table = Table.from_curve(wave, span)
+    table = TableCurve.from_curve(wave, span)
     at = np.linspace(*span, 5000)
     apart = np.abs(table.evaluate(at) - wave.evaluate(at)).max()
     assert apart <= 0.0025 * abs(wave.amplitude)
 
 
-PASTED = Table(SPAN, ((-275.0, -1.5), (0.0, 2.0), (275.0, 0.25)))
+PASTED = TableCurve(SPAN, ((-275.0, -1.5), (0.0, 2.0), (275.0, 0.25)))
 EXAMPLES = [
     Constant(SPAN, 23.1),
     Ramp(SPAN, -43.7),
     Poly(SPAN, (0.5, 0.02, -1e-5)),
     Harmonics(SPAN, ((1.0, 3.0, 0.0), (2.0, 0.5, 90.0))),
-    Table(SPAN, ((-275.0, 0.0), (0.0, 4.1), (275.0, -1.0))),
+    TableCurve(SPAN, ((-275.0, 0.0), (0.0, 4.1), (275.0, -1.0))),
 ]
 
 
@@ -95,8 +95,8 @@ def test_rows_read_back_to_the_function_and_an_error_taken_to_zero_keeps_it(func
         ("ramp", "−3  # at the upper end", Ramp(SPAN, -3.0)),
         ("polynomial", "0; 0.02", Poly(SPAN, (0.0, 0.02))),
         ("harmonics", "1 3", Harmonics(SPAN, ((1.0, 3.0, 0.0),))),
-        ("table", "-275, 0\n275, 4.1", Table(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
-        ("table", "-275\t0\n\n275\t4,1", Table(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
+        ("table", "-275, 0\n275, 4.1", TableCurve(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
+        ("table", "-275\t0\n\n275\t4,1", TableCurve(SPAN, ((-275.0, 0.0), (275.0, 4.1)))),
         ("table", "X [mm]\tEXX [µm]\n-275\t-1,5\n0\t2\n275\t0,25", PASTED),
         ("table", "Position;Wert 1\r\n−275;−1,5\r\n0;2,0\r\n275;2,5e-1\r\n", PASTED),
         ("table", '"X","EXX"\n-275.0,-1.5\n0.0,2.0\n275.0,0.25', PASTED),
@@ -150,7 +150,7 @@ def test_another_kind_starts_from_the_present_curve(function, kind):
 
 def test_long_tables_are_thinned_out_for_editing():
     points = tuple((float(q), 0.1 * q) for q in np.linspace(-275, 275, 5501))
-    rows = spell_rows(Table(SPAN, points)).splitlines()
+    rows = spell_rows(TableCurve(SPAN, points)).splitlines()
     ends = [rows[at].split() for at in (0, -1)]
     assert (len(rows), ends) == (2000, [["-275", "-27.5"], ["275", "27.5"]])
 

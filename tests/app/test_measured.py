@@ -17,8 +17,8 @@ from warpspace.app.panels.import_panel import ImportPart
 from warpspace.app.panels.measurement import (
     MOST_FILES,
     CalibratePart,
-    Held,
     TestsPart,
+    UploadedFile,
     arrows_of,
     take_file,
 )
@@ -247,7 +247,7 @@ def test_nothing_of_a_browser_becomes_a_path(tmp_path, monkeypatch):
 
 
 def test_files_have_names_of_their_own_and_are_few():
-    files: tuple[Held, ...] = ()
+    files: tuple[UploadedFile, ...] = ()
     for _ in range(MOST_FILES):
         files = (*files, take_file(SCENE, BUNDLED.decode(), "a.csv", None, files))
     assert len({one.name for one in files}) == MOST_FILES

@@ -20,7 +20,7 @@ from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene
-from warpspace.scene.notes import Mark, Note, story, told
+from warpspace.scene.notes import Note, NoteAnchor, story, told
 
 START = start_state(SCENES[0])
 EVIL = "<img src=x onerror='window.taken=1'>"
@@ -120,7 +120,7 @@ def test_a_note_on_a_trace_or_a_body_is_pinned_where_that_is_drawn():
     point = Picked({"X": 0.0, "B": 20.0}, Loop.WORKPIECE, (0.0, 275.0, 450.0))
     part, _ = alone(replace(START, picked=point))
     traced = pin(part)
-    assert traced.on == Mark("workpiece", point.point_mm)
+    assert traced.on == NoteAnchor("workpiece", point.point_mm)
     assert (traced.at["B"], {*traced.at}) == (20.0, {*START.scene.machine.axes})
     found = answer(START, point, 1.0)
     assert traced.numbers["here_um"] == pytest.approx(np.linalg.norm(found.drawn_um), abs=0.02)
@@ -128,7 +128,7 @@ def test_a_note_on_a_trace_or_a_body_is_pinned_where_that_is_drawn():
     part.store.apply(lambda state: put(state, "page.note_place", "Z"))
     part.store.apply(lambda state: put(state, "page.note_text", "Column"))
     body = part.do("keep").review[-1]
-    assert (body.on, dict(body.at)) == (Mark(body="Z"), {})
+    assert (body.on, dict(body.at)) == (NoteAnchor(body="Z"), {})
     state = replace(START, review=(traced, body))
     (flag,) = note_labels(LIVE.evaluate(state))  # no body is drawn
     drawn = LIVE.evaluate(put(state, "machine.shown", "1"))

@@ -17,7 +17,7 @@ from warpspace.analysis.registry import register, unregister
 from warpspace.app.documents.output_services import CancelledError, Services
 from warpspace.app.evaluation import cache
 from warpspace.app.panels.error_list import used_keys
-from warpspace.app.panels.panel import Context, Jobs, Part
+from warpspace.app.panels.panel import Context, Jobs, Panel
 from warpspace.app.server import session
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
@@ -140,7 +140,7 @@ def watched(monkeypatch):
     """Jobs, with what they show and report."""
     monkeypatch.setattr("warpspace.app.panels.panel.TICK_S", -1.0)
     bars, failures = list[str](), list[Exception]()
-    found = Jobs(Part(Nobody()), lambda: bars.append(str(found.html())), failures.append)
+    found = Jobs(Panel(Nobody()), lambda: bars.append(str(found.html())), failures.append)
     return found, bars, failures
 
 

@@ -14,7 +14,7 @@ from warpspace.app.state.app_state import Exclusions, start_state
 from warpspace.app.state.store import SAME_STEP_S, STEPS, StateStore, changes
 from warpspace.app.state.tree import put, spell
 from warpspace.kinematics.model import Loop
-from warpspace.machine.errors import Constant, Ramp, Table
+from warpspace.machine.errors import Constant, Ramp, TableCurve
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene
 
@@ -248,7 +248,7 @@ SPAN = (-275.0, 275.0)
 
 
 def test_a_curve_moves_amplitude_slider_and_picture():
-    curve = Table(SPAN, ((-275.0, 0.0), (0.0, 30.0), (275.0, -4.0)))
+    curve = TableCurve(SPAN, ((-275.0, 0.0), (0.0, 30.0), (275.0, -4.0)))
     state = edits.with_curve(FIRST, "EXX", curve)
     assert state.amplitudes["EXX"] == 30.0
     assert state.curve("EXX") == curve

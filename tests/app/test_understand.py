@@ -8,7 +8,7 @@ import pytest
 
 from app.parts import LIVE, Alone, lone_part, wait
 from warpspace.analysis.commands.distance import Distance
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.analysis.registry import entries
 from warpspace.app.drawing.around import around
 from warpspace.app.drawing.labels import point_labels
@@ -304,7 +304,7 @@ def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_
     words = [label.text for label in point_labels(picture) if label.kind == "measured"]
     found = Distance(
         start={"X": -200, "Y": 0}, end={"X": 200, "Y": 0}, corner={"X": -200, "Y": 200}
-    ).run(FIRST, silent)
+    ).run(FIRST, ignore_progress)
     assert words == found.words()
     assert words[0].startswith("400.000 → ")
     assert words[1].count("Δ") == 3

@@ -17,7 +17,7 @@ from warpspace.app.state.tree import put
 from warpspace.cli.services import tell_story
 from warpspace.outputs.report import ReportSettings, build_report
 from warpspace.outputs.report.review import build_review, first_page
-from warpspace.outputs.report.templating import Picture, render_html, render_pdf
+from warpspace.outputs.report.templating import ReportFigure, render_html, render_pdf
 from warpspace.scene.notes import Note, Reply
 
 FAST = ReportSettings(grid=5, samples=2000)
@@ -106,7 +106,7 @@ def test_findings_are_in_page_and_paper_escaped(renderer):
     report = build_report([scene], FAST, tell=tell_story)
     assert [part.heading for part in report.sections[:2]] == ["", "Findings and decisions"]
     assert report.sections[2].heading.startswith("Appendix A")
-    drawn = [block for block in report.sections[1].blocks if isinstance(block, Picture)]
+    drawn = [block for block in report.sections[1].blocks if isinstance(block, ReportFigure)]
     assert [one.caption.partition(":")[0] for one in drawn] == ["Step 1 of 2", "Step 2 of 2"]
     assert "view from above" in drawn[0].caption
     page = re.sub(r'(src|srcdoc)="[^"]*"', "", render_html(report))

@@ -11,7 +11,7 @@ from chains import models, positions, vectors
 from warpspace.field.evaluate import View, build_basis, evaluate_exact, evaluate_first_order
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection, axis_parameters
-from warpspace.machine.errors import Constant, Directional, ErrorSet, Ramp, Table, TwoArguments
+from warpspace.machine.errors import Constant, Directional, ErrorSet, Ramp, TableCurve, TwoArguments
 
 SPAN = (-500.0, 500.0)
 STEP = 10.0
@@ -25,7 +25,7 @@ def functions(draw, model, axis):
 
     def one():
         if not others or draw(st.booleans()):
-            return Table(SPAN, ((-400.0, draw(VALUES)), (10.0, draw(VALUES)), (300.0, 3.0)))
+            return TableCurve(SPAN, ((-400.0, draw(VALUES)), (10.0, draw(VALUES)), (300.0, 3.0)))
         rows = tuple(tuple(draw(VALUES) for _ in range(3)) for _ in range(2))
         axes = (axis, draw(st.sampled_from(others)))
         return TwoArguments(SPAN, axes, ((-300.0, 200.0), (-150.0, 0.0, 100.0)), rows)

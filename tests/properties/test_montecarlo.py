@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from warpspace.analysis.sampling.cases import Case, Over, Plan, reduce_nodes
+from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan, reduce_nodes
 from warpspace.analysis.sampling.distribution import Distribution, Stream, build_draws, loop_keys
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.field.evaluate import View
@@ -25,7 +25,7 @@ def run(chain, loop, scale, **plan):
     widths = {"translation": 10 * scale, "rotation": 20 * scale, "squareness": 25 * scale}
     keys = loop_keys(model, loop, model.machine.parameter_keys)
     draws = build_draws(ToleranceSet(widths), keys, Distribution.UNIFORM)
-    return montecarlo(Case(model, draws, Workspace(ranges), View(loop), Plan(**plan)))
+    return montecarlo(Case(model, draws, Workspace(ranges), View(loop), SamplingPlan(**plan)))
 
 
 @settings(max_examples=30)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpspace import evaluate
-from warpspace.analysis.sampling.cases import Plan
+from warpspace.analysis.sampling.cases import SamplingPlan
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.state.app_state import EXAGGERATION, NODES, start_state
@@ -139,7 +139,7 @@ def test_widgets_and_options_take_the_limits_of_files():
         (lambda value: FigureSettings(exaggeration=value), limits.EXAGGERATION),
         (lambda value: FigureSettings(range_top=value), limits.RANGE_TOP),
         (node_counts, limits.GRID_NODES),
-        (lambda value: Plan(samples=value).check(), limits.SAMPLES),
+        (lambda value: SamplingPlan(samples=value).check(), limits.SAMPLES),
     ],
     ids=["exaggeration", "range", "grid", "samples"],
 )

@@ -13,7 +13,7 @@ from warpspace.machine.errors import (
     Harmonics,
     Poly,
     Ramp,
-    Table,
+    TableCurve,
     Tolerance,
     ToleranceSet,
 )
@@ -52,7 +52,7 @@ def test_any_numbers_and_any_title_survive(title, value, centre, half, rows, exa
                 "EAX": Ramp(x, value),
                 "EXX": Poly(x, (value, 1e-7)),
                 "EXC": Harmonics(c, ((1.0, value, 90.0), (2.0, 0.1 + 0.2, 0.0))),
-                "EYX": Table(x, tuple(sorted(rows))),
+                "EYX": TableCurve(x, tuple(sorted(rows))),
             }
         ),
         tolerances=ToleranceSet(

@@ -29,7 +29,7 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
 from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
 from warpspace.bench.data import DataColumn
-from warpspace.bench.plan import Outcome, Quantity, build_plan
+from warpspace.bench.plan import Outcome, TestQuantity, build_plan
 from warpspace.cli.services import build_services, write_export
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.kinematics.chain import jacobian, nominal_point
@@ -43,7 +43,7 @@ from warpspace.kinematics.model import (
 )
 from warpspace.machine.curves.curve import ErrorFunction, single_value
 from warpspace.machine.curves.registry import register_curve, unregister_curve
-from warpspace.machine.errors import Constant, Poly, Table
+from warpspace.machine.errors import Constant, Poly, TableCurve
 from warpspace.outputs.drawing.sheet import Drawing, metadata, parameter_words
 from warpspace.outputs.exports.formats import (
     ExportFormat,
@@ -98,7 +98,7 @@ class HalfSine(ErrorFunction):
         return {"half_sine": self.value}
 
     def for_span(self, span):
-        return self if span == self.span else Table.from_curve(self, self.span)
+        return self if span == self.span else TableCurve.from_curve(self, self.span)
 
     def describe(self, unit, value, position):
         return f"half sine of {value(self.value)} {unit} in the middle"
@@ -155,7 +155,7 @@ class Corner(BenchTest):
         return self.plan(scene), table["x_um"]
 
     def evaluate(self, plan, readings):
-        return Outcome((Quantity("x_um", "reading", float(readings.mean()), "µm"),))
+        return Outcome((TestQuantity("x_um", "reading", float(readings.mean()), "µm"),))
 
     def charts(self, runs):
         curves = tuple(

@@ -5,17 +5,17 @@ import pytest
 
 import warpspace
 from bench_scenes import scene_with
-from warpspace.bench.base import Run, run_test
+from warpspace.bench.base import TestRun, run_test
 from warpspace.bench.kinds.ball_plate import BallPlate
 from warpspace.bench.kinds.circular import Circular
 from warpspace.bench.kinds.cone_frustum import ConeFrustum
 from warpspace.bench.kinds.diagonals import Diagonals
 from warpspace.bench.kinds.positioning import Positioning
-from warpspace.bench.kinds.rotary_axis import RotaryAxis, Sphere
+from warpspace.bench.kinds.rotary_axis import RotaryAxis, RTest
 from warpspace.bench.kinds.straightness import Squareness, Straightness
 from warpspace.bench.plan import simulate
 from warpspace.machine.curves.simple import Directional
-from warpspace.machine.errors import Constant, Harmonics, Poly, Table
+from warpspace.machine.errors import Constant, Harmonics, Poly, TableCurve
 
 EXACT = {"rel": 1e-6, "abs": 1e-9}
 
@@ -23,7 +23,7 @@ EXACT = {"rel": 1e-6, "abs": 1e-9}
 def run(scene, test, *, exact=False):
     plan = test.plan(scene)
     readings = simulate(scene, plan, exact=exact)
-    return Run("model", plan, readings, test.evaluate(plan, readings))
+    return TestRun("model", plan, readings, test.evaluate(plan, readings))
 
 
 def backlash(value):
@@ -246,7 +246,7 @@ def test_parabola_has_the_same_straightness_by_every_line():
 
 def test_reference_lines_of_a_kink():
     # three points 0, 0, 8: the middle one lies 4 below the line through the ends
-    scene = scene_with(EZX=Table((-275.0, 275.0), ((-275.0, 0.0), (0.0, 0.0), (275.0, 8.0))))
+    scene = scene_with(EZX=TableCurve((-275.0, 275.0), ((-275.0, 0.0), (0.0, 0.0), (275.0, 8.0))))
     found = run(scene, Straightness(axis="X", across="z", points=3))
     assert found.outcome["end_points_um"] == pytest.approx(4.0, **EXACT)
     assert found.outcome["minimum_zone_um"] == pytest.approx(4.0, **EXACT)
@@ -294,7 +294,7 @@ def test_axis_average_line_of_a_table(axis, keys):
 
 def test_tilted_c_on_the_r_test():
     # the ball at radius 100, height 60 above the axis' origin: α·h along y, −α·R·sin θ along z
-    found = run(scene_with(EA0C=25.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    found = run(scene_with(EA0C=25.0), RTest(axis="C", ball=(100.0, 0.0, 60.0)))
     theta = np.deg2rad(found.plan.marks["angle_deg"][:73])
     x, y, z = found.readings.reshape(3, -1)
     np.testing.assert_allclose(x, 0.0, atol=1e-9)
@@ -304,18 +304,18 @@ def test_tilted_c_on_the_r_test():
 
 
 def test_location_of_c_on_the_r_test():
-    found = run(scene_with(EX0C=8.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    found = run(scene_with(EX0C=8.0), RTest(axis="C", ball=(100.0, 0.0, 60.0)))
     x, y, _ = found.readings.reshape(3, -1)
     np.testing.assert_allclose(x, -8.0, rtol=1e-9)
     np.testing.assert_allclose(y, 0.0, atol=1e-9)
     turned = run(
-        scene_with(EX0C=8.0), Sphere(axis="C", ball=(100.0, 0.0, 60.0), frame="workpiece")
+        scene_with(EX0C=8.0), RTest(axis="C", ball=(100.0, 0.0, 60.0), frame="workpiece")
     ).outcome
     assert turned["x_um"] == pytest.approx(16.0, **EXACT)
 
 
 def test_a_ball_that_stands_elsewhere_is_fitted_away():
-    test = Sphere(axis="C", ball=(100.0, 0.0, 60.0))
+    test = RTest(axis="C", ball=(100.0, 0.0, 60.0))
     scene = scene_with()
     plan = test.plan(scene)
     design = np.stack(list(plan.setup.values()), -1)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from warpspace import load_scene
-from warpspace.analysis.commands.conformance import Reach, largest_box
-from warpspace.analysis.commands.form import Certify, zone_width
+from warpspace.analysis.commands.conformance import Conformance, largest_box
+from warpspace.analysis.commands.form import Form, zone_width
 from warpspace.analysis.commands.line import Line
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.simple import Constant, Poly
 from warpspace.machine.errors import ErrorSet
@@ -25,7 +25,7 @@ def with_errors(**errors):
 
 def certified(scene):
     found: dict[tuple[str, str], list[float]] = {}
-    for one in Certify(nodes=5).run(scene, silent).deviations:
+    for one in Form(nodes=5).run(scene, ignore_progress).deviations:
         found.setdefault((one.kind, one.of), []).append(one.value)
     return found
 
@@ -67,7 +67,7 @@ def test_the_zone_is_the_narrowest():
 def test_of_an_error_that_grows_along_x_the_reach_is_its_share_of_the_range():
     # |E| = |s·q| ≤ limit for |q| ≤ limit/s: limit 13.75 µm of 27.5 µm at the ends is half of X
     scene = with_errors(EXX=Poly(X, (0.0, 0.1)))
-    found = Reach(limit_um=13.75, nodes=21).run(scene, silent)
+    found = Conformance(limit_um=13.75, nodes=21).run(scene, ignore_progress)
     assert found.percent == pytest.approx(50.0, abs=1.5)
     assert found.box["X"] == pytest.approx((-137.5, 137.5), abs=1e-6)
     assert found.box["Y"] == pytest.approx(Y)
@@ -89,14 +89,14 @@ def test_the_largest_box_is_that_of_trying_all():
 
 def test_nothing_keeps_a_limit_below_every_error():
     scene = with_errors(EXX=Constant(Y, 50.0))
-    found = Reach(limit_um=10.0, nodes=3).run(scene, silent)
+    found = Conformance(limit_um=10.0, nodes=3).run(scene, ignore_progress)
     assert (found.percent, found.box) == (0.0, None)
 
 
 def test_along_a_line_a_pitch_turns_the_tool_and_moves_it_by_its_lever():
     scene = with_errors(EC0Y=Constant(Y, 20.0))
     ends = ((("X", 0.0), ("Y", -100.0)), (("X", 0.0), ("Y", 100.0)))
-    found = Line(start=ends[0], end=ends[1], points=3).run(scene, silent)
+    found = Line(start=ends[0], end=ends[1], points=3).run(scene, ignore_progress)
     assert found.length_mm == pytest.approx(200.0)
     # E_x = −γ·(y of the tool from the origin of Y): 20 µrad · 200 mm = 4 µm less at the end
     assert found.error_um[:, 0] - found.error_um[0, 0] == pytest.approx([0.0, -2.0, -4.0])
@@ -106,4 +106,4 @@ def test_along_a_line_a_pitch_turns_the_tool_and_moves_it_by_its_lever():
 def test_a_line_of_one_point_is_refused():
     same = (("X", 1.0),)
     with pytest.raises(OptionError, match="one point"):
-        Line(start=same, end=same).run(NOMINAL, silent)
+        Line(start=same, end=same).run(NOMINAL, ignore_progress)

@@ -7,7 +7,7 @@ import GTC
 import numpy as np
 import pytest
 
-from warpspace.analysis.uncertainty.propagation import field_doubt, volume_doubt
+from warpspace.analysis.uncertainty.propagation import field_uncertainty, volume_uncertainty
 from warpspace.bench.placing import ball_point
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.instruments import instrument_names, load_instrument
@@ -61,7 +61,7 @@ matrix = [[4.0], [3.0, 9.0]]
 """
     scene, at = parse_scene(MACHINE + text, "s"), {"X": 40.0, "Y": -70.0, "Z": -150.0}
     axes = complete_coordinates(scene.machine, at, scene.workspace.positions)
-    found = field_doubt(scene, evaluate(scene, at=at).error_um, axes, scene.view())
+    found = field_uncertainty(scene, evaluate(scene, at=at).error_um, axes, scene.view())
     turn, tilt = GTC.ureal(20.0, 2.0, independent=False), GTC.ureal(-30.0, 3.0, independent=False)
     GTC.set_correlation(0.5, turn, tilt)
     # a rotation about z at Y, about x at Z: lever times angle, mm times µrad is nm
@@ -299,7 +299,7 @@ def held_by_planted_machines(name, trials):
             held["parameters"].append(low <= truth.errors.amplitude(one.key) <= high)
         axes = complete_coordinates(scene.machine, CORNER, scene.workspace.positions)
         own, wanted = (evaluate(one, at=CORNER) for one in (found.scene, truth))
-        sure = field_doubt(found.scene, own.error_um, axes, scene.view())
+        sure = field_uncertainty(found.scene, own.error_um, axes, scene.view())
         off = own.error_um - wanted.error_um
         held["point"] += list(np.abs(off) <= sure.u95_um)
         held["norm"].append(abs(own.norm_um - wanted.norm_um) <= sure.u95_norm_um)
@@ -310,7 +310,7 @@ def held_by_planted_machines(name, trials):
         for limit in wanted.norm_um + sure.u_norm_um * away:
             stated = sure.doubt.within(own.norm_um, sure.u95_norm_um, -np.inf, limit)
             verdicts.append((float(stated), wanted.norm_um <= limit))
-        volume = volume_doubt(found.scene, scene.view(), 5)
+        volume = volume_uncertainty(found.scene, scene.view(), 5)
         off = volume.norm_um - evaluate(truth, grid=5).norm_um
         u95 = volume.statistics()["mean_um"]
         held["mean"].append(abs(np.sum(volume.shares * off)) <= u95)

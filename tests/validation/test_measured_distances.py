@@ -7,7 +7,7 @@ import pytest
 
 from warpspace import load_scene
 from warpspace.analysis.commands.distance import Distance
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError
 from warpspace.machine.curves.simple import Constant, Poly
 from warpspace.machine.errors import ErrorSet
@@ -19,7 +19,7 @@ X, Y = (NOMINAL.workspace.ranges[name] for name in "XY")
 def measured(scene=NOMINAL, errors=None, **options):
     if errors:
         scene = replace(scene, errors=ErrorSet(errors))
-    return Distance(**options).run(scene, silent)
+    return Distance(**options).run(scene, ignore_progress)
 
 
 def test_a_pure_ramp_of_exx_over_500_mm_adds_its_micrometres():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpspace.analysis.uncertainty.propagation import find_doubt, volume_doubt
+from warpspace.analysis.uncertainty.propagation import scene_uncertainty, volume_uncertainty
 from warpspace.bench.placing import ball_point
 from warpspace.calibration import Calibrate, calibrate
 from warpspace.calibration.readings import Readings
@@ -54,13 +54,13 @@ def test_squareness_of_an_axis_that_stood_still_is_open_and_makes_the_map_unknow
     assert known.reach["Z"] == (-150.0, -150.0)
     back = parse_scene(scene_to_toml(found.scene), "s")
     assert back.covariance == known
-    assert set(volume_doubt(back, back.view(), 3).statistics().values()) == {None}
+    assert set(volume_uncertainty(back, back.view(), 3).statistics().values()) == {None}
 
 
 def test_what_is_measured_all_over_leaves_nothing_open():
     found = calibrate(SCENE, [plane([-200.0, 0.0])], Calibrate(fit=KEYS))
     assert found.scene.covariance.undetermined == ()
-    assert find_doubt(found.scene).is_known
+    assert scene_uncertainty(found.scene).is_known
 
 
 def test_what_was_open_and_is_found_or_stated_is_open_no_longer():
@@ -112,7 +112,7 @@ def test_a_model_that_misses_something_says_so_after_it_is_saved():
     assert found.lack_of_fit == pytest.approx(5.0, rel=0.15)
     back = parse_scene(scene_to_toml(found.scene), "s")
     assert back.covariance.lack_of_fit == found.lack_of_fit
-    (said,) = find_doubt(back).remarks()
+    (said,) = scene_uncertainty(back).remarks()
     assert f"residuals were {found.lack_of_fit:.1f} times" in said
     honest = replace(readings, sigma_mm=np.full(50, 1e-3))
     assert calibrate(SCENE, [honest], Calibrate(fit=KEYS)).scene.covariance.lack_of_fit == 0.0

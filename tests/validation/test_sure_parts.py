@@ -12,7 +12,7 @@ import trimesh
 from scipy.stats import norm, t
 
 from warpspace.analysis.commands.distance import Distance
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.formats.compensation.compensate import Compensate
 from warpspace.parts.program import Program
 from warpspace.parts.workpiece import Part, PartMesh
@@ -50,7 +50,7 @@ def scene(text):
 def cube(text, **more):
     mesh = trimesh.creation.box((100.0, 100.0, 100.0))
     own = PartMesh("cube", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
-    found = Part(mesh=own, place=PLACE, **more).run(scene(text), silent)
+    found = Part(mesh=own, place=PLACE, **more).run(scene(text), ignore_progress)
     return found, found.as_json()
 
 
@@ -109,7 +109,7 @@ def test_without_a_statement_verdicts_are_those_of_the_model():
 
 
 def path(text, lines):
-    return Program(file="p.ngc", text=lines).run(scene(text), silent).as_plain()
+    return Program(file="p.ngc", text=lines).run(scene(text), ignore_progress).as_plain()
 
 
 def test_a_path_is_as_unsure_along_it_as_across_it():
@@ -128,7 +128,7 @@ def test_a_path_is_as_unsure_along_it_as_across_it():
 
 def test_a_difference_between_points_is_as_unsure_as_the_squareness():
     asked = Distance(start=(("X", 50.0),), end=(("Y", 100.0),), corner=(("Y", 0.0),))
-    found = asked.run(scene(STATED), silent)
+    found = asked.run(scene(STATED), ignore_progress)
     told = found.as_json()
     assert told["u95_along_um"] == pytest.approx([2 * U * 0.1, 0.0, 0.0], abs=1e-9)
     assert told["u95_deviation_urad"] == pytest.approx(2 * U, rel=1e-6)  # the angle is γ wider
@@ -136,12 +136,12 @@ def test_a_difference_between_points_is_as_unsure_as_the_squareness():
     assert told["u95_difference_um"] == pytest.approx(
         2 * U * 0.1 * 50 / math.hypot(50, 100), rel=1e-4
     )
-    assert not [key for key in asked.run(scene(MACHINE), silent).as_json() if "u95" in key]
+    assert not [key for key in asked.run(scene(MACHINE), ignore_progress).as_json() if "u95" in key]
 
 
 def test_what_a_table_leaves_is_not_below_what_is_not_known():
     asked = Compensate(formats=("isg-csv",))
-    bare, sure = (asked.run(scene(text), silent) for text in (MACHINE, STATED))
+    bare, sure = (asked.run(scene(text), ignore_progress) for text in (MACHINE, STATED))
     before, after = sure.as_json()["before"], sure.as_json()["after"]
     assert before["u95_max_um"] == pytest.approx(2.0 * U * 0.12)
     assert after["rms_um"] < 0.01

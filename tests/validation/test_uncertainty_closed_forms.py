@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2, norm, t
 
-from warpspace.analysis.commands.adjust import Repair
-from warpspace.analysis.commands.uncertainty import Trust
+from warpspace.analysis.commands.adjust import Adjust
+from warpspace.analysis.commands.uncertainty import Uncertainty
 from warpspace.analysis.uncertainty.propagation import (
     coverage_factor,
-    field_doubt,
-    find_doubt,
-    volume_doubt,
+    field_uncertainty,
+    scene_uncertainty,
+    volume_uncertainty,
 )
 from warpspace.bench.base import run_test
 from warpspace.bench.kinds.circular import Circular
@@ -36,7 +36,9 @@ TWO = HEAD + "EXX = 3\nEYX = 4\n" + PAIR
 
 
 def trust(text, **options):
-    return Trust(nodes=5, samples=100_000, **options).run(parse_scene(text, "s"), lambda _: None)
+    return Uncertainty(nodes=5, samples=100_000, **options).run(
+        parse_scene(text, "s"), lambda _: None
+    )
 
 
 @pytest.mark.parametrize("limit", [1.8, 2.0, 2.25])
@@ -92,7 +94,7 @@ def test_beyond_the_data_nothing_was_measured():
 
 
 def test_numbers_move_by_one_standard_uncertainty_up_and_down():
-    doubt = find_doubt(parse_scene(TWO.format(between=3.0, second=9.0), "s"))
+    doubt = scene_uncertainty(parse_scene(TWO.format(between=3.0, second=9.0), "s"))
     gain = np.array([[1.0, 2.0], [0.5, -1.0]])
     matrix = np.array([[4.0, 3.0], [3.0, 9.0]])
     expected = 2.0 * np.sqrt(np.diagonal(gain @ matrix @ gain.T))
@@ -113,7 +115,7 @@ def test_what_is_not_stated_leaves_all_of_it_unknown():
 def test_an_adjustment_helps_where_the_error_is_beyond_half_of_it(objective):
     # by −20 from γ = 20 ± 15 µrad: |γ − 20| < |γ| wherever γ > 10, which is 10 / 15 of u away
     scene = parse_scene(ONE.replace("1.5", "15"), "s")
-    found = Repair(grid=5, count=1, adjustable=("EC0Y",), objective=objective).run(scene)
+    found = Adjust(grid=5, count=1, adjustable=("EC0Y",), objective=objective).run(scene)
     expected = norm.cdf(10.0 / 15.0)
     said = found.as_json()
     assert said["errors"][0]["u95_present"] == pytest.approx(30.0)
@@ -121,8 +123,8 @@ def test_an_adjustment_helps_where_the_error_is_beyond_half_of_it(objective):
     assert said["repairs"][0]["probability"] == pytest.approx(expected, abs=1e-4)
     assert said["before"]["u95_max_um"] == pytest.approx(2 * 15e-3 * 100.0)
     unsure = found.scene.errors.with_amplitude("EXX", 1.0, (0.0, 1.0))
-    found = Repair(grid=5, count=1).run(replace(scene, errors=unsure))
-    assert found.repairs[0].sure["probability"] is None
+    found = Adjust(grid=5, count=1).run(replace(scene, errors=unsure))
+    assert found.repairs[0].expanded_uncertainty["probability"] is None
     assert "± ?" in str([*found.blocks()])
 
 
@@ -137,7 +139,7 @@ def test_a_test_is_as_sure_as_the_squareness_it_shows():
 def test_machines_drawn_move_together():
     # all of it is one number t: E = (3 + 2·t, 4 − 1.5·t) µm, so that |E|² = 25 + 6.25·t²
     scene = parse_scene(TWO.format(between=-2.999999, second=2.25), "s")
-    norm_um = np.concatenate([*volume_doubt(scene, scene.view(), 2).machines(20_000, 0)])
+    norm_um = np.concatenate([*volume_uncertainty(scene, scene.view(), 2).machines(20_000, 0)])
     assert np.quantile(norm_um.max(axis=1), 0.95) == pytest.approx(
         math.sqrt(25 + 6.25 * norm.ppf(0.975) ** 2), rel=0.01
     )
@@ -159,9 +161,9 @@ freedom = 3
 def test_each_error_counts_by_its_own_degrees_of_freedom():
     # u 4 of infinite, 0.01 of three degrees of freedom; |E| is along x
     scene = parse_scene(MIXED, "s")
-    doubt = find_doubt(scene)
+    doubt = scene_uncertainty(scene)
     at = complete_coordinates(scene.machine, {"X": 100.0, "Y": 0.0}, scene.workspace.positions)
-    found = field_doubt(scene, np.array([10.0, 0.0, 0.0]), at, scene.view())
+    found = field_uncertainty(scene, np.array([10.0, 0.0, 0.0]), at, scene.view())
     assert found.u95_norm_um == pytest.approx(8.0)
     assert found.u95_um == pytest.approx([8.0, coverage_factor(3) * 0.01, 0.0])
     assert doubt.factor == 2.0
@@ -188,7 +190,7 @@ def test_the_probability_that_a_point_keeps_a_limit(limit, error):
     keys = "[uncertainty.covariance]\nkeys = ['EXX', 'EYX', 'EZX']\n"
     scene = parse_scene(HEAD + "EXX = 3\n" + keys + "matrix = [[4], [0, 4], [0, 0, 4]]\n", "s")
     at = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-    found = field_doubt(scene, np.array(error), at, scene.view())
+    found = field_uncertainty(scene, np.array(error), at, scene.view())
     square = float(np.sum(np.square(error)))
     expected = ncx2.cdf(limit**2 / 4.0, 3, square / 4.0) if square else chi2.cdf(limit**2 / 4.0, 3)
     assert float(found.keeps(limit)) == pytest.approx(expected, abs=0.02 if square else 1e-9)
@@ -197,7 +199,7 @@ def test_the_probability_that_a_point_keeps_a_limit(limit, error):
 def test_a_sure_point_keeps_its_limit_or_not():
     scene = parse_scene(HEAD + "EXX = 3\n[uncertainty]\nEC0Y = 1\n", "s")
     at = complete_coordinates(scene.machine, {"Y": 0.0}, scene.workspace.positions)
-    found = field_doubt(scene, np.array([3.0, 0.0, 0.0]), at, scene.view())
+    found = field_uncertainty(scene, np.array([3.0, 0.0, 0.0]), at, scene.view())
     assert [float(found.keeps(limit)) for limit in (2.9, 3.1)] == [0.0, 1.0]
 
 
@@ -205,10 +207,10 @@ def test_where_nothing_that_is_stated_acts_all_is_unknown():
     scene = parse_scene(
         HEAD.replace("wFXYZt", "wCFXYZt") + "EXX = 3\n[uncertainty]\nEXC = 1\n", "s"
     )
-    found = Trust(nodes=3).run(scene, lambda _: None)
+    found = Uncertainty(nodes=3).run(scene, lambda _: None)
     assert found.as_json()["statistics"]["u95_mean_um"] is None
-    assert find_doubt(scene).draw(np.random.default_rng(0), 3).shape == (3, 0)
+    assert scene_uncertainty(scene).draw(np.random.default_rng(0), 3).shape == (3, 0)
     bare = replace(scene, errors=ErrorSet())  # what is stated moves the table only
-    found = Trust(nodes=3, limit_um=1.0, verify=True).run(bare, lambda _: None)
+    found = Uncertainty(nodes=3, limit_um=1.0, verify=True).run(bare, lambda _: None)
     assert found.as_json()["statistics"]["u95_max_um"] == 0.0
     assert (found.probability_everywhere, found.shares) == (1.0, [])

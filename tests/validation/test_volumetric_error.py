@@ -9,7 +9,7 @@ import warpspace
 from products import pairwise
 from warpspace.analysis.commands.contributions import expected_square
 from warpspace.analysis.commands.montecarlo import case_of
-from warpspace.analysis.sampling.cases import Case, Plan
+from warpspace.analysis.sampling.cases import Case, SamplingPlan
 from warpspace.analysis.sampling.distribution import build_draws, loop_keys
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.kinematics.model import Loop
@@ -61,7 +61,7 @@ def test_every_mode_has_the_mean_square_of_the_trace_at_a_single_point(over, dis
     point = scene.workspace.moved({"X": 50.0, "Y": -100.0, "Z": -300.0})
     keys = loop_keys(scene.model, Loop.TOOL, scene.parameter_keys)
     draws = build_draws(scene.tolerances, keys, distribution, clip=clip)
-    case = Case(scene.model, draws, point, plan=Plan(samples=200_000, over=over, seed=2))
+    case = Case(scene.model, draws, point, plan=SamplingPlan(samples=200_000, over=over, seed=2))
     result = montecarlo(case)
     variance, offset = expected_square(case)
     assert result.rms_um == pytest.approx(math.sqrt(variance.sum() + offset), rel=0.005)

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from warpspace.analysis.blocks import Bars, Column, Curve, Lines, Panel, Series, Table
-    from warpspace.analysis.description import Analysis, Change, Quantity, Result, Watch, silent
+    from warpspace.analysis.description import (
+        Analysis,
+        Change,
+        ProgressCallback,
+        Quantity,
+        Result,
+        ignore_progress,
+    )
     from warpspace.analysis.options import Grammar, Keys, Limits, Place, option
     from warpspace.analysis.registry import find_analysis, register, unregister
 
@@ -27,15 +34,15 @@ __all__ = [
     "Lines",
     "Panel",
     "Place",
+    "ProgressCallback",
     "Quantity",
     "Result",
     "Series",
     "Table",
-    "Watch",
     "find_analysis",
+    "ignore_progress",
     "option",
     "register",
-    "silent",
     "unregister",
 ]
 

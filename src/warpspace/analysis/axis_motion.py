@@ -13,7 +13,7 @@ LEAST = 1e-6  # deviations below it, µm or µrad, are none
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class ErrorMotion:
     """One deviation over the turn."""
 
     name: str  # "radial", "axial" or "tilt"
@@ -48,12 +48,12 @@ class AxisMotion:
     radius_mm: float  # distance of the point from the axis
     # of the axis at the height of the point: towards the point, along the axis, and as the
     # inclination of the axis towards the point
-    radial: Motion
-    axial: Motion
-    tilt: Motion
+    radial: ErrorMotion
+    axial: ErrorMotion
+    tilt: ErrorMotion
 
     @property
-    def motions(self) -> tuple[Motion, Motion, Motion]:
+    def motions(self) -> tuple[ErrorMotion, ErrorMotion, ErrorMotion]:
         return self.radial, self.axial, self.tilt
 
 
@@ -88,11 +88,11 @@ def assemble_motion(
     kept = slice(None, -1 if closed else None)  # the last place of a turn is the first one
     turn = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
 
-    def motion(name: str, unit: str, values: Array, line: Array) -> Motion:
+    def motion(name: str, unit: str, values: Array, line: Array) -> ErrorMotion:
         strongest = times_a_turn(values) if closed else None
         coefficients = np.linalg.lstsq(line[kept], values[kept], rcond=None)[0]
         rest, once = values - line @ coefficients, float(np.linalg.norm(coefficients[1:]))
-        return Motion(name, f"{name} error motion", unit, values, rest, once, strongest)
+        return ErrorMotion(name, f"{name} error motion", unit, values, rest, once, strongest)
 
     radial, axial, tilt = deviations
     return AxisMotion(

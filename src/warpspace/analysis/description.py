@@ -12,12 +12,12 @@ from warpspace.analysis.blocks import Block, Table, blocks_html
 from warpspace.analysis.options import PLACE, Option, options_of, outside_travel
 
 if TYPE_CHECKING:
-    from warpspace.analysis.uncertainty.propagation import Doubt
+    from warpspace.analysis.uncertainty.propagation import ErrorUncertainty
     from warpspace.field.evaluate import SecondOrder
     from warpspace.scene.model import Scene
 
 Task: TypeAlias = Literal["see", "understand", "measure", "improve", "design", "machine"]
-Watch: TypeAlias = Callable[[float], None]
+ProgressCallback: TypeAlias = Callable[[float], None]
 """Called with the share of the work that is done; raises where nobody waits for it any more."""
 A = TypeVar("A", bound="type[Analysis]")
 
@@ -49,7 +49,9 @@ class Result(ABC):
     no_change: ClassVar[str] = "nothing is to be changed"
     # what its numbers leave out if they are of first order: a warning, and in its JSON object
     second_order: "SecondOrder | None" = None
-    doubt: "Doubt | None" = None  # how sure the errors are, where its numbers say U95
+    uncertainty: "ErrorUncertainty | None" = (
+        None  # how sure the errors are, where its numbers say U95
+    )
 
     @abstractmethod
     def blocks(self) -> Iterable[Block]:
@@ -59,11 +61,11 @@ class Result(ABC):
         """Give the scenes it proposes, the best last."""
         return ()
 
-    def doubts(self) -> Iterable[str]:
+    def caveats(self) -> Iterable[str]:
         """Say what a reader should doubt of its numbers."""
-        return self.doubt.remarks() if self.doubt else ()
+        return self.uncertainty.remarks() if self.uncertainty else ()
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
+    def files(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
         """Give the files that -o writes, by what is added to its name: "", "_X.COM"."""
         return {}
 
@@ -115,7 +117,7 @@ class Analysis(ABC):
     def __post_init__(self) -> None:
         """Take words and mappings as Python users give them; refuse numbers out of range."""
         for one in options_of(type(self)):
-            value = one.hold(getattr(self, one.name))
+            value = one.coerce(getattr(self, one.name))
             one.check(value)
             object.__setattr__(self, one.name, value)
 
@@ -130,7 +132,7 @@ class Analysis(ABC):
         return cls.__doc__ or ""
 
     @abstractmethod
-    def run(self, scene: "Scene", watch: Watch, /) -> Result:
+    def run(self, scene: "Scene", watch: ProgressCallback, /) -> Result:
         """Answer it.
 
         Parameters
@@ -149,7 +151,7 @@ class Analysis(ABC):
         """Give it as it is run for a file of this name; refuse one too many, or none."""
         return self
 
-    def run_all(self, scenes: "Sequence[Scene]", watch: Watch, /) -> Result:
+    def run_all(self, scenes: "Sequence[Scene]", watch: ProgressCallback, /) -> Result:
         """Answer it for several scenes; an analysis of one scene takes the only one."""
         (scene,) = scenes
         return self.run(scene, watch)
@@ -162,11 +164,11 @@ class Analysis(ABC):
                     yield f"{{{one.name}}} {words}"
 
 
-def silent(_share: float) -> None:
+def ignore_progress(_share: float) -> None:
     """Watch nothing."""
 
 
-def counting(watch: Watch, total: float) -> Watch:
+def count_progress(watch: ProgressCallback, total: float) -> ProgressCallback:
     """Give what is called with the work that was done since its last call."""
     done = 0.0
 

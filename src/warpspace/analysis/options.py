@@ -91,7 +91,7 @@ class Option:
             return ""
         return f"{self.default:g}" if isinstance(self.default, float) else str(self.default)
 
-    def hold(self, value: Any) -> Any:
+    def coerce(self, value: Any) -> Any:
         """Give a value as its field holds it: a word as a member, a mapping as pairs."""
         if isinstance(value, Mapping):
             return tuple(value.items())
@@ -120,7 +120,7 @@ class Option:
             joint = ";" if str(error).startswith("expected") else ":"
             raise OptionError(f"{{{self.name}}} {text!r}{joint} {error}") from None
         if self.enum is not None:
-            return self.hold(word)
+            return self.coerce(word)
         if self.choices and word not in self.choices:
             known = ", ".join(self.choices)
             raise OptionError(f"{{{self.name}}} {text!r}; expected one of {known}")

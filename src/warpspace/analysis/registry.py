@@ -11,7 +11,7 @@ from warpspace.exceptions import UnknownNameError
 from warpspace.plugins import load_plugins
 
 if TYPE_CHECKING:
-    from warpspace.analysis.description import Analysis, Result, Task, Watch
+    from warpspace.analysis.description import Analysis, ProgressCallback, Result, Task
     from warpspace.scene.model import Scene
 
 TASKS: "dict[Task, str]" = {
@@ -44,7 +44,7 @@ R_co = TypeVar("R_co", bound="Result", covariant=True)
 class Verb(Protocol[R_co]):
     """An analysis as a function: ``warpspace.NAME(scene, **options)``."""
 
-    def __call__(self, *scenes: "Scene", watch: "Watch" = ..., **options: Any) -> R_co:
+    def __call__(self, *scenes: "Scene", watch: "ProgressCallback" = ..., **options: Any) -> R_co:
         """Answer it; options are those of its command: ``at={"X": 0}``, ``over_travel=True``."""
         ...
 
@@ -122,7 +122,7 @@ def find_analysis(name: str) -> "type[Analysis]":
 
 
 def verb(name: str) -> "Verb[Result]":
-    from warpspace.analysis.description import silent
+    from warpspace.analysis.description import ignore_progress
     from warpspace.analysis.options import options_of
 
     kind = find_analysis(name)
@@ -131,7 +131,9 @@ def verb(name: str) -> "Verb[Result]":
         names |= {flag.strip("-").replace("-", "_"): one.name for flag in one.former}
     of_run = kind.run_all.__kwdefaults__ or {}
 
-    def answer(*scenes: "Scene", watch: "Watch" = silent, **options: Any) -> "Result":
+    def answer(
+        *scenes: "Scene", watch: "ProgressCallback" = ignore_progress, **options: Any
+    ) -> "Result":
         for given in options:
             if given not in names and given not in of_run:
                 raise UnknownNameError(f"option of {name}", given, [*names, *of_run])

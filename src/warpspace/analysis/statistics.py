@@ -26,7 +26,7 @@ class Summary:
     p95_um: float
     max_um: float
     # U95 of these, u95_mean_um and so on, µm; None is not known, empty where nothing is stated
-    sure: Numbers = attribute(default_factory=dict[str, float | None], kw_only=True)
+    expanded_uncertainty: Numbers = attribute(default_factory=dict[str, float | None], kw_only=True)
 
     @property
     def three(self) -> tuple[float, float, float]:

@@ -11,13 +11,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import File, Option, Place, option, options_of
 from warpspace.analysis.sampling.distribution import round_width
-from warpspace.analysis.uncertainty.propagation import find_doubt, plus_minus
+from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty
 from warpspace.bench.data import DataColumn, read_table, unit_notes
-from warpspace.bench.data import Table as DataTable
-from warpspace.bench.plan import Outcome, Plan, fit_setup, respond, simulate
+from warpspace.bench.data import ReadingsFile as DataTable
+from warpspace.bench.plan import Outcome, TestPlan, fit_setup, respond, simulate
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.plugins import Registry, load_plugins
 from warpspace.scene.model import Scene
@@ -28,11 +28,11 @@ SHARED = 3  # options that every test has, the first fields of the base class
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class TestRun:
     """Readings of a test and what they come to."""
 
     who: str  # "model" or "measured"
-    plan: Plan
+    plan: TestPlan
     readings: Array  # [m], µm or µrad
     outcome: Outcome
 
@@ -99,11 +99,11 @@ class BenchTest(Analysis):
         """Say nothing: a path beyond the travel is refused."""
         return ()
 
-    def run(self, scene: Scene, _watch: Watch, /) -> "BenchResult":
+    def run(self, scene: Scene, _watch: ProgressCallback, /) -> "BenchResult":
         return run_test(scene, self, self.data)
 
     @abstractmethod
-    def plan(self, scene: Scene) -> Plan:
+    def plan(self, scene: Scene) -> TestPlan:
         """Lay the path of the test on a machine.
 
         Raises
@@ -113,7 +113,7 @@ class BenchTest(Analysis):
         """
 
     @abstractmethod
-    def plan_data(self, scene: Scene, table: DataTable) -> tuple[Plan, Array]:
+    def plan_data(self, scene: Scene, table: DataTable) -> tuple[TestPlan, Array]:
         """Lay the path along which readings were taken, and give these in its order, [m].
 
         Raises
@@ -123,11 +123,11 @@ class BenchTest(Analysis):
         """
 
     @abstractmethod
-    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
         """Evaluate readings, [m], µm or µrad, by the formulas of the standard."""
 
     @abstractmethod
-    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
         """Lay out the customary figure of runs, the model first."""
 
     def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:  # noqa: ARG002 - for others
@@ -163,15 +163,15 @@ class BenchResult(Result):
     drawn_by: ClassVar[str] = "warpspace.outputs.charts.result_charts:bench_chart"
     test: BenchTest
     scene: Scene
-    runs: tuple[Run, ...]  # the model; behind it what was measured, if anything
+    runs: tuple[TestRun, ...]  # the model; behind it what was measured, if anything
     notes: tuple[str, ...] = ()  # what a reader should doubt
 
     @property
-    def model(self) -> Run:
+    def model(self) -> TestRun:
         return self.runs[0]
 
     @property
-    def measured(self) -> Run | None:
+    def measured(self) -> TestRun | None:
         return self.runs[1] if len(self.runs) > 1 else None
 
     @property
@@ -185,7 +185,7 @@ class BenchResult(Result):
     @cached_property
     def u95(self) -> dict[str, float | None]:
         """Give U95 of what the model comes to; empty where a scene does not say how sure it is."""
-        run, scene, doubt = self.model, self.scene, find_doubt(self.scene, Loop.RELATIVE)
+        run, scene, doubt = self.model, self.scene, scene_uncertainty(self.scene, Loop.RELATIVE)
         if doubt is None:
             return {}
         each = (
@@ -284,7 +284,7 @@ def run_test(
     )
     plan, measured = (test.plan(scene), None) if table is None else test.plan_data(scene, table)
     readings = simulate(scene, plan, exact=exact)
-    runs = (Run("model", plan, readings, test.evaluate(plan, readings)),)
+    runs = (TestRun("model", plan, readings, test.evaluate(plan, readings)),)
     if table is None or measured is None:
         return BenchResult(test, scene, runs)
     angular = any(name.endswith("_urad") for name in table.columns)
@@ -292,7 +292,7 @@ def run_test(
     return BenchResult(
         test,
         scene,
-        (*runs, Run("measured", plan, measured, test.evaluate(plan, measured))),
+        (*runs, TestRun("measured", plan, measured, test.evaluate(plan, measured))),
         (*table.notes, *test.data_notes(table), *notes),
     )
 

@@ -38,7 +38,7 @@ XYZ = tuple(DataColumn(f"{letter}_um") for letter in "xyz")
 
 
 @dataclass(frozen=True)
-class Table:
+class ReadingsFile:
     """What a file of readings holds."""
 
     source: str  # of messages
@@ -70,14 +70,14 @@ class Table:
         ]
 
 
-def read_table(path: str | Path, columns: Sequence[DataColumn]) -> Table:
+def read_table(path: str | Path, columns: Sequence[DataColumn]) -> ReadingsFile:
     """Read a file of readings; columns that are not asked for are left aside."""
     source = str(path)
     text = text_files.read_text(Path(path), MAX_CSV_BYTES, source)
     return parse_table(text, columns, source)
 
 
-def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Table:
+def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> ReadingsFile:
     rows = text_files.CsvRows(io.StringIO(text, newline=""), source, MAX_POINTS, once=True)
     if not rows.header:
         raise SceneError(source, ["is empty; expected a header " + _header(columns)])
@@ -101,7 +101,7 @@ def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Table:
         if one.name not in header and one.kind != "name":
             default = SIGNS.get(str(one.default), one.default)
             values[one.name] = [float(default or 0.0)] * len(lines)
-    return Table(
+    return ReadingsFile(
         source,
         {name: np.array(column) for name, column in values.items()},
         {name: tuple(column) for name, column in words.items()},

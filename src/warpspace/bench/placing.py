@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.bench.plan import Plan, build_plan
+from warpspace.bench.plan import TestPlan, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import AxisFrames, branch_frames, branch_pose, nominal_point
@@ -166,7 +166,7 @@ PLANES: Mapping[str, tuple[str, str, str]] = {
 
 
 @dataclass(frozen=True)
-class Plane:
+class AxisPlane:
     """A plane of two axes where a machine stands."""
 
     first: str  # axes
@@ -199,7 +199,7 @@ def plane_axes(machine: Machine, plane: str) -> tuple[str, str, str]:
     return PLANES[plane]
 
 
-def find_plane(model: Model, stand: Coordinates, plane: str) -> Plane:
+def find_plane(model: Model, stand: Coordinates, plane: str) -> AxisPlane:
     first, second, key = plane_axes(model.machine, plane)
     along, up = axis_vector(model, stand, first), axis_vector(model, stand, second)
     about = axis_vector(model, stand, parameter(key).axis, key[1])
@@ -208,7 +208,7 @@ def find_plane(model: Model, stand: Coordinates, plane: str) -> Plane:
         float(np.sign(motion_direction(model, stand, name) @ vector))
         for name, vector in ((first, along), (second, up))
     )
-    return Plane(first, second, key, along, up, sign, (ways[0], ways[1]))
+    return AxisPlane(first, second, key, along, up, sign, (ways[0], ways[1]))
 
 
 BAR_MM = 100.0  # length of a bar beside a rotary axis: what across it does is of second order
@@ -313,7 +313,7 @@ def lay_followed(
     stand: Mapping[str, Array],
     angle_deg: Array,
     sense: Array,
-) -> Plan:
+) -> TestPlan:
     axis = rotary_axis(scene.machine, name)
     ball = default_ball(scene, model, axis, stand, radius_mm)
     coordinates = followed(scene, model, axis, angle_deg, ball, stand)

@@ -204,7 +204,7 @@ _SLOTS, _ABOVE_MM = 8, 0.3
 _STEEP = 0.9
 
 
-class Stack:
+class WorkpieceSide:
     """The stack of bodies under the workpiece, built from the top downwards."""
 
     def __init__(self, parts: Parts) -> None:

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from warpspace.bodies.ends import Head, Mount, Stack
+from warpspace.bodies.ends import Head, Mount, WorkpieceSide
 from warpspace.bodies.mesh import LIGHT, MIDDLE, Body
 from warpspace.bodies.schematic import (
     Colour,
@@ -42,7 +42,7 @@ class _Frame:
     sign: float  # of the depth along the other one in R
     zero_mm: float  # where depths count from
 
-    def __init__(self, parts: Parts, mount: Mount, stack: Stack) -> None:
+    def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:
         self.layout, self.parts, self.mount, self.stack = parts.layout, parts, mount, stack
         self.u, self.spine = parts.layout.unit_mm, mount.point_mm
         self.axes = list(reversed(mount.inner))
@@ -87,7 +87,7 @@ class _Frame:
 class _Behind(_Frame):
     """What carries a level head from behind: headstock, ram, and a column that may travel."""
 
-    def __init__(self, parts: Parts, mount: Mount, stack: Stack) -> None:
+    def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:
         super().__init__(parts, mount, stack)
         level = self.layout.poses["t"][:2, 2]
         self.i = int(np.argmin(np.abs(level)))
@@ -157,7 +157,7 @@ class _Rear:
 class _Overhead(_Frame):
     """What carries a head from above."""
 
-    def __init__(self, parts: Parts, mount: Mount, stack: Stack) -> None:
+    def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:
         super().__init__(parts, mount, stack)
         level = [axis for axis in mount.inner if axis.slides_level]
         self.i, self.sign, self.zero_mm = self._across(level), 1.0, 0.0
@@ -414,7 +414,7 @@ def _generate(
     by_name = {axis.name: axis for axis in axes}
     machine = Machine(parse_chain(chain), by_name, dict(fixed_mm), fixed_deg=dict(fixed_deg))
     parts = Parts(build_layout(machine))
-    stack = Stack(parts)
+    stack = WorkpieceSide(parts)
     stack.build()
     mount = Head(parts, tool).build()
     lying = abs(parts.layout.poses["t"][2, 2]) < _LYING

@@ -32,7 +32,7 @@ class Material:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class GltfNode:
     """A surface or a set of lines, with a node of its own."""
 
     name: str
@@ -54,7 +54,7 @@ def to_gltf(points_mm: Array) -> Array:
 
 
 def build_gltf(
-    parts: Sequence[Part],
+    parts: Sequence[GltfNode],
     *,
     root: str = "scene",
     generator: str = "warpspace",
@@ -134,7 +134,7 @@ class _Arrays:
         return at
 
 
-def _mesh(part: Part, material: int, arrays: _Arrays) -> Json:
+def _mesh(part: GltfNode, material: int, arrays: _Arrays) -> Json:
     values: dict[str, NDArray[Any]] = {"POSITION": part.points, **part.attributes}
     if part.colours is not None:
         values["COLOR_0"] = part.colours

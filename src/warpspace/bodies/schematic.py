@@ -178,7 +178,7 @@ class Way:
 
 
 @dataclass(frozen=True)
-class Layout:
+class MachineLayout:
     """A machine at home."""
 
     poses: dict[str, Array]  # [4, 4]; every frame in R
@@ -196,7 +196,7 @@ class Layout:
     slant: Array
 
 
-def build_layout(machine: Machine) -> Layout:
+def build_layout(machine: Machine) -> MachineLayout:
     axes = tuple(machine.axes.values())
     home = {
         axis.name: np.asarray(
@@ -234,7 +234,9 @@ def build_layout(machine: Machine) -> Layout:
     )
     low, high = tip - filled, tip + filled
     length = -float(machine.fixed_mm.get("t", (0.0, 0.0, 0.0))[2])
-    return Layout(poses, tool, workpiece, tip, filled, low, high, unit, 0.2 * unit, length, slant)
+    return MachineLayout(
+        poses, tool, workpiece, tip, filled, low, high, unit, 0.2 * unit, length, slant
+    )
 
 
 def _way(axis: Axis, pose: Array) -> Way:
@@ -297,7 +299,7 @@ COLOURS = {body: colour for colour, bodies in _BODIES.items() for body in bodies
 
 
 @dataclass
-class _Part:
+class _BodyShapes:
     frame: str
     colour: Colour
     shapes: list[Shape] = field(default_factory=list[Shape])
@@ -308,10 +310,10 @@ class _Part:
 class Parts:
     """Shapes in R at home, by the body they belong to."""
 
-    layout: Layout
+    layout: MachineLayout
     # [2, 2], mm; rectangles, lower and upper corner, that the bed has to carry
     floor: list[Array] = field(default_factory=list[Array])
-    _parts: dict[str, _Part] = field(default_factory=dict[str, _Part])
+    _parts: dict[str, _BodyShapes] = field(default_factory=dict[str, _BodyShapes])
 
     def add(
         self,
@@ -322,7 +324,9 @@ class Parts:
         colour: Colour | None = None,
     ) -> None:
         """Add shapes and lines, [2, 3], to the body of a frame."""
-        part = self._parts.setdefault(f"{frame}_{what}", _Part(frame, colour or COLOURS[what]))
+        part = self._parts.setdefault(
+            f"{frame}_{what}", _BodyShapes(frame, colour or COLOURS[what])
+        )
         part.shapes.extend(shapes)
         part.lines_mm.extend(lines_mm)
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, TypeAlias
 import numpy as np
 
 from warpspace.analysis.description import Analysis
-from warpspace.analysis.description import Watch as Share
+from warpspace.analysis.description import ProgressCallback as Share
 from warpspace.analysis.options import PLACE, Files, Grammar, option, typed_word
 from warpspace.calibration.calibration_result import (
     TARGETS,
@@ -34,9 +34,9 @@ from warpspace.calibration.next_best import next_best, observability, separating
 from warpspace.calibration.readings import Readings, read_readings
 from warpspace.calibration.solve import (
     MAD,
+    MeasurementModel,
     Rank,
     Solved,
-    Stack,
     Terms,
     Watch,
     automatic,
@@ -277,7 +277,7 @@ def _fit(
     sets, assumed = _weighed(scene, sets, request, watch)
     if instrument.scatter[0]:
         predict = _weighed(scene, predict, request, watch)[0]
-    stack = Stack.of(scene, sets, watch)
+    stack = MeasurementModel.of(scene, sets, watch)
     terms = build_terms(scene, automatic(scene, sets) if request.fit is None else request.fit)
     if not terms.keys:
         raise OptionError("no axis moves whose errors could be found; expected {fit} KEYS")
@@ -385,7 +385,7 @@ def _weighed(
     return weighed, (f"readings without u_um are taken as ± {UM_PER_MM * width:.3g} µm: {why}",)
 
 
-def _moved(instrument: Instrument, stack: Stack, solved: Solved) -> list[Array]:
+def _moved(instrument: Instrument, stack: MeasurementModel, solved: Solved) -> list[Array]:
     """Give what one u of what readings share moves: parameters and set-ups, [n, c] each."""
     weights = np.sqrt(solved.trust) * np.concatenate(stack.weights())[:, None]
     answer = covariance_of(solved, solved.weighted.shape[1]) @ solved.weighted.T
@@ -393,13 +393,13 @@ def _moved(instrument: Instrument, stack: Stack, solved: Solved) -> list[Array]:
     return [-answer @ (weights * common_mode(stack, one)) for one in instrument.shared]
 
 
-def _rank(stack: Stack, terms: Terms, unknown: Array) -> Rank:
+def _rank(stack: MeasurementModel, terms: Terms, unknown: Array) -> Rank:
     by_parameter, by_unknown = stack.derivatives(terms, terms.start, unknown)
     weights = np.concatenate(stack.weights())[:, None]
     return find_rank(terms.keys, weights * by_parameter, weights * by_unknown, stack.blind)
 
 
-def _check_count(stack: Stack, rank: Rank, fitted: int, has_prior: bool) -> None:
+def _check_count(stack: MeasurementModel, rank: Rank, fitted: int, has_prior: bool) -> None:
     if not rank.kept and not has_prior:
         raise OptionError(
             f"{stack.size} numbers in {sum(map(len, stack.sets))} readings determine none of the"
@@ -491,7 +491,7 @@ def _found(
     return tuple(rows), tuple(sums)
 
 
-def _outliers(stack: Stack, after: Sequence[Array]) -> list[tuple[int, ...]]:
+def _outliers(stack: MeasurementModel, after: Sequence[Array]) -> list[tuple[int, ...]]:
     weights = stack.weights()
     lengths = [
         np.linalg.norm(row * weight.reshape(row.shape), axis=-1)
@@ -505,7 +505,7 @@ def _outliers(stack: Stack, after: Sequence[Array]) -> list[tuple[int, ...]]:
 
 
 def _predict(
-    stack: Stack,
+    stack: MeasurementModel,
     terms: Terms,
     part: Terms,
     predict: Sequence[Readings],
@@ -524,7 +524,7 @@ def _predict(
     """
     if not predict:
         return (), None, ()
-    held = Stack.of(stack.scene, predict, stack.watch)
+    held = MeasurementModel.of(stack.scene, predict, stack.watch)
     before = named(stack.unknowns, begin.unknown)
     after = named(stack.unknowns, solved.unknown)
     new = [name for name in held.unknowns if name not in after]
@@ -565,7 +565,7 @@ CHANCE = 0.01  # of calling a model incomplete that is not
 
 
 def _lack_of_fit(
-    stack: Stack, after: Sequence[Array], sigma_mm: float, freedom: int
+    stack: MeasurementModel, after: Sequence[Array], sigma_mm: float, freedom: int
 ) -> tuple[float | None, tuple[str, ...]]:
     """Compare the scatter of residuals with that of readings, stated or seen in repeated ones.
 

@@ -147,7 +147,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class NextMeasurement:
     """One measurement to make."""
 
     keys: ClassVar[tuple[str, ...]] = (
@@ -205,7 +205,7 @@ class Calibration(Result):
     notes: tuple[str, ...] = ()
     # groups that cannot be told apart, and the measurement that would
     apart: Mapping[tuple[str, ...], str] = field(default_factory=dict[tuple[str, ...], str])
-    steps: tuple[Step, ...] = ()  # next measurements
+    steps: tuple[NextMeasurement, ...] = ()  # next measurements
     target: Target = "map"  # that they are to make sure
     # by rotary axis: how well the poses tell its location and orientation errors
     merit: Mapping[str, float] = field(default_factory=dict[str, float])

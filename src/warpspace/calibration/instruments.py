@@ -15,7 +15,7 @@ import numpy as np
 from warpspace.analysis.blocks import Column, Table
 from warpspace.bench.placing import ball_point
 from warpspace.calibration.readings import Readings
-from warpspace.calibration.solve import Stack
+from warpspace.calibration.solve import MeasurementModel
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
@@ -105,7 +105,7 @@ def load_instrument(name: str, _scene: object = None) -> Instrument:
     return Instrument(path.stem, found["title"] or path.stem, rows)
 
 
-def _levers_mm(stack: Stack, one: Readings) -> Array:
+def _levers_mm(stack: MeasurementModel, one: Readings) -> Array:
     """Give what readings take of a scale: distances from the mean point as they are sensed."""
     if one.kind in {"lengths", "positions"}:  # in the frame of the instrument
         return one.observed_mm - one.observed_mm.mean(axis=0)
@@ -118,7 +118,7 @@ def _levers_mm(stack: Stack, one: Readings) -> Array:
     return (np.sum(away * plan.direction, axis=1) * plan.gain)[:, None]
 
 
-def common_mode(stack: Stack, one: Contribution) -> Array:
+def common_mode(stack: MeasurementModel, one: Contribution) -> Array:
     """Give what a standard uncertainty of a contribution moves all readings by, [N, c], mm."""
     if one.acts == "scale":
         levers = np.concatenate([_levers_mm(stack, each).ravel() for each in stack.sets])
@@ -137,7 +137,9 @@ BUDGET = (
 )  # fmt: skip
 
 
-def share_out(instrument: Instrument, stack: Stack, shares: Sequence[float]) -> dict[str, Any]:
+def share_out(
+    instrument: Instrument, stack: MeasurementModel, shares: Sequence[float]
+) -> dict[str, Any]:
     """Say what an instrument brings; shares of the map: of scatter, and of each that is shared."""
     levers = [np.linalg.norm(_levers_mm(stack, one), axis=-1) for one in stack.sets]
     length = round(float(np.sqrt(np.mean(np.concatenate(levers) ** 2))), 6)

@@ -49,7 +49,7 @@ With less, noise of a thousandth makes values that no machine has.
 """
 
 
-class Kind(ABC):
+class MeasurementKind(ABC):
     """A kind of measurement.
 
     A reading is a function of the errors of the machine and of a few numbers that nobody knows:
@@ -95,7 +95,7 @@ class Kind(ABC):
         return scene.parameter_keys
 
 
-class FromVectors(Kind):
+class FromVectors(MeasurementKind):
     """A kind whose readings follow from the error vectors at its poses."""
 
     @abstractmethod
@@ -125,7 +125,7 @@ def _error_mm(scene: Scene, readings: Readings, guess: Guess) -> Array:
     return field.error_um * MM_PER_UM
 
 
-class Placed(FromVectors):
+class FreePlacementKind(FromVectors):
     """A kind whose readings are ± the error plus the place of something, one place per session."""
 
     place: ClassVar[str]
@@ -171,7 +171,7 @@ _COLUMN = re.compile(
 )
 
 
-class Points(Placed):
+class Points(FreePlacementKind):
     """Errors actual − nominal at axis positions; a session that is named has its own shift.
 
     Readings are kept in the workpiece frame, whichever they were taken in.
@@ -234,7 +234,7 @@ class Tracker(Points):
     place = "tracker"
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        names = dict.fromkeys(name[:-2] for name in Placed.unknowns(self, readings))
+        names = dict.fromkeys(name[:-2] for name in FreePlacementKind.unknowns(self, readings))
         return tuple(f"{name} {at}{x}" for name in names for at in ("", "turn ") for x in "xyz")
 
     def start(self, readings: Readings) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from warpspace.analysis.uncertainty.propagation import coverage_factor
 from warpspace.bench.placing import PLANES, ball_point, within_travel
 from warpspace.calibration import solve
-from warpspace.calibration.calibration_result import Calibration, Candidate, Step, Target
+from warpspace.calibration.calibration_result import Calibration, Candidate, NextMeasurement, Target
 from warpspace.calibration.instruments import NO_INSTRUMENT, Instrument, common_mode
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import TestReadings
@@ -172,7 +172,7 @@ def next_best(
     watch: solve.Watch = solve.unwatched,
     target: Target = "map",
     instrument: Instrument = NO_INSTRUMENT,
-) -> tuple[Step, ...]:
+) -> tuple[NextMeasurement, ...]:
     """Choose measurements one after the other, each for the greatest gain per minute.
 
     Notes
@@ -190,15 +190,15 @@ def next_best(
     stated = [one.sigma_mm for one in sets if one.sigma_mm is not None]
     if len(stated) == len(sets):
         noise = float(np.median(np.concatenate(stated)))
-    made = solve.Stack.of(scene, sets, watch)
+    made = solve.MeasurementModel.of(scene, sets, watch)
     known = _information(made, terms, noise, instrument) + _prior(scene, keys)
     over_map = u95_at(found.scene, terms, "map")
     told = u95_at(found.scene, terms, target)
     rows = [
-        (one, _information(solve.Stack.of(scene, [one.readings], watch), terms, noise))
+        (one, _information(solve.MeasurementModel.of(scene, [one.readings], watch), terms, noise))
         for one in choice or candidates(scene)
     ]
-    steps: list[Step] = []
+    steps: list[NextMeasurement] = []
     covariance = _covariance(known)
     for _ in range(count):
         watch()
@@ -211,7 +211,7 @@ def next_best(
             break
         _, best, covariance, row = max(useful, key=lambda gain: gain[0] / minutes(gain[1].readings))
         ends = before, told(covariance), map_before / FACTOR, over_map(covariance) / FACTOR
-        steps.append(Step(best, minutes(best.readings), *ends, covariance))
+        steps.append(NextMeasurement(best, minutes(best.readings), *ends, covariance))
         known = known + row
     return tuple(steps)
 
@@ -230,7 +230,7 @@ def separating(
     for one in candidates(scene):
         if not missing:
             break
-        stack = solve.Stack.of(scene, [*sets, one.readings], watch)
+        stack = solve.MeasurementModel.of(scene, [*sets, one.readings], watch)
         both = stack.derivatives(terms, terms.start, stack.start())
         rank = solve.find_rank(keys, *both, stack.blind)
         still = {group[0] for group in rank.confounded}
@@ -241,7 +241,7 @@ def separating(
 
 
 def _information(
-    stack: solve.Stack,
+    stack: solve.MeasurementModel,
     terms: solve.Terms,
     noise_mm: float,
     instrument: Instrument = NO_INSTRUMENT,
@@ -343,7 +343,7 @@ def observability(
 
     def gram(readings: Sequence[Readings]) -> Array:
         alike = [replace(one, sigma_mm=None) for one in readings]
-        stack = solve.Stack.of(scene, alike, watch)
+        stack = solve.MeasurementModel.of(scene, alike, watch)
         return _information(stack, terms, 1.0) * np.outer(scale, scale)
 
     draw, ends = np.random.default_rng(0), {n: a.travel for n, a in scene.machine.axes.items()}

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.calibration.kinds import Guess, Kind
+from warpspace.calibration.kinds import Guess, MeasurementKind
 from warpspace.calibration.readings import (
     Readings,
     ReadingTable,
@@ -28,7 +28,7 @@ SPREAD_MM = 100.0  # that a first fit may leave
 STEP = 1e-3  # mm or mrad, for differences
 
 
-class Positions(Kind):
+class Positions(MeasurementKind):
     """Positions R(turn)·T·(tool point + reflector) + place, T being the pose of the tool frame.
 
     The pose is the actual one in the workpiece frame. The turn is a whole rotation vector. An

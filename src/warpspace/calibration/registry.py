@@ -10,11 +10,11 @@ import numpy as np
 from warpspace.analysis.options import Option
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
-from warpspace.bench.plan import Plan, respond, simulate
-from warpspace.calibration.kinds import Guess, Kind, Lengths, Points, Tracker
+from warpspace.bench.plan import TestPlan, respond, simulate
+from warpspace.calibration.kinds import Guess, Lengths, MeasurementKind, Points, Tracker
 from warpspace.calibration.positions import Positions
 from warpspace.calibration.readings import Readings, ReadingTable, check_spread
-from warpspace.calibration.spheres import Sphere, SphereTcp
+from warpspace.calibration.spheres import SphereKind, SphereTcp
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.model import Scene
@@ -30,7 +30,7 @@ def test_kinds() -> tuple[str, ...]:
     return tuple(NAMES.get(name, name) for name in bench_names())
 
 
-class TestReadings(Kind):
+class TestReadings(MeasurementKind):
     """Readings of one test with its options, for instance ``circular:plane=XZ:radius=150``."""
 
     __test__ = False
@@ -69,7 +69,7 @@ class TestReadings(Kind):
         return self._readings(plan, np.zeros(plan.readings), self._text, lines)
 
     def _readings(
-        self, plan: Plan, read_um: Array, source: str, lines: tuple[int, ...]
+        self, plan: TestPlan, read_um: Array, source: str, lines: tuple[int, ...]
     ) -> Readings:
         return Readings(
             self._text,
@@ -100,7 +100,7 @@ class TestReadings(Kind):
         return matrix[:, None, :], _set_up(readings, guess.unknowns)[:, None, :]
 
 
-def _plan(readings: Readings) -> Plan:
+def _plan(readings: Readings) -> TestPlan:
     if readings.plan is None:
         raise OptionError(f"{readings.source}: expected readings of a test")
     return readings.plan
@@ -128,12 +128,13 @@ def _value(option: Option, text: str, given: str) -> Any:
         raise OptionError(f"{{kinds}} {given!r}: {said}") from None
 
 
-KINDS: Mapping[str, Kind] = {
-    kind.name: kind for kind in (Points(), Tracker(), Positions(), Sphere(), SphereTcp(), Lengths())
+KINDS: Mapping[str, MeasurementKind] = {
+    kind.name: kind
+    for kind in (Points(), Tracker(), Positions(), SphereKind(), SphereTcp(), Lengths())
 }
 
 
-def find_kind(name: str) -> Kind:
+def find_kind(name: str) -> MeasurementKind:
     """Look up a kind: one of this table, or a test with its options (``circular:plane=XZ``)."""
     if name in KINDS:
         return KINDS[name]
@@ -146,7 +147,7 @@ def find_kind(name: str) -> Kind:
 _test_kind = lru_cache(maxsize=256)(TestReadings)
 
 
-def recognise(table: ReadingTable, scene: Scene) -> Kind:
+def recognise(table: ReadingTable, scene: Scene) -> MeasurementKind:
     found = next((kind for kind in KINDS.values() if kind.fits(table, scene)), None)
     if found is None:
         there = ", ".join((*table.labels, *table.columns))

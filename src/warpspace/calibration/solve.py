@@ -228,7 +228,7 @@ def unwatched() -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Stack:
+class MeasurementModel:
     """Readings of one or more files."""
 
     scene: Scene
@@ -239,7 +239,9 @@ class Stack:
     watch: Watch = unwatched
 
     @classmethod
-    def of(cls, scene: Scene, sets: Sequence[Readings], watch: Watch = unwatched) -> "Stack":
+    def of(
+        cls, scene: Scene, sets: Sequence[Readings], watch: Watch = unwatched
+    ) -> "MeasurementModel":
         names = (name for one in sets for name in find_kind(one.kind).unknowns(one))
         return cls(scene, tuple(sets), tuple(dict.fromkeys(names)), watch)
 
@@ -329,7 +331,7 @@ class Solved:
 
 
 def solve(
-    stack: Stack,
+    stack: MeasurementModel,
     terms: Terms,
     prior: tuple[Array, Array] | None = None,
     unknown: Array | None = None,

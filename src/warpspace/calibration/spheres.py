@@ -6,7 +6,7 @@ import numpy as np
 
 from warpspace.analysis.axis_motion import fit_flat_circle
 from warpspace.bench.placing import ball_point
-from warpspace.calibration.kinds import Placed
+from warpspace.calibration.kinds import FreePlacementKind
 from warpspace.calibration.readings import (
     Circle,
     Readings,
@@ -28,7 +28,7 @@ READ = ("x_mm", "y_mm", "z_mm")
 TCP_SPREAD_MM = 20.0  # centres that wander further than this were not measured with TCP correction
 
 
-class Centres(Placed):
+class Centres(FreePlacementKind):
     """Centres of one sphere, wherever its stand is."""
 
     place = "sphere"
@@ -80,7 +80,7 @@ class SphereTcp(Centres):
         return take_readings(self.name, scene, table, coordinates, observed, notes)
 
 
-class Sphere(Centres):
+class SphereKind(Centres):
     """Positions of the linear axes, each time the tool point stands at the sphere."""
 
     name = "sphere"

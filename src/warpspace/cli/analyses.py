@@ -103,7 +103,7 @@ def _runner(kind: "type[Analysis]", run_it: Callable[..., Any] | None) -> Callab
                 its_own = {key: values[key] for key in values if key not in own}
                 files = {"plot": plot, "output": output, "force": force}
                 found = run_it(asked, loaded, bar.reach, names=names, **files, **its_own)
-        warn(*found.doubts())
+        warn(*found.caveats())
         if left_out := found.second_order:
             warn(*second_order_words(left_out))
         chart, file = plot if kind.has_chart else None, None if run_it else output
@@ -163,7 +163,7 @@ def write_result(
         from warpspace.scene.scene_writer import scene_files
 
         path, changes = Path(output), found.changes()
-        if texts := found.texts(path.suffix.lower()):
+        if texts := found.files(path.suffix.lower()):
             wrote = write_texts(texts, path, force=force)
         elif changes:
             _, *beside = write_texts(scene_files(changes[-1].scene, path.stem), path, force=force)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from warpspace.analysis.commands.concepts import Concepts, ConceptsResult
     from warpspace.analysis.commands.montecarlo import Machines, MachinesResult
-    from warpspace.analysis.description import Watch
+    from warpspace.analysis.description import ProgressCallback
     from warpspace.analysis.sampling.machine_sampling import Take
     from warpspace.scene.model import Scene
     from warpspace.units import Array
@@ -43,7 +43,7 @@ COUNTED = ("samples", "seed")
 def draw_beside(
     asked: "Concepts",
     scenes: "Sequence[Scene]",
-    watch: "Watch",
+    watch: "ProgressCallback",
     *,
     size: tuple[int, int],
     plot: str | None,
@@ -64,7 +64,7 @@ def draw_beside(
 def sample(
     asked: "Machines",
     scenes: "Sequence[Scene]",
-    watch: "Watch",
+    watch: "ProgressCallback",
     *,
     names: Sequence[str],
     workers: int | None,

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.analysis import blocks
-from warpspace.formats.compensation.corrections import Wanted
-from warpspace.formats.source import Place, Source
+from warpspace.formats.compensation.corrections import RequiredCorrections
+from warpspace.formats.source import Source, SourceLine
 from warpspace.machine.axes import TravelDirection, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Directional
-from warpspace.machine.curves.table import Table, TwoArguments
+from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
@@ -25,7 +25,7 @@ Matrix = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
-class Run:
+class MeasuredRun:
     """One run over the positions of a series."""
 
     number: int
@@ -34,12 +34,12 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Series:
+class ErrorSeries:
     """One error along its axis."""
 
     key: str  # parameter
     positions: tuple[float, ...]  # (n,), mm or degrees; ascending
-    runs: tuple[Run, ...]  # at least one
+    runs: tuple[MeasuredRun, ...]  # at least one
     # (n,), µm or µrad; standard uncertainties (k = 1); empty where none are given
     uncertainty: tuple[float, ...] = ()
 
@@ -93,7 +93,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Plane:
+class ErrorSurface:
     """One error over two axes."""
 
     key: str
@@ -117,13 +117,13 @@ def plane_by_direction(
     axes: tuple[str, str],
     positions: tuple[ArrayLike, ArrayLike],
     tables: Mapping[int, Array],
-) -> Plane:
+) -> ErrorSurface:
     """Build an error over two axes of its values in both directions of travel."""
     forward, backward = (
         tuple(tuple(row) for row in tables[way].tolist()) for way in (FORWARD, BACKWARD)
     )
     first, second = (tuple(np.asarray(at, dtype=float).tolist()) for at in positions)
-    return Plane(key, axes, first, second, forward, () if backward == forward else backward)
+    return ErrorSurface(key, axes, first, second, forward, () if backward == forward else backward)
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,8 @@ class Imported:
     """What a file holds."""
 
     format: str  # name of its format
-    series: tuple[Series, ...] = ()
-    planes: tuple[Plane, ...] = ()
+    series: tuple[ErrorSeries, ...] = ()
+    planes: tuple[ErrorSurface, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict[str, float])  # µm or µrad
     # µm or µrad; standard uncertainty of constants
     uncertainty: Mapping[str, float] = field(default_factory=dict[str, float])
@@ -178,7 +178,7 @@ def merge(parts: Sequence[Imported]) -> Imported:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Summary:
+class ErrorSummary:
     """One error."""
 
     keys: ClassVar[tuple[str, ...]] = (
@@ -204,12 +204,12 @@ class Summary:
         return parameter(self.key).unit
 
 
-def summaries(found: Imported) -> list[Summary]:
+def summaries(found: Imported) -> list[ErrorSummary]:
     rows = [_of_series(one) for one in found.series]
     for plane in found.planes:
         values = plane.table(BOTH)
         rows.append(
-            Summary(
+            ErrorSummary(
                 key=plane.key,
                 kind=f"over {plane.axes[1]}{', by direction' if plane.backward else ''}",
                 points=values.size,
@@ -221,12 +221,14 @@ def summaries(found: Imported) -> list[Summary]:
         )
     for key, value in found.constants.items():
         own = found.uncertainty.get(key)
-        row = Summary(key=key, kind="constant", smallest=value, largest=value, uncertainty=own)
+        row = ErrorSummary(key=key, kind="constant", smallest=value, largest=value, uncertainty=own)
         rows.append(row)
     for key, curve in found.curves.items():
         ((kind, numbers),) = curve.items()
         last = numbers[-1][1] if kind == "harmonics" else numbers[-1]
-        rows.append(Summary(key=key, kind=kind, points=len(numbers), smallest=last, largest=last))
+        rows.append(
+            ErrorSummary(key=key, kind=kind, points=len(numbers), smallest=last, largest=last)
+        )
     return rows
 
 
@@ -255,12 +257,12 @@ def summary_table(found: Imported) -> blocks.Table:
     return blocks.Table(columns, rows)
 
 
-def _of_series(one: Series) -> Summary:
+def _of_series(one: ErrorSeries) -> ErrorSummary:
     values, reversal, repeatability = one.values, one.reversal, one.repeatability
     if repeatability is not None and np.isnan(repeatability).all():
         repeatability = None
     ways = {run.direction for run in one.runs}
-    return Summary(
+    return ErrorSummary(
         key=one.key,
         kind="table" if reversal is None else "by direction",
         points=len(one.positions),
@@ -277,7 +279,7 @@ def _of_series(one: Series) -> Summary:
 
 WAYS = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
 SAME = 1e-9  # mm or degrees: positions nearer than this are one
-Point = tuple[Place, float, float, float]  # line, position of both axes, value
+Point = tuple[SourceLine, float, float, float]  # line, position of both axes, value
 
 
 @dataclass(frozen=True)
@@ -300,12 +302,12 @@ def zero_key(scene: Scene) -> str:
     return f"E{'XYZABC'[direction_index(axis) + (0 if is_linear(axis) else 3)]}{axis}"
 
 
-def sampled(wanted: Wanted) -> Imported:
+def sampled(wanted: RequiredCorrections) -> Imported:
     """Sample the errors of a scene at the points of a table."""
     scene = wanted.scene
     constants: dict[str, float] = {}
-    series: list[Series] = []
-    planes: list[Plane] = []
+    series: list[ErrorSeries] = []
+    planes: list[ErrorSurface] = []
     for key, curve in scene.errors.functions.items():
         row = parameter(key)
         if row.axis not in scene.machine.axes:
@@ -317,7 +319,7 @@ def sampled(wanted: Wanted) -> Imported:
         at = np.linspace(*scene.axis_span(row.axis), count)
         ways = _ways(curve)
         other = _second_axis(curve)
-        tabled = all(isinstance(one, Table | TwoArguments) for one in ways.values() or [curve])
+        tabled = all(isinstance(one, TableCurve | TwoArguments) for one in ways.values() or [curve])
         if tabled and (other is not None or len(curve.kinks) <= count):
             at = np.array(curve.kinks)
         elif other is not None:
@@ -333,21 +335,23 @@ def sampled(wanted: Wanted) -> Imported:
             planes.append(plane_by_direction(key, (row.axis, other[0]), (at, other[1]), tables))
         else:
             runs = tuple(
-                Run(1, way, tuple(np.asarray(part.evaluate(at)).tolist()))
+                MeasuredRun(1, way, tuple(np.asarray(part.evaluate(at)).tolist()))
                 for way, part in (ways or {BOTH: curve}).items()
             )
-            series.append(Series(key, tuple(at.tolist()), runs))
+            series.append(ErrorSeries(key, tuple(at.tolist()), runs))
     return Imported("scene", tuple(series), tuple(planes), constants)
 
 
-def in_one_direction(held: Imported, wanted: Wanted) -> Imported:
+def in_one_direction(held: Imported, wanted: RequiredCorrections) -> Imported:
     """Give errors by direction of travel as the scene has them in the direction it looks at."""
     way = WAYS.get(TravelDirection(wanted.scene.model.direction), BOTH)
 
     return replace(
         held,
         series=tuple(
-            Series(one.key, one.positions, (Run(1, BOTH, tuple(one.toward(way).tolist())),))
+            ErrorSeries(
+                one.key, one.positions, (MeasuredRun(1, BOTH, tuple(one.toward(way).tolist())),)
+            )
             for one in held.series
         ),
         planes=tuple(
@@ -406,11 +410,11 @@ def distinct(at: np.ndarray) -> np.ndarray:
 
 def plane_of(
     key: str, axes: tuple[str, str], points: Sequence[Point], source: Source, where: str = ""
-) -> Plane:
+) -> ErrorSurface:
     first = distinct(np.array([point[1] for point in points]))
     second = distinct(np.array([point[2] for point in points]))
     values = np.full((len(first), len(second)), math.nan)
-    lines: dict[tuple[int, int], Place] = {}
+    lines: dict[tuple[int, int], SourceLine] = {}
     for at, one, other, value in points:
         i = int(np.abs(first - one).argmin())
         j = int(np.abs(second - other).argmin())
@@ -424,12 +428,12 @@ def plane_of(
         found = f"{key} has no value at {axes[0]} {first[i]:g}, {axes[1]} {second[j]:g}{where}"
         (lines.get((i, j)) or source).refuse(found, "a value at every point of the grid")
     rows = tuple(tuple(row) for row in values.tolist())
-    return Plane(key, axes, tuple(first.tolist()), tuple(second.tolist()), rows)
+    return ErrorSurface(key, axes, tuple(first.tolist()), tuple(second.tolist()), rows)
 
 
 def plane_by_ways(
     key: str, axes: tuple[str, str], points: Mapping[int, Sequence[Point]], source: Source
-) -> Plane:
+) -> ErrorSurface:
     """Build an error of two axes from its points by direction of travel, see `plane_of`."""
     words = {FORWARD: " forward", BACKWARD: " backward", BOTH: ""}
     planes = {way: plane_of(key, axes, own, source, words[way]) for way, own in points.items()}

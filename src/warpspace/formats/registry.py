@@ -11,9 +11,9 @@ from pkgutil import resolve_name
 from typing import Any
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.compensation.corrections import Wanted
+from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.measured import Imported, merge
-from warpspace.formats.source import MAX_BYTES, Place, Source, source_of_bytes
+from warpspace.formats.source import MAX_BYTES, Source, SourceLine, source_of_bytes
 from warpspace.formats.terms import Tables, errors_of
 from warpspace.machine.axes import is_axis_name
 from warpspace.machine.definition import Machine
@@ -48,7 +48,7 @@ class ReadOptions:
         """Say what the numbers are: what the user says, else the documentation of the format."""
         return f"sign: {self.sign}" if self.sign else usual
 
-    def axis_named(self, name: str, at: Source | Place) -> str:
+    def axis_named(self, name: str, at: Source | SourceLine) -> str:
         """Find the axis of the machine behind a name in a file: X1, MX1 and X mean X."""
         bare = name.strip().strip('"').upper()
         given = self.names.get(bare, "")
@@ -83,7 +83,7 @@ class Format:
     read: Callable[[Sequence[Source], ReadOptions], Imported] | None = None
     # what the controller evaluates after reading them; None where it is no controller's
     tables: Callable[[Sequence[Source], ReadOptions], Tables] | None = None
-    write: Callable[[Wanted], Files] | None = None  # the files that compensate
+    write: Callable[[RequiredCorrections], Files] | None = None  # the files that compensate
     apart: bool = False  # whether each of its files is a table by itself
     points: int = 21  # per axis where none are asked for
     most_points: int = 10_000  # per axis that the controller takes

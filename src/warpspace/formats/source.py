@@ -97,22 +97,22 @@ class Source:
         """Read it as a table with a header and at most so many rows."""
         return CsvRows(io.StringIO(self.text), self.name, most, once=True)
 
-    def at(self, line: int) -> "Place":
+    def at(self, line: int) -> "SourceLine":
         """Give one of its lines, counted from 1."""
-        return Place(self, line)
+        return SourceLine(self, line)
 
-    def scan(self, *comments: str) -> Iterator[tuple["Place", str]]:
+    def scan(self, *comments: str) -> Iterator[tuple["SourceLine", str]]:
         """Give the lines that hold something, without what follows the mark of a comment."""
         for number, text in enumerate(self.lines, start=1):
             bare = text
             for mark in comments:
                 bare = bare.split(mark)[0]
             if bare := bare.strip():
-                yield Place(self, number), bare
+                yield SourceLine(self, number), bare
 
 
 @dataclass(frozen=True)
-class Place:
+class SourceLine:
     """A line of a file: what is read from it, and how it is refused."""
 
     source: Source

@@ -23,7 +23,7 @@ HELD, MODULO, EXTENDED = "held", "modulo", "extended"
 
 
 @dataclass(frozen=True)
-class Line:
+class AxisTable:
     """A table of one axis that corrects one axis."""
 
     source: str  # the axis whose position is looked up, and the one that is corrected
@@ -65,8 +65,8 @@ class Line:
 class Product:
     """Two tables whose values are multiplied; the product is added to the target of the first."""
 
-    first: Line  # their own corrections are no part of it
-    second: Line
+    first: AxisTable  # their own corrections are no part of it
+    second: AxisTable
     sign: float = 1.0  # of the product: −1 where the controller subtracts what its tables say
 
     @property
@@ -127,7 +127,7 @@ class Affine:
         }
 
 
-Term: TypeAlias = Line | Product | Grid3 | Affine
+Term: TypeAlias = AxisTable | Product | Grid3 | Affine
 """A part of a controller's compensation."""
 
 
@@ -186,7 +186,7 @@ NEGLIGIBLE = 1e-9  # µm or µrad
 def errors_of(
     tables: Tables, name: str, source: Source, machine: Machine | None = None
 ) -> measured.Imported:
-    lines = [term for term in tables.terms if isinstance(term, Line)]
+    lines = [term for term in tables.terms if isinstance(term, AxisTable)]
     series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
     planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]
     notes = list(tables.notes)
@@ -246,8 +246,8 @@ def _factor(machine: Machine | None, source_axis: str, target: str) -> float:
     return -size * sense(machine, target) * side(machine, source_axis)
 
 
-def _by_key(lines: Sequence[Line], source: Source) -> dict[str, list[Line]]:
-    found: defaultdict[str, list[Line]] = defaultdict(list)
+def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTable]]:
+    found: defaultdict[str, list[AxisTable]] = defaultdict(list)
     for line in lines:
         if not is_linear(line.target) and line.source != line.target:
             source.refuse(
@@ -259,19 +259,21 @@ def _by_key(lines: Sequence[Line], source: Source) -> dict[str, list[Line]]:
     return found
 
 
-def _series(key: str, parts: Sequence[Line], machine: Machine | None) -> measured.Series:
+def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> measured.ErrorSeries:
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
         ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
     if np.array_equal(ways[measured.FORWARD], ways[measured.BACKWARD]):
-        runs = (measured.Run(1, measured.BOTH, tuple(ways[measured.FORWARD].tolist())),)
+        runs = (measured.MeasuredRun(1, measured.BOTH, tuple(ways[measured.FORWARD].tolist())),)
     else:
-        runs = tuple(measured.Run(1, way, tuple(values.tolist())) for way, values in ways.items())
-    return measured.Series(key, tuple(at.tolist()), runs)
+        runs = tuple(
+            measured.MeasuredRun(1, way, tuple(values.tolist())) for way, values in ways.items()
+        )
+    return measured.ErrorSeries(key, tuple(at.tolist()), runs)
 
 
-def _plane(term: Product, machine: Machine | None, source: Source) -> measured.Plane:
+def _plane(term: Product, machine: Machine | None, source: Source) -> measured.ErrorSurface:
     one, other = term.first, term.second
     if one.source == other.source or not is_linear(one.target):
         source.refuse(
@@ -287,8 +289,8 @@ def _plane(term: Product, machine: Machine | None, source: Source) -> measured.P
     )
 
 
-def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.Plane], float]:
-    planes: list[measured.Plane] = []
+def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.ErrorSurface], float]:
+    planes: list[measured.ErrorSurface] = []
     left = 0.0
     for index, target in enumerate(term.axes):
         values = term.values[..., index]
@@ -317,16 +319,16 @@ def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.Pl
 
 
 def _joined(
-    series: list[measured.Series], planes: list[measured.Plane], source: Source
-) -> tuple[list[measured.Series], list[measured.Plane]]:
-    joined: dict[tuple[str, tuple[str, str]], measured.Plane] = {}
+    series: list[measured.ErrorSeries], planes: list[measured.ErrorSurface], source: Source
+) -> tuple[list[measured.ErrorSeries], list[measured.ErrorSurface]]:
+    joined: dict[tuple[str, tuple[str, str]], measured.ErrorSurface] = {}
     for plane in planes:
         place = (plane.key, plane.axes)
         joined[place] = _added(joined[place], plane) if place in joined else plane
     keys = [key for key, _ in joined]
     if twice := next((key for key in keys if keys.count(key) > 1), ""):
         source.refuse(f"has products of {twice} with two other axes", "one for each error")
-    left: list[measured.Series] = []
+    left: list[measured.ErrorSeries] = []
     for one in series:
         place = next((place for place in joined if place[0] == one.key), None)
         if place is None:
@@ -339,7 +341,7 @@ def _joined(
     return left, list(joined.values())
 
 
-def _added(one: measured.Plane, other: measured.Plane) -> measured.Plane:
+def _added(one: measured.ErrorSurface, other: measured.ErrorSurface) -> measured.ErrorSurface:
     first = np.union1d(one.first, other.first)
     second = np.union1d(one.second, other.second)
     totals = {
@@ -349,7 +351,7 @@ def _added(one: measured.Plane, other: measured.Plane) -> measured.Plane:
     return measured.plane_by_direction(one.key, one.axes, (first.tolist(), second.tolist()), totals)
 
 
-def _resampled(plane: measured.Plane, direction: int, first: Array, second: Array) -> Array:
+def _resampled(plane: measured.ErrorSurface, direction: int, first: Array, second: Array) -> Array:
     rows = np.array([np.interp(second, plane.second, row) for row in plane.table(direction)])
     return np.array([np.interp(first, plane.first, column) for column in rows.T]).T
 

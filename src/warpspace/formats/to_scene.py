@@ -7,14 +7,14 @@ from typing import TypeVar
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Plane, Series
+from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, ErrorSurface, Imported
 from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Constant, Directional
-from warpspace.machine.curves.table import Table, TwoArguments
-from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run
+from warpspace.machine.curves.table import TableCurve, TwoArguments
+from warpspace.machine.errors import Covariance, ErrorSet, Measurement, TravelRun
 from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN
 from warpspace.scene.curve_reader import CurveReader
 from warpspace.scene.library import load_scene, parse_scene
@@ -171,7 +171,7 @@ def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]
         if one.key in curves:
             raise SceneError(name, [f"{one.key} is given twice; expected each error once"])
         curves[one.key] = (
-            _curve(one, base) if isinstance(one, Series) else _surface(one, base, name)
+            _curve(one, base) if isinstance(one, ErrorSeries) else _surface(one, base, name)
         )
     problems = Problems()
     for key, value in found.curves.items():
@@ -184,7 +184,7 @@ def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]
     return curves
 
 
-def _curve(one: Series, base: Scene) -> ErrorFunction:
+def _curve(one: ErrorSeries, base: Scene) -> ErrorFunction:
     span = base.axis_span(parameter(one.key).axis)
     forward, backward = one.mean(FORWARD), one.mean(BACKWARD)
     if forward is not None and backward is not None and np.any(forward != backward):
@@ -195,11 +195,11 @@ def _curve(one: Series, base: Scene) -> ErrorFunction:
     return _table(span, one.positions, one.values.tolist())
 
 
-def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[float]) -> Table:
-    return Table(span, tuple(zip(at, values, strict=True)))
+def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[float]) -> TableCurve:
+    return TableCurve(span, tuple(zip(at, values, strict=True)))
 
 
-def _surface(plane: Plane, base: Scene, name: str) -> ErrorFunction:
+def _surface(plane: ErrorSurface, base: Scene, name: str) -> ErrorFunction:
     if len(plane.first) * len(plane.second) > MAX_POINTS:
         found = f"{plane.key} has {len(plane.first)} × {len(plane.second)} values"
         raise SceneError(name, [f"{found}; expected at most {MAX_POINTS:,}"])
@@ -230,7 +230,7 @@ def _measured(
             ]
             measured[one.key] = Measurement(
                 tuple(
-                    Run(sign, tuple((q, value) for q, value in pairs if not np.isnan(value)))
+                    TravelRun(sign, tuple((q, value) for q, value in pairs if not np.isnan(value)))
                     for sign, pairs in runs
                 )
             )

@@ -13,7 +13,7 @@ from warpspace.machine.axes import DIRECTIONS, TravelDirection
 from warpspace.machine.curves.curve import ErrorFunction, Span
 from warpspace.machine.curves.polynomial_pieces import SMALL, Pieces, fit_curves
 from warpspace.machine.curves.simple import Constant, Directional
-from warpspace.machine.curves.table import Table
+from warpspace.machine.curves.table import TableCurve
 from warpspace.machine.errors import ErrorSet
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Array
 
@@ -134,7 +134,7 @@ class AxisErrors:
         function = self.errors.functions.get(key)
         if isinstance(function, Pieces):
             return function.points
-        return function.kinks if isinstance(function, Table) else ()
+        return function.kinks if isinstance(function, TableCurve) else ()
 
     def with_components(self, along: Along, *, adds: bool = False) -> ErrorSet:
         self.refuse_two_arguments(adds=adds)

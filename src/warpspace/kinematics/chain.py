@@ -140,7 +140,7 @@ class LoopLinks(NamedTuple):
     tool_axis: Triple  # direction of the tool axis behind the last step of the tool branch
 
 
-class Deviation(NamedTuple):
+class BranchMotion(NamedTuple):
     """The motion D of a branch in R, as `Link` has it of an axis."""
 
     shift_um: Triple
@@ -152,7 +152,7 @@ class Deviation(NamedTuple):
         return components.add(self.shift_um, components.scale(UM_PER_MM_URAD, turned))
 
 
-NO_DEVIATION = Deviation(components.ZERO, components.ZERO_ROWS)
+NO_DEVIATION = BranchMotion(components.ZERO, components.ZERO_ROWS)
 
 
 def build_links(
@@ -224,7 +224,7 @@ def solve_links(
     last = _walk(links.tool) if loop is not Loop.WORKPIECE else NO_DEVIATION
     if loop is Loop.WORKPIECE:  # the workpiece against the frame, not the frame against it
         first, last = last, first
-    difference = Deviation(
+    difference = BranchMotion(
         components.subtract(last.shift_um, first.shift_um),
         components.subtract_rows(last.turn_urad, first.turn_urad),
     )
@@ -278,7 +278,7 @@ def loop_error(
     return error, orientation
 
 
-def _walk(links: tuple[Link, ...]) -> Deviation:
+def _walk(links: tuple[Link, ...]) -> BranchMotion:
     shift, turn = NO_DEVIATION
     for link in reversed(links):
         inside = components.multiply(link.actual, turn)
@@ -289,7 +289,7 @@ def _walk(links: tuple[Link, ...]) -> Deviation:
             components.scale(-UM_PER_MM_URAD, lever),
         )
         turn = components.add_rows(link.turn_urad, carried)
-    return Deviation(shift, turn)
+    return BranchMotion(shift, turn)
 
 
 def _between(start: Triple, end: Triple) -> Triple:
@@ -311,7 +311,7 @@ _SIDES: dict[Loop, tuple[tuple[str, float], ...]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class JacobianColumn:
     """One column of the geometric Jacobian."""
 
     direction: Array  # [..., 3]; unit vector in R along or about which the error acts
@@ -342,12 +342,12 @@ def rotation_gain(lever_mm: ArrayLike, direction: ArrayLike) -> Array:
 
 def column(
     model: Model, row: Parameter, frames: AxisFrames, point_mm: ArrayLike, sign: float = 1.0
-) -> Column:
+) -> JacobianColumn:
     pose = model.convention(row.axis).frame(frames, row)
     direction = pose[..., :3, row.direction]
     lever = np.asarray(point_mm, dtype=float) - pose[..., :3, 3]
     gain = rotation_gain(lever, direction) if row.is_rotation else direction
-    return Column(direction, lever, sign * gain, sign)
+    return JacobianColumn(direction, lever, sign * gain, sign)
 
 
 def columns(
@@ -356,7 +356,7 @@ def columns(
     keys: Sequence[str],
     coordinates: Coordinates,
     point_mm: ArrayLike,
-) -> dict[str, Column]:
+) -> dict[str, JacobianColumn]:
     """Build the Jacobian columns of parameters that act in a loop, at points, [..., 3], mm."""
     rows = [parameter(key) for key in keys]
     return {

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpspace.machine.axes import TravelDirection, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.curves.simple import NOTHING, Constant, Directional, Harmonics, Poly, Ramp
-from warpspace.machine.curves.table import Table, TwoArguments
+from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.machine.limits import MIN_SPAN
 from warpspace.units import Array
 
@@ -22,7 +22,7 @@ __all__ = [
     "Harmonics",
     "Poly",
     "Ramp",
-    "Table",
+    "TableCurve",
     "TwoArguments",
 ]
 
@@ -180,7 +180,7 @@ RUN_DIRECTIONS = (FORWARD, BACKWARD, UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class TravelRun:
     """Readings of one travel along an axis."""
 
     # "+" towards growing positions, "-" towards falling ones, empty where it is not known
@@ -193,7 +193,7 @@ class Run:
 class Measurement:
     """All runs of one error."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[TravelRun, ...]
 
     @cached_property
     def scatter(self) -> dict[str, Array]:

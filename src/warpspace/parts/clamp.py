@@ -13,10 +13,14 @@ from typing import Literal
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.description import ProgressCallback, Result
 from warpspace.analysis.options import option
 from warpspace.analysis.statistics import Numbers
-from warpspace.analysis.uncertainty.propagation import FieldDoubt, find_doubt, plus_minus
+from warpspace.analysis.uncertainty.propagation import (
+    FieldUncertainty,
+    plus_minus,
+    scene_uncertainty,
+)
 from warpspace.bench.placing import ball_point, following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
@@ -66,7 +70,7 @@ class Clamp(OfPart):
     grid: int = option(7, "Places along x and along y", low=2, high=31)
     placed: bool = option(False, "Judge what is left after the best rigid fit of the part")
 
-    def run(self, scene: Scene, watch: Watch, /) -> "ClampResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "ClampResult":
         mesh = self.find_mesh(scene)
         part = place_part(mesh, scene, self.place)
         a, b, c = part.place[3:]
@@ -106,7 +110,7 @@ class Clamp(OfPart):
             second_order=second_order(scene, Loop.RELATIVE),
         )  # fmt: skip
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        if is_large or not find_doubt(scene, Loop.RELATIVE):
+        if is_large or not scene_uncertainty(scene, Loop.RELATIVE):
             return result
         return result.said_of(*(_doubts(scene, mesh, one.place) for one in (now, first)))
 
@@ -118,7 +122,7 @@ def _judge(scene: Scene, part: PartMesh) -> Clamping:
     return Clamping(part.place, most, placed, int(made.outside.sum()))
 
 
-def _doubts(scene: Scene, mesh: PartMesh, place: Sequence[float]) -> list[FieldDoubt]:
+def _doubts(scene: Scene, mesh: PartMesh, place: Sequence[float]) -> list[FieldUncertainty]:
     made = make_points(scene, place_part(mesh, scene, place).vertices_mm)
     found = made_doubt(scene, made)
     return [found, found.seen(partial(fit_out, made.point_mm))] if found else []
@@ -138,7 +142,7 @@ class ClampResult(Result):
     warnings: tuple[str, ...]  # of the mesh
     sure: Numbers = field(default_factory=dict[str, float | None])  # U95 of what is gained
 
-    def said_of(self, *each: list[FieldDoubt]) -> "ClampResult":
+    def said_of(self, *each: list[FieldUncertainty]) -> "ClampResult":
         """Say U95 at present, at the best place and of the gain."""
         before, after = (found[self.placed] for found in each)
         gain = before.u95(before.gradients[-1] - after.gradients[-1])
@@ -178,6 +182,6 @@ class ClampResult(Result):
         yield Lines("plane", f"Where to clamp: {self.title}", "x [mm]", "y [mm]", dots, (), note)
 
     def doubts(self) -> Iterator[str]:
-        yield from (*self.warnings, *super().doubts())
+        yield from (*self.warnings, *super().caveats())
         if self.present.outside:
             yield f"at present {self.present.outside:,} vertices are beyond the travel"

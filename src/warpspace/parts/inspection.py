@@ -19,7 +19,12 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.commands.contributions import budget_words
-from warpspace.analysis.uncertainty.propagation import SURE, Doubt, FieldDoubt, plus_minus
+from warpspace.analysis.uncertainty.propagation import (
+    SURE,
+    ErrorUncertainty,
+    FieldUncertainty,
+    plus_minus,
+)
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
@@ -48,7 +53,7 @@ SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circl
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class FeatureShape:
     """A plane, sphere, cylinder or cone."""
 
     kind: str
@@ -81,10 +86,10 @@ class Shape:
         return beyond * cosine - height * sine, normal, design
 
 
-class Motion(NamedTuple):
+class ShapeMotion(NamedTuple):
     """How a shape follows F fields of small moves."""
 
-    shape: Shape
+    shape: FeatureShape
     shift_mm: Array  # [F, 3], of its centre
     turn_rad: Array  # [F, 3]
     radius_mm: Array  # [F]
@@ -96,13 +101,13 @@ class Motion(NamedTuple):
 class Feature:
     """One surface of a part."""
 
-    shape: Shape  # in the frame of the mesh
+    shape: FeatureShape  # in the frame of the mesh
     vertices: NDArray[np.int32]  # [n], of the mesh
     area_mm2: float
     normal: Array  # [n, 3]; see `Shape.respond`
     design: Array  # [n, 8]
 
-    def follow(self, move_um: Array) -> Motion:
+    def follow(self, move_um: Array) -> ShapeMotion:
         """Fit how the shape follows moves of all vertices of the mesh, [F, V, 3]."""
         move = move_um[:, self.vertices] * MM_PER_UM
         mean = move.mean(axis=1)  # what no distance tells follows this
@@ -110,10 +115,10 @@ class Feature:
         step = -np.linalg.lstsq(self.design, away.T, WEAK)[0].T
         radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
         form = np.ptp(away + step @ self.design.T, axis=1)
-        return Motion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
+        return ShapeMotion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
 
 
-def fit_shape(start: Shape, point_mm: Array) -> Shape:
+def fit_shape(start: FeatureShape, point_mm: Array) -> FeatureShape:
     """Fit a shape to points, [n, 3], by least squares of their distances, from a near one."""
     shape = start
     for _ in range(STEPS):
@@ -121,7 +126,7 @@ def fit_shape(start: Shape, point_mm: Array) -> Shape:
         step = -np.linalg.lstsq(design, distance, WEAK)[0]
         centre, axis = shape.centre_mm + step[:3], vector_rotation(step[3:6]) @ shape.axis
         radius, angle = shape.radius_mm + step[6], shape.angle_rad + step[7]
-        shape = Shape(shape.kind, centre, axis, radius, angle)
+        shape = FeatureShape(shape.kind, centre, axis, radius, angle)
         if not STILL_MM < np.abs(design @ step).max() < FAR_MM:
             break
     return shape
@@ -175,7 +180,7 @@ def _fitted(mesh: PartMesh, kind: str, part: NDArray[np.intp]) -> Feature | None
     reach = 0.0 if is_flat else weight @ np.sum((place - centre) * bent, 1) / np.trace(spread)
     axis = axis * np.copysign(1.0, lean if is_flat else -lean * reach)
     centre = centre - reach * (mean - (mean @ axis) * axis)
-    start = Shape(kind, centre, axis, abs(reach) * np.cos(angle), angle)
+    start = FeatureShape(kind, centre, axis, abs(reach) * np.cos(angle), angle)
     turned = np.sum(start.respond(place)[1] * normal, axis=1)
     if area @ (turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))) > ODD * area.sum():
         return None
@@ -188,7 +193,7 @@ def _fitted(mesh: PartMesh, kind: str, part: NDArray[np.intp]) -> Feature | None
     return Feature(shape, vertices, float(area.sum()), *response) if is_close else None
 
 
-def _distance(one: Motion, other: Motion) -> Array:
+def _distance(one: ShapeMotion, other: ShapeMotion) -> Array:
     """Distance square to a plane; else square to an axis; else between centres."""
     fixing = min(other, one, key=lambda motion: SHAPES.index(motion.shape.kind))
     away = one.shape.centre_mm - other.shape.centre_mm
@@ -196,7 +201,7 @@ def _distance(one: Motion, other: Motion) -> Array:
     return np.linalg.norm((away + moved) @ fixing.shape.across, axis=1)
 
 
-def _angle(one: Motion, other: Motion) -> Array:
+def _angle(one: ShapeMotion, other: ShapeMotion) -> Array:
     """Angle through the material between planes, else up to 90° between axes, or to a plane."""
     axis, planes = one.shape.axis, [one.shape.kind, other.shape.kind].count("plane")
     same = -1.0 if axis @ other.shape.axis < -RIGHT_RAD else 1.0
@@ -207,7 +212,7 @@ def _angle(one: Motion, other: Motion) -> Array:
     return np.abs(offset - np.linalg.norm(start + turned - np.outer(turned @ axis, axis), axis=1))
 
 
-def _position(own: Motion, *datums: Motion) -> Array:
+def _position(own: ShapeMotion, *datums: ShapeMotion) -> Array:
     """How far a feature is from where it should be against datums, along what it fixes.
 
     Each datum fixes what those before it have left; what none does stays as the best fit has it.
@@ -226,7 +231,7 @@ def _position(own: Motion, *datums: Motion) -> Array:
     return np.linalg.norm((own.shift_mm - found[..., :3]) @ own.shape.across, axis=1)
 
 
-class Kind(NamedTuple):
+class MeasureKind(NamedTuple):
     """A kind of measure: how it is taken, of what, to how many others."""
 
     take: Callable[..., Array]  # mm or rad, [F], of the motions of these
@@ -235,18 +240,18 @@ class Kind(NamedTuple):
     is_angle: bool = False
 
 
-KINDS: Mapping[str, Kind] = {
-    "flatness": Kind(lambda one: one.form_mm, ["plane"]),
-    "cylindricity": Kind(lambda one: one.form_mm, ["cylinder"]),
-    "conicity": Kind(lambda one: one.form_mm, ["cone"]),
-    "sphericity": Kind(lambda one: one.form_mm, ["sphere"]),
-    "diameter": Kind(lambda one: 2.0 * one.radius_mm, ["cylinder", "sphere"]),
-    "half_angle": Kind(lambda one: one.angle_rad, ["cone"], is_angle=True),
-    "position": Kind(_position, SHAPES, (0, 6)),
-    "distance": Kind(_distance, SHAPES, (1, 1)),
-    "angle": Kind(_angle, SHAPES[:3], (1, 1), is_angle=True),
-    "squareness": Kind(_angle, SHAPES[:3], (1, 1), is_angle=True),
-    "parallelism": Kind(_angle, SHAPES[:3], (1, 1), is_angle=True),
+KINDS: Mapping[str, MeasureKind] = {
+    "flatness": MeasureKind(lambda one: one.form_mm, ["plane"]),
+    "cylindricity": MeasureKind(lambda one: one.form_mm, ["cylinder"]),
+    "conicity": MeasureKind(lambda one: one.form_mm, ["cone"]),
+    "sphericity": MeasureKind(lambda one: one.form_mm, ["sphere"]),
+    "diameter": MeasureKind(lambda one: 2.0 * one.radius_mm, ["cylinder", "sphere"]),
+    "half_angle": MeasureKind(lambda one: one.angle_rad, ["cone"], is_angle=True),
+    "position": MeasureKind(_position, SHAPES, (0, 6)),
+    "distance": MeasureKind(_distance, SHAPES, (1, 1)),
+    "angle": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
+    "squareness": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
+    "parallelism": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
 }
 Band: TypeAlias = tuple[float, float] | None  # a tolerance, µm or µrad
 Measure: TypeAlias = tuple[str, tuple[int, ...]]  # its kind, and numbers of features
@@ -269,7 +274,7 @@ def inspect(
     mesh: PartMesh,
     made: Made,
     tolerances: tuple[str, str] | None = None,
-    sure: FieldDoubt | None = None,
+    sure: FieldUncertainty | None = None,
     between_um: float = 0.0,
 ) -> tuple[FeatureResult, ...]:
     """Measure the features of a part, in its own frame, and made at some place in a scene.
@@ -360,11 +365,11 @@ def _take(features: Collection[Feature], wanted: Collection[Measure], move_um: A
 
 
 def _numbers(
-    kind: Kind,
+    kind: MeasureKind,
     values: Array,
     band: Band,
     budget: dict[str, float],
-    known: tuple[Doubt, float | None] | None,
+    known: tuple[ErrorUncertainty, float | None] | None,
     between_um: float,
 ) -> dict[str, Any]:
     """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad.
@@ -395,7 +400,7 @@ def _numbers(
     return found | {"budget": dict(sorted(budget.items(), key=lambda pair: -abs(pair[1])))}
 
 
-def _read(source: str, text: str, shapes: Sequence[Shape], names: list[str]) -> Wanted:
+def _read(source: str, text: str, shapes: Sequence[FeatureShape], names: list[str]) -> Wanted:
     problems, raw = schema.Problems(), parse_toml(text, source)
     entries: Sequence[Any] = (problems.read(schema.FEATURES, "", raw) or {}).get("features", ())
     known, wanted = {name: at for at, name in enumerate(names)}, Wanted()
@@ -425,7 +430,7 @@ def _read(source: str, text: str, shapes: Sequence[Shape], names: list[str]) -> 
     return wanted
 
 
-def _wrong(entry: Mapping[str, Any], shapes: Sequence[Shape]) -> str:
+def _wrong(entry: Mapping[str, Any], shapes: Sequence[FeatureShape]) -> str:
     name, count = entry["measure"], len(shapes) - 1
     bands = entry["tolerance_um"], entry["tolerance_urad"]
     if not name:
@@ -442,7 +447,7 @@ def _wrong(entry: Mapping[str, Any], shapes: Sequence[Shape]) -> str:
         if one.kind not in kind.features:
             return f"{name} of a {one.kind}; expected a {' or a '.join(kind.features)}"
     if name in ("squareness", "parallelism"):
-        (angle,) = _angle(*(Motion(shape, *np.zeros((5, 1, 3))) for shape in shapes))
+        (angle,) = _angle(*(ShapeMotion(shape, *np.zeros((5, 1, 3))) for shape in shapes))
         if abs((np.cos if name == "squareness" else np.sin)(angle)) > RIGHT_RAD:
             return f"{name} at a nominal angle of {np.rad2deg(angle):.4g}°; expected angle"
     return ""

@@ -181,7 +181,7 @@ def read_program(
     scene: Scene, lines: Iterable[str], setup: Setup | None = None, name: str = "program"
 ) -> ReadProgram:
     """Run the lines of a program on the control of a machine; a `SceneError` names its line."""
-    control = Control(scene, setup or Setup(), name)
+    control = Interpreter(scene, setup or Setup(), name)
     for _ in control.run(lines):
         pass
     rows = np.frombuffer(control.rows).reshape(-1, control.width)
@@ -194,7 +194,7 @@ def read_program(
     )  # fmt: skip
 
 
-class Control:
+class Interpreter:
     """Modal words of a control, where its axes stand, and the words of the line that it is at."""
 
     def __init__(self, scene: Scene, setup: Setup, name: str) -> None:

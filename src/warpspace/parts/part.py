@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.description import ProgressCallback, Result
 from warpspace.analysis.options import File, option
 from warpspace.analysis.statistics import Numbers, Statistics, statistics
-from warpspace.analysis.uncertainty.propagation import FieldDoubt, plus_minus, u95_lines
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, plus_minus, u95_lines
 from warpspace.bodies.gltf import to_gltf
 from warpspace.bodies.own_meshes import FORMATS, MM_PER_M, UNITS_MM
 from warpspace.field.evaluate import ErrorField
@@ -72,7 +72,7 @@ class Part(OfPart):
     )
     tolerances: tuple[str, str] | None = None  # name and text of features that are read already
 
-    def run(self, scene: Scene, watch: Watch, /) -> "PartResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult":
         mesh = self.find_mesh(scene)
         is_own = not (self.mesh or self.file)
         features = self.features or (scene.part.path("features") if is_own else None)
@@ -96,7 +96,7 @@ class Part(OfPart):
             **vars(cut),
             placed=placed,
             features=() if is_large else inspect(scene, mesh, made, tolerances, sure, unseen),
-            doubt=sure and sure.doubt,
+            uncertainty=sure and sure.doubt,
             unseen_um=unseen,
             part=part,
             made=made,
@@ -119,7 +119,9 @@ def _between(scene: Scene, part: PartMesh, made: Made) -> float:
     return float(np.linalg.norm(off, axis=1).max())
 
 
-def _off(part: PartMesh, made: Made, *found: tuple[Array, FieldDoubt | None]) -> Iterator[Off]:
+def _off(
+    part: PartMesh, made: Made, *found: tuple[Array, FieldUncertainty | None]
+) -> Iterator[Off]:
     from trimesh import triangles
 
     # lowest and highest so far: how far, at which vertex, along which normal
@@ -187,8 +189,8 @@ class PartResult(Off, Result):
         ]
         heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
-        yield from u95_lines(self.doubt, {word: one.deviation for word, one in both})
-        for word, one in both if self.doubt else ():
+        yield from u95_lines(self.uncertainty, {word: one.deviation for word, one in both})
+        for word, one in both if self.uncertainty else ():
             low, high = (plus_minus(one.normal[f"u95_{end}"]) for end in ends)
             yield f"  U95 along the normal, {word}: min {low}, max {high} µm"
         yield features_table(self.features)

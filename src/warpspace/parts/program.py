@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.contributions import budget_words, explain
-from warpspace.analysis.description import Analysis, Result, Watch, plain
+from warpspace.analysis.description import Analysis, ProgressCallback, Result, plain
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Statistics
 from warpspace.analysis.uncertainty.propagation import (
-    FieldDoubt,
+    FieldUncertainty,
     combine,
-    find_doubt,
     plus_minus,
+    scene_uncertainty,
     u95_lines,
 )
 from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
@@ -67,7 +67,7 @@ class ToolPath:
     error_um: Array  # [n, 3], relative, actual − nominal, w
     outside: NDArray[np.bool_]  # [n], beyond the travel; errors are continued
     step_mm: Array  # [n, 3], from the sample before; zero where the path begins or a tool changes
-    sure: FieldDoubt | None  # how sure its errors are; statistics over the way
+    sure: FieldUncertainty | None  # how sure its errors are; statistics over the way
 
     @cached_property
     def norm_um(self) -> Array:
@@ -124,9 +124,9 @@ def trace_program(read: interpreter.ReadProgram, chord_mm: float = CHORD_MM) -> 
     return replace(found, sure=_path_doubt(read, found))
 
 
-def _path_doubt(read: interpreter.ReadProgram, path: ToolPath) -> FieldDoubt | None:
+def _path_doubt(read: interpreter.ReadProgram, path: ToolPath) -> FieldUncertainty | None:
     """Say how sure the errors along a path are; None where a scene does not say, or it is long."""
-    doubt, scene = find_doubt(read.scene, Loop.RELATIVE), read.scene
+    doubt, scene = scene_uncertainty(read.scene, Loop.RELATIVE), read.scene
     if doubt is None or len(path.line) > MOST_SURE:
         return None
     view, length = scene.view(Loop.RELATIVE, "workpiece"), read.length_mm[path.move]
@@ -230,7 +230,7 @@ class Program(interpreter.Setup, Analysis):
         file = self.file or ""
         return interpreter.program_lines(file) if self.text is None else self.text.splitlines()
 
-    def run(self, scene: Scene, watch: Watch, /) -> "ProgramResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "ProgramResult":
         if self.file is None:
             if (path := scene.part.path("program")) is None:
                 raise OptionError("{file} is missing; expected a program")
@@ -372,7 +372,7 @@ def correct_program(asked: Program, read: interpreter.ReadProgram) -> Iterator[s
         raise OptionError(f"line {line}: {word} is not followed; expected a program that is")
     row, places = corrected_places(read, asked.within_um / 1e3)
     scene, lines, own = read.scene, [*asked.lines()], read.line[row]
-    state = interpreter.Control(scene, asked, asked.file or "")
+    state = interpreter.Interpreter(scene, asked, asked.file or "")
     linear = {name[0] for name in following_axes(scene.model)}
     if missing := ", ".join(linear - state.index.keys()):
         raise OptionError(f"no word moves axis {missing}; expected one axis of each letter")
@@ -416,7 +416,7 @@ def _header(scene: Scene, asked: Program) -> Iterator[str]:
 
 
 def _blocks(
-    state: interpreter.Control, letters: Sequence[str], kinds: Integers, places: Array
+    state: interpreter.Interpreter, letters: Sequence[str], kinds: Integers, places: Array
 ) -> Iterator[str]:
     """Write the line that a control is at as straight blocks to places, [n, a]."""
     number = [word for key, word in state.tokens if key == "N"]

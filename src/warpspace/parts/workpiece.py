@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.description import Analysis
 from warpspace.analysis.options import File, Grammar, option
-from warpspace.analysis.uncertainty.propagation import FieldDoubt, combine, find_doubt
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, combine, scene_uncertainty
 from warpspace.bench.placing import ball_point, follow, within_travel
 from warpspace.bodies.mesh import CREASE_DEG
 from warpspace.bodies.own_meshes import read_mesh
@@ -240,9 +240,9 @@ def point_basis(
     return build_basis(scene.model, scene.errors, keys, at, view, point)
 
 
-def made_doubt(scene: Scene, made: Made) -> FieldDoubt | None:
+def made_doubt(scene: Scene, made: Made) -> FieldUncertainty | None:
     """Say how sure errors of points are; None where a scene does not say."""
-    if (doubt := find_doubt(scene, Loop.RELATIVE)) is None:
+    if (doubt := scene_uncertainty(scene, Loop.RELATIVE)) is None:
         return None
     point = transforms.apply(branch_pose(scene.model, "workpiece", made.coordinates), made.point_mm)
     view = scene.view(Loop.RELATIVE, "workpiece")

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
 from warpspace.analysis.sampling.distribution import loop_axes
-from warpspace.analysis.uncertainty.propagation import FieldDoubt, plus_minus
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, plus_minus
 from warpspace.kinematics.model import Convention, Loop, Model
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, is_rotary
 from warpspace.machine.errors import ToleranceSet
@@ -76,7 +76,7 @@ def u95_behind(u95: float | None) -> str:
     return f" {plus_minus(u95, '.2g' if u95 and u95 < 0.95 else '.1f')}"
 
 
-def length_words(found: FieldDoubt | None, point: int = 0) -> str:
+def length_words(found: FieldUncertainty | None, point: int = 0) -> str:
     """Say U95 of |E| at a point of a field, by its flat number; empty where none is stated."""
     return u95_behind(found.u95_at(point)) if found else ""
 

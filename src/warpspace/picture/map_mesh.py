@@ -34,7 +34,7 @@ class MapMesh:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class MapPatch:
     """One grid of a map: the volume, or a slice."""
 
     drawn_mm: Array
@@ -52,16 +52,16 @@ class Part:
         ]
 
 
-def map_parts(picture: Picture) -> list[Part]:
+def map_parts(picture: Picture) -> list[MapPatch]:
     """List the grids that the map of a picture consists of; a slice is seen from both sides."""
     lift = LIFT * picture.size_mm
     lifts = (lift, -lift) if picture.slices else (lift,)
-    parts: list[Part] = []
+    parts: list[MapPatch] = []
     for one in picture.slices or (picture,):
         drawn_mm, values = thick_nodes(one, one.drawn_mm), spread(one.values)
         faded = None if one.faded is None else spread(one.faded)
         drawn_of = topology(values.shape, cut=one.cut)
-        parts.append(Part(drawn_mm, values, drawn_of, lifts, one.grid.ways, faded))
+        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, one.grid.ways, faded))
     return parts
 
 
@@ -93,7 +93,7 @@ def map_mesh(picture: Picture) -> MapMesh:
 
 def line_mesh(picture: Picture, *, grid: bool = True) -> MapMesh:
     """Give the lines of a map alone: those of its grid too, or only its edges."""
-    found: list[tuple[Part, Index, Index]] = []
+    found: list[tuple[MapPatch, Index, Index]] = []
     for part in map_parts(picture):
         segments = part.drawn_of.edge_segments
         if grid:
@@ -103,7 +103,7 @@ def line_mesh(picture: Picture, *, grid: bool = True) -> MapMesh:
     return _collect(found)
 
 
-def _collect(found: list[tuple[Part, Index, Index]]) -> MapMesh:
+def _collect(found: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
     vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in found]
     values = [part.values.reshape(-1).take(used) for part, used, _ in found]
     faded = [part.faded.reshape(-1)[at] for part, at, _ in found if part.faded is not None]

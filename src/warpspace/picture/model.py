@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpspace.analysis.commands.concepts import Concept, expected_um
 from warpspace.analysis.description import plain
 from warpspace.analysis.statistics import Statistics, volume_statistics
-from warpspace.analysis.uncertainty.propagation import SURE, FieldDoubt, field_doubt
+from warpspace.analysis.uncertainty.propagation import SURE, FieldUncertainty, field_uncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, View, placed_words, second_order_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
@@ -112,7 +112,7 @@ class Picture:
     # ... of the "position" error, µm, of the "orientation" error of the tool axis, µrad, or of the
     # "uncertainty" of the position error, its U95, µm.
     quantity: str = "position"
-    uncertainty: FieldDoubt | None = None  # of its errors; None where nothing is stated
+    uncertainty: FieldUncertainty | None = None  # of its errors; None where nothing is stated
     significant: bool = False  # whether colours fade where an error is not above its U95
     # that colours hold |E| against; they fade where it cannot be told whether it is kept
     limit_um: float | None = None
@@ -430,7 +430,9 @@ def evaluate_picture(
     coloured_values(field, component, quantity)  # refuses a component that does not exist
     largest, uncertainty = float(field.norm_um.max()), None
     if quantity == "uncertainty":
-        uncertainty = field_doubt(scene, field.error_um, nodes.coordinates, view, nodes.point_mm)
+        uncertainty = field_uncertainty(
+            scene, field.error_um, nodes.coordinates, view, nodes.point_mm
+        )
         if uncertainty is None or not uncertainty.doubt.is_known:
             remarks = () if uncertainty is None else uncertainty.doubt.remarks()
             raise OptionError("; ".join(remarks) or NOT_STATED)

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from warpspace.analysis.axis_motion import AxisMotion, Motion, axis_motion, points_on_axis
+from warpspace.analysis.axis_motion import AxisMotion, ErrorMotion, axis_motion, points_on_axis
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.field.evaluate import ErrorField, evaluate_first_order
 from warpspace.geometry.surfaces import deform
@@ -231,7 +231,7 @@ POSITIVE = {
 """Which deviation is positive."""
 
 
-def motion_lines(name: str, motion: AxisMotion, part: Motion) -> Lines:
+def motion_lines(name: str, motion: AxisMotion, part: ErrorMotion) -> Lines:
     """Give one deviation as a polar chart around the position of its axis."""
     turns = turn_words(part.times_a_turn) if motion.closed else "an arc"
     values = (

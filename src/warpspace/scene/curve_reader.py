@@ -12,9 +12,9 @@ from warpspace.machine import limits
 from warpspace.machine.curves.curve import MISSING, ErrorFunction, Points, ValueReader, is_number
 from warpspace.machine.curves.registry import find_form, spell_forms
 from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
-from warpspace.machine.curves.table import Table, TwoArguments
+from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.machine.definition import Gantry, default_across
-from warpspace.machine.errors import RUN_DIRECTIONS, UNKNOWN, Run
+from warpspace.machine.errors import RUN_DIRECTIONS, UNKNOWN, TravelRun
 from warpspace.scene import text_files
 from warpspace.scene.schema import Problems
 from warpspace.units import Array
@@ -50,7 +50,7 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
             terms = _terms(first, second, weights)
             if len(terms) <= limits.MAX_TERMS:
                 return Harmonics(span, terms)
-        case ((Constant() | Table()), (Constant() | Table())):
+        case ((Constant() | TableCurve()), (Constant() | TableCurve())):
             at = np.union1d(first.kinks, second.kinks)
             if len(at) <= limits.MAX_POINTS:
                 return _table(first, second, weights, at)
@@ -72,7 +72,7 @@ def _surface(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
     zero = Constant(first.span)
     plain = [
         curve
-        if isinstance(curve, TwoArguments | Constant | Table)
+        if isinstance(curve, TwoArguments | Constant | TableCurve)
         else _sampled(curve, zero, (1.0, 0.0))
         for curve in (first, second)
     ]
@@ -113,12 +113,12 @@ def _terms(
     return tuple((order, value, phase) for (order, phase), value in found.items())
 
 
-def _table(first: ErrorFunction, second: ErrorFunction, weights: Weights, at: Array) -> Table:
+def _table(first: ErrorFunction, second: ErrorFunction, weights: Weights, at: Array) -> TableCurve:
     value = weights[0] * first.evaluate(at) + weights[1] * second.evaluate(at)
-    return Table(first.span, tuple(zip(at.tolist(), value.tolist(), strict=True)))
+    return TableCurve(first.span, tuple(zip(at.tolist(), value.tolist(), strict=True)))
 
 
-def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> Table:
+def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> TableCurve:
     kinks = [q for q in (*first.kinks, *second.kinks) if first.span[0] < q < first.span[1]]
     count = 65
     while True:
@@ -143,7 +143,7 @@ def read_csv_column(path: Path, column: str) -> list[tuple[float, float]]:
     return _read_csv(path, lambda rows: _points(rows, column))
 
 
-def read_csv_runs(path: Path, column: str) -> tuple[Run, ...]:
+def read_csv_runs(path: Path, column: str) -> tuple[TravelRun, ...]:
     """Read the runs of one error, a row a reading; ``run`` and ``direction`` tell them apart."""
     return _read_csv(path, lambda rows: _runs(rows, column))
 
@@ -187,7 +187,7 @@ def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
     return points
 
 
-def _runs(rows: text_files.CsvRows, column: str) -> tuple[Run, ...]:
+def _runs(rows: text_files.CsvRows, column: str) -> tuple[TravelRun, ...]:
     value_at = _column(rows, column)
     run_at, way_at = (
         rows.header.index(name) if name in rows.header else None for name in (RUN, DIRECTION)
@@ -209,7 +209,7 @@ def _runs(rows: text_files.CsvRows, column: str) -> tuple[Run, ...]:
             )
     if not found and not rows.problems:
         rows.note("has 0 rows below the header; expected at least one")
-    return tuple(Run(way, tuple(points)) for (_, way), points in found.items())
+    return tuple(TravelRun(way, tuple(points)) for (_, way), points in found.items())
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,16 @@ from warpspace.machine import limits
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, sort_axes
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.simple import Constant
-from warpspace.machine.curves.table import Table
+from warpspace.machine.curves.table import TableCurve
 from warpspace.machine.definition import BODY_FRAMES, Machine, Range, build_machine
-from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run, Tolerance, ToleranceSet
+from warpspace.machine.errors import (
+    Covariance,
+    ErrorSet,
+    Measurement,
+    Tolerance,
+    ToleranceSet,
+    TravelRun,
+)
 from warpspace.resources import scenes_dir
 from warpspace.scene import machine_library, schema
 from warpspace.scene.curve_reader import GUIDES, CurveReader, read_csv_runs
@@ -384,7 +391,7 @@ class _Document:
             curve = self.curves(key).read(raw, where, constant=constant)
             if curve is None:
                 continue
-            if not isinstance(curve, Constant | Table):
+            if not isinstance(curve, Constant | TableCurve):
                 expected = "expected a number or { table = [[position, uncertainty], …] }"
                 self.problems.add(where, expected, raw)
                 continue
@@ -459,14 +466,14 @@ class _Document:
                 runs = self._csv_runs(where, **named) if named else ()
             else:
                 table = self.problems.read(schema.RUNS, where, raw)
-                runs: tuple[Run, ...] = table["runs"] if table else ()
+                runs: tuple[TravelRun, ...] = table["runs"] if table else ()
             found[key] = Measurement(runs)
             if (count := found[key].count) > limits.MAX_POINTS:
                 expected = f"expected at most {limits.MAX_POINTS:,}"
                 self.problems.add(f"{where}.runs", f"have {count:,} readings; {expected}")
         return found
 
-    def _csv_runs(self, where: str, csv: str, column: str) -> tuple[Run, ...]:
+    def _csv_runs(self, where: str, csv: str, column: str) -> tuple[TravelRun, ...]:
         if self.folder is None:
             expected = "expected the readings as runs = [ … ]"
             self.problems.add(where, f"CSV files are not read here; {expected}")

@@ -38,7 +38,7 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
-class Mark:
+class NoteAnchor:
     """What a note is pinned to, where it is not a point of the volume."""
 
     loop: str = ""  # of a trace of the rotary axes
@@ -54,7 +54,7 @@ class Note:
     kind: str = "note"
     # mm or degrees; where the axes stand at the point it is about; empty: about the whole
     at: Mapping[str, float] = field(default_factory=dict[str, float])
-    on: Mark | None = None  # the trace or body that the point belongs to
+    on: NoteAnchor | None = None  # the trace or body that the point belongs to
     text: str
     author: str = ""
     date: datetime = field(default_factory=now)

@@ -15,8 +15,14 @@ from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.curve import MISSING, Path, ValueReader
 from warpspace.machine.curves.table import MAX_COLUMN_NAME, MAX_FILE_NAME
 from warpspace.machine.definition import MESH_UNITS, ORIGIN, TOOL_SHAPES, BodySource
-from warpspace.machine.errors import RUN_DIRECTIONS, TOLERANCE_CLASSES, UNKNOWN, Run, Tolerance
-from warpspace.scene.notes import KINDS, MEASURES, STATUSES, Mark, Note, Reply
+from warpspace.machine.errors import (
+    RUN_DIRECTIONS,
+    TOLERANCE_CLASSES,
+    UNKNOWN,
+    Tolerance,
+    TravelRun,
+)
+from warpspace.scene.notes import KINDS, MEASURES, STATUSES, Note, NoteAnchor, Reply
 from warpspace.scene.text_files import location, spell_value
 
 Kind = Callable[[ValueReader, Any, Path], Any]
@@ -165,7 +171,7 @@ def _list(kind: Kind, most: int, least: int = 0) -> Kind:
 
 
 @dataclass(frozen=True)
-class Section:
+class TableSchema:
     """A table whose keys are known: by key the kind of its value, and what stands for none."""
 
     fields: Mapping[str, tuple[Kind, Any]]
@@ -191,13 +197,13 @@ POINT = _numbers("[x, y, z]", *[limits.MAX_LENGTH_MM] * 3)
 TURN = _numbers("[x, y, z]", *[limits.FULL_TURN_DEG] * 3)
 TEXT = _text(limits.MAX_TEXT)
 _HALF_WIDTH = 0.0, limits.MAX_ERROR, limits.MIN_HALF_WIDTH
-GANTRY = Section(
+GANTRY = TableSchema(
     {
         "span_mm": (_number(*limits.GANTRY_SPAN_MM), MISSING),
         "across": (_choice(lambda: "xyz"), None),
     }
 )
-MACHINE = Section(
+MACHINE = TableSchema(
     {
         "title": (TEXT, ""),
         "description": (TEXT, ""),
@@ -212,7 +218,7 @@ MACHINE = Section(
         "bodies": (_by_name(lambda _reader, value, _path: value), {}),
     }
 )
-BODY = Section(
+BODY = TableSchema(
     {
         "file": (_text(MAX_FILE_NAME), ""),
         "unit": (_one_of(MESH_UNITS), ""),
@@ -222,7 +228,7 @@ BODY = Section(
     },
     BodySource,
 )
-CONVENTION = Section(
+CONVENTION = TableSchema(
     {
         "component_errors": (_component_errors, ComponentErrors.AFTER_MOTION.value),
         "reference_axis": (_choice(lambda: ("fixed", "free")), "fixed"),
@@ -231,14 +237,14 @@ CONVENTION = Section(
         "measuring_line_mm": (_by_name(POINT), {}),
     }
 )
-POINTS = Section(
+POINTS = TableSchema(
     {
         "tool": (POINT, ORIGIN),
         "workpiece": (POINT, ORIGIN),
         "traces": (_list(POINT, limits.MAX_TRACES), ()),
     }
 )
-VIEW = Section(
+VIEW = TableSchema(
     {
         "exaggeration": (_exaggeration, None),
         "reference": (_reference, None),
@@ -246,7 +252,7 @@ VIEW = Section(
         "limit_um": (_number(*limits.LIMIT_UM), None),
     }
 )
-PART = Section(
+PART = TableSchema(
     {
         "file": (_text(MAX_FILE_NAME), ""),
         "place": (_numbers("[x, y, z, a, b, c]", *[limits.MAX_LENGTH_MM] * 6), None),
@@ -257,7 +263,7 @@ PART = Section(
     }
 )
 DEFAULTS = _by_name(_number(*_HALF_WIDTH), TOLERANCE_CLASSES)
-_RANGE = Section(
+_RANGE = TableSchema(
     {
         "centre": (_number(-limits.MAX_ERROR, limits.MAX_ERROR), 0.0),
         "half_width": (_number(*_HALF_WIDTH), MISSING),
@@ -277,20 +283,20 @@ def workspace_range(reader: ValueReader, value: Any, path: Path) -> tuple[float,
     return at, at
 
 
-_RUN = Section(
+_RUN = TableSchema(
     {
         "direction": (_choice(lambda: RUN_DIRECTIONS, "{} or {} (not known)"), UNKNOWN),
         "points": (_list(_READING, limits.MAX_POINTS, least=1), MISSING),
     },
-    Run,
+    TravelRun,
 )
-RUNS = Section({"runs": (_list(_RUN, limits.MAX_RUNS, least=1), MISSING)})
-CSV_RUNS = Section(
+RUNS = TableSchema({"runs": (_list(_RUN, limits.MAX_RUNS, least=1), MISSING)})
+CSV_RUNS = TableSchema(
     {"csv": (_text(MAX_FILE_NAME, 1), MISSING), "column": (_text(MAX_COLUMN_NAME, 1), MISSING)}
 )
 _PRODUCT = _number(-(limits.MAX_ERROR**2), limits.MAX_ERROR**2)
 _KEYS = _list(_text(8, 1), limits.MAX_COVARIANCE)
-COVARIANCE = Section(
+COVARIANCE = TableSchema(
     {
         "keys": (_KEYS, ()),
         "matrix": (_list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE), ()),
@@ -302,7 +308,7 @@ COVARIANCE = Section(
 )
 ACTS = "each", "all", "scale"  # what a contribution acts on
 DIVISORS = {"normal": 1.0, "rectangular": 3**0.5, "triangular": 6**0.5, "u-shaped": 2**0.5}
-_CONTRIBUTION = Section(
+_CONTRIBUTION = TableSchema(
     {
         "name": (_text(100, 1), MISSING),
         "type": (_choice(lambda: ("A", "B")), MISSING),
@@ -315,7 +321,7 @@ _CONTRIBUTION = Section(
         "source": (_text(limits.MAX_TEXT), ""),
     }
 )
-INSTRUMENT = Section(
+INSTRUMENT = TableSchema(
     {
         "title": (TEXT, ""),
         "source": (TEXT, ""),
@@ -326,8 +332,8 @@ _MEASURED = _by_name(_number(0.0, limits.MAX_ERROR * 10.0), MEASURES)
 _VERSION = _text(16, 1, r"[a-z0-9]*", "small letters and digits")
 # what people write has lines and tabulators, but no other control characters
 _PLAIN = r"[^\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]*", "a text without control characters"
-_MARK = Section(
-    {"loop": (_one_of(Loop), ""), "point_mm": (POINT, None), "body": (_text(8), "")}, Mark
+_MARK = TableSchema(
+    {"loop": (_one_of(Loop), ""), "point_mm": (POINT, None), "body": (_text(8), "")}, NoteAnchor
 )
 _NOTE: dict[str, tuple[Kind, Any]] = {
     "id": (_VERSION, MISSING),
@@ -346,12 +352,12 @@ _NOTE: dict[str, tuple[Kind, Any]] = {
     "view": (_text(limits.MAX_NOTE_VIEW), ""),
     "replaces": (_list(_VERSION, limits.MAX_REPLACED), ()),
 }
-_REPLY = Section({name: _NOTE[name] for name in ("text", "author", "date")}, Reply)
+_REPLY = TableSchema({name: _NOTE[name] for name in ("text", "author", "date")}, Reply)
 _BESIDE: dict[str, tuple[Kind, Any]] = {
     "replies": (_list(_REPLY, limits.MAX_REPLIES), ()),
-    "versions": (_list(Section(_NOTE, Note), limits.MAX_REPLIES), ()),
+    "versions": (_list(TableSchema(_NOTE, Note), limits.MAX_REPLIES), ()),
 }
-NOTES = _list(Section(_NOTE | _BESIDE, Note), limits.MAX_NOTES)
+NOTES = _list(TableSchema(_NOTE | _BESIDE, Note), limits.MAX_NOTES)
 
 
 def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
@@ -361,7 +367,7 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     return -most, most
 
 
-_FEATURE = Section(
+_FEATURE = TableSchema(
     {
         "name": (_text(100, 1, *_PLAIN), ""),
         "is": (_text(100, 1), MISSING),
@@ -372,7 +378,7 @@ _FEATURE = Section(
         "tolerance_urad": (_band, None),
     }
 )
-FEATURES = Section({"features": (_list(_FEATURE, limits.MAX_TOLERANCES, 1), MISSING)})
+FEATURES = TableSchema({"features": (_list(_FEATURE, limits.MAX_TOLERANCES, 1), MISSING)})
 
 
 def tolerance(reader: ValueReader, value: Any, path: Path) -> Tolerance:

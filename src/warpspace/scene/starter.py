@@ -31,7 +31,7 @@ WORKPIECE_HEIGHT, WORKPIECE_SHARE = 200.0, 0.8
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class StarterDimensions:
     """Sizes of a machine, all frames at zero of their axes."""
 
     # origin of each frame in the frame before it; R stands in the middle of the table
@@ -47,7 +47,7 @@ class Layout:
     traces_mm: tuple[Vector, Vector]
 
 
-def layout(chain: Chain) -> Layout:
+def layout(chain: Chain) -> StarterDimensions:
     spanning = _spanning(chain)
     lying = _is_lying(chain)
     up = 1 if lying else 2
@@ -62,7 +62,7 @@ def layout(chain: Chain) -> Layout:
     workpiece = _workpiece_places(chain, up)
     first = (next(iter(tool)), next(iter(workpiece))) if lying else ()
     rim = (0.0, radius, WORKPIECE_HEIGHT)
-    return Layout(
+    return StarterDimensions(
         {**_steps(tool, lying=lying), **_steps(workpiece, lying=lying)},
         dict.fromkeys(first, LYING),
         travel,

@@ -204,7 +204,7 @@ WORKPIECE_NAMES = ("workpiece", "work", "w", "table")
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class RobotMachine:
     """A machine read from a robot, and what became of its parts."""
 
     machine: Machine
@@ -215,7 +215,7 @@ class Placed:
     notes: list[str] = field(default_factory=list[str])
 
 
-def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") -> Placed:
+def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") -> RobotMachine:
     """Find the chain of a robot between workpiece and tool.
 
     Notes
@@ -283,7 +283,7 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
     )
     notes += [f"joint {name!r} is axis {axis}" for name, axis in names.items() if name != axis]
     start = _pose_mm(paths[0][:shared])
-    return Placed(machine, _frames_of_links(robot, names, still, poses, start), notes)
+    return RobotMachine(machine, _frames_of_links(robot, names, still, poses, start), notes)
 
 
 def _end(robot: Any, source: str, what: str, wanted: str) -> str:

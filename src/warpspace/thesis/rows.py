@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import Any, NamedTuple
 
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max
-from warpspace.analysis.sampling.cases import Case, Plan
+from warpspace.analysis.sampling.cases import Case, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, build_draws, loop_keys
 from warpspace.analysis.sampling.machine_sampling import MonteCarlo, montecarlo
 from warpspace.analysis.tolerance_check import Check, check_errors, measured
@@ -178,7 +178,7 @@ def sampled(case: ThesisCase, name: str, distribution: str) -> MonteCarlo:
     keys = loop_keys(model, loop, model.machine.parameter_keys)
     draws = build_draws(scene.tolerances, keys, Distribution(distribution))
     workspace = case.general.workspace
-    return montecarlo(Case(model, draws, workspace, View(loop), Plan(SAMPLES, SEED)))
+    return montecarlo(Case(model, draws, workspace, View(loop), SamplingPlan(SAMPLES, SEED)))
 
 
 def table_4_6(case: ThesisCase) -> Iterator[Row]:

@@ -9,7 +9,7 @@ from scipy import special, stats
 
 import warpspace
 from warpspace.analysis.commands.allocate import Allocate, allocate
-from warpspace.analysis.sampling.cases import Case, Over, Plan
+from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, build_draws, machines_needed
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.analysis.sampling.tolerance_search import build_ensemble
@@ -38,7 +38,7 @@ def draws_of(distribution=Distribution.UNIFORM, centre=0.0, **half_widths):
 
 
 def widths(draws, limit_um=40.0, plan=None, widest=1000.0, **wish):
-    case = Case(MODEL, draws, HERE, plan=plan or Plan())
+    case = Case(MODEL, draws, HERE, plan=plan or SamplingPlan())
     found = allocate(case, Allocate(limit_um=limit_um, **wish), widest=widest)
     return dict(zip(draws.keys, found.half_width, strict=True)), found
 
@@ -105,7 +105,9 @@ def test_the_lower_end_of_the_interval_is_the_promise():
     # P(|E| ≤ 40) = 40/w: of what a thousand machines allow, 97.5 % hold the wanted share or more
     kept = 0
     for seed in range(40):
-        found, result = widths(draws_of(EXX=3.0), plan=Plan(1000, seed, Over.MAX), probability=0.9)
+        found, result = widths(
+            draws_of(EXX=3.0), plan=SamplingPlan(1000, seed, Over.MAX), probability=0.9
+        )
         assert 0.9 <= result.after.low < 0.91
         kept += 40.0 / found["EXX"] >= 0.9
     assert kept >= 37  # of fewer than that the chance is 0.2 %
@@ -172,7 +174,7 @@ def test_no_other_proportions_are_cheaper():
     scene = load_scene("dvf5000_first")
     found = warpspace.allocate(scene, limit_um=40.0, over="max", samples=50_000, seed=1)
     draws, view = found.draws, View()
-    plan = Plan(20_000, 77, Over.MAX)
+    plan = SamplingPlan(20_000, 77, Over.MAX)
     judge = build_ensemble(Case(scene.model, draws, scene.workspace, view, plan))
     free, rng = found.free, np.random.default_rng(5)
 
@@ -192,10 +194,10 @@ def test_no_other_proportions_are_cheaper():
 def test_the_check_is_a_plain_monte_carlo_with_its_seed():
     draws = draws_of(EXX=3.0, EYX=3.0)
     done: list[float] = []
-    case = Case(MODEL, draws, HERE, plan=Plan(samples=20_000))
+    case = Case(MODEL, draws, HERE, plan=SamplingPlan(samples=20_000))
     found = allocate(case, Allocate(limit_um=40.0), done.append)
     assert sum(done) == pytest.approx(1.0)
-    plan = Plan(found.samples, found.seed, spec_um=40.0)
+    plan = SamplingPlan(found.samples, found.seed, spec_um=40.0)
     run = montecarlo(Case(MODEL, replace(draws, half_width=found.half_width), HERE, plan=plan))
     assert run.probability == found.after
 

@@ -8,15 +8,15 @@ import pytest
 import trimesh
 
 from warpspace import load_scene
-from warpspace.analysis.commands.conformance import Reach
-from warpspace.analysis.commands.form import Certify
+from warpspace.analysis.commands.conformance import Conformance
+from warpspace.analysis.commands.form import Form
 from warpspace.analysis.commands.line import Line
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
     coverage_factor,
-    field_doubt,
-    find_doubt,
-    volume_doubt,
+    field_uncertainty,
+    scene_uncertainty,
+    volume_uncertainty,
 )
 from warpspace.bench.base import find_test, run_test
 from warpspace.exceptions import SceneError
@@ -54,7 +54,7 @@ EBX = 1
 def sure(scene, at):
     field = evaluate(scene, at=at)
     axes = complete_coordinates(scene.machine, at, scene.workspace.positions)
-    return field_doubt(scene, field.error_um, axes, scene.view())
+    return field_uncertainty(scene, field.error_um, axes, scene.view())
 
 
 def test_gains_times_uncertainties_add_up_in_squares():
@@ -83,7 +83,7 @@ def test_ends_of_an_axis_are_not_sure_by_themselves_near_points_together():
     np.testing.assert_allclose(found.u95_um[1], found.u95_um[2], rtol=0.01, atol=1e-12)
     # along the axis they vary by u · cos φ and u · sin φ, so that u of a mean is (2 / π) · √2 · u
     alone = HEAD + "[errors]\nEXX = 5\n[uncertainty]\nEXX = 0.4\n"
-    mean = volume_doubt(parse_scene(alone, "s"), parse_scene(alone, "s").view(), 21)
+    mean = volume_uncertainty(parse_scene(alone, "s"), parse_scene(alone, "s").view(), 21)
     assert mean.statistics()["mean_um"] == pytest.approx(2 * 0.4 * math.sqrt(8) / math.pi, rel=2e-3)
     assert mean.statistics()["max_um"] == pytest.approx(2 * 0.4)
 
@@ -129,7 +129,7 @@ def test_one_error_makes_all_statistics_as_unsure_as_itself():
     # |E| is proportional to one amplitude everywhere: u(mean) / mean = u / amplitude
     text = HEAD + "[errors]\nEC0Y = 20\n[uncertainty]\nEC0Y = 1.5\n"
     scene = parse_scene(text, "s")
-    found = volume_doubt(scene, scene.view(), 11)
+    found = volume_uncertainty(scene, scene.view(), 11)
     mean = evaluate(scene, grid=11)
     u95 = found.statistics()
     weights = found.shares
@@ -138,7 +138,13 @@ def test_one_error_makes_all_statistics_as_unsure_as_itself():
 
 
 ALONE = HEAD + "[errors]\nEC0Y = 20\n[uncertainty]\nEC0Y = 1.5\n"
-QUESTIONS = Line(points=5), Certify(nodes=3), Reach(nodes=5), Part(place=(0, 0, 0)), Clamp(grid=2)
+QUESTIONS = (
+    Line(points=5),
+    Form(nodes=3),
+    Conformance(nodes=5),
+    Part(place=(0, 0, 0)),
+    Clamp(grid=2),
+)
 
 
 OTHERWISE = {"u95": "value", "u95_um": "error_um"}
@@ -174,16 +180,16 @@ def test_one_error_makes_every_number_as_unsure_as_itself(asked, tmp_path):
 
 def test_numbers_of_errors_that_nobody_states_are_unknown():
     scene = parse_scene(ALONE.replace("EC0Y = 1.5", "EXX = 1"), "s")
-    for asked in (Certify(nodes=3), Reach(nodes=5)):
+    for asked in (Form(nodes=3), Conformance(nodes=5)):
         found = asked.run(scene, lambda _: None)
         assert all(u95 is None for u95, _ in pairs(found.as_json()))
-        assert "uncertainty not stated of EC0Y" in " ".join(found.doubts())
+        assert "uncertainty not stated of EC0Y" in " ".join(found.caveats())
         assert any("± ?" in row for block in found.blocks() for row in getattr(block, "rows", ()))
 
 
 def test_statistics_move_by_their_gradient():
     scene = parse_scene(TWO, "s")
-    found, names = volume_doubt(scene, scene.view(), 21), ("mean_um", "rms_um", "max_um")
+    found, names = volume_uncertainty(scene, scene.view(), 21), ("mean_um", "rms_um", "max_um")
     grid = build_grid(scene.model, scene.workspace, 21)
 
     def numbers(key, by):
@@ -207,11 +213,11 @@ def test_k_is_two_or_what_student_says():
 
 def test_what_is_not_stated_is_unknown_and_not_zero():
     scene = parse_scene(TWO.replace("EA0Z = -30", "EA0Z = -30\nEXX = 4"), "s")
-    found = volume_doubt(scene, scene.view(), 5)
+    found = volume_uncertainty(scene, scene.view(), 5)
     assert found.doubt.unknown == ("EXX",)
     assert set(found.statistics().values()) == {None}
     assert "EXX" in " ".join(found.doubt.remarks())
-    assert find_doubt(load_scene("dvf5000_first")) is None
+    assert scene_uncertainty(load_scene("dvf5000_first")) is None
 
 
 def test_a_covariance_comes_back_from_its_text_and_from_a_file(tmp_path):

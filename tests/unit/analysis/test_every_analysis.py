@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from warpspace import load_scene
 from warpspace.analysis import Analysis, Column, Result, Table, option, register, unregister
 from warpspace.analysis.blocks import Bars, Histogram, Lines
-from warpspace.analysis.description import plain, silent
+from warpspace.analysis.description import ignore_progress, plain
 from warpspace.analysis.options import options_of
 from warpspace.analysis.registry import TASKS, entries, first_line
 from warpspace.cli.analyses import command_of, print_blocks
@@ -89,7 +89,7 @@ def test_every_option_has_help_and_a_range_it_keeps(entry):
 def test_text_page_and_json_say_the_result(entry, scene, capsys):
     kind = entry.load()
     loaded = scene_of(entry.name, scene)
-    result = small(kind).run(loaded, silent)
+    result = small(kind).run(loaded, ignore_progress)
     spelled = result.as_json()
     if all(getattr(type(result), way) is getattr(Result, way) for way in ("as_json", "as_plain")):
         own = [one.name for one in fields(result) if one.name != "second_order"]
@@ -119,14 +119,14 @@ def test_the_command_prints_one_json_object(entry, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     said = CliRunner().invoke(command_of(entry.load()), arguments)
     assert said.exit_code == 0, said.output
-    assert json.loads(said.output) == asked.run(load_scene(scene), silent).as_json()
+    assert json.loads(said.output) == asked.run(load_scene(scene), ignore_progress).as_json()
 
 
 @EVERY
 def test_what_a_user_calls_a_scene_is_text(entry):
     scene = scene_of(entry.name)
     hostile = replace(scene, title="<script>alert(1)</script>")
-    page = small(entry.load()).run(hostile, silent)._repr_html_()
+    page = small(entry.load()).run(hostile, ignore_progress)._repr_html_()
     assert "<script" not in page
 
 

@@ -20,7 +20,7 @@ from warpspace.analysis.sampling.cases import (
     MOST_BLOCKS,
     Case,
     Cylinder,
-    Plan,
+    SamplingPlan,
     Site,
     both_orders,
     choose_cylinder,
@@ -63,7 +63,7 @@ def test_seed_changes_the_numbers_and_repeats_them():
 
 
 def test_streams_are_those_of_spawn():
-    plan = Plan(samples=2 * BLOCK + 5, seed=7, workers=2)
+    plan = SamplingPlan(samples=2 * BLOCK + 5, seed=7, workers=2)
     found = list(sample_chunks(lambda rng, count: rng.random(count), plan))
     children = np.random.SeedSequence(7).spawn(3)
     counts = [BLOCK, BLOCK, 5]
@@ -76,7 +76,7 @@ def test_a_failing_or_interrupted_chunk_ends_the_run():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        list(sample_chunks(job, Plan(samples=100 * BLOCK, workers=2)))
+        list(sample_chunks(job, SamplingPlan(samples=100 * BLOCK, workers=2)))
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_the_second_order_matters_above_a_tenth_or_one_per_cent(um, largest_um, 
 
 def case(**plan):
     draws = scene_draws(SCENE, Loop.TOOL, "uniform", clip=False)
-    return Case(SCENE.model, draws, SCENE.workspace, View(), Plan(**plan))
+    return Case(SCENE.model, draws, SCENE.workspace, View(), SamplingPlan(**plan))
 
 
 def numbers(found):

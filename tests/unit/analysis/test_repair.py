@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear, minimize
 
 from warpspace.analysis import adjustment_search
 from warpspace.analysis.adjustment_search import Objective, least_rms
-from warpspace.analysis.commands.adjust import Repair, repaired
+from warpspace.analysis.commands.adjust import Adjust, repaired
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import build_grid
@@ -77,7 +77,7 @@ def least_max(keys, low, high, scene=FIRST):
 
 
 def test_leaving_one_out_is_what_direct_evaluation_gives():
-    found = Repair(grid=NODES).run(FIRST)
+    found = Adjust(grid=NODES).run(FIRST)
     assert numbers(found.before) == pytest.approx(outcome_of(FIRST), abs=1e-9)
     assert {effect.key for effect in found.errors} == set(FIRST.errors) - {"EX0B", "EZ0B"}
     for effect in found.errors:
@@ -92,7 +92,7 @@ def test_leaving_one_out_is_what_direct_evaluation_gives():
 
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_rms_is_the_least_squares_optimum_over_all_sets(size):
-    found = Repair(grid=NODES).run(FIRST).repairs[size - 1]
+    found = Adjust(grid=NODES).run(FIRST).repairs[size - 1]
     best = np.inf
     for keys in combinations(SQUARENESS, size):
         matrix, present, weights = response(keys)
@@ -109,7 +109,7 @@ def test_rms_is_the_least_squares_optimum_over_all_sets(size):
 
 def test_rms_within_limits_is_the_bounded_optimum():
     keys, limit = ("EXX", "EYX", "EZX", "EAY", "EA0Z"), 4.0
-    plan = Repair(count=5, adjustable=keys, limit={"all": limit, "EA0Z": 1.5}, grid=NODES)
+    plan = Adjust(count=5, adjustable=keys, limit={"all": limit, "EA0Z": 1.5}, grid=NODES)
     found = plan.run(FIRST).repairs[-1]
     matrix, present, weights = response(keys)
     root = np.sqrt(weights)
@@ -138,7 +138,7 @@ def test_rms_is_least_where_many_limits_are_met_one_after_the_other():
     [(("EA0Z",), 200.0), (SQUARENESS, 200.0), (SQUARENESS, 3.0), (("EAY", "EA0Z", "EYX"), 200.0)],
 )
 def test_max_is_what_a_second_solver_finds(keys, limit):
-    plan = Repair(
+    plan = Adjust(
         objective="max", count=len(keys), adjustable=keys, limit={"all": limit}, grid=NODES
     )
     found = plan.run(FIRST).repairs[-1]
@@ -150,7 +150,7 @@ def test_max_is_what_a_second_solver_finds(keys, limit):
 
 @pytest.mark.parametrize("objective", Objective)
 def test_more_adjustments_are_never_worse(objective):
-    plan = Repair(objective=objective, count=4, adjustable=("all",), grid=5)
+    plan = Adjust(objective=objective, count=4, adjustable=("all",), grid=5)
     found = plan.run(FIRST)
     values = [getattr(one, f"{objective}_um") for one in found.repairs]
     assert [len(one.adjust) for one in found.repairs] == [1, 2, 3, 4]
@@ -160,7 +160,7 @@ def test_more_adjustments_are_never_worse(objective):
 
 @pytest.mark.parametrize("objective", Objective)
 def test_sets_that_are_built_up_say_so_and_are_near_the_best(objective, monkeypatch):
-    plan = Repair(objective=objective, count=3, adjustable=("all",), grid=3)
+    plan = Adjust(objective=objective, count=3, adjustable=("all",), grid=3)
     every = plan.run(FIRST)
     monkeypatch.setattr(adjustment_search, "MOST_SETS", dict.fromkeys(Objective, 21))
     built = plan.run(FIRST)
@@ -172,12 +172,12 @@ def test_sets_that_are_built_up_say_so_and_are_near_the_best(objective, monkeypa
 
 
 def test_nothing_to_repair():
-    found = Repair(grid=5).run(load_scene("dvf5000_nominal"))
+    found = Adjust(grid=5).run(load_scene("dvf5000_nominal"))
     assert (found.before.max_um, found.errors, found.repairs) == (0.0, (), ())
 
 
 def test_a_loop_without_alignment_has_no_sets():
     scene = parse_scene('[machine]\nchain = "wFXt"\n[errors]\nEXX = { ramp = 5 }\n', "x")
-    found = Repair(grid=5).run(scene)
+    found = Adjust(grid=5).run(scene)
     assert found.repairs == ()
     assert found.errors != ()

@@ -3,12 +3,12 @@ import pytest
 import trimesh
 
 from glb import opened, values
-from warpspace.bodies.gltf import Material, Part, build_gltf
+from warpspace.bodies.gltf import GltfNode, Material, build_gltf
 from warpspace.geometry.colour import linear_to_srgb
 
 POINTS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
 COLOURS = np.array([[0.0, 0.1, -0.2], [2.5, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
-TRIANGLE = Part("surface", POINTS, np.array([[0, 1, 2]]), colours=COLOURS)
+TRIANGLE = GltfNode("surface", POINTS, np.array([[0, 1, 2]]), colours=COLOURS)
 
 
 def only_primitive(data):
@@ -21,7 +21,7 @@ def only_primitive(data):
 def test_lines_come_out_as_the_given_pairs(count):
     pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
     points = np.random.default_rng(count).normal(size=(count, 3)).astype(np.float32)
-    data = build_gltf([Part("lines", points, pairs, targets={"nominal": -points})])
+    data = build_gltf([GltfNode("lines", points, pairs, targets={"nominal": -points})])
     primitive = only_primitive(data)
     assert primitive["mode"] == 1
     np.testing.assert_array_equal(values(data, primitive["indices"]).reshape(-1, 2), pairs)
@@ -36,7 +36,9 @@ def test_lines_come_out_as_the_given_pairs(count):
 def test_numbers_of_points_take_16_bits_where_they_fit(points, kind):
     many = np.zeros((points, 3))
     many[:, 0] = np.arange(points)
-    data = build_gltf([Part("many", many, np.array([[0, 1, points - 1], [2, 3, 4], [5, 6, 7]]))])
+    data = build_gltf(
+        [GltfNode("many", many, np.array([[0, 1, points - 1], [2, 3, 4], [5, 6, 7]]))]
+    )
     accessor = only_primitive(data)["indices"]
     assert opened(data)[0]["accessors"][accessor]["componentType"] == kind
     assert list(values(data, accessor)) == [0, 1, points - 1, 2, 3, 4, 5, 6, 7]
@@ -46,10 +48,10 @@ def test_nodes_hang_under_root_and_groups_and_empty_parts_are_left_out():
     glass = Material("glass", (10, 20, 30), 0.25)
     triangle = np.array([[0, 1, 2]])
     parts = [
-        Part("a", POINTS, triangle),
-        Part("b", POINTS, triangle, glass, group="bodies"),
-        Part("b", POINTS + 1.0, triangle, glass, group="bodies"),
-        Part("none", POINTS, np.empty((0, 2), int)),
+        GltfNode("a", POINTS, triangle),
+        GltfNode("b", POINTS, triangle, glass, group="bodies"),
+        GltfNode("b", POINTS + 1.0, triangle, glass, group="bodies"),
+        GltfNode("none", POINTS, np.empty((0, 2), int)),
     ]
     document, _ = opened(build_gltf(parts, root="all ×2", generator="w 1", extras={"é": 1}))
     nodes = document["nodes"]

@@ -22,7 +22,7 @@ from warpspace.field.grid import PLANES, Workspace, build_grid, build_slice, nod
 from warpspace.geometry.surfaces import outer_faces
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.machine.definition import build_machine
-from warpspace.machine.errors import Constant, ErrorSet, Ramp, Table
+from warpspace.machine.errors import Constant, ErrorSet, Ramp, TableCurve
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import choose_view, evaluate_grid, grid_basis, placed_in
 
@@ -39,7 +39,7 @@ ERRORS = ErrorSet(
         "EXX": Constant(SPAN, 3.0),
         "EAY": Ramp(SPAN, -40.0),
         "EC0Y": Constant(SPAN, 25.0),
-        "EBZ": Table(SPAN, ((-200.0, 5.0), (0.0, -9.0), (200.0, 2.0))),
+        "EBZ": TableCurve(SPAN, ((-200.0, 5.0), (0.0, -9.0), (200.0, 2.0))),
         "EAC": Constant(SPAN, 12.0),
     }
 )

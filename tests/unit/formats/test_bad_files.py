@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench_scenes import scene_with
-from warpspace.analysis.uncertainty.propagation import find_doubt
+from warpspace.analysis.uncertainty.propagation import scene_uncertainty
 from warpspace.bench.base import find_test, run_test
 from warpspace.calibration.readings import parse_readings
 from warpspace.exceptions import SceneError
@@ -207,7 +207,7 @@ reach = { X = [-10, 20], Y = 7 }
     scene = into_scene(reading, base, "", "x.csv").scene
     assert (scene.covariance.keys, scene.covariance.rows) == (("EC0Y",), ((9.0,),))
     assert set(scene.uncertainty) == ({"EXX"} if u else set())
-    assert find_doubt(scene, Loop.RELATIVE).unknown == (() if u else ("EXX",))
+    assert scene_uncertainty(scene, Loop.RELATIVE).unknown == (() if u else ("EXX",))
     assert scene.covariance.reach["X"] == ((-100.0, 100.0) if u else (-10.0, 20.0))
     alone = into_scene(reading, None, "", "x.csv").scene
     assert (alone.covariance.reach if u else alone.covariance) == (

@@ -11,14 +11,14 @@ from warpspace.formats.compensation.corrections import build_corrector
 from warpspace.formats.kinds import fanuc_3d
 from warpspace.formats.registry import ReadOptions, formats, read_errors, recognise
 from warpspace.formats.source import source_of_text
-from warpspace.formats.terms import Line, Product
+from warpspace.formats.terms import AxisTable, Product
 from warpspace.formats.to_scene import into_scene
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, error_transform, point_in_branch
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.axes import TravelDirection
 from warpspace.machine.curves.simple import Directional
-from warpspace.machine.errors import ErrorSet, Harmonics, Poly, Table
+from warpspace.machine.errors import ErrorSet, Harmonics, Poly, TableCurve
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
 
@@ -188,7 +188,7 @@ def test_an_axis_against_iso_841_is_said():
 def test_tables_of_a_machine_that_moves_its_workpiece_come_back_as_its_errors():
     base = load_scene("machine_c_frame_mill")
     exx = Poly(base.axis_span("X"), (1.0, 0.03))
-    ezy = Table(base.axis_span("Y"), ((-100.0, 0.0), (100.0, 8.0)))
+    ezy = TableCurve(base.axis_span("Y"), ((-100.0, 0.0), (100.0, 8.0)))
     scene = replace(base, errors=ErrorSet({"EXX": exx, "EZY": ezy}))
     back = read_back(corrected(scene, "sinumerik-cec", 9, loop="relative"), scene)
     assert largest_difference_um(scene, back, loop="relative") < 0.6
@@ -402,8 +402,8 @@ def test_surfaces_by_direction_stand_in_the_own_table_to_the_printed_digits():
 
 
 def test_a_product_of_tables_in_one_direction_is_half_in_the_mean():
-    first = Line("Y", "X", (0.0, 1.0), (2.0, 2.0), direction=1)
-    second = Line("Z", "X", (0.0, 1.0), (3.0, 3.0))
+    first = AxisTable("Y", "X", (0.0, 1.0), (2.0, 2.0), direction=1)
+    second = AxisTable("Z", "X", (0.0, 1.0), (3.0, 3.0))
     at = {"Y": np.array(0.5), "Z": np.array(0.5)}
     values = [float(Product(first, second).corrections(at, way)["X"]) for way in (1, -1, 0)]
     assert values == [6.0, 0.0, 3.0]

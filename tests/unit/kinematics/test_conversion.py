@@ -27,7 +27,7 @@ from warpspace.machine.errors import (
     ErrorSet,
     Harmonics,
     Poly,
-    Table,
+    TableCurve,
     TwoArguments,
 )
 from warpspace.scene.library import parse_scene
@@ -117,7 +117,7 @@ def spans_of(scene):
 
 def test_fits_give_the_simplest_curve_that_is_exact():
     span, at = (-100.0, 300.0), np.linspace(-100.0, 300.0, 1001)
-    table = Table(span, ((-100.0, 1.0), (50.0, 7.0), (300.0, -2.0)))
+    table = TableCurve(span, ((-100.0, 1.0), (50.0, 7.0), (300.0, -2.0)))
 
     def values(q):
         parts = (0.0 * q, 4.0 + 0.0 * q, 1e-3 * q**2, q * table.evaluate(q), np.sin(q / 20.0))
@@ -245,7 +245,7 @@ def test_the_tilt_of_straightness_goes_to_the_squareness(line):
     span = (0.0, 400.0)
     points = tuple(zip(POSITION.tolist(), STRAIGHTNESS.tolist(), strict=True))
     model = Model(build_machine("wFXYt", travel={"X": (0.0, 400.0), "Y": span}))
-    errors = ErrorSet({"EXY": Table(span, points), "EC0Y": Constant(span, 20.0)})
+    errors = ErrorSet({"EXY": TableCurve(span, points), "EC0Y": Constant(span, 20.0)})
     found = convert_reference_line(model, errors, {"X": span, "Y": span}, {"Y": line})
     offset, slope = fit_line(POSITION, STRAIGHTNESS, line)
     # x grows with y: Y leans towards +X, that is by −slope about z; 1 µm/mm is 1000 µrad

@@ -14,7 +14,7 @@ from warpspace.machine.errors import (
     Harmonics,
     Poly,
     Ramp,
-    Table,
+    TableCurve,
     Tolerance,
     ToleranceSet,
     TwoArguments,
@@ -30,7 +30,7 @@ FUNCTIONS = [
     Ramp(SPAN, -8.0),
     Poly(SPAN, (1.0, 0.0, 0.0005)),
     Harmonics(TURN, ((1.0, 3.0, 0.0), (2.0, -4.0, 90.0))),
-    Table(SPAN, ((-200.0, -20.0), (0.0, 4.0), (200.0, 12.0))),
+    TableCurve(SPAN, ((-200.0, -20.0), (0.0, 4.0), (200.0, 12.0))),
     TwoArguments(
         SPAN, ("X", "Z"), ((-200.0, 0.0, 200.0), (0.0, 10.0)), ((1.0, 2.0), (3.0, -9.0), (4.0, 5.0))
     ),
@@ -52,11 +52,11 @@ FUNCTIONS = [
         ),
         # linear between its points and held beyond them
         (
-            Table(SPAN, ((-100.0, 1.0), (100.0, 3.0))),
+            TableCurve(SPAN, ((-100.0, 1.0), (100.0, 3.0))),
             [-500.0, -100.0, 0.0, 100.0, 500.0],
             [1.0, 1.0, 2.0, 3.0, 3.0],
         ),
-        (Table(SPAN, ((5.0, 2.0),)), AT, [2.0] * 5),
+        (TableCurve(SPAN, ((5.0, 2.0),)), AT, [2.0] * 5),
     ],
 )
 def test_a_curve_has_its_values(function, at, values):
@@ -88,7 +88,7 @@ def test_a_curve_is_its_amplitude_times_its_shape(function):
     [
         (Poly(SPAN, (0.0, -0.5)), 100.0),
         (Poly((-100.0, 200.0), (0.0, -0.5)), -100.0),
-        (Table(SPAN, ((0.0, -9.0), (1.0, 8.0))), -9.0),
+        (TableCurve(SPAN, ((0.0, -9.0), (1.0, 8.0))), -9.0),
         (Harmonics(TURN, ((3.0, 5.0, 0.0),)), 5.0),
     ],
 )
@@ -216,7 +216,7 @@ def test_a_surface_is_the_mean_of_four_points_weighted_by_opposite_areas():
 
 def test_along_its_axis_a_surface_is_shown_by_sections():
     assert [line[0] for line in TWO.lines] == ["Z -480", "Z -280", "Z -80"]
-    assert TWO.lines[1][1] == Table(TWO_SPAN, ((-100.0, 3.0), (0.0, -3.0), (300.0, 5.0)))
+    assert TWO.lines[1][1] == TableCurve(TWO_SPAN, ((-100.0, 3.0), (0.0, -3.0), (300.0, 5.0)))
     np.testing.assert_array_equal(TWO.evaluate(np.array(X)), [3.0, -3.0, 5.0])
 
 
@@ -267,9 +267,9 @@ NOTHING = TWO_SPAN, ZERO, Ramp(TWO_SPAN, 0.0)
         (Ramp, (TWO_SPAN, 0.0), (TWO_SPAN, 11.0)),
         (Poly, (TWO_SPAN, (0.0,)), (TWO_SPAN, (11.0,))),
         (Poly, (TWO_SPAN, (0.0, 0.0, 0.0)), (TWO_SPAN, (5.5, 0.02, 0.0))),
-        (Table, (TWO_SPAN, ((7.0, 0.0),)), (TWO_SPAN, ((7.0, 11.0),))),
+        (TableCurve, (TWO_SPAN, ((7.0, 0.0),)), (TWO_SPAN, ((7.0, 11.0),))),
         (
-            Table,
+            TableCurve,
             (TWO_SPAN, ((-100.0, 0.0), (0.0, 0.0), (100.0, 0.0))),
             (TWO_SPAN, ((-100.0, 0.0), (0.0, 5.5), (100.0, 11.0))),
         ),

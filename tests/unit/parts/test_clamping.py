@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 import warpspace
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError
 from warpspace.parts.clamp import Clamp, ClampResult
 from warpspace.parts.sample_pieces import build_piece
@@ -23,7 +23,7 @@ def clamp(tmp_path, name="cube", size=100.0, long=1.0, **asked) -> ClampResult:
     file.write_text(build_piece(name, size)[".stl"])
     trimesh.load_mesh(file).apply_scale([long, 1.0, 1.0]).export(file)
     scene = parse_scene(f"{HEAD}\n[errors]\nEXX = {{ poly = [0.0, 0.1] }}", "plain")
-    return Clamp(file=str(file), **asked).run(scene, silent)
+    return Clamp(file=str(file), **asked).run(scene, ignore_progress)
 
 
 def test_a_scale_is_least_about_its_zero(tmp_path):

@@ -13,7 +13,13 @@ from warpspace.bench.kinds.ball_plate import BallPlate, left_over
 from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import simulate
 from warpspace.exceptions import SceneError
-from warpspace.parts.inspection import Shape, features_table, find_features, fit_shape, inspect
+from warpspace.parts.inspection import (
+    FeatureShape,
+    features_table,
+    find_features,
+    fit_shape,
+    inspect,
+)
 from warpspace.parts.workpiece import PartMesh, fit_out, make_points, place_part
 
 make = trimesh.creation
@@ -108,13 +114,13 @@ def test_fits_are_those_of_another_least_squares(seed):
         return least_squares(distance, start, args=(points,), xtol=1e-15, ftol=1e-15, gtol=1e-15)
 
     points = cloud(20.0 + noise, height)
-    fitted = fit_shape(Shape("cylinder", place + 1.0, frame[:, 2], 19.0), points)
+    fitted = fit_shape(FeatureShape("cylinder", place + 1.0, frame[:, 2], 19.0), points)
     other = best(cylinder_distance, [*place, *frame[:, 2], 20.0], points)
     assert fitted.radius_mm == pytest.approx(other.x[6], abs=1e-7)
     assert np.sum(fitted.respond(points)[0] ** 2) == pytest.approx(2.0 * other.cost)
 
     points = cloud(60.0 + height * np.tan(0.3) + noise, height)
-    fitted = fit_shape(Shape("cone", place + 1.0, frame[:, 2], 59.0, 0.25), points)
+    fitted = fit_shape(FeatureShape("cone", place + 1.0, frame[:, 2], 59.0, 0.25), points)
     apex = place - frame[:, 2] * 60.0 / np.tan(0.3)
     other = best(cone_distance, [*apex, *frame[:, 2], 0.3], points)
     assert fitted.angle_rad == pytest.approx(other.x[6], abs=1e-7)
@@ -122,12 +128,12 @@ def test_fits_are_those_of_another_least_squares(seed):
 
     tilt = height / 30.0
     points = cloud((40.0 + noise) * np.cos(tilt), (40.0 + noise) * np.sin(tilt))
-    fitted = fit_shape(Shape("sphere", place + 1.0, np.zeros(3), 39.0), points)
+    fitted = fit_shape(FeatureShape("sphere", place + 1.0, np.zeros(3), 39.0), points)
     other = best(sphere_distance, [*place, 40.0], points)
     assert [*fitted.centre_mm, fitted.radius_mm] == pytest.approx(other.x, abs=1e-7)
 
     points = cloud(height, noise)
-    fitted = fit_shape(Shape("plane", place + 1.0, frame[:, 2], 0.0, -np.pi / 2.0), points)
+    fitted = fit_shape(FeatureShape("plane", place + 1.0, frame[:, 2], 0.0, -np.pi / 2.0), points)
     normal = np.linalg.svd(points - points.mean(axis=0))[2][2]
     assert abs(fitted.axis @ normal) == pytest.approx(1.0, abs=1e-14)
 
@@ -140,7 +146,7 @@ def test_a_published_cylinder():
         [259.58, 1483.65, 1332.64], [247.51, 1484.00, 1345.92],
     ])  # fmt: skip
     frame = np.array([[0.0, 1.0, 1.0], [np.sqrt(2.0), 0.0, 0.0], [0.0, 1.0, -1.0]]) / np.sqrt(2.0)
-    fitted = fit_shape(Shape("cylinder", points.mean(axis=0), frame[:, 2], 19.0), points)
+    fitted = fit_shape(FeatureShape("cylinder", points.mean(axis=0), frame[:, 2], 19.0), points)
     rest = fitted.respond(points)[0]
     assert fitted.radius_mm == pytest.approx(19.16, abs=0.005)
     assert np.sqrt(np.sum(rest**2) / 3.0) == pytest.approx(0.03, abs=0.01)

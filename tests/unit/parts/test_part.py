@@ -8,7 +8,7 @@ import trimesh
 
 from bench_scenes import scene_with
 from warpspace import load_scene
-from warpspace.analysis.description import silent
+from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
 from warpspace.parts.program import Program
@@ -141,7 +141,7 @@ def test_a_location_error_is_fitted_out_and_a_squareness_is_not():
 
 
 def cut(mesh, place, **errors):
-    return Part(mesh=mesh_of(mesh), place=place).run(scene_with(**errors), silent)
+    return Part(mesh=mesh_of(mesh), place=place).run(scene_with(**errors), ignore_progress)
 
 
 def test_what_is_off_is_told_by_closed_forms():
@@ -185,14 +185,14 @@ tolerance_um = %s
 def test_what_waves_between_vertices_is_said_and_leaves_verdicts_in_doubt(limit, verdict):
     # 0.004 x² µm: 10 µm at the corners of a box from x −50 to 50, none amid its edges
     asked = Part(mesh=mesh_of(BOX), place=(0.0, 0.0, 0.0), tolerances=("f", KEEPS % limit))
-    found = asked.run(parse_scene(WAVE, "s"), silent)
+    found = asked.run(parse_scene(WAVE, "s"), ignore_progress)
     assert [*found.doubts()] == [
         "between its vertices errors are off by up to 10.0 µm more: expected a finer mesh"
     ]
     (one,) = [m for f in found.features for m in f.measures.values() if "verdict" in m]
     assert one["verdict"] == verdict
     fine = BOX.subdivide().subdivide().subdivide().subdivide()
-    finer = replace(asked, mesh=mesh_of(fine)).run(parse_scene(WAVE, "s"), silent)
+    finer = replace(asked, mesh=mesh_of(fine)).run(parse_scene(WAVE, "s"), ignore_progress)
     assert [*finer.doubts()] == []
     (one,) = [m for f in finer.features for m in f.measures.values() if "verdict" in m]
     assert one["verdict"] == "kept"
@@ -203,7 +203,7 @@ def test_a_part_beyond_the_travel_is_counted_and_said():
     assert 0 < far.outside < far.vertices
     assert any("beyond the travel" in said for said in far.doubts())
     with pytest.raises(OptionError, match="expected a mesh"):
-        Part().run(scene_with(), silent)
+        Part().run(scene_with(), ignore_progress)
 
 
 def test_a_scene_names_its_part(tmp_path):
@@ -214,10 +214,10 @@ def test_a_scene_names_its_part(tmp_path):
     scene_file = tmp_path / "scene.toml"
     scene_file.write_text(f'machine = "dvf5000"\n{text}')
     scene = load_scene(scene_file)
-    found = Part().run(scene, silent)
+    found = Part().run(scene, ignore_progress)
     assert found.part.place == scene.part.place
     assert np.ptp(found.part.vertices_mm, axis=0) == pytest.approx([600.0, 1000.0, 400.0])
-    assert Program().run(scene, silent).read.blocks == 1
+    assert Program().run(scene, ignore_progress).read.blocks == 1
     saved = scene_to_toml(scene)
     assert text in saved
     assert parse_scene(saved, "scene", folder=tmp_path) == scene
@@ -237,7 +237,7 @@ def test_a_bent_file_is_as_cut_and_a_predistorted_one_is_cut_nominal(ending, tmp
     file = tmp_path / f"ball{ending}"
     file.write_bytes(data.encode() if isinstance(data, str) else data)
     ways = [Part(file=str(file), place=place, unit="mm", predistorted=way) for way in (False, True)]
-    found, other = (way.run(scene, silent) for way in ways)
+    found, other = (way.run(scene, ignore_progress) for way in ways)
     texts = [one.texts(ending)[""] for one in (found, other)]
     bent, asked = (
         load_part(f"bent{ending}", "mm", text.encode() if isinstance(text, str) else text)

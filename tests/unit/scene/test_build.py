@@ -15,9 +15,9 @@ from warpspace.machine.errors import (
     Measurement,
     Poly,
     Ramp,
-    Run,
-    Table,
+    TableCurve,
     Tolerance,
+    TravelRun,
 )
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.model import evaluate
@@ -52,8 +52,8 @@ def test_every_kind_of_error_function_is_built(tmp_path):
     assert functions["EAZ"] == Ramp((-480.0, -80.0), -22.5)
     assert functions["EYX"] == Poly(travel, (0, 0.02))
     assert functions["EXC"] == Harmonics(turn, ((1, 3, 90),))
-    assert functions["EZX"] == Table(travel, ((-275, 0), (275, 4.1)))
-    assert functions["EBX"] == Table(travel, ((-275.0, -4.0), (275.0, 6.0)))
+    assert functions["EZX"] == TableCurve(travel, ((-275, 0), (275, 4.1)))
+    assert functions["EBX"] == TableCurve(travel, ((-275.0, -4.0), (275.0, 6.0)))
 
 
 def test_ramp_runs_over_the_travel_where_the_axis_stands_still():
@@ -179,7 +179,7 @@ runs = [
 def test_they_are_read_and_reload_equal():
     scene = parse_scene(MEASURED, "s")
     assert scene.uncertainty["EXX"] == Constant((-275.0, 275.0), 0.4)
-    assert scene.uncertainty["EYX"] == Table((-275.0, 275.0), ((-275.0, 0.1), (275.0, 0.2)))
+    assert scene.uncertainty["EYX"] == TableCurve((-275.0, 275.0), ((-275.0, 0.1), (275.0, 0.2)))
     runs = scene.measured["EXX"].runs
     assert [run.direction for run in runs] == ["+", "-", ""]
     assert runs[1].points == ((275.0, 1.5), (-275.0, 2.5))
@@ -187,7 +187,11 @@ def test_they_are_read_and_reload_equal():
 
 
 def test_readings_come_by_direction():
-    runs = (Run("+", ((0.0, 1.0),)), Run("-", ((0.0, 2.0),)), Run("+", ((5.0, 3.0),)))
+    runs = (
+        TravelRun("+", ((0.0, 1.0),)),
+        TravelRun("-", ((0.0, 2.0),)),
+        TravelRun("+", ((5.0, 3.0),)),
+    )
     measurement = Measurement(runs)
     assert measurement.count == 3
     np.testing.assert_array_equal(measurement.scatter["+"], [[0.0, 1.0], [5.0, 3.0]])
@@ -202,9 +206,9 @@ def test_readings_may_stand_in_a_file_beside_the_scene(tmp_path):
     (tmp_path / "s.toml").write_text(text)
     scene = load_scene(tmp_path / "s.toml")
     assert scene.measured["EXX"].runs == (
-        Run("+", ((-275.0, 1.0), (275.0, 2.0))),
-        Run("-", ((275.0, 1.5),)),
-        Run("-", ((-275.0, 2.5),)),
+        TravelRun("+", ((-275.0, 1.0), (275.0, 2.0))),
+        TravelRun("-", ((275.0, 1.5),)),
+        TravelRun("-", ((-275.0, 2.5),)),
     )
     assert parse_scene(scene_to_toml(scene), "s") == scene  # needs no other file
 

@@ -8,7 +8,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 import pytest
 
-from warpspace.analysis.uncertainty.propagation import find_doubt
+from warpspace.analysis.uncertainty.propagation import scene_uncertainty
 from warpspace.exceptions import SceneError
 from warpspace.machine.errors import Covariance
 from warpspace.scene.library import load_scene, parse_scene
@@ -46,18 +46,18 @@ def test_all_that_a_covariance_says_comes_back_from_its_text():
     nothing = Covariance((), (), undetermined=("EXX",))
     back = parse_scene(scene_to_toml(replace(scene, covariance=nothing)), "s")
     assert back.covariance == nothing
-    assert find_doubt(back).unknown == ("EC0Y", "EA0Z", "EXX")
+    assert scene_uncertainty(back).unknown == ("EC0Y", "EA0Z", "EXX")
 
 
 def test_what_is_left_open_is_unknown_also_where_its_value_is_zero():
-    doubt = find_doubt(replace(parse_scene(SCENE, "s"), covariance=WHOLE))
+    doubt = scene_uncertainty(replace(parse_scene(SCENE, "s"), covariance=WHOLE))
     assert (doubt.unknown, doubt.is_known) == (("EXX", "EYY"), False)
     assert not replace(doubt, unknown=()).is_known  # as an app does that counts again
     said = " ".join(doubt.remarks())
     assert "the readings did not determine EXX, EYY: unknown wherever they act" in said
     assert "residuals were 61.9 times what its readings scatter; U95 does not contain" in said
     assert "not stated" not in said
-    known = find_doubt(parse_scene(SCENE, "s"))
+    known = scene_uncertainty(parse_scene(SCENE, "s"))
     assert (known.is_known, [*known.remarks()]) == (True, [])
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from warpspace import evaluate
-from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, Table
+from warpspace.machine.errors import Constant, Harmonics, Poly, Ramp, TableCurve
 from warpspace.scene.curve_reader import combine_curves
 from warpspace.scene.library import parse_scene
 from warpspace.scene.scene_writer import scene_to_toml
@@ -85,8 +85,12 @@ def test_a_tool_over_a_guide_has_the_positioning_error_of_that_guide():
         (Constant(SPAN, 4.0), Ramp(SPAN, 7.0), Poly),
         (Harmonics(SPAN, ((1, 3, 10),)), Harmonics(SPAN, ((1, 2, 10), (2, 1, 0))), Harmonics),
         (Harmonics(SPAN, ((1, 3, 10),)), Constant(SPAN, 2.0), Harmonics),
-        (Table(SPAN, ((-500, 1), (500, 2))), Table(SPAN, ((-100, 3), (0, 1), (100, 5))), Table),
-        (Constant(SPAN, 2.0), Table(SPAN, ((-100, 3), (0, 1), (100, 5))), Table),
+        (
+            TableCurve(SPAN, ((-500, 1), (500, 2))),
+            TableCurve(SPAN, ((-100, 3), (0, 1), (100, 5))),
+            TableCurve,
+        ),
+        (Constant(SPAN, 2.0), TableCurve(SPAN, ((-100, 3), (0, 1), (100, 5))), TableCurve),
         (Constant(SPAN, 0.0), Ramp(SPAN, 2.0), Ramp),
     ],
 )

@@ -9,14 +9,20 @@ import numpy as np
 
 from warpspace.analysis.adjustment_search import Objective, Search, Volume
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
-from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
+from warpspace.analysis.description import (
+    Analysis,
+    Change,
+    ProgressCallback,
+    Result,
+    ignore_progress,
+)
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
 from warpspace.analysis.statistics import Numbers, Summary, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
-    FieldDoubt,
-    field_doubt,
-    find_doubt,
+    FieldUncertainty,
+    field_uncertainty,
     plus_minus,
+    scene_uncertainty,
     u95_lines,
 )
 from warpspace.exceptions import OptionError
@@ -74,7 +80,7 @@ class AdjustedSet(Summary):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Repair(Analysis):
+class Adjust(Analysis):
     """Find which errors of SCENE to adjust, and to what.
 
     For each error stands what leaving it out, and what its best value, gives for the whole volume
@@ -133,12 +139,12 @@ class Repair(Analysis):
         scene = replace(scene, placed=True) if self.placed else scene
         return scene, scene.view(self.seen_loop)
 
-    def run(self, scene: Scene, watch: Watch = silent, /) -> "RepairResult":
+    def run(self, scene: Scene, watch: ProgressCallback = ignore_progress, /) -> "AdjustResult":
         scene, view = self.seen(scene)
         nodes = build_grid(scene.model, scene.workspace, self.grid)
         basis = grid_basis(scene, nodes, view, self.included(scene))
         values = amplitudes_of(scene.errors, basis.keys)
-        found = find_repairs(basis, nodes, values, self, scene, watch)
+        found = find_adjustments(basis, nodes, values, self, scene, watch)
         exact = [
             volume_statistics(evaluate_grid(change.scene, nodes, view, exact=True), nodes)
             for change in found.changes()
@@ -151,7 +157,7 @@ class Repair(Analysis):
         found = replace(found, repairs=tuple(sets), second_order=left_out)
         error = basis.evaluate(values, orientation=False).error_um
         at = nodes.coordinates, view, nodes.point_mm, nodes.weights
-        doubt = field_doubt(scene, error, *at)
+        doubt = field_uncertainty(scene, error, *at)
         return found if doubt is None else _with_doubt(found, doubt, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
@@ -164,12 +170,12 @@ class Repair(Analysis):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RepairResult(Result):
+class AdjustResult(Result):
     """What repairs a machine."""
 
     keys = ("objective", "before", "errors", "adjustable", "repairs", "all_sets_compared")
     no_change = "there is nothing to adjust in this loop"
-    asked: Repair
+    asked: Adjust
     scene: Scene
     before: Summary
     # every error that is not zero and acts in the loop; the one whose best value helps the
@@ -199,7 +205,7 @@ class RepairResult(Result):
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
-        yield from u95_lines(find_doubt(self.scene, self.asked.seen_loop), {"": self.before})
+        yield from u95_lines(scene_uncertainty(self.scene, self.asked.seen_loop), {"": self.before})
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
@@ -220,7 +226,7 @@ class RepairResult(Result):
         )
         yield from self._set_blocks()
         for one in self.errors:
-            if (share := one.best.sure.get("probability")) is not None:
+            if (share := one.best.expanded_uncertainty.get("probability")) is not None:
                 now = f"{one.key} {one.present:.4g} {plus_minus(one.sure['u95_present'], '.3g')}"
                 yield f"  {now} {one.unit}: best value {one.best.value:.1f} helps with {share:.1%}"
         yield self.bars()
@@ -323,14 +329,14 @@ def repaired(scene: Scene, adjust: Mapping[str, float]) -> Scene:
     return replace(scene, title=f"{scene.title}, repaired"[:MAX_TEXT], errors=errors)
 
 
-def find_repairs(
+def find_adjustments(
     basis: ErrorBasis,
     grid: Grid,
     amplitudes: Array,
-    asked: Repair,
+    asked: Adjust,
     scene: Scene,
-    watch: Watch = silent,
-) -> RepairResult:
+    watch: ProgressCallback = ignore_progress,
+) -> AdjustResult:
     volume = Volume(basis, grid, amplitudes)
     candidates = _candidates(volume, asked)
     limits = np.array([asked.limit_of(key) for key in basis.keys])
@@ -350,7 +356,7 @@ def find_repairs(
     errors = [_effect(search, index) for index in volume.acting if amplitudes[index] != 0.0]
     wanted = f"{asked.objective}_um"
     keys = [basis.keys[index] for index in candidates]
-    return RepairResult(
+    return AdjustResult(
         asked=asked,
         scene=scene,
         before=Summary(*volume.statistics(amplitudes).four),
@@ -361,12 +367,12 @@ def find_repairs(
     )
 
 
-def _with_doubt(found: RepairResult, before: FieldDoubt, basis: ErrorBasis) -> RepairResult:
+def _with_doubt(found: AdjustResult, before: FieldUncertainty, basis: ErrorBasis) -> AdjustResult:
     def sure(adjust: Mapping[str, float]) -> Numbers:
         values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
         helps = {"probability": before.falls(after, f"{found.objective}_um")} if adjust else {}
-        return {**after.said_of(found.before).sure, **helps}
+        return {**after.said_of(found.before).expanded_uncertainty, **helps}
 
     def sure_effect(one: Effect) -> Effect:
         best = replace(one.best, sure=sure({one.key: one.best.value}))
@@ -380,7 +386,7 @@ def _with_doubt(found: RepairResult, before: FieldDoubt, basis: ErrorBasis) -> R
     )
 
 
-def _candidates(volume: Volume, asked: Repair) -> tuple[int, ...]:
+def _candidates(volume: Volume, asked: Adjust) -> tuple[int, ...]:
     keys = volume.basis.keys
     acting = [keys[index] for index in volume.acting]
     if ALL in asked.adjustable:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Change, Result, Watch, counting
+from warpspace.analysis.description import Change, ProgressCallback, Result, count_progress
 from warpspace.analysis.options import Grammar, option, read_keys, read_numbers
 from warpspace.analysis.sampling import tolerance_search
 from warpspace.analysis.sampling.cases import Case, Over, both_orders
@@ -86,9 +86,9 @@ class Allocate(KeptLimit):
     )
     fixed: Fixed = option((), "Errors whose tolerance stays as it is")
 
-    def run(self, scene: Scene, watch: Watch, /) -> "AllocateResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "AllocateResult":
         case = self.case(scene, self.plan_of(self.limit_um))
-        return replace(allocate(case, self, counting(watch, 1.0)), scene=scene)
+        return replace(allocate(case, self, count_progress(watch, 1.0)), scene=scene)
 
     def check_keys(self, known: Sequence[str]) -> None:
         for key in (*dict(self.costs), *self.fixed):

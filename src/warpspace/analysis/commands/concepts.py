@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.contributions import Share, SharesResult, variance_contributions
 from warpspace.analysis.commands.montecarlo import sampled_second_order
-from warpspace.analysis.description import Result, Watch, counting
+from warpspace.analysis.description import ProgressCallback, Result, count_progress
 from warpspace.analysis.options import option
 from warpspace.analysis.sampling.machine_sampling import MonteCarlo, Progress, montecarlo
 from warpspace.analysis.sampling.sampling_options import KeptLimit
@@ -102,11 +102,11 @@ class Concepts(KeptLimit):
         False, "Each scene with its own tolerances instead of those of the first one by class"
     )
 
-    def run(self, scene: Scene, watch: Watch, /) -> "ConceptsResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "ConceptsResult":
         return self.run_all((scene,), watch)
 
-    def run_all(self, scenes: Sequence[Scene], watch: Watch, /) -> "ConceptsResult":
-        progress = counting(watch, self.samples * len(scenes))
+    def run_all(self, scenes: Sequence[Scene], watch: ProgressCallback, /) -> "ConceptsResult":
+        progress = count_progress(watch, self.samples * len(scenes))
         found = compare_concepts(scenes, self, progress=progress)
         left_out = sampled_second_order(*((one.scene, one.sampled) for one in found))
         return ConceptsResult(asked=self, concepts=found, second_order=left_out)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.statistics import share_below, share_within
-from warpspace.analysis.uncertainty.propagation import field_doubt, plus_minus
+from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
@@ -24,7 +24,7 @@ SHARES = (0.25, 0.5, 0.75, 1.0)  # parts of the volume whose limit the table say
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reach(Analysis):
+class Conformance(Analysis):
     """Say which part of the volume of SCENE keeps a limit.
 
     The volume is cut into boxes between the nodes of a grid; a box keeps the limit if all its
@@ -41,7 +41,7 @@ class Reach(Analysis):
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     nodes: int = option(21, "Nodes per axis of the working volume", low=2, high=61, flag="--grid")
 
-    def run(self, scene: Scene, watch: Watch, /) -> "ReachResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "ConformanceResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         view = choose_view(scene, self.loop)
         field = evaluate_grid(scene, grid, view)
@@ -61,7 +61,7 @@ class Reach(Analysis):
                 for axis, ends, count in zip(axes, found, keeps.shape, strict=True)
                 if axis
             }
-        sure = field_doubt(scene, field.error_um, grid.coordinates, view, grid.point_mm)
+        sure = field_uncertainty(scene, field.error_um, grid.coordinates, view, grid.point_mm)
 
         def ask(error_um: Array) -> Array:
             moved = replace(field, error_um=error_um)
@@ -72,20 +72,20 @@ class Reach(Analysis):
         u95, *u95_um = sure.through(ask) if sure else [None] * (1 + len(SHARES))
         names = [f"{part:.0%}" for part in SHARES]
         told = {"u95_percent": u95, "u95_keeps_um": dict(zip(names, u95_um, strict=True))}
-        return ReachResult(
+        return ConformanceResult(
             limit_um=self.limit_um,
             percent=percent,
             box=box,
             keeps_um=dict(zip(names, keeps_um, strict=True)),
             sure=told if sure else {},
-            doubt=sure and sure.doubt,
+            uncertainty=sure and sure.doubt,
             title=scene.title,
             ranges={axis: ranges[axis] for axis in axes if axis},
         )
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReachResult(Result):
+class ConformanceResult(Result):
     """The part of a volume that keeps a limit."""
 
     keys = ("limit_um", "percent", "box", "keeps_um")

@@ -15,9 +15,9 @@ from warpspace.analysis.blocks import (
     Table,
     number_columns,
 )
-from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.description import ProgressCallback, Result
 from warpspace.analysis.options import error_words, option
-from warpspace.analysis.sampling.cases import Case, Over, Plan, reduce_nodes
+from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan, reduce_nodes
 from warpspace.analysis.sampling.sampling_options import Sampled
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, amplitudes_of, build_basis, error_values, evaluate_exact
@@ -160,10 +160,10 @@ class Shares(Sampled):
         unset="none",
     )
 
-    def run(self, scene: Scene, watch: Watch, /) -> "SharesResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "SharesResult":
         if self.sobol is not None and self.sobol < 2:
             raise OptionError(f"{{sobol}} {self.sobol}; expected a power of two, 2 or above")
-        plan = Plan(seed=self.seed, cylinder=self.cylinder)
+        plan = SamplingPlan(seed=self.seed, cylinder=self.cylinder)
         plan.check()
         found = variance_contributions(self.case(scene, plan), self.sobol)
         watch(1.0)
@@ -244,7 +244,7 @@ def share_bars(rows: tuple[Share, ...], title: str, subtitle: str) -> Bars:
 
 
 @dataclass(frozen=True, slots=True)
-class Contribution:
+class PointContribution:
     """What one parameter does to one point."""
 
     key: str  # parameter key
@@ -265,7 +265,7 @@ class Explanation:
     error_um: Array  # [3]; from the exact chain
     orientation_urad: Array  # [3]; from the exact chain
     # all parameters of the loop that are not zero there, largest first
-    contributions: tuple[Contribution, ...]
+    contributions: tuple[PointContribution, ...]
     # [3]; exact error minus the sum of the contributions: what the first order leaves out
     remainder_um: Array
 
@@ -289,7 +289,7 @@ def explain(
     found = columns(model, view.loop, keys, coordinates, point)
     values = error_values(model, errors, coordinates)
     parts = [
-        Contribution(
+        PointContribution(
             key,
             float(values[key]),
             vector,

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import Grammar, option, typed_word
 from warpspace.exceptions import OptionError, near_miss
 from warpspace.kinematics.conversion import (
@@ -64,7 +64,7 @@ class Convert(Analysis):
         (), "; ".join(f"{name}={form}" for name, form in FORMS.items()), flag="--to", required=True
     )
 
-    def run(self, scene: Scene, _watch: Watch, /) -> "ConvertResult":
+    def run(self, scene: Scene, _watch: ProgressCallback, /) -> "ConvertResult":
         return convert_scene(scene, self.target(scene), self.wishes)
 
     def target(self, scene: Scene) -> "Target":

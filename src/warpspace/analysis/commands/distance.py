@@ -9,9 +9,9 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.line import Between
-from warpspace.analysis.description import Result, Watch
+from warpspace.analysis.description import ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
-from warpspace.analysis.uncertainty.propagation import field_doubt, plus_minus
+from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_order
 from warpspace.kinematics import transforms
@@ -41,7 +41,7 @@ class Distance(Between):
     placed: bool = option(False, "Leave out where the workpiece lies; of the relative loop")
     exact: bool = option(False, "The exact chain instead of the first order")
 
-    def run(self, scene: Scene, watch: Watch, /) -> "DistanceResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "DistanceResult":
         scene = placed_in(scene, self.loop, placed=self.placed)
         at = self.places(scene, self.corner)
         point = nominal_point(scene.model, Loop.TOOL, at)  # in any loop, as over the grid
@@ -49,7 +49,7 @@ class Distance(Between):
         field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
         watch(1.0)
         found = self.between(scene, at, field)
-        sure = field_doubt(scene, field.error_um, at, scene.view(self.loop), point)
+        sure = field_uncertainty(scene, field.error_um, at, scene.view(self.loop), point)
         if sure is None:
             return found
 

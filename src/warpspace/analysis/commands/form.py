@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.statistics import Numbers
-from warpspace.analysis.uncertainty.propagation import field_doubt, plus_minus
+from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
@@ -23,7 +23,7 @@ PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
 
 
 @dataclass(frozen=True, slots=True)
-class Deviation:
+class FormDeviation:
     """One form deviation of one plane or line."""
 
     keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit")
@@ -36,7 +36,7 @@ class Deviation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Certify(Analysis):
+class Form(Analysis):
     """Certify flatness, straightness, squareness of SCENE.
 
     What an inspector would find on a part that the bent volume is copied to. Flatness and
@@ -51,7 +51,7 @@ class Certify(Analysis):
     nodes: int = option(11, "Nodes per axis of the working volume", low=3, high=41, flag="--grid")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
 
-    def run(self, scene: Scene, watch: Watch, /) -> "CertifyResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "FormResult":
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
@@ -59,11 +59,11 @@ class Certify(Analysis):
         view = choose_view(scene, self.loop)
         error = evaluate_grid(scene, grid, view).error_um
         found, asked = [*_deviations(axes, grid.nominal_mm, error)], 1
-        sure = field_doubt(scene, error, grid.coordinates, view, grid.point_mm)
+        sure = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
         count = 2 * (1 + len(sure.doubt.keys)) if sure else 1
         watch(1 / count)
         if sure is None:
-            return CertifyResult(deviations=tuple(found), title=scene.title)
+            return FormResult(deviations=tuple(found), title=scene.title)
 
         def ask(error_um: Array) -> Array:
             nonlocal asked
@@ -72,10 +72,10 @@ class Certify(Analysis):
 
         each = zip(found, sure.through(ask), strict=True)
         told = tuple(replace(one, sure={"u95": u95}) for one, u95 in each)
-        return CertifyResult(deviations=told, title=scene.title, doubt=sure.doubt)
+        return FormResult(deviations=told, title=scene.title, uncertainty=sure.doubt)
 
 
-def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[Deviation]:
+def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[FormDeviation]:
     moving = [i for i, axis in enumerate(axes) if axis]
     for third in moving:
         yield from _flatness(axes, nominal, error, [i for i in moving if i != third], third)
@@ -85,23 +85,30 @@ def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator
 
 
 @dataclass(frozen=True, kw_only=True)
-class CertifyResult(Result):
+class FormResult(Result):
     """Form deviations of the bent volume."""
 
     keys = ("deviations",)
-    deviations: tuple[Deviation, ...]
+    deviations: tuple[FormDeviation, ...]
     title: str
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.title} · form of the bent volume"
         columns = (
-            *(Column(name, key=name, leads=name != "at") for name in Deviation.keys[:3]),
+            *(Column(name, key=name, leads=name != "at") for name in FormDeviation.keys[:3]),
             Column("value", ".2f", key="value"),
-            *([Column("U95"), Column(key="u95", shows=False)] if self.doubt else ()),
+            *([Column("U95"), Column(key="u95", shows=False)] if self.uncertainty else ()),
             Column("unit", key="unit"),
         )
         rows = [
-            (d.kind, d.of, d.at, d.value, *([plus_minus(u95), u95] if self.doubt else ()), d.unit)
+            (
+                d.kind,
+                d.of,
+                d.at,
+                d.value,
+                *([plus_minus(u95), u95] if self.uncertainty else ()),
+                d.unit,
+            )
             for d in self.deviations
             for u95 in [d.sure.get("u95")]
         ]
@@ -124,19 +131,19 @@ def zone_width(deviation: Array, *places: Array) -> float:
 
 def _flatness(
     axes: tuple[str, ...], nominal: Array, error: Array, plane: list[int], third: int
-) -> Iterator[Deviation]:
+) -> Iterator[FormDeviation]:
     name = "".join(axes[i] for i in plane)
     for word, share in PLACES.items():
         index = round(share * (error.shape[third] - 1))
         flat, places = (np.take(part, index, third) for part in (error[..., third], nominal))
         width = zone_width(flat.ravel(), *(places[..., i].ravel() for i in plane))
         at = f"{axes[third]} {np.take(nominal, index, third)[..., third].mean():.6g} mm ({word})"
-        yield Deviation("flatness", name, at, width, "µm")
+        yield FormDeviation("flatness", name, at, width, "µm")
 
 
 def _straightness(
     axes: tuple[str, ...], nominal: Array, error: Array, moving: list[int], axis: int
-) -> Iterator[Deviation]:
+) -> Iterator[FormDeviation]:
     others = [i for i in moving if i != axis]
     for across in others:
         widths: dict[str, float] = {}
@@ -149,12 +156,12 @@ def _straightness(
             widths[at] = zone_width(error[line][:, across], nominal[line][:, axis])
         worst = max(widths, key=lambda at: widths[at])
         name = f"{axes[axis]} in {'xyz'[across]}"
-        yield Deviation("straightness", name, f"worst of lines: {worst}", widths[worst], "µm")
+        yield FormDeviation("straightness", name, f"worst of lines: {worst}", widths[worst], "µm")
 
 
 def _squareness(
     axes: tuple[str, ...], nominal: Array, error: Array, first: int, second: int
-) -> Deviation:
+) -> FormDeviation:
     slope = 0.0
     for axis, across in ((first, second), (second, first)):
         index = tuple(
@@ -163,4 +170,4 @@ def _squareness(
         fit = np.polynomial.polynomial.polyfit(nominal[index][:, axis], error[index][:, across], 1)
         slope += 1e3 * float(fit[1])  # µm over mm is mrad
     name = f"{axes[second]} to {axes[first]}"
-    return Deviation("squareness", name, "through the middle", -slope, "µrad")
+    return FormDeviation("squareness", name, "through the middle", -slope, "µrad")

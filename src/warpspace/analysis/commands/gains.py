@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import AT_HELP, LOOP_HELP, Place, error_words, option, place_words
 from warpspace.analysis.sampling.distribution import loop_keys
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
-from warpspace.kinematics.chain import Column as Response
+from warpspace.kinematics.chain import JacobianColumn as Response
 from warpspace.kinematics.chain import branch_frames, nominal_point
 from warpspace.kinematics.chain import columns as responses
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
@@ -268,7 +268,7 @@ class Gains(Analysis):
         "Key errors: the largest that together make up this share of the sum of squares",
     )
 
-    def run(self, scene: Scene, _watch: Watch, /) -> "GainsResult":
+    def run(self, scene: Scene, _watch: ProgressCallback, /) -> "GainsResult":
         if self.at and self.over_travel:
             raise OptionError("{at}: expected one point, and none with {over_travel}")
         if self.step_deg is not None and not self.over_travel:

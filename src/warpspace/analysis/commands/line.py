@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
-from warpspace.analysis.uncertainty.propagation import find_doubt, plus_minus, u95_columns
+from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty, u95_columns
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.axes import is_linear
@@ -62,7 +62,7 @@ class Line(Between):
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     exact: bool = option(False, "The exact chain instead of the first order")
 
-    def run(self, scene: Scene, watch: Watch, /) -> "LineResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "LineResult":
         share = np.linspace(0.0, 1.0, self.points)
         ends = self.places(scene).items()
         axes = {name: low + (high - low) * share for name, (low, high) in ends}
@@ -78,7 +78,7 @@ class Line(Between):
             error_um=field.error_um,
             orientation_urad=field.orientation_urad,
             title=f"{scene.title} · {self.loop} loop",
-            doubt=find_doubt(scene, self.loop),
+            uncertainty=scene_uncertainty(scene, self.loop),
             sure=u95_columns(scene, field, axes, scene.view(self.loop)),
         )
 
@@ -105,7 +105,7 @@ class LineResult(Result):
         place = {name: float(at[worst]) for name, at in self.axes.items()}
         yield f"{self.title} · {self.length_mm:.1f} mm"
         u95 = [self.sure["u95_norm_um"]] if self.sure else []
-        about = f" {plus_minus(u95[0][worst] if u95 else None)}" if self.doubt else ""
+        about = f" {plus_minus(u95[0][worst] if u95 else None)}" if self.uncertainty else ""
         yield f"  largest |E| {norm[worst]:.2f}{about} µm at {place_words(place)}"
         columns = self.along_mm, *self.axes.values(), norm, *u95
         everything = np.column_stack([*columns, self.error_um, self.orientation_urad])

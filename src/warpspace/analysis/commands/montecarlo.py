@@ -12,7 +12,7 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_columns
-from warpspace.analysis.description import Result, Watch, counting, plain
+from warpspace.analysis.description import ProgressCallback, Result, count_progress, plain
 from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Over, both_orders
 from warpspace.analysis.sampling.machine_sampling import MonteCarlo, Progress, Take, montecarlo_each
@@ -132,13 +132,13 @@ class Machines(SampledMachines):
         False, "A row for each scene, as --tolerance gives for each combination of half widths"
     )
 
-    def run(self, scene: Scene, watch: Watch, /) -> "MachinesResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "MachinesResult":
         return self.run_all((scene,), watch)
 
     def run_all(
         self,
         scenes: Sequence[Scene],
-        watch: Watch,
+        watch: ProgressCallback,
         /,
         *,
         executor: Executor | None = None,
@@ -147,7 +147,7 @@ class Machines(SampledMachines):
         take: Take | None = None,
     ) -> "MachinesResult":
         self.check_against(len(scenes))
-        counted = counting(watch, self.machines(len(scenes)))
+        counted = count_progress(watch, self.machines(len(scenes)))
 
         def advance(count: int) -> None:
             counted(count)

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, option, place_words
 from warpspace.analysis.statistics import P95, Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
     COVERED,
     NAMES,
-    FieldDoubt,
+    FieldUncertainty,
     plus_minus,
-    volume_doubt,
+    volume_uncertainty,
 )
 from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import Loop
@@ -31,7 +31,7 @@ UNSTATED = "the scene does not state how sure its errors are; expected [uncertai
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trust(Analysis):
+class Uncertainty(Analysis):
     """Say how sure the map of SCENE is.
 
     U95 of mean, RMS, P95 and max of |E| from what the scene states of the uncertainty of its
@@ -54,14 +54,14 @@ class Trust(Analysis):
     samples: int = option(10_000, "How many machines are drawn", low=100, high=1_000_000)
     seed: int = option(0, "Of the random numbers", low=0, high=2**63 - 1)
 
-    def run(self, scene: Scene, watch: Watch, /) -> "TrustResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "UncertaintyResult":
         view = choose_view(scene, self.loop)
         grid = build_grid(scene.model, scene.workspace, self.nodes)
-        found = volume_doubt(scene, view, self.nodes)
+        found = volume_uncertainty(scene, view, self.nodes)
         limit = scene.limit_um if self.limit_um is None else self.limit_um
         statistics = volume_statistics(evaluate_grid(scene, grid, view), grid)
         beyond = (scene.covariance or Covariance((), ())).outside(grid.coordinates, grid.shape)
-        result = TrustResult(
+        result = UncertaintyResult(
             limit_um=limit,
             statistics=found.said_of(statistics) if found else statistics,
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
@@ -104,7 +104,7 @@ def _spread(drawn: Array) -> Mapping[str, float]:
     return {"mean_um": float(drawn.mean()), "u95_um": float(high - low) / 2.0}
 
 
-def _shares(found: FieldDoubt) -> list[Mapping[str, Any]]:
+def _shares(found: FieldUncertainty) -> list[Mapping[str, Any]]:
     mean, _, _, largest = found.gradients
     of_mean, doubt = found.parts_of(mean), found.doubt
     u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))
@@ -116,7 +116,7 @@ def _shares(found: FieldDoubt) -> list[Mapping[str, Any]]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrustResult(Result):
+class UncertaintyResult(Result):
     """How sure a map is; None is not known, or was not asked for."""
 
     keys = (
@@ -149,7 +149,10 @@ class TrustResult(Result):
         )
         rows: list[tuple[Any, ...]] = []
         for name, words in NAMES.items():
-            u95, more = self.statistics.sure.get(f"u95_{name}"), [*drawn.get(name, {}).values()]
+            u95, more = (
+                self.statistics.expanded_uncertainty.get(f"u95_{name}"),
+                [*drawn.get(name, {}).values()],
+            )
             more += [100.0 * (more[1] / u95 - 1.0) if u95 else None] if more else []
             rows.append((words, getattr(self.statistics, name), plus_minus(u95), u95, *more))
         yield Table(columns, rows)

@@ -11,7 +11,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from warpspace.analysis.sampling.distribution import EXACT_SAMPLES, Draws, Part, summarise
+from warpspace.analysis.sampling.distribution import EXACT_SAMPLES, Draws, PartialSums, summarise
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import View, build_basis, reference_point
 from warpspace.field.grid import Workspace, build_grid, node_counts
@@ -224,7 +224,7 @@ LIMIT_OVER = Over.MAX
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class SamplingPlan:
     """What is sampled and how."""
 
     samples: int = DEFAULT_SAMPLES
@@ -305,7 +305,7 @@ class Case:
     draws: Draws  # the parameters and their distributions, see `build_draws`
     workspace: Workspace
     view: View = field(default_factory=View)  # loop and reference
-    plan: Plan = field(default_factory=Plan)
+    plan: SamplingPlan = field(default_factory=SamplingPlan)
 
     def check(self) -> None:
         self.plan.check()
@@ -390,7 +390,9 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     return first, exact
 
 
-def sample_blocks(case: Case, first: int, end: int, *, keep: bool, job: Job | None = None) -> Part:
+def sample_blocks(
+    case: Case, first: int, end: int, *, keep: bool, job: Job | None = None
+) -> PartialSums:
     do = case.build_job() if job is None else job
 
     def blocks() -> Iterator[Array]:

@@ -23,7 +23,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Histogram:
+class BinCounts:
     """Counts in bins of equal width."""
 
     edges_um: Array  # [n + 1]
@@ -41,7 +41,7 @@ class Probability:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PartialSums:
     """Some blocks of samples, as little of them as a stream needs."""
 
     count: int  # how many samples
@@ -58,7 +58,7 @@ class Part:
 
 def summarise(
     blocks: Iterable[Array], spec_um: float | None = None, *, keep: bool, count: bool
-) -> Part:
+) -> PartialSums:
     """Summarise one block of samples or more, [n] each, µm."""
     sums: list[float] = []
     squares: list[float] = []
@@ -77,7 +77,7 @@ def summarise(
         if keep:
             kept.append(values)
     filled = None if fine is None else np.flatnonzero(fine)
-    return Part(
+    return PartialSums(
         number,
         tuple(sums),
         tuple(squares),
@@ -104,7 +104,7 @@ class Stream:
         exact = self.exact_quantiles
         self.merge(summarise([values], self.spec_um, keep=exact, count=not exact))
 
-    def merge(self, part: Part) -> None:
+    def merge(self, part: PartialSums) -> None:
         """Take in blocks of samples that were summarised, in their order."""
         if self._values is not None and part.values is not None:
             self._values[self.count : self.count + part.count] = part.values
@@ -142,7 +142,7 @@ class Stream:
         index = int(np.searchsorted(np.cumsum(self._fine), share * self.count))
         return min(float(_fine_centres()[index]), self._largest)
 
-    def histogram(self, edges_um: Array) -> Histogram:
+    def histogram(self, edges_um: Array) -> BinCounts:
         """Count the samples in bins with ascending edges, [n + 1], µm."""
         if self._values is not None:
             counts = np.histogram(self._values[: self.count], edges_um)[0]
@@ -150,9 +150,9 @@ class Stream:
             assert self._fine is not None  # noqa: S101
             centres = np.minimum(_fine_centres(), self._largest)
             counts = np.histogram(centres, edges_um, weights=self._fine)[0]
-        return Histogram(edges_um, counts.astype(np.int64))
+        return BinCounts(edges_um, counts.astype(np.int64))
 
-    def display_histogram(self) -> Histogram:
+    def display_histogram(self) -> BinCounts:
         """Count the samples in 32 to 81 bins of a round width that start at zero."""
         width = round_width(self._largest / 80.0)
         bins = max(1, math.floor(self._largest / width) + 1)

@@ -16,8 +16,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TypeVar, TypeVarTuple, Unpack
 
-from warpspace.analysis.sampling.cases import LEAST_BLOCKS, Case, Job, Plan, sample_blocks
-from warpspace.analysis.sampling.distribution import Draws, Histogram, Part, Probability, Stream
+from warpspace.analysis.sampling.cases import LEAST_BLOCKS, Case, Job, SamplingPlan, sample_blocks
+from warpspace.analysis.sampling.distribution import (
+    BinCounts,
+    Draws,
+    PartialSums,
+    Probability,
+    Stream,
+)
 from warpspace.analysis.statistics import Summary
 from warpspace.exceptions import WorkersLostError
 from warpspace.field.evaluate import View
@@ -39,13 +45,13 @@ Result = TypeVar("Result")
 class MonteCarlo(Summary):
     """Distribution of |E| over sampled machines."""
 
-    plan: Plan
+    plan: SamplingPlan
     draws: Draws  # which parameters were drawn, and how
     view: View
     mode_um: float
     median_um: float
     p99_um: float
-    histogram: Histogram
+    histogram: BinCounts
     probability: Probability | None  # of staying within the specification
     # false beyond a million samples: quantiles are then good to 0.002 % of their value
     exact_quantiles: bool
@@ -81,7 +87,7 @@ def montecarlo_each(
         yield from _collect(_tasks(cases, take, sent=False), pool, 2 * count, progress, take)
 
 
-def sample_chunks(job: Job, plan: Plan) -> Iterator[Array]:
+def sample_chunks(job: Job, plan: SamplingPlan) -> Iterator[Array]:
     """Run a job for every block on several threads and give the results in order, a few at once."""
 
     def block(index: int) -> Array:
@@ -107,7 +113,7 @@ def _tasks(cases: Iterable[Case], take: Take | None, *, sent: bool) -> Iterator[
             yield case, first, min(first + size, blocks), take is not None, job
 
 
-def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> Part | MonteCarlo:
+def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> PartialSums | MonteCarlo:
     part = sample_blocks(case, first, end, keep=keep, job=job)
     if keep or job is not None or case.plan.blocks > LEAST_BLOCKS:
         return part

@@ -11,7 +11,7 @@ from warpspace.analysis.sampling.cases import (
     Case,
     Cylinder,
     Over,
-    Plan,
+    SamplingPlan,
 )
 from warpspace.analysis.sampling.distribution import Distribution, Draws, build_draws, loop_keys
 from warpspace.kinematics.model import Loop
@@ -65,7 +65,7 @@ class Sampled(Analysis):
     def draws(self, scene: Scene) -> Draws:
         return scene_draws(scene, self.loop, self.drawn, clip=self.clip)
 
-    def case(self, scene: Scene, plan: Plan) -> Case:
+    def case(self, scene: Scene, plan: SamplingPlan) -> Case:
         return Case(scene.model, self.draws(scene), scene.workspace, scene.view(self.loop), plan)
 
 
@@ -80,8 +80,8 @@ class SampledMachines(Sampled):
         high=SAMPLES[1],
     )
 
-    def plan(self, over: Over, limit_um: float | None, nodes: int = DEFAULT_NODES) -> Plan:
-        return Plan(self.samples, self.seed, over, nodes, limit_um, self.cylinder)
+    def plan(self, over: Over, limit_um: float | None, nodes: int = DEFAULT_NODES) -> SamplingPlan:
+        return SamplingPlan(self.samples, self.seed, over, nodes, limit_um, self.cylinder)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,5 +105,5 @@ class KeptLimit(SampledMachines):
     def where(self) -> str:
         return "everywhere" if self.over == "max" else "at a random point"
 
-    def plan_of(self, limit_um: float | None) -> Plan:
+    def plan_of(self, limit_um: float | None) -> SamplingPlan:
         return replace(self.plan(Over(self.over), limit_um), workers=self.workers)

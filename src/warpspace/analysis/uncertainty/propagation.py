@@ -22,7 +22,7 @@ from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
 from warpspace.field.grid import DEFAULT_NODES, build_grid, cut, pieces
 from warpspace.kinematics.model import Coordinates, Loop, Model
 from warpspace.machine.axes import parameter
-from warpspace.machine.errors import Covariance, ErrorFunction, ErrorSet, Table
+from warpspace.machine.errors import Covariance, ErrorFunction, ErrorSet, TableCurve
 from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
@@ -47,7 +47,7 @@ def coverage_factor(freedom: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Doubt:
+class ErrorUncertainty:
     """How sure the errors of a scene are, through one loop."""
 
     layers: tuple[Layer, ...]  # curves that are not sure; their amplitudes play no part
@@ -154,7 +154,7 @@ class Doubt:
             )
 
 
-def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
+def scene_uncertainty(scene: Scene, loop: Loop = Loop.TOOL) -> ErrorUncertainty | None:
     """Collect how sure the errors of a scene are; None where it says nothing of that."""
     joint, alone = scene.covariance, scene.uncertainty
     if joint is None and not alone:
@@ -183,7 +183,7 @@ def find_doubt(scene: Scene, loop: Loop = Loop.TOOL) -> Doubt | None:
     )
     unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
     every = *unknown, *undetermined
-    return Doubt(layers, covariance, freedoms, every, undetermined, known.lack_of_fit)
+    return ErrorUncertainty(layers, covariance, freedoms, every, undetermined, known.lack_of_fit)
 
 
 def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
@@ -198,7 +198,9 @@ def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
     at = np.unique([*curve.kinks, *np.linspace(low, high, SAMPLES)])
     phase = 0.5 * np.pi * np.clip((at - low) / (high - low), 0.0, 1.0)
     parts = (curve.evaluate(at) * way for way in (np.cos(phase), np.sin(phase)))
-    return tuple(Table(curve.span, tuple(zip(at.tolist(), u.tolist(), strict=True))) for u in parts)
+    return tuple(
+        TableCurve(curve.span, tuple(zip(at.tolist(), u.tolist(), strict=True))) for u in parts
+    )
 
 
 def _root(variance: Array) -> Array:
@@ -206,10 +208,10 @@ def _root(variance: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class FieldDoubt:
+class FieldUncertainty:
     """How sure the errors of points are; `replace` error_um where only these change."""
 
-    doubt: Doubt
+    doubt: ErrorUncertainty
     response: Array  # [K, ..., 3], of the position errors to what is not sure
     expanded_um2: Array  # [..., 3, 3]: U95 along a unit vector v is the root of v · this · v
     error_um: Array  # [..., 3], position errors
@@ -335,7 +337,7 @@ class FieldDoubt:
         size = self.norm_um.size
         return np.full(size, 1.0 / size) if self.shares is None else self.shares.reshape(-1)
 
-    def seen(self, linear: Callable[[Array], Array]) -> "FieldDoubt":
+    def seen(self, linear: Callable[[Array], Array]) -> "FieldUncertainty":
         """Give the same of what a linear function makes of position errors, [..., n, 3]."""
         return combine(self.doubt, linear(self.response), linear(self.error_um), self.shares)
 
@@ -363,7 +365,7 @@ class FieldDoubt:
             found.append(response[:, few].reshape(len(response), own.size) @ own)
         return np.stack(found)
 
-    def falls(self, after: "FieldDoubt", name: str) -> float | None:
+    def falls(self, after: "FieldUncertainty", name: str) -> float | None:
         """Give the probability that RMS or max of |E| is smaller with other errors of the points.
 
         Squares are compared: that of the RMS is linear in what is not sure, however large that is.
@@ -389,23 +391,23 @@ class FieldDoubt:
             yield np.sqrt(sum(part**2 for part in parts))
 
 
-def field_doubt(
+def field_uncertainty(
     scene: Scene,
     error_um: Array,
     at: Coordinates,
     view: View,
     point_mm: Array | None = None,
     shares: Array | None = None,
-) -> FieldDoubt | None:
+) -> FieldUncertainty | None:
     """Say how sure a field of a scene is; None where the scene says nothing of that."""
-    doubt = find_doubt(scene, view.loop)
+    doubt = scene_uncertainty(scene, view.loop)
     return doubt and _field_doubt(doubt, scene.model, error_um, at, view, point_mm, shares)
 
 
 def _field_doubt(
-    doubt: Doubt, model: Model, error_um: Array, at: Coordinates, view: View,
+    doubt: ErrorUncertainty, model: Model, error_um: Array, at: Coordinates, view: View,
     point_mm: Array | None, shares: Array | None = None,
-) -> FieldDoubt:  # fmt: skip
+) -> FieldUncertainty:  # fmt: skip
     basis = doubt.respond(model, at, view, point_mm)
     return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
 
@@ -414,7 +416,11 @@ def u95_columns(
     scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
 ) -> dict[str, Array]:
     """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
-    shape, found, doubt = field.norm_um.shape, dict[str, Array](), find_doubt(scene, view.loop)
+    shape, found, doubt = (
+        field.norm_um.shape,
+        dict[str, Array](),
+        scene_uncertainty(scene, view.loop),
+    )
     if doubt is None or not doubt.is_known:
         return found
     point_mm = None if point_mm is None else np.broadcast_to(point_mm, (*shape, 3))
@@ -429,10 +435,10 @@ def u95_columns(
 
 
 def combine(
-    doubt: Doubt, response: Array, error_um: Array, shares: Array | None = None
-) -> FieldDoubt:
+    doubt: ErrorUncertainty, response: Array, error_um: Array, shares: Array | None = None
+) -> FieldUncertainty:
     """Carry how sure errors are to points, by the response of these, [K, ..., 3]."""
-    return FieldDoubt(doubt, response, _carry(doubt.expanded, response), error_um, shares)
+    return FieldUncertainty(doubt, response, _carry(doubt.expanded, response), error_um, shares)
 
 
 def _carry(covariance: Array, response: Array) -> Array:
@@ -440,19 +446,24 @@ def _carry(covariance: Array, response: Array) -> Array:
     return np.einsum("k...i,k...j->...ij", response, turned)
 
 
-def volume_doubt(scene: Scene, view: View, nodes: int = DEFAULT_NODES) -> FieldDoubt | None:
+def volume_uncertainty(
+    scene: Scene, view: View, nodes: int = DEFAULT_NODES
+) -> FieldUncertainty | None:
     """Say how sure the errors over the working volume are; None where a scene does not say."""
     grid = build_grid(scene.model, scene.workspace, min(nodes, DEFAULT_NODES))
     error = evaluate_grid(scene, grid, view).error_um
-    return field_doubt(scene, error, grid.coordinates, view, grid.point_mm, grid.weights)
+    return field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm, grid.weights)
 
 
-def u95_lines(doubt: Doubt | None, named: Mapping[str, Summary]) -> Iterator[str]:
+def u95_lines(doubt: ErrorUncertainty | None, named: Mapping[str, Summary]) -> Iterator[str]:
     """Say U95 of mean, RMS, P95 and max by what they are of, and what is not stated."""
     if doubt is None:
         return
     for of, one in named.items():
-        each = (f"{word} {plus_minus(one.sure[f'u95_{name}'])}" for name, word in NAMES.items())
+        each = (
+            f"{word} {plus_minus(one.expanded_uncertainty[f'u95_{name}'])}"
+            for name, word in NAMES.items()
+        )
         yield f"  U95{of and f', {of}'} (k = {doubt.factor:.3g}): {', '.join(each)} µm"
     yield from (f"  {words}" for words in doubt.remarks())
 

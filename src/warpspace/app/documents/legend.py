@@ -28,7 +28,7 @@ APART = 15.5 / 240.0  # least distance of two names beside the colour bar, as a 
 _STOPS = 33
 
 
-class Mark(NamedTuple):
+class LegendMark(NamedTuple):
     """What is named beside the colour bar; heights are parts of its own."""
 
     name: str  # empty at the ends
@@ -37,7 +37,7 @@ class Mark(NamedTuple):
     name_at: float  # away from others
 
 
-def marks(picture: LivePicture) -> list[Mark]:
+def marks(picture: LivePicture) -> list[LegendMark]:
     """Name ends, limit and statistics of what is coloured, from the lowest up."""
     low, high = picture.scale.low, picture.scale.high
     named = sorted([("", low), ("", high), *marked(picture).items()], key=lambda mark: mark[1])
@@ -52,7 +52,7 @@ def marks(picture: LivePicture) -> list[Mark]:
         f"{name} {spell_short(value) if name in ('', 'limit') else number(value)}".strip()
         for name, value in named
     ]
-    return list(map(Mark, [name for name, _ in named], spelt, at, placed))
+    return list(map(LegendMark, [name for name, _ in named], spelt, at, placed))
 
 
 def marked(picture: LivePicture) -> dict[str, float]:

@@ -60,7 +60,7 @@ LEFT_OUT = "machine, slices, isolines, traces and paths are left out of the step
 
 
 @dataclass(frozen=True)
-class Step:
+class PageStep:
     """What a page shows at a time; one picture is the only step."""
 
     picture: LivePicture
@@ -91,7 +91,7 @@ def build_offline_html(
     conditions = list(legend.picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
     shapes = {**box(picture), **around(picture), **words(picture)}
-    steps = [Step(picture, camera or _usual_camera(picture))]
+    steps = [PageStep(picture, camera or _usual_camera(picture))]
     return _build_page(picture.title, steps, shapes, about)
 
 
@@ -133,7 +133,7 @@ def _usual_camera(picture: LivePicture) -> CameraMemory:
     return fit_camera(drawn, ASPECT)
 
 
-def _export(step: Step, shapes: Shapes) -> str:
+def _export(step: PageStep, shapes: Shapes) -> str:
     with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
@@ -147,11 +147,11 @@ def _export(step: Step, shapes: Shapes) -> str:
             server.stop()
 
 
-def _story_steps(state: AppState, known: Known) -> list[Step]:
+def _story_steps(state: AppState, known: Known) -> list[PageStep]:
     notes, scene, live = story(state.review), state.resulting_scene(), LiveModel()
     if not notes:
         raise OptionError("no note of this scene has a step of a story")
-    picture, camera, steps = live.evaluate(_whole(state, state)), None, list[Step]()
+    picture, camera, steps = live.evaluate(_whole(state, state)), None, list[PageStep]()
     for index, note in enumerate(notes):
         problem = ""
         try:
@@ -163,7 +163,7 @@ def _story_steps(state: AppState, known: Known) -> list[Step]:
         except WarpspaceError as error:
             problem = str(error)
         said = step_words(scene, notes, index, problem)
-        steps.append(Step(picture, camera or _usual_camera(picture), said))
+        steps.append(PageStep(picture, camera or _usual_camera(picture), said))
     return steps
 
 
@@ -174,7 +174,7 @@ def _whole(shown: AppState, like: AppState, *notes: Note) -> AppState:
     return replace(shown, look=look, shown=ground, machine=machine, nodes=like.nodes, review=notes)
 
 
-def _packed_steps(steps: Sequence[Step]) -> str:
+def _packed_steps(steps: Sequence[PageStep]) -> str:
     """Pack what the page draws steps by; points as whole shifts from those of the first."""
     first, told = steps[0].picture, [{"camera": asdict(step.camera)} for step in steps]
     found: dict[str, object] = {"steps": told}
@@ -196,7 +196,7 @@ def _packed_steps(steps: Sequence[Step]) -> str:
 # --- The page around it ---------------------------------------------------------------------------
 
 
-def _build_page(title: str, steps: Sequence[Step], shapes: Shapes, about: About) -> str:
+def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: About) -> str:
     texts = files("warpspace.app.documents")
     scripts = "".join(f"<script>{script_source(name)}</script>" for name in ("mesh.js", "fly.js"))
     scene = _export(steps[0], shapes).replace("</body>", f"{scripts}</body>")
@@ -225,7 +225,7 @@ def _build_page(title: str, steps: Sequence[Step], shapes: Shapes, about: About)
     )
 
 
-def _step_pieces(step: Step, title: str) -> tuple[Markup, Markup, Markup]:
+def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
     picture, errors = step.picture, _error_rows(step.picture)
     kept = "" if picture.is_difference else f" · {legend.kept_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)

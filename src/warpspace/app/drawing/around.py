@@ -7,10 +7,10 @@ import numpy as np
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.drawing.box import coloured_shape
 from warpspace.app.drawing.colours import Rgb, colour, colour_levels, level_colours
-from warpspace.app.drawing.labels import TICK, Axis, axes, axis_labels, point_labels
+from warpspace.app.drawing.labels import TICK, AxisLabels, axes, axis_labels, point_labels
 from warpspace.app.drawing.shapes import (
     SCENE_PER_MM,
-    Shape,
+    SceneNode,
     Shapes,
     ball,
     dashes,
@@ -64,7 +64,7 @@ def _axes(picture: LivePicture) -> Shapes:
 
 
 @lru_cache(maxsize=32)
-def _axis_lines(of: tuple[Axis, ...], tick: float, rgb: Rgb) -> Shape | None:
+def _axis_lines(of: tuple[AxisLabels, ...], tick: float, rgb: Rgb) -> SceneNode | None:
     pieces = [axis.ends_mm for axis in of]
     pieces += [np.stack([at, at + tick * axis.out]) for axis in of for _, at in axis.ticks]
     return lines(np.stack(pieces), rgb, 1.2)
@@ -177,7 +177,7 @@ def _measured(picture: LivePicture) -> Shapes:
 
 def _marks(picture: LivePicture) -> Shapes:
     look, size, rgb = picture.state.look, picture.size_mm, colour(picture, "edge")
-    shapes: dict[str, Shape | None] = {}
+    shapes: dict[str, SceneNode | None] = {}
     if look.arrows:
         chosen = corners(picture.shape)
         start, end = (
@@ -197,7 +197,7 @@ def _uncertainty(picture: LivePicture) -> Shapes:
     The extent of an ellipsoid along any direction is U95 of the error along it, exaggerated.
     """
     found, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
-    shapes: dict[str, Shape | None] = {}
+    shapes: dict[str, SceneNode | None] = {}
     if found is not None and scene.covariance is not None and look.unmeasured:
         surface = picture.topology.surface.nodes
         outside = scene.covariance.outside(picture.grid.coordinates, picture.shape)
@@ -270,12 +270,12 @@ def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
 def words(picture: LivePicture) -> Shapes:
     """Draw all words in 3-D, for a page that cannot place them."""
     away, middle = 0.03 * picture.size_mm, picture.grid.bounds_mm.mean(axis=0)
-    shapes: dict[str, Shape | None] = {}
+    shapes: dict[str, SceneNode | None] = {}
     for number, label in enumerate((*axis_labels(picture), *point_labels(picture))):
         way = label.at_mm - (middle if label.from_mm is None else label.from_mm)
         out = away * way / max(float(np.linalg.norm(way)), 1e-9)
         at = label.at_mm + (5.0 if label.kind == "axis" else 1.0) * out
         looks = {"font_screen_scale": 0.8, "anchor": "center-center"}
         follows = {"text": label.text, "position": at * SCENE_PER_MM}
-        shapes[f"/words/{label.kind}{number}"] = Shape("add_label", looks, follows)
+        shapes[f"/words/{label.kind}{number}"] = SceneNode("add_label", looks, follows)
     return shapes

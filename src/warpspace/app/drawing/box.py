@@ -17,10 +17,10 @@ from warpspace.app.drawing.colours import (
     inverse_tone_map,
     level_colours,
 )
-from warpspace.app.drawing.shapes import UNLIT, Nodes, Shape, Shapes, dashes, lines
+from warpspace.app.drawing.shapes import UNLIT, Nodes, SceneNode, Shapes, dashes, lines
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.leaf import Identity
-from warpspace.bodies.gltf import Part, build_gltf
+from warpspace.bodies.gltf import GltfNode, build_gltf
 from warpspace.geometry.colour import ColourScale
 from warpspace.geometry.surfaces import box_edges, is_thin
 from warpspace.picture.map_mesh import (
@@ -48,7 +48,7 @@ def ghost_dashes(picture: LivePicture) -> Array:
     return dashes(np.array(edges).reshape(-1, 2, 3), DASH * longest, GAP * longest)
 
 
-def surface(picture: LivePicture) -> Shape:
+def surface(picture: LivePicture) -> SceneNode:
     """Draw the coloured map of a picture, or its lines alone."""
     has_lines, alone = picture.state.look.surface == "grid", picture.state.part.is_empty
     # lines of the grid would stand before a part
@@ -63,7 +63,7 @@ def coloured_shape(
     values: Array,
     scale: ColourScale,
     faded: NDArray[np.bool_] | None = None,
-) -> Shape:
+) -> SceneNode:
     """Give a surface or lines, points in mm, in the colours of the values at their points.
 
     Where they fade they are nearly the grey of the ghost.
@@ -72,13 +72,13 @@ def coloured_shape(
     if faded is not None:
         grey = inverse_tone_map(np.array(COLOURS["ghost"][0], dtype=np.uint8))
         colours[faded] = FADED * grey + (1.0 - FADED) * colours[faded]
-    data = build_gltf([Part("surface", points, indices, colours=colours)])
-    return Shape("add_glb", UNLIT, {"glb_data": data})
+    data = build_gltf([GltfNode("surface", points, indices, colours=colours)])
+    return SceneNode("add_glb", UNLIT, {"glb_data": data})
 
 
 def box(picture: LivePicture) -> Shapes:
     look, shown = picture.state.look, picture.state.shown
-    shapes: dict[str, Shape | None] = {SURFACE: surface(picture)}
+    shapes: dict[str, SceneNode | None] = {SURFACE: surface(picture)}
     if look.surface != "grid":
         shapes["/box/edges"] = lines(edge_pieces(picture), colour(picture, "edge"), 1.8)
         if shown.grid_lines:

@@ -48,7 +48,7 @@ class Label:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Axis:
+class AxisLabels:
     """An axis beside the nominal box, numbered in positions of the machine's axis along it."""
 
     name: str  # "X"; "x in R" where no linear axis of the machine runs along it
@@ -57,13 +57,13 @@ class Axis:
     ticks: tuple[tuple[str, Array], ...]  # number and place
 
 
-def axes(picture: LivePicture) -> tuple[Axis, ...]:
+def axes(picture: LivePicture) -> tuple[AxisLabels, ...]:
     """Lay out the axes: X along the front, Y along the right, Z up the left of the front."""
     return _axes(Identity(picture.grid), AWAY * picture.size_mm)
 
 
 @lru_cache(maxsize=32)
-def _axes(of: Identity, away: float) -> tuple[Axis, ...]:
+def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
     grid: Grid = of.thing
     low, high = grid.bounds_mm
     frames = (
@@ -71,7 +71,7 @@ def _axes(of: Identity, away: float) -> tuple[Axis, ...]:
         (np.array([high[0] + away, 0.0, low[2]]), np.array([1.0, 0.0, 0.0])),
         (np.array([low[0] - away, low[1], 0.0]), np.array([-1.0, 0.0, 0.0])),
     )
-    found: list[Axis] = []
+    found: list[AxisLabels] = []
     for k, (foot, out) in enumerate(frames):
         along, name, way, shift = np.eye(3)[k], grid.axes[k], 1.0, 0.0
         if name and is_linear(name):
@@ -87,7 +87,7 @@ def _axes(of: Identity, away: float) -> tuple[Axis, ...]:
             for value in tick_values(first, last, MAX_TICKS)
         )
         found.append(
-            Axis(name, np.stack([foot + low[k] * along, foot + high[k] * along]), out, ticks)
+            AxisLabels(name, np.stack([foot + low[k] * along, foot + high[k] * along]), out, ticks)
         )
     return tuple(found)
 
@@ -112,7 +112,7 @@ def axis_labels(picture: LivePicture) -> list[Label]:
 
 
 @lru_cache(maxsize=32)
-def _axis_labels(of: tuple[Axis, ...], tick: float) -> list[Label]:
+def _axis_labels(of: tuple[AxisLabels, ...], tick: float) -> list[Label]:
     found: list[Label] = []
     for k, axis in enumerate(of):
         found += [Label(text, at + tick * axis.out, "tick", at, k) for text, at in axis.ticks]

@@ -11,7 +11,7 @@ from viser.transforms import SO3
 from warpspace.app.browser.page import Page
 from warpspace.app.drawing.around import GIZMO, around, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
-from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, Shape, Shapes, ball, lines, mesh
+from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, SceneNode, Shapes, ball, lines, mesh
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import drawn_bodies, played_position, tool_point
 from warpspace.app.evaluation.scene_overlays import moved_place
@@ -34,7 +34,7 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
     Some axes may stand elsewhere, degrees, while one is turned; its table is then drawn also where
     the machine is not.
     """
-    shown, shapes = picture.state.machine.shown, dict[str, Shape | None]()
+    shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
     if shown or turned:
         edge = colour(picture, "body_edge")
         for part in drawn_bodies(picture, turned):
@@ -48,7 +48,7 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
 def ghost_machine(picture: LivePicture) -> Shapes:
     """Draw the nominal machine, nearly transparent: it tells what the box is a part of."""
     rgb, edge = (colour(picture, name) for name in ("ghost_body", "ghost_body_edge"))
-    shapes: dict[str, Shape | None] = {}
+    shapes: dict[str, SceneNode | None] = {}
     for part in drawn_bodies(picture, nominal=True):
         shapes |= _body("/ghost_machine", part, rgb, edge, opacity=OPACITY)
     return shapes
@@ -97,7 +97,7 @@ class MovingLayer:
         stays = {"scale": size, "depth_test": False, "disable_sliders": True}
         at = transforms.apply(part.pose, part.of.middle_mm) * SCENE_PER_MM
         follows = {"position": at, "wxyz": SO3.from_matrix(part.pose[:3, :3]).wxyz}
-        return {GIZMO: Shape("add_transform_controls", stays, follows, self._drag)}
+        return {GIZMO: SceneNode("add_transform_controls", stays, follows, self._drag)}
 
     def _drag(self, event: Any) -> None:
         """Clamp the part where it is let go; viser calls it in a thread of its own."""

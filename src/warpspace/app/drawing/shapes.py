@@ -23,7 +23,7 @@ Pieces = NDArray[np.float32]  # [S, 2, 3], mm; ends of pieces of line
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class SceneNode:
     """One node of the scene."""
 
     add: str  # method of viser's scene that adds it
@@ -32,7 +32,7 @@ class Shape:
     on_update: Callable[[Any], None] | None = None  # told what a user does with it
 
 
-Shapes = Mapping[str, Shape | None]
+Shapes = Mapping[str, SceneNode | None]
 
 
 class Nodes:
@@ -40,7 +40,7 @@ class Nodes:
 
     def __init__(self, scene: SceneApi, page: Page | None = None) -> None:
         self._scene, self._page = scene, page
-        self._drawn: dict[str, tuple[Any, Shape]] = {}
+        self._drawn: dict[str, tuple[Any, SceneNode]] = {}
 
     def draw(self, shapes: Shapes) -> None:
         """Draw these shapes and hide all others; what has not changed is not sent."""
@@ -51,7 +51,7 @@ class Nodes:
             if shape is not None:
                 self._drawn[name] = self._handle(name, shape), shape
 
-    def _handle(self, name: str, shape: Shape) -> Any:
+    def _handle(self, name: str, shape: SceneNode) -> Any:
         known = self._drawn.get(name)
         if known is None or not _same(known[1].stays, shape.stays):
             handle = getattr(self._scene, shape.add)(name, **shape.stays, **shape.follows)
@@ -76,45 +76,47 @@ def _same(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
     )
 
 
-def lines(pieces: Array | Pieces, rgb: Rgb | NDArray[np.uint8], width_px: float) -> Shape | None:
+def lines(
+    pieces: Array | Pieces, rgb: Rgb | NDArray[np.uint8], width_px: float
+) -> SceneNode | None:
     """Give pieces of line, [S, 2, 3], in one colour or many, as thick from near and far."""
     stays = {"thickness": width_px, "thickness_units": "screen", "scale": SCENE_PER_MM}
     colours = line_colour(rgb) if isinstance(rgb, tuple) else rgb
     follows = {"points": pieces.astype(np.float32), "colors": colours}
-    return Shape("add_line_segments", stays, follows) if len(pieces) else None
+    return SceneNode("add_line_segments", stays, follows) if len(pieces) else None
 
 
-def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **more: object) -> Shape:
+def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **more: object) -> SceneNode:
     """Give a lit body; `more` goes to viser as it is."""
     stays = {"faces": triangles.astype(np.uint32), **UNLIT, **more}
     follows = {"vertices": vertices_mm.astype(np.float32), "color": rgb}
-    return Shape("add_mesh_simple", stays, follows)
+    return SceneNode("add_mesh_simple", stays, follows)
 
 
-def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> Shape:
+def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> SceneNode:
     """Give the marker of a point, [3]."""
     stays = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
-    return Shape("add_icosphere", stays, {"position": at_mm * SCENE_PER_MM, "color": rgb})
+    return SceneNode("add_icosphere", stays, {"position": at_mm * SCENE_PER_MM, "color": rgb})
 
 
-def ellipsoid(at_mm: Array, square_mm2: Array, rgb: Rgb, opacity: float) -> Shape:
+def ellipsoid(at_mm: Array, square_mm2: Array, rgb: Rgb, opacity: float) -> SceneNode:
     """Give one about a point; along a unit vector v it extends by the root of v · square · v."""
     values, axes = np.linalg.eigh(square_mm2)
     axes[:, 0] *= np.linalg.det(axes)  # right-handed
     scale = SCENE_PER_MM * np.sqrt(np.maximum(values, 0.0))
     follows = {"position": at_mm * SCENE_PER_MM, "wxyz": SO3.from_matrix(axes).wxyz, "color": rgb}
     stays = {"opacity": opacity, "cast_shadow": False, "receive_shadow": False}
-    return Shape("add_icosphere", stays, {**follows, "scale": tuple(scale.tolist())})
+    return SceneNode("add_icosphere", stays, {**follows, "scale": tuple(scale.tolist())})
 
 
-def dots(at_mm: Array, size_mm: float, rgb: Rgb) -> Shape | None:
+def dots(at_mm: Array, size_mm: float, rgb: Rgb) -> SceneNode | None:
     """Give points, [n, 3], as flat circles."""
     stays = {
         "point_size": size_mm, "point_shape": "circle", "point_shading": "flat",
         "precision": "float32", "scale": SCENE_PER_MM,
     }  # fmt: skip
     follows = {"points": at_mm.astype(np.float32), "colors": np.array(rgb, dtype=np.uint8)}
-    return Shape("add_point_cloud", stays, follows) if len(at_mm) else None
+    return SceneNode("add_point_cloud", stays, follows) if len(at_mm) else None
 
 
 # --- Pieces of line -------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 
 from warpspace.analysis.sampling.distribution import loop_axes
-from warpspace.analysis.uncertainty.propagation import FieldDoubt, field_doubt
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_uncertainty
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.compare import compare_pictures
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -96,17 +96,21 @@ class LiveModel:
             ),
         )
 
-    def _uncertainty(self, state: AppState, grid: Grid, field: ErrorField) -> FieldDoubt | None:
+    def _uncertainty(
+        self, state: AppState, grid: Grid, field: ErrorField
+    ) -> FieldUncertainty | None:
         """Say how sure errors over a grid are; a slider that is moved keeps its covariance."""
         scene = state.scene
         if scene.covariance is None and not scene.uncertainty:
             return None
 
-        def build() -> FieldDoubt | None:  # something is stated
-            return field_doubt(scene, field.error_um, grid.coordinates, state.view(), grid.point_mm)
+        def build() -> FieldUncertainty | None:  # something is stated
+            return field_uncertainty(
+                scene, field.error_um, grid.coordinates, state.view(), grid.point_mm
+            )
 
         key = "uncertainty", Identity(grid), _place(state)
-        found: FieldDoubt = self._kept.get(key, build, lambda one: 3 * one.response.nbytes)
+        found: FieldUncertainty = self._kept.get(key, build, lambda one: 3 * one.response.nbytes)
         axes, known = loop_axes(scene.model, state.loop), found.doubt.keys
         acting = (key for key, value in state.active.items() if value and key not in known)
         unknown = [key for key in acting if parameter(key).axis in axes]

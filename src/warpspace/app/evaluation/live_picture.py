@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics
-from warpspace.app.evaluation.scene_overlays import InBox, T, bench_in_box, part_in_box, path_in_box
+from warpspace.app.evaluation.scene_overlays import (
+    SceneOverlay,
+    T,
+    bench_in_box,
+    part_in_box,
+    path_in_box,
+)
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
@@ -58,19 +64,19 @@ class LivePicture(Picture):
         return picture_size_mm(self.state.scene, self.grid)
 
     @cached_property
-    def bench(self) -> InBox[type[BenchTest]] | None:
+    def bench(self) -> SceneOverlay[type[BenchTest]] | None:
         """The path of the standard test that is run; None where none is, or cannot be."""
         return None if self.is_difference else bench_in_box(self.drawn_state)
 
     @cached_property
-    def part(self) -> InBox[PartMesh] | None:
+    def part(self) -> SceneOverlay[PartMesh] | None:
         return self._in_box(part_in_box)
 
     @cached_property
-    def path(self) -> InBox[ToolPath] | None:
+    def path(self) -> SceneOverlay[ToolPath] | None:
         return self._in_box(path_in_box)
 
-    def _in_box(self, find: Callable[[AppState], InBox[T] | None]) -> InBox[T] | None:
+    def _in_box(self, find: Callable[[AppState], SceneOverlay[T] | None]) -> SceneOverlay[T] | None:
         """Find a part or a path; of a difference its change; None where none is, or cannot be."""
         if not self.is_difference or self.compared is None:
             return find(self.drawn_state)
@@ -79,7 +85,7 @@ class LivePicture(Picture):
             return None
         return replace(b, error_um=b.error_um - a.error_um)
 
-    def coloured(self, found: InBox[Any]) -> tuple[Array, ColourScale]:
+    def coloured(self, found: SceneOverlay[Any]) -> tuple[Array, ColourScale]:
         """Give what is coloured of it, in the colours of the map; along normals in its own."""
         if self.state.part.normal and isinstance(found.of, PartMesh):
             normals = found.of.corners.normals @ found.pose[:3, :3].T

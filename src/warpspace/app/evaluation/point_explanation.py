@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.analysis.commands.contributions import Contribution, Explanation, explain
+from warpspace.analysis.commands.contributions import Explanation, PointContribution, explain
 from warpspace.analysis.commands.distance import Distance, DistanceResult
-from warpspace.analysis.uncertainty.propagation import FieldDoubt, field_doubt
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_uncertainty
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.form_values import option_values, read_form, with_form
@@ -35,7 +35,7 @@ PARALLEL = 1e-12
 
 
 @dataclass(frozen=True)
-class Answer:
+class PointExplanation:
     """A picked point explained, as it is drawn."""
 
     at: Mapping[str, float]  # mm or degrees; positions of all axes
@@ -46,7 +46,9 @@ class Answer:
     drawn_mm: Array  # [3]; where the displaced point is drawn
     # [3]; the error that it is drawn with: the one explained, or what a table leaves of it
     drawn_um: Array
-    uncertainty: FieldDoubt | None  # of the error that is explained; None where nothing is stated
+    uncertainty: (
+        FieldUncertainty | None
+    )  # of the error that is explained; None where nothing is stated
 
     @property
     def is_corrected(self) -> bool:
@@ -59,7 +61,7 @@ class Answer:
         return float(np.linalg.norm(self.explanation.error_um))
 
     @cached_property
-    def ranked(self) -> list[Contribution]:
+    def ranked(self) -> list[PointContribution]:
         """What it is made of, the largest part along the error first."""
         return sorted(self.explanation.contributions, key=lambda part: -abs(part.along_um))
 
@@ -138,7 +140,7 @@ def _denser(samples: Array) -> Array:
     return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
 
 
-def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
+def answer(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
     """Explain the error of a picked point."""
     scene, model = state.active_scene(), state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
@@ -159,8 +161,8 @@ def answer(state: AppState, picked: Picked, exaggeration: float) -> Answer:
         nominal = found.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
     drawn, view = deform(found.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
-    sure = field_doubt(scene, found.error_um, coordinates, view, found.nominal_mm)
-    return Answer(at, loop, found, shift, drawn, drawn_um, sure)
+    sure = field_uncertainty(scene, found.error_um, coordinates, view, found.nominal_mm)
+    return PointExplanation(at, loop, found, shift, drawn, drawn_um, sure)
 
 
 def drawn_places(

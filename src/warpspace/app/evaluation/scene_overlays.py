@@ -15,7 +15,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.bench.base import BenchTest, bench_names, find_test
-from warpspace.bench.plan import Plan, respond_sites
+from warpspace.bench.plan import TestPlan, respond_sites
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import seen_from_workpiece
 from warpspace.kinematics import transforms
@@ -36,7 +36,7 @@ _KEPT: Cache[Any] = Cache(400_000_000)
 
 
 @dataclass(frozen=True, eq=False)
-class InBox(Generic[T]):
+class SceneOverlay(Generic[T]):
     """Points of a part, or of a path, as they are drawn; numbers of 4 bytes are enough for it."""
 
     of: T  # in the workpiece frame
@@ -54,7 +54,7 @@ class InBox(Generic[T]):
         """Give where the points are, [n, 3], exaggerated."""
         return self.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
 
-    def with_errors(self, state: AppState) -> "InBox[T]":
+    def with_errors(self, state: AppState) -> "SceneOverlay[T]":
         """Evaluate it to first order, or what a table of compensation leaves."""
         controller, scene, point = state.controller, state.active_scene(), self.point_mm
         if controller is None:
@@ -70,12 +70,12 @@ class InBox(Generic[T]):
 
 
 def _in_box(
-    state: AppState, own: tuple[Hashable, ...], build: Callable[[Scene], InBox[T]]
-) -> InBox[T] | None:
+    state: AppState, own: tuple[Hashable, ...], build: Callable[[Scene], SceneOverlay[T]]
+) -> SceneOverlay[T] | None:
     """Give something with the errors of a state; None where it cannot be made."""
     key = Identity(state.scene), tuple(state.positions.items()), state.placed, own
     try:
-        found: InBox[T] = _KEPT.get(
+        found: SceneOverlay[T] = _KEPT.get(
             key, lambda: build(state.standing), lambda found: found.response.nbytes
         )
         return found.with_errors(state)
@@ -83,7 +83,7 @@ def _in_box(
         return None
 
 
-def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> InBox[T]:
+def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> SceneOverlay[T]:
     count, keys = len(made.point_mm), scene.parameter_keys
     if count > MOST_POINTS:
         raise OptionError(f"{count:,} points; expected at most {MOST_POINTS:,} in the app")
@@ -96,19 +96,21 @@ def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> InBox[T]:
     here = branch_pose(scene.model, "workpiece", made.coordinates)
     point, turn = transforms.apply(here, made.point_mm), (pose @ transforms.inverse(here))
     flat = response.reshape(len(keys), -1)
-    return InBox(of, pose, at, made.coordinates, point, made.outside, turn, nominal, flat, nominal)
+    return SceneOverlay(
+        of, pose, at, made.coordinates, point, made.outside, turn, nominal, flat, nominal
+    )
 
 
 # --- A part ---------------------------------------------------------------------------------------
 
 
-def part_in_box(state: AppState) -> InBox[PartMesh] | None:
+def part_in_box(state: AppState) -> SceneOverlay[PartMesh] | None:
     """Give the part as it is cut; None where there is none, or it cannot be clamped."""
     mesh, wanted = state.part.mesh, state.part.place
     if mesh is None or not state.part.shown:
         return None
 
-    def clamp(scene: Scene) -> InBox[PartMesh]:
+    def clamp(scene: Scene) -> SceneOverlay[PartMesh]:
         part = place_part(mesh, scene, wanted)
         return _respond(scene, part, make_points(scene, part.vertices_mm), part.corners.corner_of)
 
@@ -126,13 +128,13 @@ def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
 # --- Paths ----------------------------------------------------------------------------------------
 
 
-def path_in_box(state: AppState) -> InBox[ToolPath] | None:
+def path_in_box(state: AppState) -> SceneOverlay[ToolPath] | None:
     """Give the path of the program; None where there is none, or it cannot be followed."""
     text, told = state.part.program, option_values(state, Program.name) | {"at_line": ""}
     if text is None:
         return None
 
-    def trace(scene: Scene) -> InBox[ToolPath]:
+    def trace(scene: Scene) -> SceneOverlay[ToolPath]:
         asked = read_form(Program, Program.options(), told, scene)
         read = read_program(scene, text.splitlines(), asked, state.part.program_name)
         path = trace_program(read)
@@ -148,7 +150,7 @@ def chosen_test(state: AppState) -> type[BenchTest] | None:
     return find_test(name) if name in bench_names() else None
 
 
-def plan_test(test: BenchTest, scene: Scene) -> Plan:
+def plan_test(test: BenchTest, scene: Scene) -> TestPlan:
     """Lay the path of a test on a machine."""
     plan = test.plan(scene)
     if len(plan.point_mm) > MOST_SITES:
@@ -158,20 +160,22 @@ def plan_test(test: BenchTest, scene: Scene) -> Plan:
     return plan
 
 
-def bench_in_box(state: AppState) -> InBox[type[BenchTest]] | None:
+def bench_in_box(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
     """Give the path of the chosen test; None where none is drawn, or it cannot be run."""
     kind, told = chosen_test(state), option_values(state, TEST)
     if kind is None or told.get("path") == "0":
         return None
 
-    def lay(scene: Scene) -> InBox[type[BenchTest]]:
+    def lay(scene: Scene) -> SceneOverlay[type[BenchTest]]:
         plan = plan_test(read_form(kind, kind.settings(), told, scene), scene)
         at, point = plan.coordinates, plan.point_mm
         nominal = seen_from_workpiece(scene.model, at, scene.workspace, point)
         response = respond_sites(scene, plan, scene.parameter_keys).reshape(-1, point.size)
         pieces = np.concatenate([np.stack([rows[:-1], rows[1:]], 1) for rows in plan.path])
         still, inside = np.eye(4), np.zeros(len(point), bool)
-        return InBox(kind, still, pieces, at, point, inside, still, nominal, response, nominal)
+        return SceneOverlay(
+            kind, still, pieces, at, point, inside, still, nominal, response, nominal
+        )
 
     without = replace(state, controller=None)  # a test is of the machine as it is
     return _in_box(without, (kind, *sorted(told.items())), lay)

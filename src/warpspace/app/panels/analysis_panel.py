@@ -62,7 +62,7 @@ T = TypeVar("T")
 Question = tuple[object, ...]
 
 
-class Answer(NamedTuple):
+class AnalysisOutcome(NamedTuple):
     question: Question  # that it answers
     found: Result
     cards: tuple[tuple[Change, Markup], ...] = ()  # what it proposes, and that in words
@@ -82,7 +82,7 @@ class AnalysisPart(Section):
         words = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
         self.sentence = self.sentence or words.rstrip(".")
         self.at_once = self.at_once or entry.task == "understand"
-        self._answer: Answer | None = None
+        self._answer: AnalysisOutcome | None = None
         self._applied: Question = ()  # what is asked once a change has been applied
         self._problem: tuple[Question, str] | None = None
         self._jobs = Jobs(self, self.renew, self._fail)
@@ -188,7 +188,7 @@ class AnalysisPart(Section):
             found, faded = answer.found, stale and question != self._applied
             said = join((self.headline(found), self.cards_html(question), self.result_html(found)))
             parts.append(tag("div", said, class_="ws-result" + (" stale" if faded else "")))
-            parts += [tag("p", words, class_="ws-doubt") for words in found.doubts()]
+            parts += [tag("p", words, class_="ws-doubt") for words in found.caveats()]
             parts.append(self.actions(found, stale=stale))
         bar = EMPTY if stale and is_quick else self._jobs.html()
         wanted = answer is None or problem or (stale and not is_quick)
@@ -272,13 +272,13 @@ class AnalysisPart(Section):
             self._fail(error)
             return
 
-        def answer(job: Job) -> Answer:
+        def answer(job: Job) -> AnalysisOutcome:
             with taken_turn(lambda: job.tell(job.share)):
                 started = time.monotonic()
                 found = asked.run_all(scenes, job.tell)
                 took_s = time.monotonic() - started
             cards = tuple((one, _change_html(state, one)) for one in found.changes())
-            return Answer(question, found, cards, took_s)
+            return AnalysisOutcome(question, found, cards, took_s)
 
         self._make(self.kind.doing, answer, self._take_answer)
 
@@ -299,7 +299,7 @@ class AnalysisPart(Section):
 
         self._jobs.start(words, work)
 
-    def _take_answer(self, answer: Answer) -> None:
+    def _take_answer(self, answer: AnalysisOutcome) -> None:
         self._answer, self._problem = answer, None
         self.renew()
 

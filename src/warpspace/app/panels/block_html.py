@@ -100,7 +100,7 @@ def _first_bars(bars: Bars) -> Markup:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class PlotFrame:
     """Ends of two axes, and where a point lies between them."""
 
     x: tuple[float, float]
@@ -112,7 +112,7 @@ class Frame:
         down = TOP + (HIGH - TOP - BOTTOM) * (self.y[1] - y) / (self.y[1] - self.y[0])
         return np.stack(np.broadcast_arrays(across, down), axis=-1)
 
-    def to_scale(self) -> "Frame":
+    def to_scale(self) -> "PlotFrame":
         """Widen one of the axes until a unit is as long on both."""
         rooms = (self.x, WIDE - LEFT - RIGHT), (self.y, HIGH - TOP - BOTTOM)
         per = max((high - low) / room for (low, high), room in rooms) / 2.0
@@ -120,7 +120,7 @@ class Frame:
             ((low + high) / 2.0 - per * room, (low + high) / 2.0 + per * room)
             for (low, high), room in rooms
         )
-        return Frame(x, y)
+        return PlotFrame(x, y)
 
     def axes(self, x_label: str, y_label: str) -> Markup:
         """Draw ticks with their values, and what the axes are."""
@@ -153,7 +153,7 @@ def lines_html(chart: Lines) -> Markup:
         return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", said, "ws-polar")
     xs = np.concatenate([curve.x for curve in chart.curves])
     ys = np.concatenate([curve.y for curve in chart.curves])
-    frame = Frame(_ends(xs), _ends(ys))
+    frame = PlotFrame(_ends(xs), _ends(ys))
     frame = frame.to_scale() if chart.kind == "plane" else frame
     curves = join(_curve(one, frame.place(one.x, one.y)) for one in chart.curves)
     for one in chart.bands:
@@ -166,7 +166,7 @@ def histogram_html(chart: Histogram) -> Markup:
     """Draw a distribution with its marks and its limit."""
     limit = math.inf if chart.limit is None else chart.limit
     ends = float(chart.edges[0]), max(float(chart.edges[-1]), chart.limit or 0.0)
-    frame = Frame(ends, (0.0, max(float(chart.heights.max()), 1e-9) * 1.05))
+    frame = PlotFrame(ends, (0.0, max(float(chart.heights.max()), 1e-9) * 1.05))
     bars: list[Markup] = []
     for low, high, height in zip(chart.edges[:-1], chart.edges[1:], chart.heights, strict=True):
         (x0, y0), (x1, y1) = frame.place(np.array([low, high]), np.array([height, 0.0]))

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from warpspace.analysis.blocks import Histogram
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option, read_numbers
-from warpspace.analysis.sampling.cases import Case, Over, Plan
+from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan
 from warpspace.analysis.sampling.distribution import (
     Distribution,
     Draws,
@@ -35,7 +35,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
-from warpspace.app.panels.analysis_panel import AnalysisPart, Answer, Question
+from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPart, Question
 from warpspace.app.panels.block_html import histogram_html
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.state import edits
@@ -107,7 +107,7 @@ class TolerancesPart(AnalysisPart):
             fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
         )  # fmt: skip
 
-    def _take_answer(self, answer: Answer) -> None:
+    def _take_answer(self, answer: AnalysisOutcome) -> None:
         super()._take_answer(answer)
         found: Any = answer.found
 
@@ -222,7 +222,7 @@ def sample_machines(state: AppState) -> Ensemble:
         keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
         none = np.zeros(len(keys))
         draws = Draws(keys, none, none, Distribution(wanted.distribution))
-        plan, view = Plan(SAMPLES, 0, Over(wanted.over)), scene.view(state.loop)
+        plan, view = SamplingPlan(SAMPLES, 0, Over(wanted.over)), scene.view(state.loop)
         return build_ensemble(Case(scene.model, draws, scene.workspace, view, plan))
 
     return ENSEMBLES.get(_sampled(state), build, lambda found: found.size)

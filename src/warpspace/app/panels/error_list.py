@@ -27,7 +27,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
-from warpspace.app.panels.panel import Context, Part
+from warpspace.app.panels.panel import Context, Panel
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import amplitude_span
@@ -252,7 +252,7 @@ OF_ALL = {
 """What can be done with all errors: words and hint by event of the page."""
 
 
-class ErrorsPart(Part):
+class ErrorsPart(Panel):
     """Search, rows by effect, and those that are zero folded away.
 
     Order, scale of the bars and ranges of the sliders stay until the hand has left the column

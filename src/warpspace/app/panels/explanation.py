@@ -6,7 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Column, Table, number_columns
-from warpspace.analysis.commands.contributions import Contribution
+from warpspace.analysis.commands.contributions import PointContribution
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.analysis.uncertainty.propagation import NAMES
 from warpspace.app.browser.html import (
@@ -25,7 +25,7 @@ from warpspace.app.evaluation.compare import without_words
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import (
     POINTS,
-    Answer,
+    PointExplanation,
     answer,
     awaited,
     measured,
@@ -62,7 +62,7 @@ class WorstPart(Section):
 
     name, task, title = "worst", "understand", "Worst point"
     sentence = "What the largest error of the volume is made of"
-    _found: tuple[LivePicture, Answer] | None = None
+    _found: tuple[LivePicture, PointExplanation] | None = None
 
     def heading(self, picture: LivePicture) -> str:
         if picture.is_difference:
@@ -86,7 +86,7 @@ class WorstPart(Section):
         details = tag("details", details, class_="ws-details", data_key="worst.details")
         return asked + _contributions(found) + _uncertainty(found, limit) + best + details
 
-    def _answer(self, picture: LivePicture) -> Answer:
+    def _answer(self, picture: LivePicture) -> PointExplanation:
         if self._found is None or self._found[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
             self._found = picture, answer(picture.drawn_state, picked, picture.exaggeration)
@@ -120,11 +120,11 @@ class WorstPart(Section):
             self.context.look_from(pose)
 
 
-def _axes(found: Answer) -> str:
+def _axes(found: PointExplanation) -> str:
     return spell_axes(found.at).removeprefix("axes ")
 
 
-def _contributions(found: Answer) -> Markup:
+def _contributions(found: PointExplanation) -> Markup:
     first, others = found.ranked[:FIRST], len(found.ranked[FIRST:])
     left = found.length_um - sum(part.along_um for part in first)
     # their names stand in the column of errors
@@ -142,7 +142,7 @@ def _contributions(found: Answer) -> Markup:
     return rows(lines, "ws-rows ws-causes") + told
 
 
-def _uncertainty(found: Answer, limit_um: float) -> Markup:
+def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
     """Say what the uncertainty of |E| comes from, the largest share first, and if a limit is kept.
 
     Shares are below zero where correlations make it smaller; all of them add up to 100 %.
@@ -163,7 +163,7 @@ def _uncertainty(found: Answer, limit_um: float) -> Markup:
     return tag("p", words, class_="ws-tiny") + rest
 
 
-def _details(found: Answer, lever: str) -> Markup:
+def _details(found: PointExplanation, lever: str) -> Markup:
     explained, parts = found.explanation, found.ranked
     lines: list[tuple[object, ...]] = [
         (button(part.key, "worst:lever", part.key, kind="link", pressed=part.key == lever,
@@ -191,7 +191,7 @@ def _details(found: Answer, lever: str) -> Markup:
     )))  # fmt: skip
 
 
-def _lever(part: Contribution) -> Markup:
+def _lever(part: PointContribution) -> Markup:
     row, how = parameter(part.key), "along the direction drawn"
     if row.is_rotation:
         arm = float(np.linalg.norm(np.cross(part.direction, part.lever_mm)))

@@ -10,19 +10,25 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Block, Curve, Lines, Style
-from warpspace.analysis.description import Analysis, Change, Result, Watch, silent
+from warpspace.analysis.description import (
+    Analysis,
+    Change,
+    ProgressCallback,
+    Result,
+    ignore_progress,
+)
 from warpspace.analysis.options import Grammar, Option, option, typed_word
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser.html import EMPTY, tag, upload_button
 from warpspace.app.panels.block_html import details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
-from warpspace.app.panels.measurement import FilesPart, Held
+from warpspace.app.panels.measurement import FilesPart, UploadedFile
 from warpspace.app.panels.panel import Context
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import read_form
 from warpspace.exceptions import WarpspaceError
 from warpspace.formats import registry
-from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, Series, summary_table
+from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, ErrorSeries, summary_table
 from warpspace.formats.source import Source
 from warpspace.formats.to_scene import ImportedScene, into_scene
 from warpspace.machine.axes import is_linear, parameter
@@ -65,7 +71,7 @@ class Import(Analysis):
     variant: str | None = option(None, "Published variant of the format", unset="usual one")
     sources: tuple[Source, ...] = ()
 
-    def run(self, scene: Scene, _watch: Watch, /) -> "ImportResult":
+    def run(self, scene: Scene, _watch: ProgressCallback, /) -> "ImportResult":
         axis, names = registry.parse_axis_options(
             [word for word in re.split(r"[\s,;]+", self.axis) if word]
         )
@@ -114,7 +120,7 @@ class ImportResult(Result):
             yield f"{left} more curves are not drawn"
 
 
-def _curves(one: Series) -> Iterator[Curve]:
+def _curves(one: ErrorSeries) -> Iterator[Curve]:
     at = np.array(one.positions)
     thin = slice(None, None, max(1, len(at) // MOST_POINTS))
 
@@ -201,7 +207,11 @@ class ImportPart(FilesPart):
         Alone it is kept also where it cannot be read yet: the section asks for what it does not
         say, or another file comes to it.
         """
-        own, before, problem = Held(name, registry.open_upload(name, content)), self._files, None
+        own, before, problem = (
+            UploadedFile(name, registry.open_upload(name, content)),
+            self._files,
+            None,
+        )
         is_applied = self._applied[-1:] == (before,)
         held = () if is_applied else tuple(one for one in before if one.name != name)
         state, keeps = self.context.state, False
@@ -209,7 +219,9 @@ class ImportPart(FilesPart):
         for keeps in (True, False) if 0 < len(held) < MOST_FILES else (False,):
             self._files = (*held, own) if keeps else (own,)
             try:
-                self.ask(state, self.values(state) if keeps else {}, [scene]).run(scene, silent)
+                self.ask(state, self.values(state) if keeps else {}, [scene]).run(
+                    scene, ignore_progress
+                )
                 break
             except WarpspaceError as error:
                 problem = error

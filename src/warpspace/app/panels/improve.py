@@ -11,7 +11,7 @@ from typing import Any
 from markupsafe import Markup
 
 from warpspace.analysis.adjustment_search import Objective
-from warpspace.analysis.commands.adjust import Repair
+from warpspace.analysis.commands.adjust import Adjust
 from warpspace.analysis.description import Analysis, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import entries
@@ -34,7 +34,7 @@ NO_GAIN_UM = 0.005  # what improves by less is not offered
 
 
 @dataclass(frozen=True, kw_only=True)
-class IncludedRepair(Repair):
+class IncludedRepair(Adjust):
     """A repair that leaves alone what is excluded."""
 
     keys: tuple[str, ...]
@@ -96,7 +96,7 @@ class BestPart(RepairPart):
     follows = "at rest"
 
     def __init__(self, context: Context) -> None:
-        super().__init__(context, next(one for one in entries() if one.name == Repair.name))
+        super().__init__(context, next(one for one in entries() if one.name == Adjust.name))
         self.name, self.title = "best", "One adjustment"
 
     def is_seen(self, state: AppState) -> bool:

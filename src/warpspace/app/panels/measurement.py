@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Lines, Table
-from warpspace.analysis.description import Analysis, Result, Watch
+from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import Option
 from warpspace.analysis.registry import Entry
 from warpspace.app.browser.html import (
@@ -53,7 +53,7 @@ WHAT = "CSV file of readings"
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class UploadedFile:
     """A file that a page has sent."""
 
     name: str  # never a path
@@ -70,7 +70,7 @@ class FilesPart(AnalysisPart):
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
-        self._files: tuple[Held, ...] = ()
+        self._files: tuple[UploadedFile, ...] = ()
         self._trouble = ""
 
     def question(self, state: AppState) -> Question:
@@ -198,7 +198,7 @@ class TestsPart(FilesPart):
         return super().take(state, word, value)
 
     def received(self, name: str, content: bytes) -> None:
-        self._files = (Held(name, upload_text(content, name, WHAT)),)
+        self._files = (UploadedFile(name, upload_text(content, name, WHAT)),)
 
 
 # --- Calibration ----------------------------------------------------------------------------------
@@ -216,16 +216,18 @@ DOUBTS = (("in part", "Determined only in part"), ("no", "Not determined, kept")
 class CalibrateTexts(Calibrate):
     """A calibration out of texts of files."""
 
-    files: tuple[Held, ...] = ()
+    files: tuple[UploadedFile, ...] = ()
 
-    def run(self, scene: Scene, watch: Watch, /) -> Calibration:
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
         sets = [
             parse_readings(one.content, one.name, scene, one.kind, self.frame) for one in self.files
         ]
         return self.find(scene, sets, (), lambda: watch(0.0))
 
 
-def take_file(scene: Scene, text: str, name: str, kind: str | None, others: Sequence[Held]) -> Held:
+def take_file(
+    scene: Scene, text: str, name: str, kind: str | None, others: Sequence[UploadedFile]
+) -> UploadedFile:
     """Take in the text of a file beside those that are there."""
     if len(others) >= MOST_FILES:
         raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
@@ -241,7 +243,7 @@ def take_file(scene: Scene, text: str, name: str, kind: str | None, others: Sequ
         )
     readings = parse_readings(text, unlike, scene, kind)
     words = f"{_kind_words(readings.kind)}, {len(readings)}"
-    return Held(unlike, text, words, kind, len(readings))
+    return UploadedFile(unlike, text, words, kind, len(readings))
 
 
 class CalibratePart(FilesPart):

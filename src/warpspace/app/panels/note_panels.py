@@ -21,13 +21,13 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import answer, pick_worst, with_picked
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Part, actions
+from warpspace.app.panels.panel import Context, Panel, actions
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
 from warpspace.exceptions import WarpspaceError
 from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_REPLIES
-from warpspace.scene.notes import TOLERANCES, Mark, Note, Pair, Reply, story, with_note
+from warpspace.scene.notes import TOLERANCES, Note, NoteAnchor, Pair, Reply, story, with_note
 from warpspace.units import spell_short
 
 LIST, NEW = "list", "new"
@@ -43,7 +43,7 @@ def clean(text: str) -> str:
     return "".join(sign for sign in lines if sign in "\n\t" or sign.isprintable())
 
 
-class NotesPart(Part):
+class NotesPart(Panel):
     """The list of notes, in the column of the tasks."""
 
     name = "notes"
@@ -118,15 +118,15 @@ class NotesPart(Part):
             note = replace(note, numbers=note_numbers(state.resulting_scene(), [note])[0])
         return _opened(replace(state, review=with_note(state.review, note)), LIST)
 
-    def _place(self, state: AppState) -> tuple[Mapping[str, float], Mark | None]:
+    def _place(self, state: AppState) -> tuple[Mapping[str, float], NoteAnchor | None]:
         picture, place = self.context.shown, state.page.note_place
         if place in state.scene.machine.axes:
-            return {}, Mark(body=place)
+            return {}, NoteAnchor(body=place)
         if place != "point" or picture is None or picture.is_difference:
             return {}, None
         picked = state.picked or pick_worst(picture)
         at = answer(state, picked, 1.0).at
-        on = picked.point_mm and Mark(str(picked.loop or state.loop), picked.point_mm)
+        on = picked.point_mm and NoteAnchor(str(picked.loop or state.loop), picked.point_mm)
         return at, on or None
 
     def _reopened(self, state: AppState, note: Note) -> AppState:
@@ -304,7 +304,7 @@ def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
     ))  # fmt: skip
 
 
-class NoteNumbersPart(Part):
+class NoteNumbersPart(Panel):
     """What the numbers of notes have become."""
 
     name = "note-numbers"
@@ -335,7 +335,7 @@ class NoteNumbersPart(Part):
 GLIDE_MS = 600  # from step to step
 
 
-class StoryPart(Part):
+class StoryPart(Panel):
     """Tells the story of a scene's notes; the state is not changed by it, only what is shown."""
 
     name = "story"

@@ -25,7 +25,7 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Part
+from warpspace.app.panels.panel import Context, Panel
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.geometry.surfaces import corners
@@ -35,7 +35,7 @@ from warpspace.picture.map_mesh import isoline_labels
 from warpspace.units import Array, spell_short
 
 
-class HeadPart(Part):
+class HeadPart(Panel):
     """Mean and max with the place of the latter."""
 
     name = "head"
@@ -55,7 +55,7 @@ class HeadPart(Part):
         return {"head": head}
 
 
-class LegendPart(Part):
+class LegendPart(Panel):
     """The colour bar, and how much of the volume keeps the limit."""
 
     name = "legend"
@@ -77,7 +77,7 @@ class LegendPart(Part):
         return {"head.kept": kept, "legend": legend_html(picture)}
 
 
-class OrderPart(Part):
+class OrderPart(Panel):
     """What machines within tolerance reach, what the first order leaves out, errors left behind.
 
     All but the last are too slow for every move.
@@ -94,7 +94,7 @@ class OrderPart(Part):
                 "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
 
 
-class RoomPart(Part):
+class RoomPart(Panel):
     """What the page places by itself as the camera moves, and how large the drawing is."""
 
     name = "room"
@@ -175,7 +175,7 @@ MOST_QUEUED = 8  # messages that wait for a page; one that takes none is sent no
 Tabs = Callable[[], Iterable[Context]]
 
 
-class PointerPart(Part):
+class PointerPart(Panel):
     """Takes where the mouse is over the map: ``pointer:at``, a name, then a ray of six numbers."""
 
     name = "pointer"

@@ -24,7 +24,7 @@ from warpspace.app.panels.machine_editor import (
 from warpspace.app.panels.measurement import CalibratePart, TestsPart
 from warpspace.app.panels.note_panels import NoteNumbersPart, NotesPart, StoryPart
 from warpspace.app.panels.overlay import HeadPart, LegendPart, OrderPart, RoomPart
-from warpspace.app.panels.panel import Context, Part, Section
+from warpspace.app.panels.panel import Context, Panel, Section
 from warpspace.app.panels.part_panels import PartPart, ProgramPart
 from warpspace.app.panels.toolbar import ComparePart, ControlsPart
 from warpspace.app.panels.top_bar import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
@@ -44,7 +44,7 @@ RARE = frozenset(
 """Sections that stand under "More analyses", so that a task is calm at first sight."""
 
 
-class TasksPart(Part):
+class TasksPart(Panel):
     """The column at the right: five tasks, one open, each a list of sections that unfold."""
 
     name = "tasks"
@@ -83,7 +83,7 @@ def _places(names: Iterable[str]) -> Markup:
     return join(tag("div", "", data_piece=f"section.{name}") for name in names)
 
 
-def build_parts(context: Context) -> list[Part]:
+def build_parts(context: Context) -> list[Panel]:
     of_tasks = (WorstPart, VolumePart, ImportPart, TestsPart)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     found: list[Section] = [

@@ -60,7 +60,7 @@ class Context:
         # of the display, for the session: write a part anew, at once; what the page has closed by
         # itself may be opened again; what follows at rest, and these parts, are due once nothing
         # has happened for a while
-        self.renew: Callable[[Part], None] = lambda _: None
+        self.renew: Callable[[Panel], None] = lambda _: None
         self.closed: Callable[[], None] = lambda: None
         self.rest_again: Callable[..., None] = lambda *_: None
         self.jobs: set[threading.Event] = set()  # work that goes on; set when the page has gone
@@ -197,7 +197,7 @@ Follows = Literal["at once", "often", "in a pause", "at rest"]
 has changed; when the hand pauses; when it has left."""
 
 
-class Part:
+class Panel:
     name: str = ""  # its events begin with it
     follows: ClassVar[Follows] = "in a pause"
 
@@ -225,7 +225,7 @@ class Part:
         self.context.renew(self)
 
 
-class Section(Part):
+class Section(Panel):
     """A section of a task; folded it is neither computed nor sent."""
 
     task = ""
@@ -261,7 +261,7 @@ class Section(Part):
         return {f"section.{self.name}": section}
 
 
-class Window(Part):
+class Window(Panel):
     """A window over the page, in its one dialog: open while `state.page.window` is its name."""
 
     title = ""
@@ -314,7 +314,7 @@ class Jobs:
     """Runs the work of a part in threads of its own; what is called back runs in the session."""
 
     def __init__(
-        self, part: Part, again: Callable[[], None], failed: Callable[[Exception], None]
+        self, part: Panel, again: Callable[[], None], failed: Callable[[Exception], None]
     ) -> None:
         self._part, self._failed = part, failed
         self._again = partial(part.context.act, again)

@@ -20,7 +20,7 @@ from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_i
 from warpspace.app.panels.analysis_panel import Question
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.measurement import MOST_BYTES, FilesPart, Held
+from warpspace.app.panels.measurement import MOST_BYTES, FilesPart, UploadedFile
 from warpspace.app.panels.panel import actions
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
@@ -133,7 +133,7 @@ class PartPart(InBoxPart):
     def received(self, name: str, content: bytes) -> None:
         """Take in tolerances, or a mesh: of another name it is clamped in the middle."""
         if name.lower().endswith(".toml"):
-            self._files = (Held(name, upload_text(content, name, "file of tolerances")),)
+            self._files = (UploadedFile(name, upload_text(content, name, "file of tolerances")),)
             return
         self._sent, state = (name, content), self.context.state
         mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)

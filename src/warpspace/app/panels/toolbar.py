@@ -25,7 +25,7 @@ from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Part
+from warpspace.app.panels.panel import Panel
 from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, SHOWN, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
@@ -61,7 +61,7 @@ def chosen_map(state: AppState) -> str:
     return "limit" if state.look.pass_fail and chosen == "position.norm" else chosen
 
 
-class ControlsPart(Part):
+class ControlsPart(Panel):
     name = "controls"
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
@@ -171,7 +171,7 @@ def _machine(state: AppState) -> Markup:
 # --- Comparing ------------------------------------------------------------------------------------
 
 
-class ComparePart(Part):
+class ComparePart(Panel):
     """Which two are compared and which of them is drawn, and the numbers of both."""
 
     name = "compare"

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.file_dialogs import accepted_endings
-from warpspace.app.panels.panel import Context, Part, Window
+from warpspace.app.panels.panel import Context, Panel, Window
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
@@ -19,7 +19,7 @@ from warpspace.machine.limits import MAX_UPLOAD_BYTES
 LONGEST_SENTENCE = 110
 
 
-class StatePart(Part):
+class StatePart(Panel):
     """Sets a field of the state to what the page says: ``state:set.PATH``."""
 
     name = "state"
@@ -28,7 +28,7 @@ class StatePart(Part):
         return put(state, word.removeprefix("set."), value)
 
 
-class TopPart(Part):
+class TopPart(Panel):
     """Scene, open, save, share, report, help; notes, undo and redo where there are any."""
 
     name = "top"
@@ -214,7 +214,7 @@ class HelpWindow(Window):
         return self.closed(state)
 
 
-class PagePart(Part):
+class PagePart(Panel):
     """What acts on the page as a whole: tasks, sections, windows, undo, redo, and all errors."""
 
     name = "page"

@@ -14,7 +14,7 @@ from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
 from warpspace.app.browser.incoming import Events, read_message
-from warpspace.app.server.request_policy import Doors, Refusal, plain_address
+from warpspace.app.server.request_policy import Refusal, RequestPolicy, plain_address
 
 logger = logging.getLogger(__name__)
 HEADERS = {
@@ -70,7 +70,7 @@ class Rate:
 class Guard:
     """Checks each request before viser answers it, and limits each connection."""
 
-    def __init__(self, doors: Doors, limits: Limits = LIMITS) -> None:
+    def __init__(self, doors: RequestPolicy, limits: Limits = LIMITS) -> None:
         self.limits, self._doors = limits, doors
         self._logged: set[str] = set()
 

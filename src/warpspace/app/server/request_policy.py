@@ -44,18 +44,18 @@ class Access:
 
 
 @dataclass(frozen=True)
-class Place:
+class HostPort:
     """A host and a port; None is the usual port of the scheme."""
 
     host: str
     port: int | None
 
-    def usual(self, scheme: str) -> "Place":
+    def usual(self, scheme: str) -> "HostPort":
         """Leave out the port where the scheme has it by itself."""
-        return Place(self.host, None if self.port == _DEFAULT_PORTS[scheme] else self.port)
+        return HostPort(self.host, None if self.port == _DEFAULT_PORTS[scheme] else self.port)
 
 
-def read_place(text: str) -> Place | None:
+def read_place(text: str) -> HostPort | None:
     """Read `host`, `host:port` or `[address]:port`; None where it is none of them."""
     found = _AUTHORITY.fullmatch(text)
     if found is None:
@@ -67,7 +67,7 @@ def read_place(text: str) -> Place | None:
         if literal:
             return None
         host = name.lower()
-    return Place(host, int(port) if port else None)
+    return HostPort(host, int(port) if port else None)
 
 
 def plain_address(text: str) -> str:
@@ -86,7 +86,7 @@ class Refusal:
     status: HTTPStatus = HTTPStatus.FORBIDDEN
 
 
-class Doors:
+class RequestPolicy:
     """Tells which requests for a page or a websocket are answered.
 
     Any page of the web can send requests to a server on this machine. Its browser names the page in
@@ -159,7 +159,7 @@ class Doors:
         )
         return any(_is(value, self._pass) for name, _, value in pairs if name.startswith(COOKIE))
 
-    def _is_own(self, url: str, place: Place) -> bool:
+    def _is_own(self, url: str, place: HostPort) -> bool:
         found = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
         own = None if found is None else read_place(found[2].partition("/")[0])
         if found is None or own is None:
@@ -177,7 +177,7 @@ def _is(text: str, secret: str) -> bool:
     return hmac.compare_digest(text.encode("utf-8", "replace"), secret.encode())
 
 
-def _allowed(text: str) -> Place:
+def _allowed(text: str) -> HostPort:
     place = read_place(text)
     if place is None:
         raise OptionError(

@@ -35,7 +35,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick, pick_line, with_clicked
 from warpspace.app.panels.overlay import PointerPart, Tabs
 from warpspace.app.panels.page_panels import build_parts
-from warpspace.app.panels.panel import PAUSE_S, Context, Part, Window
+from warpspace.app.panels.panel import PAUSE_S, Context, Panel, Window
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.store import StateStore
@@ -54,21 +54,21 @@ class Display:
         context.renew, context.closed = self._renew, self._closed
         context.rest_again = self._rest_again
         self.layers: tuple[BoxLayer | MovingLayer, ...] = ()
-        self.parts: dict[str, Part] = {}
-        self._shown: dict[Part, object] = {}
-        self._following: list[Part] = []
-        self._often: dict[Part, tuple[float, object]] = {}
-        self._waiting: deque[Part] = deque()
+        self.parts: dict[str, Panel] = {}
+        self._shown: dict[Panel, object] = {}
+        self._following: list[Panel] = []
+        self._often: dict[Panel, tuple[float, object]] = {}
+        self._waiting: deque[Panel] = deque()
         self._noted_at = 0.0
         self._changed_at: float | None = None  # since when parts wait for a pause
         self._is_to_rest = False
-        self._late: set[Part] = set()  # that wait for a rest, whatever they usually wait for
+        self._late: set[Panel] = set()  # that wait for a rest, whatever they usually wait for
 
     def add(
         self,
         picture: LivePicture,
         layers: Sequence[BoxLayer | MovingLayer] = (),
-        parts: Sequence[Part] = (),
+        parts: Sequence[Panel] = (),
     ) -> None:
         """Add what has just been built, and write its pieces."""
         self.layers = (*self.layers, *layers)
@@ -90,7 +90,7 @@ class Display:
         self._write([one for one in parts if self._is_due(one, picture)], picture)
         self._note(picture)
 
-    def _is_due(self, part: Part, picture: LivePicture) -> bool:
+    def _is_due(self, part: Panel, picture: LivePicture) -> bool:
         # a part that has just come into sight is not kept waiting, nor is one that has left it
         if part.is_seen(picture.state) != (self._shown.get(part) is not None):
             return True
@@ -107,11 +107,11 @@ class Display:
         self._rest_again()
         self._changed_at = self._changed_at or self._noted_at
 
-    def _rest_again(self, *parts: Part) -> None:
+    def _rest_again(self, *parts: Panel) -> None:
         self._noted_at, self._is_to_rest = time.monotonic(), True
         self._late.update(parts)
 
-    def _renew(self, part: Part) -> None:
+    def _renew(self, part: Panel) -> None:
         if self._context.shown is not None:
             self._shown[part] = None  # whatever it depends on
             self._write([part], self._context.shown)
@@ -121,7 +121,7 @@ class Display:
         windows = [part for part in self.parts.values() if isinstance(part, Window)]
         self._shown |= dict.fromkeys(windows)
 
-    def _write(self, parts: Iterable[Part], picture: LivePicture) -> None:
+    def _write(self, parts: Iterable[Panel], picture: LivePicture) -> None:
         pieces: dict[str, str] = {}
         for part in parts:
             key = _key(part, picture)
@@ -165,7 +165,7 @@ class Display:
                 break
 
 
-def _key(part: Part, picture: LivePicture) -> object:
+def _key(part: Panel, picture: LivePicture) -> object:
     return part.depends(picture) if part.is_seen(picture.state) else None
 
 

@@ -29,7 +29,7 @@ from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Part
+from warpspace.app.panels.panel import Context, Panel
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -153,7 +153,7 @@ JOINED = (
 )
 
 
-class TabKeeper(Part):
+class TabKeeper(Panel):
     """Has the page keep what it shows, and takes it back."""
 
     name = "keeper"

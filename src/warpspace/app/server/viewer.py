@@ -28,7 +28,7 @@ from warpspace.app.drawing.shapes import light_scene
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.panels.panel import Context
 from warpspace.app.server.connection_guard import Guard, TabConnection
-from warpspace.app.server.request_policy import Access, Doors, plain_address
+from warpspace.app.server.request_policy import Access, RequestPolicy, plain_address
 from warpspace.app.server.session import Session
 from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
@@ -235,7 +235,7 @@ class Viewer:
         self.token = (access := access or Access()).choose_token(local=self.is_local)
         self._services = replace(services or Services(), token=self.token)
         self.port = free_port(self.address, port)
-        doors = Doors(
+        doors = RequestPolicy(
             served_names(host, self.address),
             self.port,
             everywhere=is_everywhere(self.address),

@@ -33,7 +33,7 @@ from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBA
 from warpspace.parts.interpreter import program_lines
 from warpspace.parts.workpiece import PartMesh, load_part
 from warpspace.scene.model import Scene
-from warpspace.scene.notes import KINDS, Mark, Note
+from warpspace.scene.notes import KINDS, Note, NoteAnchor
 
 if TYPE_CHECKING:
     from warpspace.formats.compensation.controller import Controller
@@ -162,7 +162,7 @@ class Picked:
     @classmethod
     def of_note(cls, note: Note) -> "Picked | None":
         """Give the point that a note is pinned to; none for the whole or a body."""
-        mark = note.on or Mark()
+        mark = note.on or NoteAnchor()
         if not note.at or mark.body:
             return None
         is_traced = mark.loop and mark.point_mm

@@ -75,7 +75,7 @@ SAME_STEP_S = 0.8  # changes of one thing that follow each other faster than thi
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class UndoStep:
     state: AppState
     what: Mapping[str, str]
 
@@ -88,7 +88,7 @@ class Step:
         return found[0] if len(found) == 1 else f"{found[0]} and {len(found) - 1} more"
 
 
-Steps: TypeAlias = tuple[Step, ...]
+Steps: TypeAlias = tuple[UndoStep, ...]
 
 
 def _on_page(state: AppState, other: AppState) -> AppState:
@@ -141,7 +141,7 @@ class StateStore:
         alone = {"scene", "review"} & what.keys()
         same = self.past and not self.future and self.past[-1].what == what and not alone
         if not same or at - self._changed_at >= SAME_STEP_S:
-            self.past = (*self.past, Step(self.state, what))[-STEPS:]
+            self.past = (*self.past, UndoStep(self.state, what))[-STEPS:]
         self.state, self.future, self._changed_at = state, (), at
 
     def undo(self) -> str:
@@ -161,7 +161,7 @@ class StateStore:
         if not steps:
             return steps, others, ""
         *rest, step = steps
-        others = (*others, Step(self.state, step.what))
+        others = (*others, UndoStep(self.state, step.what))
         self.state = _on_page(step.state, self.state)
         return tuple(rest), others, step.words
 

@@ -9,9 +9,9 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import XYZ, DataColumn, Table
-from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan, fit_setup
+from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.data import XYZ, DataColumn, ReadingsFile
+from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan, fit_setup
 from warpspace.exceptions import OptionError
 from warpspace.geometry.surfaces import round_down
 from warpspace.scene.model import Scene
@@ -42,12 +42,12 @@ class BallPlate(BenchTest):
     )
     positions: int = option(3, "Positions of the plate along the third axis", low=1, high=10)
 
-    def plan(self, scene: Scene) -> Plan:
+    def plan(self, scene: Scene) -> TestPlan:
         balls = np.arange(self.balls)
         grid = np.meshgrid(np.arange(self.positions), balls, balls, indexing="ij")
         return self._lay(scene, *(part.reshape(-1).astype(float) for part in grid))
 
-    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
         problems: list[str] = []
         given: dict[str, Array] = {}
         for name, most in (
@@ -72,7 +72,7 @@ class BallPlate(BenchTest):
         readings = np.concatenate([table["x_um"], table["y_um"], table["z_um"]])
         return self._lay(scene, given["position"], given["row"], given["column"]), readings
 
-    def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> Plan:
+    def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> TestPlan:
         first, second, _ = placing.plane_axes(scene.machine, self.plane)
         names = placing.following_axes(scene.model)
         third = next(name for name in names if name not in (first, second))
@@ -120,7 +120,7 @@ class BallPlate(BenchTest):
             )
         return (low + high) / 2.0 + pitch * (index - (self.balls - 1) / 2.0)
 
-    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
         rest = left_over(plan, readings)
         first, second, key = placing.PLANES[self.plane]
         sign = float(plan.marks["gain_sign"][0])
@@ -151,20 +151,20 @@ class BallPlate(BenchTest):
             return float(np.mean([float(str(row[name])) for row in rows]))
 
         quantities = (
-            Quantity("length_error_um", "largest error of a distance",
+            TestQuantity("length_error_um", "largest error of a distance",
                      worst("length_error_um"), "µm"),
-            Quantity("squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"),
+            TestQuantity("squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"),
             *(
-                Quantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
+                TestQuantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
                          mean(f"scale_{axis}_um_per_m"), "µm/m")
                 for axis in (first, second)
             ),
-            Quantity("flatness_um", "largest height of the plate", worst("flatness_um"), "µm"),
-            Quantity("rms_um", "RMS of a position, mean", mean("rms_um"), "µm"),
+            TestQuantity("flatness_um", "largest height of the plate", worst("flatness_um"), "µm"),
+            TestQuantity("rms_um", "RMS of a position, mean", mean("rms_um"), "µm"),
         )  # fmt: skip
         return Outcome(quantities, {"positions": rows, "squareness_key": key})
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
         first, second = placing.PLANES[self.plane][:2]
         columns = ["XYZ".index(name) for name in (first, second)]
         largest = max(float(np.abs(left_over(run.plan, run.readings)).max()) for run in runs)
@@ -195,7 +195,7 @@ class BallPlate(BenchTest):
         return tuple(charts)
 
 
-def left_over(plan: Plan, readings: Array) -> Array:
+def left_over(plan: TestPlan, readings: Array) -> Array:
     """Give the deviations of the balls once the place of the plate is fitted, [b, 3], µm."""
     return fit_setup(plan, readings)[1].reshape(3, -1).T
 

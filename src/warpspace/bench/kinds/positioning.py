@@ -7,10 +7,10 @@ import numpy as np
 
 from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.analysis.options import Axis, option
-from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import DataColumn, Table
+from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.data import DataColumn, ReadingsFile
 from warpspace.bench.placing import axis_line, motion_direction, tool_points
-from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
+from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
@@ -23,7 +23,7 @@ ALIKE = 1e-6  # means that differ by less, µm or µrad, are drawn as one
 
 
 @dataclass(frozen=True)
-class Statistics:
+class TargetStatistics:
     """Means and standard deviations at the targets, NaN where an axis did not come that way."""
 
     target: Array  # [t], mm or degrees
@@ -32,7 +32,7 @@ class Statistics:
     deviation: Array
 
 
-def target_statistics(target: Array, way: Array, readings: Array) -> Statistics:
+def target_statistics(target: Array, way: Array, readings: Array) -> TargetStatistics:
     """Take the mean and the standard deviation of the readings at each target in each direction."""
     targets, index = np.unique(np.round(target, 6), return_inverse=True)
     mean = np.full((2, len(targets)), np.nan)
@@ -45,7 +45,7 @@ def target_statistics(target: Array, way: Array, readings: Array) -> Statistics:
         mean[row, seen] = np.bincount(at, values, len(targets))[seen] / count[seen]
         squares = np.bincount(at, (values - mean[row, at]) ** 2, len(targets))
         deviation[row, seen] = np.sqrt(squares[seen] / np.maximum(count[seen] - 1, 1))
-    return Statistics(targets, mean, deviation)
+    return TargetStatistics(targets, mean, deviation)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +84,7 @@ class Positioning(BenchTest):
             return self.columns
         return (*self.columns[:2], DataColumn("target_deg", "number"), DataColumn("deviation_urad"))
 
-    def plan(self, scene: Scene) -> Plan:
+    def plan(self, scene: Scene) -> TestPlan:
         axis = self.own_axis(scene)
         low, high = scene.axis_span(axis)
         low = low if self.start is None else self.start
@@ -95,7 +95,7 @@ class Positioning(BenchTest):
         way = np.repeat([FORWARD, BACKWARD], self.targets)
         return self._lay(scene, np.concatenate([targets, targets[::-1]]), way, np.ones(len(way)))
 
-    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
         linear = is_linear(self.own_axis(scene))
         target = table["target_mm" if linear else "target_deg"]
         readings = table["deviation_um" if linear else "deviation_urad"]
@@ -118,7 +118,7 @@ class Positioning(BenchTest):
             raise table.refuse(*problems)
         return self._lay(scene, target, table["direction"], table["run"]), readings
 
-    def _lay(self, scene: Scene, target: Array, way: Array, run: Array) -> Plan:
+    def _lay(self, scene: Scene, target: Array, way: Array, run: Array) -> TestPlan:
         axis, model = self.own_axis(scene), self.model(scene)
         coordinates = {**self.stand(scene), axis: target}
         marks = {"target": target, "way": way, "run": run}
@@ -147,18 +147,18 @@ class Positioning(BenchTest):
             travel={axis: np.tile(way, 2)}, setup=zero, path=(both,),
         )  # fmt: skip
 
-    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
         found = target_statistics(plan.marks["target"], plan.marks["way"], readings)
         unit = "µm" if "zero_um" in plan.setup else "µrad"
         suffix = "um" if unit == "µm" else "urad"
         quantities = [
-            Quantity(f"{key}_{suffix}", name, value, unit)
+            TestQuantity(f"{key}_{suffix}", name, value, unit)
             for key, name, value in _numbers(found)
             if np.isfinite(value)
         ]
         return Outcome(tuple(quantities), {"targets": _target_rows(found, unit)})
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         bands: list[Band] = []
         note = ""
@@ -193,7 +193,7 @@ class Positioning(BenchTest):
         )  # fmt: skip
 
 
-def _numbers(found: Statistics) -> list[tuple[str, str, float]]:
+def _numbers(found: TargetStatistics) -> list[tuple[str, str, float]]:
     mean, spread = found.mean, COVERAGE * found.deviation
     both = not np.isnan(mean).any()
     reversal = mean[0] - mean[1]
@@ -221,7 +221,7 @@ def _numbers(found: Statistics) -> list[tuple[str, str, float]]:
     return rows
 
 
-def _target_rows(found: Statistics, unit: str) -> list[dict[str, float]]:
+def _target_rows(found: TargetStatistics, unit: str) -> list[dict[str, float]]:
     suffix = "um" if unit == "µm" else "urad"
     place = "target_mm" if unit == "µm" else "target_deg"
     rows: list[dict[str, float]] = []

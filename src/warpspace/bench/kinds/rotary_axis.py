@@ -9,10 +9,10 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, Vector, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import ANGLE, XYZ, DataColumn, Table
+from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.data import ANGLE, XYZ, DataColumn, ReadingsFile
 from warpspace.bench.kinds.circular import is_full
-from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan, fit_setup
+from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan, fit_setup
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.scene.model import Scene
@@ -65,19 +65,19 @@ class RotaryAxis(BenchTest):
     )
     points: int = option(72, "Positions along the turn", low=8, high=3_600)
 
-    def plan(self, scene: Scene) -> Plan:
+    def plan(self, scene: Scene) -> TestPlan:
         axis = placing.rotary_axis(scene.machine, self.axis)
         low, high = scene.machine.axes[axis].travel
         full = high - low >= 360.0
         end = low + 360.0 if full else high
         return self._lay(scene, np.linspace(low, end, self.points, endpoint=not full))
 
-    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
         table.check_angles(8, "turn")
         readings = np.concatenate([table[name] for name in CHANNELS])
         return self._lay(scene, table["angle_deg"]), readings
 
-    def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
+    def _lay(self, scene: Scene, angle_deg: Array) -> TestPlan:
         axis, model = placing.rotary_axis(scene.machine, self.axis), self.model(scene)
         stand = self.stand(scene)
         line = placing.axis_line(model, stand, axis)
@@ -125,27 +125,29 @@ class RotaryAxis(BenchTest):
             path=(one,),
         )  # fmt: skip
 
-    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
         found = motions(plan, readings)
         axis = plan.place.partition(" ")[0]
         quantities = [
-            Quantity("radial_um", "radial error motion", float(np.ptp(found.radial)), "µm"),
-            Quantity("axial_um", "axial error motion", float(np.ptp(found.axial)), "µm"),
-            Quantity("tilt_urad", "tilt error motion", float(np.ptp(found.tilt)), "µrad"),
-            Quantity("angular_urad", "angular positioning", float(np.ptp(found.angular)), "µrad"),
+            TestQuantity("radial_um", "radial error motion", float(np.ptp(found.radial)), "µm"),
+            TestQuantity("axial_um", "axial error motion", float(np.ptp(found.axial)), "µm"),
+            TestQuantity("tilt_urad", "tilt error motion", float(np.ptp(found.tilt)), "µrad"),
+            TestQuantity(
+                "angular_urad", "angular positioning", float(np.ptp(found.angular)), "µrad"
+            ),
         ]
         across = {"A": "yz", "B": "zx", "C": "xy"}[axis[0]]
         parts = [(letter.upper(), f"location in {letter}", "µm") for letter in across]
         parts += [("abc"["xyz".index(a)].upper(), f"orientation about {a}", "µrad") for a in across]
         for (letter, word, unit), value in zip(parts, found.average_line, strict=True):
             key, suffix = f"E{letter}0{axis}", "um" if unit == "µm" else "urad"
-            quantities.append(Quantity(f"{key}_{suffix}", f"{word} ({key})", value, unit))
+            quantities.append(TestQuantity(f"{key}_{suffix}", f"{word} ({key})", value, unit))
         details: dict[str, object] = {"angle_deg": found.angle_deg.tolist()}
         for name in ("radial", "axial", "tilt", "angular"):
             details[f"{name}_motion"] = getattr(found, name).tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
         axis = runs[0].plan.place.partition(" ")[0]
         charts: list[Lines] = []
         units = {"radial": "µm", "tilt": "µrad", "axial": "µm", "angular": "µrad"}
@@ -163,7 +165,7 @@ class RotaryAxis(BenchTest):
         return tuple(charts)
 
 
-def motions(plan: Plan, readings: Array) -> Motions:
+def motions(plan: TestPlan, readings: Array) -> Motions:
     """Take the readings of the six channels, [6 n], apart."""
     channels = readings.reshape(6, -1)
     angle_deg = plan.marks["angle_deg"][: channels.shape[1]]
@@ -210,7 +212,7 @@ AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sphere(BenchTest):
+class RTest(BenchTest):
     """R-test with the controller's compensation of the tool centre point on."""
 
     name = "sphere"
@@ -239,12 +241,12 @@ class Sphere(BenchTest):
     points: int = option(73, "Positions along the way", low=4, high=3_600)
     frame: Literal["machine", "workpiece"] = option("machine", "Directions of the readings")
 
-    def plan(self, scene: Scene) -> Plan:
+    def plan(self, scene: Scene) -> TestPlan:
         axis, ball = self._set_up(scene)
         where = scene, self.model(scene), axis, ball, self.stand(scene)
         return self._lay(scene, placing.reachable(*where, self.start, self.end, self.points))
 
-    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
         table.check_angles(4, "way")
         readings = np.concatenate([table[f"{name}_um"] for name in AXES])
         return self._lay(scene, table["angle_deg"]), readings
@@ -255,7 +257,7 @@ class Sphere(BenchTest):
             return axis, np.asarray(self.ball, dtype=float)
         return axis, placing.default_ball(scene, self.model(scene), axis, self.stand(scene), None)
 
-    def _lay(self, scene: Scene, angle_deg: Array) -> Plan:
+    def _lay(self, scene: Scene, angle_deg: Array) -> TestPlan:
         axis, ball = self._set_up(scene)
         model = self.model(scene)
         coordinates = placing.followed(scene, model, axis, angle_deg, ball, self.stand(scene))
@@ -281,15 +283,15 @@ class Sphere(BenchTest):
             setup=placing.ball_columns(model, coordinates, direction),
         )
 
-    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
         place, rest = fit_setup(plan, readings)
         raw, left = readings.reshape(3, -1), rest.reshape(3, -1)
         quantities = [
-            Quantity(f"{name}_um", f"range in {name}", float(np.ptp(raw[index])), "µm")
+            TestQuantity(f"{name}_um", f"range in {name}", float(np.ptp(raw[index])), "µm")
             for index, name in enumerate(AXES)
         ]
         quantities += [
-            Quantity(
+            TestQuantity(
                 f"{name}_fitted_um", f"range in {name}, ball's place fitted",
                 float(np.ptp(left[index])), "µm",
             )
@@ -297,7 +299,7 @@ class Sphere(BenchTest):
         ]  # fmt: skip
         norm = np.linalg.norm(left, axis=0)
         rms = float(np.sqrt(np.mean(norm**2)))
-        quantities.append(Quantity("rms_fitted_um", "RMS distance, place fitted", rms, "µm"))
+        quantities.append(TestQuantity("rms_fitted_um", "RMS distance, place fitted", rms, "µm"))
         details: dict[str, object] = {
             "ball_um": place.tolist(),
             "angle_deg": plan.marks["angle_deg"][: raw.shape[1]].tolist(),
@@ -306,7 +308,7 @@ class Sphere(BenchTest):
             details[f"{name}_readings_um"] = raw[index].tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             rows = run.readings.reshape(3, -1)

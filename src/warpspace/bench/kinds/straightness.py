@@ -9,9 +9,9 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchTest, Run
-from warpspace.bench.data import ALONG, DataColumn, Table
-from warpspace.bench.plan import Outcome, Plan, Quantity, build_plan
+from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
+from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.conversion import fit_line
 from warpspace.scene.model import Scene
@@ -26,7 +26,7 @@ WORDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class ReferenceLine:
+class FittedLine:
     """A straight line through deviations."""
 
     name: str  # one of `REFERENCES`
@@ -38,14 +38,14 @@ class ReferenceLine:
         return self.offset + self.slope * 1e-3 * position_mm
 
 
-def reference_lines(position_mm: Array, deviation_um: Array) -> dict[str, ReferenceLine]:
+def reference_lines(position_mm: Array, deviation_um: Array) -> dict[str, FittedLine]:
     """Lay the three reference lines through deviations, [n], µm, at two positions or more."""
     order = np.argsort(position_mm, kind="stable")
     x, y = position_mm[order], deviation_um[order]
-    found: dict[str, ReferenceLine] = {}
+    found: dict[str, FittedLine] = {}
     for name in REFERENCES:
         offset, slope = fit_line(x, y, name.replace("points", "point"))
-        found[name] = ReferenceLine(name, slope * 1e3, offset, float(np.ptp(y - slope * x)))
+        found[name] = FittedLine(name, slope * 1e3, offset, float(np.ptp(y - slope * x)))
     return found
 
 
@@ -57,7 +57,7 @@ def lay_lines(
     position: Array,
     way: Array,
     unknowns: Sequence[str],
-) -> Plan:
+) -> TestPlan:
     """Lay the plan of axes that run along straight edges, a probe sensing across them.
 
     Lines are axes with the direction across each, [3] in R; of each site is given on which line it
@@ -131,7 +131,7 @@ class Straightness(BenchTest):
             )
         return axis, "xyz".index(self.across) if self.across else (own + 1) % 3
 
-    def plan(self, scene: Scene) -> Plan:
+    def plan(self, scene: Scene) -> TestPlan:
         axis, _ = self.directions(scene)
         position = np.linspace(*scene.axis_span(axis), self.points)
         return self._lay(
@@ -140,22 +140,22 @@ class Straightness(BenchTest):
             np.repeat([1.0, -1.0], self.points),
         )
 
-    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
         places = len(np.unique(np.round(table["position_mm"], 6)))
         if places < 3:
             raise table.refuse(f"has {places} positions; expected at least 3")
         return self._lay(scene, table["position_mm"], table["direction"]), table["deviation_um"]
 
-    def _lay(self, scene: Scene, position: Array, way: Array) -> Plan:
+    def _lay(self, scene: Scene, position: Array, way: Array) -> TestPlan:
         axis, across = self.directions(scene)
         lines, which = {axis: np.eye(3)[across]}, np.zeros(len(position))
         return lay_lines(self, scene, lines, which, position, way, ("zero_um", "tilt_urad"))
 
-    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
         position, mean = mean_by_position(plan.marks["along_mm"], readings)
         found = reference_lines(position, mean)
         quantities = [
-            Quantity(f"{name}_um", f"straightness, {WORDS[name]}", line.deviation_um, "µm")
+            TestQuantity(f"{name}_um", f"straightness, {WORDS[name]}", line.deviation_um, "µm")
             for name, line in found.items()
         ]
         slopes = {name: line.slope for name, line in found.items()}
@@ -166,7 +166,7 @@ class Straightness(BenchTest):
         }
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             position, mean = mean_by_position(run.plan.marks["along_mm"], run.readings)
@@ -187,7 +187,7 @@ class Straightness(BenchTest):
 
 
 def _lines_drawn(
-    lines: Mapping[str, ReferenceLine], names: Sequence[str], position: Array, level: Array | float
+    lines: Mapping[str, FittedLine], names: Sequence[str], position: Array, level: Array | float
 ) -> list[Curve]:
     return [
         Curve(WORDS[name], position, lines[name].at(position) - level, colour, "dashed")
@@ -214,7 +214,7 @@ class Squareness(BenchTest):
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the two axes")
     points: int = option(21, "Positions along each axis", low=3, high=2_000)
 
-    def plan(self, scene: Scene) -> Plan:
+    def plan(self, scene: Scene) -> TestPlan:
         axes = placing.plane_axes(scene.machine, self.plane)[:2]
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
@@ -224,7 +224,7 @@ class Squareness(BenchTest):
             np.tile(np.repeat([1.0, -1.0], self.points), 2),
         )
 
-    def plan_data(self, scene: Scene, table: Table) -> tuple[Plan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
         axes = placing.plane_axes(scene.machine, self.plane)[:2]
         expected = f"{axes[0]} or {axes[1]} (--plane {self.plane})"
         problems = table.unknown_words("line", axes, expected)
@@ -241,7 +241,7 @@ class Squareness(BenchTest):
         )
         return plan, table["deviation_um"][order]
 
-    def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> Plan:
+    def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> TestPlan:
         plane = placing.find_plane(self.model(scene), self.stand(scene), self.plane)
         lines = {plane.first: plane.up, plane.second: plane.along}
         unknowns = (*(f"zero_{axis}_um" for axis in lines), "turned_urad")
@@ -249,23 +249,23 @@ class Squareness(BenchTest):
         marks = {**plan.marks, "gain_sign": np.full(len(which), plane.sign), "line": which}
         return replace(plan, place=f"{self.plane} · {plan.place}", marks=marks)
 
-    def evaluate(self, plan: Plan, readings: Array) -> Outcome:
+    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
         key, sign = placing.PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
         lines = [found for _, _, found in _arms(plan, readings)]
-        quantities: list[Quantity] = []
+        quantities: list[TestQuantity] = []
         for name in REFERENCES:
             angle = sign * (lines[0][name].slope + lines[1][name].slope)
             quantities.append(
-                Quantity(f"{name}_urad", f"squareness {key}, {WORDS[name]}", angle, "µrad")
+                TestQuantity(f"{name}_urad", f"squareness {key}, {WORDS[name]}", angle, "µrad")
             )
         for index, axis in enumerate(self.plane):
             height = lines[index]["least_squares"].deviation_um
             quantities.append(
-                Quantity(f"straightness_{axis}_um", f"straightness of {axis}", height, "µm")
+                TestQuantity(f"straightness_{axis}_um", f"straightness of {axis}", height, "µm")
             )
         return Outcome(tuple(quantities), {"squareness_key": key})
 
-    def charts(self, runs: Sequence[Run]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
         charts: list[Lines] = []
         for index, axis in enumerate(self.plane):
             curves: list[Curve] = []
@@ -285,7 +285,7 @@ class Squareness(BenchTest):
         return tuple(charts)
 
 
-def _arms(plan: Plan, readings: Array) -> list[tuple[Array, Array, dict[str, ReferenceLine]]]:
+def _arms(plan: TestPlan, readings: Array) -> list[tuple[Array, Array, dict[str, FittedLine]]]:
     arms = [plan.marks["line"] == index for index in (0.0, 1.0)]
     along = plan.marks["along_mm"]
     means = [mean_by_position(along[chosen], readings[chosen]) for chosen in arms]

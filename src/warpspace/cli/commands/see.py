@@ -214,7 +214,7 @@ def compare(
     """
     from warpspace.analysis.description import plain
     from warpspace.analysis.statistics import statistics
-    from warpspace.analysis.uncertainty.propagation import u95_lines, volume_doubt
+    from warpspace.analysis.uncertainty.propagation import u95_lines, volume_uncertainty
     from warpspace.picture.comparison import scene_change, statistics_blocks, statistics_change
     from warpspace.picture.model import evaluate_picture
 
@@ -226,7 +226,7 @@ def compare(
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
     compared = [*pictures, scene_change(pictures[0], pictures[1])]
     say_first_order(settings.loop, *scenes)
-    sure = [*(volume_doubt(one.scene, one.view, settings.grid) for one in pictures), None]
+    sure = [*(volume_uncertainty(one.scene, one.view, settings.grid) for one in pictures), None]
     both = zip(sure, (picture.statistics for picture in compared), strict=True)
     found = [one.said_of(numbers) if one else numbers for one, numbers in both]
     if output is not None:
@@ -368,7 +368,7 @@ def report(
     machines side by side, as `warpspace concepts` has them; --with adds an appendix of any other
     analysis. The file needs no network.
     """
-    from warpspace.analysis.description import silent
+    from warpspace.analysis.description import ignore_progress
     from warpspace.outputs.report import ReportSettings, write_report
     from warpspace.scene.library import load_scene, scene_path
 
@@ -388,7 +388,7 @@ def report(
             tell=tell_story,
             concepts=beside,
             results={
-                f"{heading}: {scene.title}": analysis.run(scene, silent)
+                f"{heading}: {scene.title}": analysis.run(scene, ignore_progress)
                 for heading, analysis in asked.items()
                 for scene in loaded
             },

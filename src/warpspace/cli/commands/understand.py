@@ -71,10 +71,10 @@ def field(
     from warpspace.analysis.description import plain
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.analysis.uncertainty.propagation import (
-        field_doubt,
+        field_uncertainty,
         u95_columns,
         u95_lines,
-        volume_doubt,
+        volume_uncertainty,
     )
     from warpspace.field.evaluate import placed_words
     from warpspace.picture.formatting import direction_words, own_axes, spell_at, spell_point
@@ -99,10 +99,10 @@ def field(
         even = statistics(result, axes)
         u95 = {}
         if nodes is None:
-            over, summary = field_doubt(loaded, result.error_um, axes, view), even
+            over, summary = field_uncertainty(loaded, result.error_um, axes, view), even
             u95 = over.columns if over and over.doubt.is_known else {}
         else:
-            over = volume_doubt(loaded, view, max(nodes.shape))
+            over = volume_uncertainty(loaded, view, max(nodes.shape))
             summary = volume_statistics(result, nodes)
             if files or as_json:
                 u95 = u95_columns(loaded, result, axes, view, nodes.point_mm)

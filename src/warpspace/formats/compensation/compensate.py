@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import Analysis, Result, Watch, plain
+from warpspace.analysis.description import Analysis, ProgressCallback, Result, plain
 from warpspace.analysis.options import PLACED_HELP, Grammar, option
 from warpspace.analysis.statistics import Statistics
 from warpspace.analysis.uncertainty.propagation import u95_lines
@@ -21,7 +21,11 @@ from warpspace.formats.compensation.controller import (
     read_back,
     reversal_notes,
 )
-from warpspace.formats.compensation.corrections import Corrector, Wanted, build_corrector
+from warpspace.formats.compensation.corrections import (
+    Corrector,
+    RequiredCorrections,
+    build_corrector,
+)
 from warpspace.formats.registry import SIGNS, Files, Format, find_format
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
@@ -143,7 +147,7 @@ class Compensate(Analysis):
             )
         return self if stem is None else replace(self, stem=stem)
 
-    def run(self, scene: Scene, watch: Watch, /) -> "Compensation | Sweep":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "Compensation | Sweep":
         asked = replace(self, loop="relative") if self.placed and self.loop is None else self
         scene = placed_in(scene, asked.loop or "", placed=self.placed)
         if self.sweep:
@@ -323,7 +327,7 @@ def compensate(
     scene = placed_for([kind], scene, loop)
     corrector = build_corrector(scene, loop, orientation=asked.orientation)
     points = table_points(kind, scene, asked.points)
-    wanted = Wanted(scene, corrector, points, asked.resolution, sign, asked.stem)
+    wanted = RequiredCorrections(scene, corrector, points, asked.resolution, sign, asked.stem)
     watch()
     if kind.tables is not None:
         wanted = replace(wanted, corrector=_placed(kind, kind.write, wanted, watch))
@@ -360,7 +364,10 @@ def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
 
 
 def _placed(
-    kind: Format, write: Callable[[Wanted], Files], wanted: Wanted, watch: Callable[[], None]
+    kind: Format,
+    write: Callable[[RequiredCorrections], Files],
+    wanted: RequiredCorrections,
+    watch: Callable[[], None],
 ) -> Corrector:
     """Let the corrector leave alone where the workpiece lies, if that is fitted out.
 
@@ -393,7 +400,7 @@ def _placed(
 
 
 @dataclass(frozen=True)
-class Step:
+class SweepStep:
     """One compensation of a sweep."""
 
     keys: ClassVar[tuple[str, ...]] = (
@@ -419,7 +426,7 @@ class Sweep(Result):
 
     title: str  # of the scene
     before: Statistics
-    steps: tuple[Step, ...]
+    steps: tuple[SweepStep, ...]
     left_out: tuple[str, ...]  # formats of which no table can be made, and why
 
     def as_json(self) -> dict[str, Any]:
@@ -472,7 +479,7 @@ def sweep(scene: Scene, asked: Compensate) -> Sweep:
     title = scene.title
     scene = placed_for([find_format(name) for name in names], scene, asked.loop or "")
     before: Statistics | None = None
-    steps: list[Step] = []
+    steps: list[SweepStep] = []
     left_out: dict[str, str] = {}
     for name, count in wanted:
         kind = find_format(name)
@@ -498,11 +505,11 @@ def sweep(scene: Scene, asked: Compensate) -> Sweep:
     return Sweep(title=title, before=before, steps=tuple(steps), left_out=words)
 
 
-def _step(scene: Scene, found: Compensation, count: int) -> Step:
+def _step(scene: Scene, found: Compensation, count: int) -> SweepStep:
     spans = [
         (scene.workspace.ranges[axis][1] - scene.workspace.ranges[axis][0]) / (number - 1)
         for axis, number in found.points.items()
     ]
     pitch = max(spans) if count else 0.0
     size, after = (found.size, found.bytes), found.after_statistics
-    return Step(found.format.name, count, *size, pitch, after, found.placed)
+    return SweepStep(found.format.name, count, *size, pitch, after, found.placed)

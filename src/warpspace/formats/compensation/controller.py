@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from warpspace.analysis.statistics import Statistics, volume_statistics
-from warpspace.analysis.uncertainty.propagation import FieldDoubt, field_doubt
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_uncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, fit_placement
 from warpspace.field.grid import Grid, build_grid
-from warpspace.formats.compensation.corrections import Corrector, Moved, Wanted
+from warpspace.formats.compensation.corrections import Corrector, Moved, RequiredCorrections
 from warpspace.formats.registry import Files, Format, Reading, ReadOptions
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables
@@ -135,7 +135,7 @@ def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | Non
     return {axis: np.asarray(still.get(axis, at)) for axis, at in coordinates.items()}
 
 
-def read_back(kind: Format, files: Files, wanted: Wanted, label: str) -> Controller:
+def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: str) -> Controller:
     from warpspace.formats.to_scene import into_scene
 
     scene, corrector = wanted.scene, wanted.corrector
@@ -204,7 +204,7 @@ class BeforeAfter:
     before: ErrorField
     after: ErrorField
     grid: Grid
-    sure: FieldDoubt | None  # how sure the errors before are; those after are no surer
+    sure: FieldUncertainty | None  # how sure the errors before are; those after are no surer
 
     @property
     def before_statistics(self) -> Statistics:
@@ -229,7 +229,7 @@ def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter
     scene = in_direction(scene, direction)
     before = controller.without().field(at, nominal, scene)
     view = scene.view(controller.loop)
-    sure = field_doubt(scene, before.error_um, at, view, grid.point_mm, grid.weights)
+    sure = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
     return BeforeAfter(before, controller.field(at, nominal, scene), grid, sure)
 
 

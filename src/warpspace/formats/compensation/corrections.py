@@ -208,7 +208,7 @@ OTHER_NODES = 9  # positions of the other axes that a table of one axis is avera
 
 
 @dataclass(frozen=True)
-class Wanted:
+class RequiredCorrections:
     """What a table is to correct, and how fine it may be."""
 
     scene: Scene
@@ -249,7 +249,7 @@ class Wanted:
         found = {parameter(key).axis for key, curve in functions.items() if curve.has_directions}
         return tuple(axis for axis in self.axes if axis in found)
 
-    def toward(self, direction: str, axis: str = "") -> "Wanted":
+    def toward(self, direction: str, axis: str = "") -> "RequiredCorrections":
         """Give what is wanted for one direction of travel, of all axes or of one alone."""
         model, errors = self.corrector.model, self.corrector.errors
         if not axis:

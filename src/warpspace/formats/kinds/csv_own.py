@@ -9,15 +9,15 @@ import numpy as np
 
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.formats import measured
-from warpspace.formats.compensation.corrections import Wanted
+from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, described
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
     UM_PER,
     URAD_PER,
-    Place,
     Source,
+    SourceLine,
     shown,
     source_of_text,
     spell,
@@ -88,7 +88,7 @@ def _to_fill_in(
     return "\n".join(lines) + "\n"
 
 
-def write(wanted: Wanted) -> Files:
+def write(wanted: RequiredCorrections) -> Files:
     """Write the errors of a scene: constants in the main file, one file an axis beside it."""
     files: dict[str, str] = {}
     for table in measured.tables_of(measured.sampled(wanted)):
@@ -126,7 +126,7 @@ _HEADING = re.compile(
 
 
 @dataclass(frozen=True)
-class _Column:
+class _CsvColumn:
     """One column of a table: what it holds, and the factor to µm, µrad, mm or degrees."""
 
     role: str
@@ -134,7 +134,7 @@ class _Column:
     factor: float = 1.0
     unit: str = ""
 
-    def value(self, cell: str, at: Place, table: CsvRows) -> float:
+    def value(self, cell: str, at: SourceLine, table: CsvRows) -> float:
         if self.role == DIRECTION:
             way = unguard_cell(cell).lower()
             if way not in DIRECTIONS:
@@ -152,16 +152,16 @@ class _Column:
         return at.checked_error(value, self.name)
 
 
-_Row = tuple[Place, dict[tuple[str, str], float]]
+_Row = tuple[SourceLine, dict[tuple[str, str], float]]
 
 
 @dataclass(frozen=True)
-class _Table:
+class _CsvTable:
     """A file that was read: its columns and its rows."""
 
     source: Source
-    head: Place
-    columns: tuple[_Column, ...]
+    head: SourceLine
+    columns: tuple[_CsvColumn, ...]
     rows: tuple[_Row, ...]
 
     def of(self, role: str) -> list[str]:
@@ -181,7 +181,7 @@ def recognise(head: str, name: str) -> bool:
     return has_unit and any(one[2] in PARAMETERS for one in found)
 
 
-def _columns(at: Place, parts: Sequence[str]) -> tuple[_Column, ...]:
+def _columns(at: SourceLine, parts: Sequence[str]) -> tuple[_CsvColumn, ...]:
     found = [_column(at, part) for part in parts]
     seen = [(one.role, one.name) for one in found]
     if twice := next((one for one in seen if seen.count(one) > 1), None):
@@ -189,10 +189,10 @@ def _columns(at: Place, parts: Sequence[str]) -> tuple[_Column, ...]:
     return tuple(found)
 
 
-def _column(at: Place, part: str) -> _Column:
+def _column(at: SourceLine, part: str) -> _CsvColumn:
     lower = part.strip().lower()
     if lower in (RUN, DIRECTION):
-        return _Column(lower, lower)
+        return _CsvColumn(lower, lower)
     matched = _HEADING.fullmatch(part.strip())
     if matched is None:
         expected = "headings such as X [mm], EXX [um], u(EXX) [um], run, direction"
@@ -211,7 +211,7 @@ def _column(at: Place, part: str) -> _Column:
     if not unit:
         units = ", ".join(one for one in known if one.isascii())
         at.refuse(f"column {name} has no unit", f"{name} [unit], of {units}")
-    return _Column(role, name, at.unit(unit, known, name), unit)
+    return _CsvColumn(role, name, at.unit(unit, known, name), unit)
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> measured.Imported:
@@ -235,14 +235,14 @@ def _read_one(source: Source) -> measured.Imported:
     given.check()
     if not rows:
         head.refuse("has no rows below its header", "at least one")
-    table = _Table(source, head, columns, tuple(rows))
+    table = _CsvTable(source, head, columns, tuple(rows))
     units = tuple(dict.fromkeys(one.unit for one in columns if one.unit))
     notes = (*source.notes, *given.notes)
     found = _errors(table)
     return replace(found, units=units, notes=(*notes, *found.notes))
 
 
-def _errors(table: _Table) -> measured.Imported:
+def _errors(table: _CsvTable) -> measured.Imported:
     errors, positions = table.of(ERROR), table.of(POSITION)
     if not positions:
         return _constants(table)
@@ -260,7 +260,7 @@ def _errors(table: _Table) -> measured.Imported:
     return _series(table, axis)
 
 
-def _constants(table: _Table) -> measured.Imported:
+def _constants(table: _CsvTable) -> measured.Imported:
     if len(table.rows) != 1:
         expected = "one, or a column of positions such as X [mm]"
         table.head.refuse(f"{len(table.rows)} rows of errors without positions", expected)
@@ -273,7 +273,7 @@ def _constants(table: _Table) -> measured.Imported:
     return measured.Imported(NAME, constants=constants, uncertainty=given)
 
 
-def _series(table: _Table, axis: str) -> measured.Imported:
+def _series(table: _CsvTable, axis: str) -> measured.Imported:
     at = np.array([row[POSITION, axis] for _, row in table.rows])
     places = measured.distinct(at)
     runs = [int(row.get((RUN, RUN), 1)) for _, row in table.rows]
@@ -288,7 +288,7 @@ def _series(table: _Table, axis: str) -> measured.Imported:
             found = f"position {places[place]:g} of {axis} stands also in line {taken[way, place]}"
             line.refuse(found, "columns run and direction to tell them apart")
         taken[way, place] = line.line
-    series: list[measured.Series] = []
+    series: list[measured.ErrorSeries] = []
     for key in table.of(ERROR):
         values = {way: np.full(len(places), math.nan) for way in known}
         uncertain = np.zeros(len(places))
@@ -300,10 +300,12 @@ def _series(table: _Table, axis: str) -> measured.Imported:
             table.source.refuse(f"column {key} is empty", "numbers, or no such column")
         _check_holes(table.source, key, given, places, axis)
         series.append(
-            measured.Series(
+            measured.ErrorSeries(
                 key,
                 tuple(places.tolist()),
-                tuple(measured.Run(*way, tuple(own.tolist())) for way, own in given.items()),
+                tuple(
+                    measured.MeasuredRun(*way, tuple(own.tolist())) for way, own in given.items()
+                ),
                 tuple(uncertain.tolist()) if uncertain.any() else (),
             )
         )
@@ -334,13 +336,13 @@ def _check_holes(
             source.refuse(found, "every direction at every position")
 
 
-def _planes(table: _Table) -> measured.Imported:
+def _planes(table: _CsvTable) -> measured.Imported:
     first, second = table.of(POSITION)
     if unknown := next((one for one in table.columns if one.role in (RUN, UNCERTAINTY)), None):
         what = RUN if unknown.role == RUN else f"u({unknown.name})"
         expected = "positions, direction and errors over two axes: one value a point"
         table.head.refuse(f"column {what}", expected)
-    planes: list[measured.Plane] = []
+    planes: list[measured.ErrorSurface] = []
     for key in table.of(ERROR):
         own = parameter(key).axis
         if own not in (first, second):

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpspace.exceptions import OptionError
-from warpspace.formats.compensation.corrections import Wanted
+from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import CORRECTION, Files, Format, ReadOptions, described, has
 from warpspace.formats.source import MM_PER, Source
 from warpspace.formats.terms import Grid3, Tables
@@ -88,7 +88,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((_grid(sources[0], options),), assumed, (), ("mm", "detection units"))
 
 
-def write(wanted: Wanted) -> Files:
+def write(wanted: RequiredCorrections) -> Files:
     """Write the grid; the magnification grows until every correction fits."""
     axes = ("X", "Y", "Z")
     if tuple(wanted.axes) != axes or not set(axes) <= set(wanted.corrector.moved):

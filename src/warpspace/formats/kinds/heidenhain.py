@@ -10,10 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpspace.formats.compensation.corrections import Wanted
+from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described
-from warpspace.formats.source import Place, Source
-from warpspace.formats.terms import HELD, Line, Tables
+from warpspace.formats.source import Source, SourceLine
+from warpspace.formats.terms import HELD, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
@@ -40,7 +40,7 @@ def recognise(head: str, name: str) -> bool:
     return POSITION in head.upper().split()
 
 
-def _rows(source: Source) -> list[tuple[Place, Cells]]:
+def _rows(source: Source) -> list[tuple[SourceLine, Cells]]:
     lines = [(source.at(at), text) for at, text in enumerate(source.lines, 1) if text.strip()]
     if lines and lines[0][1].lstrip().upper().startswith("BEGIN"):
         if "INCH" in lines[0][1].upper().split():
@@ -59,7 +59,7 @@ def _rows(source: Source) -> list[tuple[Place, Cells]]:
     for before, name in pairwise(names):
         end = head.index(before, end) + len(before)
         starts.append(head.index(name, end))
-    rows: list[tuple[Place, Cells]] = []
+    rows: list[tuple[SourceLine, Cells]] = []
     for at, text in lines[1:-1]:
         parts = text.split()
         if len(parts) != len(names):
@@ -104,7 +104,7 @@ def _looked_up(source: Source, axes: dict[str, list[str]], options: ReadOptions)
     return options.axis_named(found, source)
 
 
-def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
+def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
     rows = _rows(source)
     if not rows:
         source.refuse("has no compensation points", "at least one")
@@ -114,7 +114,7 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
     places = np.array([at.position(cells[POSITION], POSITION) for at, cells in rows])
     _check_steps(places, rows)
     factor = options.factor(ERROR)
-    lines: list[Line] = []
+    lines: list[AxisTable] = []
     for column in columns:
         if all(not cells[column] for _, cells in rows):
             continue
@@ -135,12 +135,12 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[Line]:
                 for at, cells in rows
             )
         lines.append(
-            Line(along, target, tuple(places.tolist()), tuple(values.tolist()), HELD, backward)
+            AxisTable(along, target, tuple(places.tolist()), tuple(values.tolist()), HELD, backward)
         )
     return lines
 
 
-def _check_steps(places: np.ndarray, rows: Sequence[tuple[Place, Cells]]) -> None:
+def _check_steps(places: np.ndarray, rows: Sequence[tuple[SourceLine, Cells]]) -> None:
     steps = np.diff(places)
     for index, step in enumerate(steps):
         at, _ = rows[index + 1]
@@ -156,7 +156,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     axes, tables = _assignment(sources)
     if not tables:
         sources[0].refuse("names tables", "the .COM files it names beside it")
-    terms: list[Line] = []
+    terms: list[AxisTable] = []
     for source in tables:
         along = _looked_up(source, axes, options)
         if any(term.source == along for term in terms):
@@ -165,7 +165,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables(tuple(terms), (options.said_sign(SIGN), TRAVEL))
 
 
-def write(wanted: Wanted) -> Files:
+def write(wanted: RequiredCorrections) -> Files:
     stem = wanted.stem.upper()
     files: dict[str, str] = {}
     mean = {axis: float(value) for axis, value in wanted.averaged([]).items()}
@@ -198,7 +198,7 @@ def write(wanted: Wanted) -> Files:
 
 
 def _with_backlash(
-    wanted: Wanted, axis: str, spelled: Callable[[Mapping[str, Array]], Columns]
+    wanted: RequiredCorrections, axis: str, spelled: Callable[[Mapping[str, Array]], Columns]
 ) -> Columns:
     """Spell the one column of a table and its values for travel in the negative direction.
 

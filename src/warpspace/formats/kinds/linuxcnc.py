@@ -16,10 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.formats.compensation.corrections import AXES, Wanted
+from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, described, has
 from warpspace.formats.source import Source, shown, spell
-from warpspace.formats.terms import HELD, Affine, Line, Tables
+from warpspace.formats.terms import HELD, Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
 
 MOST_POINTS = 256
@@ -118,7 +118,7 @@ def _kind(rows: np.ndarray, given: str) -> tuple[str, tuple[str, ...]]:
 
 def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
     known, tables = _assignment(sources)
-    terms: list[Line] = []
+    terms: list[AxisTable] = []
     inches = any(size != 1.0 for _, _, size in known.values())
     assumed: list[str] = [f"machine units {'inches' if inches else 'mm'} and degrees"]
     notes: list[str] = []
@@ -138,13 +138,13 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
         nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
         backward = () if forward == reverse else reverse
-        terms.append(Line(axis, axis, nominal, forward, HELD, backward))
+        terms.append(AxisTable(axis, axis, nominal, forward, HELD, backward))
     if not terms:
         sources[0].refuse("names files", "the files of its COMP_FILE lines beside it")
     return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))
 
 
-def _write_comp(wanted: Wanted) -> Files:
+def _write_comp(wanted: RequiredCorrections) -> Files:
     files: dict[str, str] = {}
     lines = [f"# {wanted.title}", f"# joints counted as {JOINTS}: trivkins without coordinates="]
     for axis in wanted.axes:
@@ -201,7 +201,7 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((Affine(AXES, matrix),), (), (), ("mm/mm",))
 
 
-def _write_matrix(wanted: Wanted) -> Files:
+def _write_matrix(wanted: RequiredCorrections) -> Files:
     allowed = [(row, column) for row in AXES for column in AXES]
     found = wanted.linear_fit(allowed)
     lines = [f"# {wanted.title}"]

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpspace.formats.measured import BACKWARD, FORWARD, Imported, Run, Series, merge
+from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, Imported, MeasuredRun, merge
 from warpspace.formats.registry import Format, ReadOptions, described, has
-from warpspace.formats.source import Place, Source
+from warpspace.formats.source import Source, SourceLine
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
 
@@ -26,7 +26,7 @@ ONE_WAY = "the flags say one direction: runs with even numbers hold nothing, lef
 KNOWN = "Filetype, Target-count, Targets and Flags"
 _SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 _KEY = re.compile(r"([A-Za-z][A-Za-z0-9 _-]*?)\s*:\s*(.*)")
-Lines = list[tuple[Place, str]]
+Lines = list[tuple[SourceLine, str]]
 
 
 def _sections(source: Source) -> dict[str, Lines]:
@@ -107,7 +107,7 @@ def _run_count(source: Source, lines: Lines) -> int:
 
 
 def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray]:
-    rows: list[tuple[Place, int, int, float]] = []
+    rows: list[tuple[SourceLine, int, int, float]] = []
     for at, text in lines:
         if re.match(r"Run\s+Target\s+Data", text, re.IGNORECASE):
             continue
@@ -145,13 +145,13 @@ def _read_one(source: Source, options: ReadOptions) -> Imported:
         source.refuse(f"{counted} readings", f"{wanted} (is the file cut off?)")
     order = np.argsort(targets)
     runs = tuple(
-        Run((run + 1) // 2, FORWARD if run % 2 else BACKWARD, tuple(row[order].tolist()))
+        MeasuredRun((run + 1) // 2, FORWARD if run % 2 else BACKWARD, tuple(row[order].tolist()))
         for run, row in kept.items()
     )
     if not is_linear(axis):
         source.refuse(f"is for the rotary axis {axis}; its units are not known: expected a CSV")
     key = f"E{'XYZ'['XYZUVW'.index(axis[0]) % 3]}{axis}"
-    series = Series(key, tuple(float(targets[index]) for index in order), runs)
+    series = ErrorSeries(key, tuple(float(targets[index]) for index in order), runs)
     air = [text for _, text in sections.get("ENVIRONMENT", [])]
     notes = (*source.notes, *([f"environment: {'; '.join(air)}"] if air else []))
     assumed = (INFERRED, *((ONE_WAY,) if one_way else ()))

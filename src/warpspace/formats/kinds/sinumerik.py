@@ -21,10 +21,10 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import shares
-from warpspace.formats.compensation.corrections import Wanted
+from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Place, Source, shown, spell
-from warpspace.formats.terms import HELD, MODULO, Line, Product, Tables, Term
+from warpspace.formats.source import Source, SourceLine, shown, spell
+from warpspace.formats.terms import HELD, MODULO, AxisTable, Product, Tables, Term
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
@@ -54,17 +54,17 @@ _QUIET = re.compile(r"(%.*|CHANDATA\(\d+\)|M17|M30|M02|N\d+)", re.IGNORECASE)
 
 
 @dataclass
-class Table:
+class AssignmentTable:
     """What a file says of one table, as it is read line by line."""
 
-    at: Place  # where it begins
+    at: SourceLine  # where it begins
     values: dict[int, float] = field(default_factory=dict[int, float])  # by interpolation point
     numbers: dict[str, float] = field(default_factory=dict[str, float])  # STEP, MIN and MAX
     # IS_MODULO and the like; 0 where they are not set
     switches: dict[str, int] = field(default_factory=dict[str, int])
     axes: dict[str, str] = field(default_factory=dict[str, str])  # where the file names them
 
-    def line(self, axes: tuple[str, str], prefix: str, what: str, factor: float) -> Line:
+    def line(self, axes: tuple[str, str], prefix: str, what: str, factor: float) -> AxisTable:
         for setting in RANGE:
             if setting not in self.numbers:
                 found = f"{what}: ${prefix}_{setting} is missing"
@@ -87,7 +87,7 @@ class Table:
         if len(self.values) > last + 1:
             found = f"{what}: interpolation point {max(self.values)}"
             self.at.refuse(found, f"the last one to be {last} at the end position")
-        return Line(
+        return AxisTable(
             *axes,
             tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
             tuple(factor * self.values[index] for index in range(last + 1)),
@@ -102,7 +102,7 @@ def _assigns(name: str) -> Callable[[str, str], bool]:
 
 def _assignments(
     source: Source, prefix: str, settings: Sequence[str], indices: tuple[str, str]
-) -> Iterator[tuple[Place, str, list[str], str]]:
+) -> Iterator[tuple[SourceLine, str, list[str], str]]:
     """Give place, setting (empty for a value), indices and value of each assignment."""
     names = (prefix, *(f"{prefix}_{setting}" for setting in settings))
     any_found = False
@@ -126,11 +126,11 @@ def _assignments(
         source.refuse(f"has no ${prefix}", "tables of this variable")
 
 
-def _index(text: str, at: Place) -> int:
+def _index(text: str, at: SourceLine) -> int:
     return at.whole(text, "index", 0, MOST_INDEX)
 
 
-def _axis_name(text: str, at: Place) -> str:
+def _axis_name(text: str, at: SourceLine) -> str:
     bare = text.strip().strip("()").strip().strip('"').strip()
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]{0,15}", bare):
         at.refuse(f"axis {shown(text)}", "the name of an axis")
@@ -147,7 +147,7 @@ def _range_lines(prefix: str, index: str, places: Array) -> list[str]:
     return [f"${prefix}_{setting}[{index}]={float(number)!r}" for setting, number in bounds]
 
 
-def _archive(name: str, wanted: Wanted, sign: str, body: Sequence[str]) -> Files:
+def _archive(name: str, wanted: RequiredCorrections, sign: str, body: Sequence[str]) -> Files:
     head = [f"%_N_{name}_INI", "CHANDATA(1)", f"; written by warpspace for {wanted.title}"]
     head.append(f"; {'sign: ' + wanted.sign if wanted.sign else sign}")
     return {"": "\n".join([*head, *body, "M17"]) + "\n"}
@@ -157,14 +157,14 @@ def _read(
     source: Source,
     prefix: str,
     indices: tuple[str, str],
-    key_of: Callable[[list[str], Place], tuple[Any, str]],
+    key_of: Callable[[list[str], SourceLine], tuple[Any, str]],
     settings: Sequence[str] = (*RANGE, IS_MODULO),
-) -> dict[Any, Table]:
-    found: dict[Any, Table] = {}
+) -> dict[Any, AssignmentTable]:
+    found: dict[Any, AssignmentTable] = {}
     for at, setting, parts, value in _assignments(source, prefix, settings, indices):
         name = f"${prefix}_{setting}" if setting else f"${prefix}"
         key, what = key_of(parts, at)
-        table = found.setdefault(key, Table(at))
+        table = found.setdefault(key, AssignmentTable(at))
         if setting in AXES:
             table.axes[setting] = _axis_name(value, at)
         elif setting in RANGE:
@@ -179,10 +179,10 @@ def _read(
 
 
 def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    terms: list[Line] = []
+    terms: list[AxisTable] = []
     notes: list[str] = []
 
-    def key_of(parts: list[str], at: Place) -> tuple[tuple[int, str], str]:
+    def key_of(parts: list[str], at: SourceLine) -> tuple[tuple[int, str], str]:
         return (_index(parts[0], at), _axis_name(parts[-1], at)), f"${ENC}"
 
     for source in sources:
@@ -198,7 +198,7 @@ def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables(tuple(terms), (options.said_sign(SIGN), UNITS), tuple(notes))
 
 
-def _write_enc(wanted: Wanted) -> Files:
+def _write_enc(wanted: RequiredCorrections) -> Files:
     body: list[str] = []
     for axis in wanted.axes:
         if axis not in wanted.corrector.moved:
@@ -218,7 +218,7 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
     terms: list[Term] = []
     factor = options.factor(ERROR)
 
-    def key_of(parts: list[str], at: Place) -> tuple[int, str]:
+    def key_of(parts: list[str], at: SourceLine) -> tuple[int, str]:
         index = _index(parts[0], at)
         if index >= MOST_TABLES:
             at.refuse(f"table {index}", f"at most {MOST_TABLES - 1}")
@@ -248,7 +248,7 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables(tuple(terms), (options.said_sign(CEC_SIGN), UNITS))
 
 
-def _write_cec(wanted: Wanted) -> Files:
+def _write_cec(wanted: RequiredCorrections) -> Files:
     tables = _cross_tables(wanted, wanted.factor(ERROR), MOST_TABLES)
     if len(tables) > MOST_TABLES:
         raise OptionError(
@@ -283,7 +283,7 @@ class CrossTable:
     number: int = 0  # how many tables further the other factor of a product stands, 0 for none
 
 
-def _cross_tables(wanted: Wanted, factor: float, most: int) -> list[CrossTable]:
+def _cross_tables(wanted: RequiredCorrections, factor: float, most: int) -> list[CrossTable]:
     mean, axes = wanted.toward(TravelDirection.MEAN), wanted.axes
     needed = {
         (target, *group): values
@@ -304,7 +304,7 @@ def _cross_tables(wanted: Wanted, factor: float, most: int) -> list[CrossTable]:
     return tables or [CrossTable(axes[0], wanted.corrector.moved[0], zeros)]
 
 
-def _half_reversals(wanted: Wanted, axis: str) -> Needed:
+def _half_reversals(wanted: RequiredCorrections, axis: str) -> Needed:
     base = wanted.toward(TravelDirection.MEAN)
     ways = [base.toward(way, axis) for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)]
     found: dict[tuple[str, ...], Array] = {}
@@ -321,7 +321,7 @@ def _half_reversals(wanted: Wanted, axis: str) -> Needed:
 
 
 def _tables_for(
-    wanted: Wanted,
+    wanted: RequiredCorrections,
     factor: float,
     target: str,
     needed: Needed,

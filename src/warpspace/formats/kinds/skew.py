@@ -18,10 +18,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.formats.compensation.corrections import AXES, Wanted
-from warpspace.formats.measured import BOTH, Imported, Run, Series, merge
+from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
+from warpspace.formats.measured import BOTH, ErrorSeries, Imported, MeasuredRun, merge
 from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Place, Source, spell
+from warpspace.formats.source import Source, SourceLine, spell
 from warpspace.formats.terms import Affine, Tables, errors_of
 from warpspace.units import URAD_PER_RAD
 
@@ -64,7 +64,7 @@ def skew_lengths(factor: float) -> tuple[float, float, float]:
     return 2.0 * SIDE_MM * math.cos(angle / 2.0), 2.0 * SIDE_MM * math.sin(angle / 2.0), SIDE_MM
 
 
-def factor_of(lengths: tuple[float, float, float], at: Place, what: str) -> float:
+def factor_of(lengths: tuple[float, float, float], at: SourceLine, what: str) -> float:
     ac, bd, ad = lengths
     # the diagonals of a parallelogram are together longer than twice a side, and differ by less
     if not (min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd)):
@@ -78,7 +78,7 @@ def skew_term(factors: Mapping[str, float]) -> Affine:
     return Affine(AXES, ((0.0, -xy, -(xz - xy * yz)), (0.0, 0.0, -yz), (0.0, 0.0, 0.0)))
 
 
-def fitted_factors(wanted: Wanted) -> dict[str, float]:
+def fitted_factors(wanted: RequiredCorrections) -> dict[str, float]:
     """Give the factors that leave the smallest RMS over the volume."""
     found = wanted.linear_fit((("X", "Y"), ("X", "Z"), ("Y", "Z")))
     xy, yz = -found.get(("X", "Y"), 0.0), -found.get(("Y", "Z"), 0.0)
@@ -93,7 +93,7 @@ _PROFILE = re.compile(r"\[skew_correction\s+([^\]]+?)\s*\]")
 _LOAD = re.compile(r"\bSKEW_PROFILE\s+LOAD=\"?([^\s\"]+)")
 _SAVED = re.compile(r"(xy|xz|yz)_skew\s*[=:]\s*(\S+)")
 _SECTION = re.compile(r"\[([a-z_]+)(?:\s+[^\]]*)?\]")
-Section = dict[str, tuple[Place, str]]
+Section = dict[str, tuple[SourceLine, str]]
 
 
 def _sections(source: Source) -> dict[str, Section]:
@@ -193,7 +193,9 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
         f"the heights that the probe is off by, {offset:g} mm behind the nozzle, are taken for"
         " roll of X; their mean is not in the file"
     )
-    series = Series("EAX", tuple(places.tolist()), (Run(1, BOTH, tuple(values.tolist())),))
+    series = ErrorSeries(
+        "EAX", tuple(places.tolist()), (MeasuredRun(1, BOTH, tuple(values.tolist())),)
+    )
     return Imported("klipper", (series,), units=("mm",), assumed=(said,))
 
 
@@ -208,7 +210,7 @@ def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> Imported:
     return merge(parts)
 
 
-def _write_klipper(wanted: Wanted) -> Files:
+def _write_klipper(wanted: RequiredCorrections) -> Files:
     parts = [
         f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
         for plane, factor in fitted_factors(wanted).items()
@@ -231,8 +233,8 @@ def _is_marlin(head: str, name: str) -> bool:
 
 
 def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    found: dict[str, tuple[Place, float]] = {}
-    defined: dict[str, dict[str, tuple[Place, float]]] = {}
+    found: dict[str, tuple[SourceLine, float]] = {}
+    defined: dict[str, dict[str, tuple[SourceLine, float]]] = {}
     notes: list[str] = []
     for source in sources:
         switches: set[str] = set()
@@ -281,7 +283,7 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
 
 
-def _write_marlin(wanted: Wanted) -> Files:
+def _write_marlin(wanted: RequiredCorrections) -> Files:
     factors = fitted_factors(wanted)
     words = [
         f"{letter}{spell(float(wanted.round(factors[plane])), DIGITS)}"

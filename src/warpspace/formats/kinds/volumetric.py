@@ -21,9 +21,9 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats import measured
-from warpspace.formats.compensation.corrections import Wanted
+from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, described
-from warpspace.formats.source import Place, Source, spell
+from warpspace.formats.source import Source, SourceLine, spell
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.units import UM_PER_MM, URAD_PER_RAD
@@ -127,8 +127,8 @@ def _plus(
         at = np.union1d(at, np.arange(at[0], at[-1], FINE_DEG))
     values = np.interp(at, present.positions, present.values) + offset
     values = values + cosine * np.cos(np.deg2rad(at)) + sine * np.sin(np.deg2rad(at))
-    changed = measured.Series(
-        key, tuple(at.tolist()), (measured.Run(1, measured.BOTH, tuple(values.tolist())),)
+    changed = measured.ErrorSeries(
+        key, tuple(at.tolist()), (measured.MeasuredRun(1, measured.BOTH, tuple(values.tolist())),)
     )
     series = tuple(changed if one.key == key else one for one in found.series)
     return replace(found, series=series)
@@ -144,8 +144,8 @@ def _read_with(
 
 ISG = "isg-csv"
 _SPLIT = re.compile(r"[\s;,]+")
-Block = list[tuple[Place, list[str]]]
-Row = tuple[Place, dict[str, float]]
+Block = list[tuple[SourceLine, list[str]]]
+Row = tuple[SourceLine, dict[str, float]]
 
 
 def _is_isg(head: str, name: str) -> bool:
@@ -233,7 +233,7 @@ def _read_block(source: Source, block: Block) -> measured.Imported:
     return measured.Imported(ISG, series, notes=notes)
 
 
-def _check_arguments(at: Place, key: str, arguments: Sequence[str]) -> None:
+def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None:
     row = parameter(key)
     if not arguments:
         if not row.is_constant:
@@ -245,25 +245,25 @@ def _check_arguments(at: Place, key: str, arguments: Sequence[str]) -> None:
         at.refuse(f"{key} over {' and '.join(arguments)}", f"the argument {row.axis}")
 
 
-def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.Series:
+def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.ErrorSeries:
     for (_, before), (at, row) in pairwise(rows):
         if row[argument] <= before[argument]:
             found = f"{argument} {row[argument]:g} after {before[argument]:g}"
             at.refuse(found, "ascending positions")
-    run = measured.Run(1, measured.BOTH, tuple(row[key] for _, row in rows))
-    return measured.Series(key, tuple(row[argument] for _, row in rows), (run,))
+    run = measured.MeasuredRun(1, measured.BOTH, tuple(row[key] for _, row in rows))
+    return measured.ErrorSeries(key, tuple(row[argument] for _, row in rows), (run,))
 
 
 def _isg_plane(
     source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]
-) -> measured.Plane:
+) -> measured.ErrorSurface:
     own = parameter(key).axis
     other = next(axis for axis in arguments if axis != own)
     points = [(at, row[own], row[other], row[key]) for at, row in rows]
     return measured.plane_of(key, (own, other), points, source)
 
 
-def _write_isg(wanted: Wanted) -> Files:
+def _write_isg(wanted: RequiredCorrections) -> Files:
     held = measured.in_one_direction(measured.sampled(wanted), wanted)
     check_axes(held, ISG)
 
@@ -300,10 +300,10 @@ def _is_iso(head: str, name: str) -> bool:
 
 def _read_iso(source: Source) -> measured.Imported:
     constants: dict[str, float] = {}
-    series: list[measured.Series] = []
+    series: list[measured.ErrorSeries] = []
     left: list[str] = []
     key, name = "", ""
-    opened: Place | None = None
+    opened: SourceLine | None = None
     rows: list[tuple[float, float]] = []
     for at, bare in source.scan("//"):
         if opened:
@@ -315,7 +315,9 @@ def _read_iso(source: Source) -> measured.Imported:
                 if key:
                     places, values = zip(*rows, strict=True)
                     series.append(
-                        measured.Series(key, places, (measured.Run(1, measured.BOTH, values),))
+                        measured.ErrorSeries(
+                            key, places, (measured.MeasuredRun(1, measured.BOTH, values),)
+                        )
                     )
                 opened, rows = None, []
         elif matched := _SECTION.fullmatch(bare):
@@ -348,7 +350,7 @@ def _read_iso(source: Source) -> measured.Imported:
 
 
 def _iso_row(
-    at: Place, parts: list[str], rows: list[tuple[float, float]], name: str, key: str
+    at: SourceLine, parts: list[str], rows: list[tuple[float, float]], name: str, key: str
 ) -> None:
     if not parts:
         return
@@ -363,7 +365,7 @@ def _iso_row(
         at.refuse(f"{name} has more points than {MAX_POINTS:,}", "at most so many")
 
 
-def _write_iso(wanted: Wanted) -> Files:
+def _write_iso(wanted: RequiredCorrections) -> Files:
     held = measured.in_one_direction(measured.sampled(wanted), wanted)
     check_axes(held, ISO)
     lines = [f"// {wanted.title}", "// mm, rad, degrees; variant Vendor"]

@@ -6,7 +6,7 @@ from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.curves.curve import ErrorFunction
 from warpspace.machine.curves.polynomial_pieces import Pieces
 from warpspace.machine.curves.simple import Constant, Directional, Harmonics, Poly, Ramp
-from warpspace.machine.curves.table import Table, TwoArguments
+from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.plugins import Registry
 
 CurveKind = type[ErrorFunction]
@@ -16,7 +16,7 @@ _KINDS: Registry[CurveKind] = Registry(
     "kind of curve",
     {
         kind.name: kind
-        for kind in (Constant, Ramp, Poly, Harmonics, Table, TwoArguments, Directional, Pieces)
+        for kind in (Constant, Ramp, Poly, Harmonics, TableCurve, TwoArguments, Directional, Pieces)
     },
 )
 """By name, in the order of lists: simplest first."""

@@ -39,7 +39,7 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Table(ErrorFunction):
+class TableCurve(ErrorFunction):
     """Piecewise linear curve through measured points, its ends held."""
 
     name = "table"
@@ -240,11 +240,11 @@ class TwoArguments(ErrorFunction):
         upper = grid[high, left] * (1.0 - across) + grid[high, right] * across
         return np.asarray(lower * (1.0 - share) + upper * share)
 
-    def section(self, other: float) -> Table:
+    def section(self, other: float) -> TableCurve:
         """Give the curve along the own axis while the other one stands at a position."""
         at = self.positions[0]
         values = self._bilinear(np.array(at), np.asarray(other))
-        return Table(self.span, tuple(zip(at, values.tolist(), strict=True)))
+        return TableCurve(self.span, tuple(zip(at, values.tolist(), strict=True)))
 
     def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
         """Give the section where the other axis stands, if it is gone."""

@@ -320,7 +320,7 @@ class Occupancy:
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedLabel:
     """A placed label."""
 
     centre: tuple[float, float]  # px
@@ -336,8 +336,8 @@ def place_label(
     frame: Rect,
     taken: Occupancy,
     unit: float,
-) -> Placed | None:
-    best: Placed | None = None
+) -> PlacedLabel | None:
+    best: PlacedLabel | None = None
     best_score = math.inf
     half_w, half_h = size[0] / 2.0 + 3.0 * unit, size[1] / 2.0 + 3.0 * unit
     for anchor in ((float(x), float(y)) for x, y in anchors):
@@ -363,7 +363,7 @@ def place_label(
                     score += taken.between(anchor, (x - c * reach, y - s * reach))
                 if score < best_score:
                     best_score = score
-                    best = Placed((x, y), rect, anchor, distance * unit, cost)
+                    best = PlacedLabel((x, y), rect, anchor, distance * unit, cost)
     if best is not None:
         taken.add_rects([best.rect])
     return best
@@ -379,7 +379,7 @@ def write_label(
     size: float = SIZES.text,
     weight: str = "normal",
     colour: str | None = None,
-) -> Placed | None:
+) -> PlacedLabel | None:
     """Write a label where there is room beside one of several points; none where there is none."""
     extent = canvas.text_size(text, size, weight)
     placed = place_label(anchors, extent, frame, taken, canvas.factor)
@@ -391,7 +391,7 @@ def write_label(
     return placed
 
 
-def draw_leader(canvas: Canvas, placed: Placed, colour: str, zorder: float = 3.0) -> None:
+def draw_leader(canvas: Canvas, placed: PlacedLabel, colour: str, zorder: float = 3.0) -> None:
     x = min(max(placed.anchor[0], placed.rect[0]), placed.rect[2])
     y = min(max(placed.anchor[1], placed.rect[1]), placed.rect[3])
     canvas.line([(x, y), placed.anchor], width=SIZES.hair, colour=colour, zorder=zorder)

@@ -19,10 +19,10 @@ from warpspace.outputs.drawing.canvas import (
     write_label,
 )
 from warpspace.outputs.drawing.off_screen import (
-    Body,
     Projection,
     Raster,
     Rect,
+    RenderedBody,
     fit_projection,
     render_bodies,
     split_visible,
@@ -185,13 +185,15 @@ def draw_map(
     return DrawnMap(projection, picture, raster)
 
 
-def surface_bodies(picture: Picture, faces: list[surfaces.Index]) -> list[Body]:
+def surface_bodies(picture: Picture, faces: list[surfaces.Index]) -> list[RenderedBody]:
     """Give the coloured surface where it is drawn; nothing where a volume has none."""
     surface = surfaces.triangulate(faces)
     if not len(surface.triangles):
         return []
     nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
-    return [Body(nodes[surface.nodes], surface.triangles, values[surface.nodes], picture.scale)]
+    return [
+        RenderedBody(nodes[surface.nodes], surface.triangles, values[surface.nodes], picture.scale)
+    ]
 
 
 def draw_raster(canvas: Canvas, raster: Raster, opacity: float = 1.0, zorder: float = 1.0) -> None:

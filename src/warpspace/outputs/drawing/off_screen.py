@@ -96,7 +96,7 @@ WINDOWS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class RenderedBody:
     """Triangles to draw."""
 
     vertices_mm: Array  # [M, 3]; where they are drawn
@@ -144,7 +144,7 @@ class Raster:
         return np.where(inside, depth[np.where(inside, i, 0), np.where(inside, j, 0)], np.inf)
 
 
-def render_bodies(bodies: Sequence[Body], projection: Projection) -> Raster | None:
+def render_bodies(bodies: Sequence[RenderedBody], projection: Projection) -> Raster | None:
     """Draw bodies; none where there are none."""
     if not bodies:
         return None
@@ -165,7 +165,7 @@ def render_bodies(bodies: Sequence[Body], projection: Projection) -> Raster | No
 
 
 def _draw(
-    bodies: Sequence[Body],
+    bodies: Sequence[RenderedBody],
     projection: Projection,
     middle_px: Array,
     size: tuple[int, int],
@@ -235,7 +235,7 @@ def _advice() -> str:
     return "Check the OpenGL driver."
 
 
-def _add_body(plotter: "pv.Plotter", body: Body) -> None:
+def _add_body(plotter: "pv.Plotter", body: RenderedBody) -> None:
     import pyvista as pv
 
     mesh = pv.PolyData.from_regular_faces(

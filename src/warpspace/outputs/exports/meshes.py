@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpspace.bodies.gltf import Material, Part, build_gltf, to_gltf
+from warpspace.bodies.gltf import GltfNode, Material, build_gltf, to_gltf
 from warpspace.bodies.placed import place_bodies
 from warpspace.field.grid import DEFAULT_NODES
 from warpspace.geometry import surfaces
@@ -65,14 +65,14 @@ def _bent(
     indices: surfaces.Index,
     material: Material,
     **more: Any,
-) -> Part:
+) -> GltfNode:
     """Build a part that is drawn displaced; its target leads back to where it nominally is."""
     drawn_mm = surfaces.deform(nominal_mm, error_um, picture.exaggeration)
     back = to_gltf(error_um * (-picture.exaggeration * MM_PER_UM))
-    return Part(name, to_gltf(drawn_mm), indices, material, targets={"nominal": back}, **more)
+    return GltfNode(name, to_gltf(drawn_mm), indices, material, targets={"nominal": back}, **more)
 
 
-def _surface(picture: ScenePicture) -> Part:
+def _surface(picture: ScenePicture) -> GltfNode:
     field = picture.field
     nominal = thick_nodes(picture, picture.grid.nominal_mm)
     surface = surfaces.outer_surface(nominal.shape[:3])
@@ -92,7 +92,7 @@ def _surface(picture: ScenePicture) -> Part:
     )
 
 
-def _lines(picture: ScenePicture) -> Iterator[Part]:
+def _lines(picture: ScenePicture) -> Iterator[GltfNode]:
     shape, ink = picture.shape, Material("line", INK)
     nominal = picture.grid.nominal_mm.reshape(-1, 3)
     error = picture.field.error_um.reshape(-1, 3)
@@ -102,7 +102,7 @@ def _lines(picture: ScenePicture) -> Iterator[Part]:
     edges = surfaces.segments(surfaces.box_edges(shape))
     at, pairs = np.unique(edges, return_inverse=True)
     yield _bent(picture, "deformed_edges", nominal[at], error[at], pairs.reshape(-1, 2), ink)
-    yield Part("ghost", to_gltf(nominal[at]), pairs.reshape(-1, 2), Material("ghost", GHOST))
+    yield GltfNode("ghost", to_gltf(nominal[at]), pairs.reshape(-1, 2), Material("ghost", GHOST))
 
 
 def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
@@ -111,19 +111,19 @@ def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
         yield f"({point}) {drawn.trace.label}", drawn
 
 
-def _traces(picture: ScenePicture) -> Iterator[Part]:
+def _traces(picture: ScenePicture) -> Iterator[GltfNode]:
     nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
     for label, drawn in _named_traces(picture):
         still, count = drawn.nominal_mm, len(drawn.nominal_mm)
         pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
-        yield Part(f"trace nominal {label}", to_gltf(still), pairs, nominal, group="traces")
+        yield GltfNode(f"trace nominal {label}", to_gltf(still), pairs, nominal, group="traces")
         name = f"trace actual {label}"
         yield _bent(picture, name, still, drawn.error_um, pairs, actual, group="traces")
 
 
-def _bodies(picture: ScenePicture) -> list[Part]:
+def _bodies(picture: ScenePicture) -> list[GltfNode]:
     return [
-        Part(
+        GltfNode(
             part.body.name,
             to_gltf(part.vertices_mm),
             part.body.triangles,

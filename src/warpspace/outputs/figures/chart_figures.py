@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from warpspace.analysis.commands.gains import Gains
 from warpspace.analysis.commands.montecarlo import Machines, sampled_histogram
-from warpspace.analysis.description import silent
-from warpspace.analysis.sampling.cases import Plan
+from warpspace.analysis.description import ignore_progress
+from warpspace.analysis.sampling.cases import SamplingPlan
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.bench.base import run_test
 from warpspace.bench.kinds.circular import Circular
@@ -33,7 +33,7 @@ from warpspace.units import spell_count
 
 def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    bars = Gains(loop=Loop(settings.loop), over_travel=True).run(scene, silent).bars()
+    bars = Gains(loop=Loop(settings.loop), over_travel=True).run(scene, ignore_progress).bars()
     title = f"Error gains: {scene.machine.title}"
     where = f"{_loop(scene, settings)} · largest absolute gains over the travel"
     chart = replace(bars, title=title, subtitle=where)
@@ -42,7 +42,7 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    found = montecarlo(Machines(loop=Loop(settings.loop)).case(scene, Plan()))
+    found = montecarlo(Machines(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
     title = f"Machines within tolerance: {scene.title}"
     loop = " · ".join((_loop(scene, settings), *placed_words(found.view)))
     what = (

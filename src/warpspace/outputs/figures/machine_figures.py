@@ -40,11 +40,13 @@ VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
 DARKER = 0.62
 
 
-def _drawn_body(part: PlacedBody, theme: Theme) -> off_screen.Body:
+def _drawn_body(part: PlacedBody, theme: Theme) -> off_screen.RenderedBody:
     shade = 1.0 if theme.name == "light" else DARKER
     red, green, blue = (shade * channel / 255.0 for channel in part.body.colour)
     triangles = part.body.triangles.astype(np.intp)
-    return off_screen.Body(part.vertices_mm, triangles, colour=(red, green, blue), shaded=True)
+    return off_screen.RenderedBody(
+        part.vertices_mm, triangles, colour=(red, green, blue), shaded=True
+    )
 
 
 def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:

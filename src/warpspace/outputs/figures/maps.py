@@ -187,7 +187,7 @@ def _draw_key(
     room = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
     nodes = picture.grid.nominal_mm.reshape(-1, 3)
     projection = off_screen.fit_projection("iso", nodes, room)
-    bodies: list[off_screen.Body] = []
+    bodies: list[off_screen.RenderedBody] = []
     creases: list[Array] = []
     for part in slices:
         faces = surfaces.outer_faces(part.shape)

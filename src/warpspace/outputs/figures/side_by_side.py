@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.analysis.commands.adjust import Repair, RepairResult
+from warpspace.analysis.commands.adjust import Adjust, AdjustResult
 from warpspace.analysis.commands.concepts import LETTERS, Concept, compare_concepts
 from warpspace.bodies.placed import PlacedBody, place_bodies
 from warpspace.kinematics.model import Loop
@@ -120,7 +120,7 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
 
 def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
-    found = Repair(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
+    found = Adjust(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
     after = found.changes()[-1].scene if found.repairs else scene
     pair = (
         replace(scene, title="before"),
@@ -130,7 +130,7 @@ def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     return _draw_pair("repair", title, pair, settings, [_adjusted(found)], exact=exact)
 
 
-def _adjusted(found: RepairResult) -> str:
+def _adjusted(found: AdjustResult) -> str:
     if not found.repairs:
         return "nothing to adjust"
     parts = ", ".join(

@@ -7,15 +7,15 @@ import numpy as np
 
 from warpspace.analysis.adjustment_search import Objective
 from warpspace.analysis.blocks import Column, Mark, Table, number_columns
-from warpspace.analysis.commands.adjust import Repair, RepairResult
+from warpspace.analysis.commands.adjust import Adjust, AdjustResult
 from warpspace.analysis.commands.contributions import Explanation, Shares, explain
 from warpspace.analysis.commands.gains import Gains
 from warpspace.analysis.commands.montecarlo import Machines
-from warpspace.analysis.description import Analysis, Result, silent
-from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, Plan
+from warpspace.analysis.description import Analysis, Result, ignore_progress
+from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, SamplingPlan
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.statistics import Statistics, share_below
-from warpspace.analysis.uncertainty.propagation import SURE, FieldDoubt, volume_doubt
+from warpspace.analysis.uncertainty.propagation import SURE, FieldUncertainty, volume_uncertainty
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -56,7 +56,7 @@ class ReportSettings:
                 limit_um=limit_um,
             )  # fmt: skip
 
-        repair = Repair(loop=loop, grid=min(self.grid, REPAIR_NODES[1]))
+        repair = Adjust(loop=loop, grid=min(self.grid, REPAIR_NODES[1]))
         return {
             "advice": replace(repair, objective=Objective.MAX, count=1),
             "repair": repair,
@@ -78,7 +78,7 @@ class Reviewed:
     results: Mapping[str, Result | str]  # of each analysis; why there is none
     within: float  # share of the volume within the limit; 0 where there is none
     advice: str  # the one thing to do
-    sure: FieldDoubt | None  # how sure its errors are
+    sure: FieldUncertainty | None  # how sure its errors are
 
     @property
     def keeps(self) -> bool:
@@ -104,7 +104,7 @@ class Reviewed:
     def is_told(self) -> bool:
         """Whether the limit is kept, or missed, with enough probability (ISO 14253-1)."""
         found, limit = self.statistics, self.scene.limit_um
-        u95 = found.sure.get("u95_max_um")
+        u95 = found.expanded_uncertainty.get("u95_max_um")
         if self.sure is None or u95 is None or limit is None:
             return True
         kept = float(self.sure.doubt.within(found.max_um, u95, -np.inf, limit))
@@ -142,7 +142,7 @@ class Review:
 def share_pictures(scenes: Sequence[Scene], settings: ReportSettings) -> tuple[ScenePicture, ...]:
     if not 1 <= len(scenes) <= 2:
         raise OptionError(f"a report is about one scene or two; given {len(scenes)}")
-    Plan(settings.samples, settings.seed, spec_um=settings.spec_um).check()
+    SamplingPlan(settings.samples, settings.seed, spec_um=settings.spec_um).check()
     if settings.spec_um is not None:
         scenes = [replace(scene, limit_um=settings.spec_um) for scene in scenes]
     return share_exaggeration(
@@ -181,12 +181,14 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
         results,
         _within(picture),
         _advice(picture, results["advice"], settings),
-        volume_doubt(scene, picture.view, settings.grid),
+        volume_uncertainty(scene, picture.view, settings.grid),
     )
 
 
 def _behind(found: Statistics, name: str) -> str:
-    return u95_behind(found.sure[f"u95_{name}"]) if found.sure else ""
+    return (
+        u95_behind(found.expanded_uncertainty[f"u95_{name}"]) if found.expanded_uncertainty else ""
+    )
 
 
 def _within(picture: ScenePicture) -> float:
@@ -196,7 +198,7 @@ def _within(picture: ScenePicture) -> float:
 
 def _ask(analysis: Analysis, scene: Scene) -> Result | str:
     try:
-        return analysis.run(scene, silent)
+        return analysis.run(scene, ignore_progress)
     except WarpspaceError as error:
         return str(error)
 
@@ -259,7 +261,7 @@ def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings
         return "Nothing to adjust: the error is zero."
     if limit is not None and before <= limit:
         return "Nothing to adjust: the limit is kept."
-    if not isinstance(found, RepairResult) or not found.repairs:
+    if not isinstance(found, AdjustResult) or not found.repairs:
         return "Nothing to adjust: no squareness or alignment acts in this loop."
     after = evaluate_picture(found.changes()[0].scene, grid=settings.grid, loop=settings.loop)
     largest = after.statistics.max_um

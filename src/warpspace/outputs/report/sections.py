@@ -14,7 +14,7 @@ import numpy as np
 from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Mark, Table, number_columns
 from warpspace.analysis.blocks import Block as AnyBlock
 from warpspace.analysis.commands.concepts import Concepts
-from warpspace.analysis.description import Result, silent
+from warpspace.analysis.description import Result, ignore_progress
 from warpspace.analysis.note_tables import notes_table
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.uncertainty.propagation import u95_lines
@@ -38,9 +38,9 @@ from warpspace.outputs.report.templating import (
     Block,
     Embedded,
     Items,
-    Picture,
     Report,
-    Section,
+    ReportFigure,
+    ReportSection,
     Text,
     render_html,
     render_pdf,
@@ -116,7 +116,7 @@ class ReportFigures:
         width = LINES_WIDTH if isinstance(chart, Lines) else 1.0
         named = isinstance(chart, Histogram)
         caption = f"Distribution: {chart.x_label}." if named else chart.title
-        return Picture("chart", caption, data, self._form, width)
+        return ReportFigure("chart", caption, data, self._form, width)
 
     def begin(
         self,
@@ -137,7 +137,7 @@ class ReportFigures:
         def drawn() -> Block:
             for first_or_second in (lambda: begun, begin):
                 try:
-                    return Picture(name, caption, first_or_second()(), self._form)
+                    return ReportFigure(name, caption, first_or_second()(), self._form)
                 except NoRendererError:
                     raise
                 except RenderError as error:
@@ -218,10 +218,10 @@ def build_report(
         }
         noted = tuple(notes(review, painter, tell))
         parts = (
-            Section("", tuple(first_page(review, painter.first()))),
-            *([Section("Findings and decisions", noted)] if noted else []),
+            ReportSection("", tuple(first_page(review, painter.first()))),
+            *([ReportSection("Findings and decisions", noted)] if noted else []),
             *(
-                Section(f"Appendix {_letters(number)} · {heading}", tuple(blocks))
+                ReportSection(f"Appendix {_letters(number)} · {heading}", tuple(blocks))
                 for number, (heading, blocks) in enumerate(found.items(), 1)
             ),
         )
@@ -447,7 +447,7 @@ def concept_blocks(
         limit_um=settings.spec_um, samples=settings.samples, seed=settings.seed,
         distribution=choose_distribution(settings.distribution),
     )  # fmt: skip
-    found = asked.run_all(every, silent)
+    found = asked.run_all(every, ignore_progress)
     yield from said(found.blocks())
     caption = "The machines in one scale; colours are the RMS of |E| within tolerance."
     chosen = FigureSettings(loop=str(asked.loop), grid=settings.grid, concepts=asked)

@@ -47,7 +47,7 @@ class Cards:
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class ReportFigure:
     """A figure as the bytes of an SVG or PDF file, with its caption."""
 
     name: str
@@ -72,11 +72,11 @@ class Items:
     items: tuple[str, ...]
 
 
-Block = Text | Cards | Table | Picture | Embedded | Items
+Block = Text | Cards | Table | ReportFigure | Embedded | Items
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class ReportSection:
     """A part of the report with a heading; the first stands on the page read first."""
 
     heading: str
@@ -90,12 +90,14 @@ class Report:
     title: str
     overline: str  # what kind of document it is
     facts: tuple[str, ...]  # machine, date, version: one line below the title
-    sections: tuple[Section, ...]
+    sections: tuple[ReportSection, ...]
     missing: tuple[str, ...] = ()  # figures that could not be drawn, and why
 
     @property
-    def pictures(self) -> tuple[Picture, ...]:
-        return tuple(b for part in self.sections for b in part.blocks if isinstance(b, Picture))
+    def pictures(self) -> tuple[ReportFigure, ...]:
+        return tuple(
+            b for part in self.sections for b in part.blocks if isinstance(b, ReportFigure)
+        )
 
 
 def report_time() -> datetime:
@@ -131,7 +133,7 @@ def _table_markup(table: Table) -> Markup:
     return Markup(table_html(table))  # noqa: S704 - escaped there
 
 
-def _data_uri(picture: Picture) -> str:
+def _data_uri(picture: ReportFigure) -> str:
     text = re.sub(r"\s+", " ", picture.data.decode())
     text = _PATH.sub(lambda path: _NUMBER.sub(_rounded, path.group()), text)
     if "'" not in text:
@@ -189,7 +191,7 @@ def render_pdf(report: Report) -> bytes:
 
 
 def _as_data(block: Block, folder: Path) -> dict[str, Any]:
-    if isinstance(block, Picture):
+    if isinstance(block, ReportFigure):
         path = folder / f"figure{len(list(folder.iterdir()))}.{block.form}"
         path.write_bytes(block.data)
         found = {"caption": block.caption, "width": block.width, "file": path.name}
