@@ -86,7 +86,7 @@ def uncertain() -> Scene:
     """Give a measured machine that states how sure its errors are, and where it was measured."""
     variances = np.diag(np.square(list(UNCERTAIN.values())))
     rows = tuple(map(tuple, variances.tolist()))
-    covariance = Covariance(tuple(UNCERTAIN), rows, reach={"Z": (-400.0, -80.0)})
+    covariance = Covariance(tuple(UNCERTAIN), rows, measured_range={"Z": (-400.0, -80.0)})
     title = "First machine, with its uncertainty"
     return replace(load_scene("dvf5000_first"), title=title, covariance=covariance)
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from warpspace.analysis.commands.allocate import AllocateResult
-    from warpspace.analysis.commands.contributions import SharesResult
+    from warpspace.analysis.commands.contributions import ContributionsResult
     from warpspace.analysis.commands.gains import GainsResult
-    from warpspace.analysis.commands.montecarlo import MachinesResult, sweep
+    from warpspace.analysis.commands.montecarlo import MonteCarloResult, sweep
     from warpspace.analysis.registry import Verb
     from warpspace.analysis.tolerance_check import measured
     from warpspace.bench.base import run_test
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from warpspace.thesis.rows import thesis
 
     allocate: Verb[AllocateResult]
-    contributions: Verb[SharesResult]
+    contributions: Verb[ContributionsResult]
     gains: Verb[GainsResult]
-    montecarlo: Verb[MachinesResult]
+    montecarlo: Verb[MonteCarloResult]
 
 _HOME = {
     "__version__": "warpspace.resources",

@@ -24,7 +24,7 @@ from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.evaluation.point_explanation import measured, pick_worst, with_picked
 from warpspace.app.panels.analysis_panel import AnalysisOutcome
 from warpspace.app.panels.conventions import with_reference
-from warpspace.app.panels.improve import BOTH, LEFT, CompensatePart, holds_for, packed, with_box
+from warpspace.app.panels.improve import BOTH, LEFT, CompensatePanel, holds_for, packed, with_box
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
@@ -46,7 +46,7 @@ CHOICE = {"formats": "heidenhain", "points": "9"}
 
 def asking(state=START, choice=CHOICE):
     """Give the part, and the state with what was chosen."""
-    part = lone_part(CompensatePart, "compensate")
+    part = lone_part(CompensatePanel, "compensate")
     part.context.store = SimpleNamespace(state=state)
     return part, replace(state, forms={f"compensate.{key}": one for key, one in choice.items()})
 

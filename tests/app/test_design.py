@@ -14,14 +14,14 @@ from warpspace.app.documents.output_services import Services
 from warpspace.app.panels.design import (
     PRESENT,
     SAMPLES,
-    ConceptsPart,
-    TolerancesPart,
+    ConceptsPanel,
+    TolerancesPanel,
     estimate,
     percent,
     sample_machines,
     tolerance_shares,
 )
-from warpspace.app.panels.improve import RepairPart
+from warpspace.app.panels.improve import RepairPanel
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Specification, start_state
 from warpspace.app.state.tree import put
@@ -47,7 +47,7 @@ def ran(part, state):
 
 
 def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
-    part = lone_part(RepairPart, "repair")
+    part = lone_part(RepairPanel, "repair")
     state = replace(START, forms={"repair.objective": "rms", "repair.grid": "9"})
     ran(part, state)
     found = part._answer.found
@@ -94,14 +94,14 @@ def test_a_probability_is_that_of_the_command(loop, over, distribution):
 
 
 def test_the_worst_point_of_the_workpiece_loop_is_refused_with_a_way_out():
-    part = lone_part(TolerancesPart, "allocate")
+    part = lone_part(TolerancesPanel, "allocate")
     shown = section(part, state_of(PROPOSED, Loop.WORKPIECE))
     assert "montecarlo --over max" in shown
     assert "Evaluated at" in shown
 
 
 def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
-    part = lone_part(TolerancesPart, "allocate")
+    part = lone_part(TolerancesPanel, "allocate")
     fixed = frozenset({"EA0Z", "EXA"})  # the latter of another machine
     state = state_of(FIRST, limit_um=40.0, percent=98.0, fixed=fixed, costs="EB0Z=9,EYA=3")
     ran(part, state)
@@ -125,7 +125,7 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
 
 
 def test_tolerances_are_typed_fixed_scaled_and_reset():
-    part = lone_part(TolerancesPart, "allocate")
+    part = lone_part(TolerancesPanel, "allocate")
     section(part, START)  # lays out the rows
     state = put(START, "specification.fixed", "+EXX")
     assert 'data-value="-EXX"' in section(part, state)
@@ -144,7 +144,7 @@ def test_tolerances_are_typed_fixed_scaled_and_reset():
 
 
 def concepts_part():
-    part = lone_part(ConceptsPart, "concepts")
+    part = lone_part(ConceptsPanel, "concepts")
     part.context.scenes = {"other": OTHER, HOSTILE: replace(OTHER, title=HOSTILE)}
     return part
 
@@ -190,7 +190,7 @@ def test_page_report_and_command_have_one_figure_for_one_question():
     (reviewed,) = build_review((SCENE,), settings).scenes
     assert reviewed.results["worst"].points[0].sampled.probability == wanted
     asked = state_of(SCENE, limit_um=50.0)
-    assert answer_of(lone_part(TolerancesPart, "allocate"), asked).before == wanted
+    assert answer_of(lone_part(TolerancesPanel, "allocate"), asked).before == wanted
     forms = {"concepts.loop": "tool", "concepts.own_tolerances": "1"}
     (found,) = answer_of(concepts_part(), replace(asked, forms=forms)).concepts
     assert found.sampled.probability == wanted

@@ -6,7 +6,7 @@ import pytest
 
 from app.parts import LIVE, lone_part
 from warpspace.app.panels.conventions import with_reference
-from warpspace.app.panels.error_list import ErrorsPart, find_parameters
+from warpspace.app.panels.error_list import ErrorsPanel, find_parameters
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.tree import toggled
 from warpspace.machine.axes import parameter
@@ -20,7 +20,7 @@ class Column:
     """The column without a page."""
 
     def __init__(self, state=STATE):
-        self.part, self.state = lone_part(ErrorsPart), state
+        self.part, self.state = lone_part(ErrorsPanel), state
 
     def do(self, word, value=""):
         self.state = self.part.take(self.state, word, value)

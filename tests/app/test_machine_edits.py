@@ -21,7 +21,7 @@ from warpspace.app.evaluation.machine_edits import (
 )
 from warpspace.app.panels.machine_editor import (
     EditorSection,
-    MachinesWindow,
+    MachinesDialog,
     PositionsSection,
     RotarySection,
 )
@@ -135,7 +135,7 @@ def test_what_cannot_be_is_refused_with_a_note_and_words_that_are_none_without(s
 
 def test_every_machine_of_the_library_starts_with_its_own_scene(state):
     state = state.with_amplitude("EAX", 33.0)
-    window = lone_part(MachinesWindow)
+    window = lone_part(MachinesDialog)
     for name, scene in library().items():
         changed = window.take(state, "choose", name)
         if name == state.scene.machine.name:  # as it was opened, with all that has been entered

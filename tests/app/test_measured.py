@@ -13,11 +13,11 @@ from warpspace.analysis.registry import entries
 from warpspace.app.documents.scene_file import settings_line, with_settings
 from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
-from warpspace.app.panels.import_panel import ImportPart
+from warpspace.app.panels.import_panel import ImportPanel
 from warpspace.app.panels.measurement import (
     MOST_FILES,
-    CalibratePart,
-    TestsPart,
+    CalibratePanel,
+    TestsPanel,
     UploadedFile,
     arrows_of,
     take_file,
@@ -72,7 +72,7 @@ class Column(Alone):
 
 
 def calibrate():
-    return Column(CalibratePart, START, next(one for one in entries() if one.name == "calibrate"))
+    return Column(CalibratePanel, START, next(one for one in entries() if one.name == "calibrate"))
 
 
 def positioned(targets):
@@ -88,7 +88,7 @@ def positioned(targets):
 
 @pytest.mark.parametrize("name", bench_names())
 def test_figure_and_path_follow_the_errors(name):
-    column = Column(TestsPart, STATE)
+    column = Column(TestsPanel, STATE)
     depends = column.part.depends(LIVE.evaluate(column.state))
     column.do("choose", name)
     assert column.part.depends(LIVE.evaluate(column.state)) != depends
@@ -117,7 +117,7 @@ def test_figure_and_path_follow_the_errors(name):
     ],
 )
 def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
-    column = Column(TestsPart, STATE)
+    column = Column(TestsPanel, STATE)
     column.do("choose", name)
     column.settle()
     for option, text in options.items():
@@ -130,16 +130,16 @@ def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
 
 def test_a_test_runs_where_the_tables_stand_or_says_why_it_cannot():
     turned = put(replace(STATE, forms={"test": "sphere"}), "positions.B", "-20.0")
-    column = Column(TestsPart, turned)
+    column = Column(TestsPanel, turned)
     column.settle()
     assert column.part._answer.found.model.plan.coordinates["B"][0] == -20.0
-    column = Column(TestsPart, start_state(load_scene("machine_c_frame_mill"), nodes=3))
+    column = Column(TestsPanel, start_state(load_scene("machine_c_frame_mill"), nodes=3))
     column.do("choose", "sphere")
     assert "no rotary axis" in column.settle()
 
 
 def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
-    column = Column(TestsPart, STATE)
+    column = Column(TestsPanel, STATE)
     column.do("choose", "positioning")
     column.do("choose", HOSTILE)
     column.do("set.nothing", HOSTILE)
@@ -286,7 +286,7 @@ TABLE = b"X [mm],EXX [um]\n-275,0\n0,5\n275,10\n"
 
 
 def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
-    column = Column(ImportPart, replace(STATE, forms={"import.axis": "Y"}))
+    column = Column(ImportPanel, replace(STATE, forms={"import.axis": "Y"}))
     column.part.received(HOSTILE, TABLE)
     assert (column.state.page.task, column.state.forms) == ("measure", {})
     html = column.settle()
@@ -314,7 +314,7 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
 
 
 def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_page():
-    column = Column(ImportPart, STATE)
+    column = Column(ImportPanel, STATE)
     column.part.received("unnamed.comp", COMP.encode())
     html = column.settle()
     assert 'role="alert"' in html

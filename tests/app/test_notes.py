@@ -14,7 +14,7 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.drawing.labels import note_labels
 from warpspace.app.evaluation.machine_bodies import drawn_bodies
 from warpspace.app.evaluation.point_explanation import answer, drawn_places
-from warpspace.app.panels.note_panels import NotesPart
+from warpspace.app.panels.note_panels import NotesPanel
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
@@ -30,7 +30,7 @@ CAMERA = CameraMemory((9.0, -12.0, 8.0), (0.5, 0.0, -2.5), (0.0, 0.0, 1.0), 0.4)
 def alone(state=START):
     """A notes part on a page that is not there, and the cameras it was put to."""
     cameras: list[CameraMemory] = []
-    found = Alone(NotesPart, state, look_from=cameras.append, decided=None)
+    found = Alone(NotesPanel, state, look_from=cameras.append, decided=None)
     found.context.camera.remember = lambda: CAMERA
     return found, cameras
 

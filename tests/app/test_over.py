@@ -13,8 +13,8 @@ from warpspace.app.drawing.colours import colour_levels
 from warpspace.app.drawing.labels import axes, point_labels
 from warpspace.app.evaluation.compare import pinned_side, scene_side, with_pin, with_sides
 from warpspace.app.panels.design import SAMPLES
-from warpspace.app.panels.overlay import HeadPart, LegendPart, OrderPart
-from warpspace.app.panels.toolbar import ComparePart, ControlsPart, chosen_map
+from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel
+from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel, chosen_map
 from warpspace.app.state.app_state import NOBODY, Side, start_state
 from warpspace.app.state.tree import put
 from warpspace.exceptions import SceneError
@@ -42,8 +42,8 @@ def pieces(kind, state):
 def test_the_heading_says_what_machines_within_tolerance_reach():
     none = replace(START, tolerances=ToleranceSet())
     largest = warpspace.montecarlo(FIRST, samples=SAMPLES, over="max").max_um
-    assert f"tolerances allow {largest:.1f} µm" in pieces(OrderPart, START)["head.allowed"]
-    assert not pieces(OrderPart, none)["head.allowed"]
+    assert f"tolerances allow {largest:.1f} µm" in pieces(OrderPanel, START)["head.allowed"]
+    assert not pieces(OrderPanel, none)["head.allowed"]
 
 
 @pytest.mark.parametrize(("limit", "kept"), [(51.0, False), (52.0, True), (1.0, False)])
@@ -105,7 +105,7 @@ def test_the_worst_corner_is_labelled_once():
 
 
 def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
-    part = lone_part(ControlsPart)
+    part = lone_part(ControlsPanel)
     limit = part.take(START, "map", "limit")
     assert chosen_map(limit) == "limit"
     assert chosen_map(part.take(limit, "map", "orientation.y")) == "orientation.y"
@@ -114,24 +114,24 @@ def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
         assert (machine.shown, machine.ghost) == drawn
     for word in ("map", "machine", "set.travel", "view"):
         assert part.take(START, word, "<script>").scene is FIRST
-    html = pieces(ControlsPart, START)["controls"]
+    html = pieces(ControlsPanel, START)["controls"]
     assert 'data-set="state:set.look.isolines"' in html
     assert 'data-value="slices"' in html
 
 
 def test_comparing_is_shown_and_left_by_one_switch():
-    assert pieces(ComparePart, START)["compared"] == ""
+    assert pieces(ComparePanel, START)["compared"] == ""
     pinned = with_pin(START).with_amplitude("EXX", 9.0)
-    html = pieces(ComparePart, pinned)["compared"]
+    html = pieces(ComparePanel, pinned)["compared"]
     assert html.count('aria-pressed="true"') == 1
-    part = lone_part(ComparePart)
+    part = lone_part(ComparePanel)
     part.context.scenes = {}
     assert part.take(pinned, "leave", "").comparison.b is None
     assert part.take(pinned, "set.b", NOBODY).comparison.b is None
     assert part.take(pinned, "set.a", "no such scene") is pinned
     change = put(pinned, "comparison.shown", "difference")
-    assert "change: mean" in pieces(HeadPart, change)["head"]
-    legend = pieces(LegendPart, change)
+    assert "change: mean" in pieces(HeadPanel, change)["head"]
+    legend = pieces(LegendPanel, change)
     assert not legend["head.kept"]
     assert "E<sub>B</sub> − E<sub>A</sub>" in legend["legend"]
 

@@ -7,14 +7,14 @@ from app.parts import Alone, wait
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList, open_link
 from warpspace.app.documents.transfers import unpack
-from warpspace.app.panels.file_dialogs import FilesWindow, ReportWindow
+from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
 from warpspace.app.panels.top_bar import (
     COMMANDS,
-    HelpWindow,
-    PagePart,
-    ScenesWindow,
-    StatePart,
-    TopPart,
+    HelpDialog,
+    PagePanel,
+    ScenesDialog,
+    StatePanel,
+    TopPanel,
     key_events,
 )
 from warpspace.app.state.app_state import start_state
@@ -28,7 +28,7 @@ HOSTILE = "<img src=x onerror=alert(1)>.csv"
 
 
 def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
-    bar = Alone(TopPart, STATE)
+    bar = Alone(TopPanel, STATE)
     assert 'data-do="page:undo"' not in bar.html
     bar.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
     assert "Undo: roll of X (Ctrl+Z)" in bar.html
@@ -40,7 +40,7 @@ def test_undo_is_there_when_there_is_something_to_undo_and_says_what():
 def test_scenes_are_chosen_by_title_and_escaped():
     hostile = replace(FIRST, name="other", title=HOSTILE, description=HOSTILE)
     scenes = SceneList({scene.title: scene for scene in (FIRST, SECOND, hostile)})
-    window = Alone(ScenesWindow, STATE, scenes=scenes)
+    window = Alone(ScenesDialog, STATE, scenes=scenes)
     assert "<img" not in window.html
     assert window.html.count('aria-current="true"') == 1
     assert window.do("choose", "nothing of that name").scene is FIRST
@@ -53,7 +53,7 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
     for command in COMMANDS:
         part, _, word = command.event.partition(":")
         if part in ("state", "page") and command.keys and "ctrl" not in command.keys[0]:
-            window = Alone({"state": StatePart, "page": PagePart}[part], STATE)
+            window = Alone({"state": StatePanel, "page": PagePanel}[part], STATE)
             window.part.context.store.apply(lambda state: state.with_amplitude("EAX", 7.0))
             before = replace(window.store.state, exaggeration=None).resulting_scene()
             after = window.do(word, command.value)
@@ -61,7 +61,7 @@ def test_every_key_is_there_once_and_none_without_ctrl_changes_the_model():
 
 
 def test_commands_are_found_by_words_and_enter_runs_the_first():
-    window = Alone(HelpWindow, STATE)
+    window = Alone(HelpDialog, STATE)
     window.store.apply(lambda state: put(state, "page.command", "zero err"))
     assert window.html.count('data-do="help:run"') == 1
     window.do("first", "whatever")
@@ -71,12 +71,12 @@ def test_commands_are_found_by_words_and_enter_runs_the_first():
 
 
 def test_a_link_says_what_it_holds_and_asks_before_it_holds_the_token():
-    window = Alone(FilesWindow, STATE.with_amplitude("EAX", 7.0))
+    window = Alone(FilesDialog, STATE.with_amplitude("EAX", 7.0))
     window.do("share")
     (name, _, token, words) = window.called[-1]
     assert (name, token) == ("share", None)
     assert "1 changed error" in words
-    asking = Alone(FilesWindow, STATE, services=Services(token="secret"))
+    asking = Alone(FilesDialog, STATE, services=Services(token="secret"))
     assert asking.do("share").page.window == "files"
     assert asking.called == []
     asking.do("share", "token")
@@ -89,7 +89,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
     texts = random.Random(1).choices("abcdefghijklmnopqrstuvwxyz0123456789", k=8000)
     notes = [Note(id=f"n{at}", text="".join(texts[at : at + 2000])) for at in range(0, 8000, 2000)]
     for count, expected in ((1, 1), (4, 0)):
-        window = Alone(FilesWindow, replace(STATE, review=tuple(notes[:count])))
+        window = Alone(FilesDialog, replace(STATE, review=tuple(notes[:count])))
         window.do("share")
         opened, _ = open_link(unpack(window.called[-1][1]), None)
         assert len(opened.review) == expected
@@ -98,7 +98,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
 
 
 def test_files_that_a_page_refuses_or_invents_are_said_or_left():
-    window = Alone(FilesWindow, STATE)
+    window = Alone(FilesDialog, STATE)
     window.do("file", f"²\n{HOSTILE}\n")
     assert "has not arrived whole" in window.said[-1][1]
     window.do("file", f"{10**9}\n{HOSTILE}\n")
@@ -112,7 +112,7 @@ def test_files_that_a_page_refuses_or_invents_are_said_or_left():
 def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_own():
     asked, done = [], (b"%PDF", ())
     write = Services(write_report=lambda _, *about: asked.append(about) or done)
-    window = Alone(ReportWindow, STATE, services=write)
+    window = Alone(ReportDialog, STATE, services=write)
     window.context.reported[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
     page = replace(STATE.page, author=HOSTILE, questions="one\n\n two ")
     window.store.apply(lambda state: replace(state, page=page))

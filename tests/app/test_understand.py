@@ -20,9 +20,9 @@ from warpspace.app.evaluation.point_explanation import (
     with_clicked,
     with_picked,
 )
-from warpspace.app.panels.analysis_panel import AnalysisPart
-from warpspace.app.panels.explanation import DistancePart, VolumePart, WorstPart
-from warpspace.app.panels.improve import BestPart
+from warpspace.app.panels.analysis_panel import AnalysisPanel
+from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
+from warpspace.app.panels.improve import BestPanel
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.app.state.typed_numbers import read_positions
@@ -172,7 +172,7 @@ def html_of(part, state=START):
 @pytest.mark.parametrize("name", scene_names())
 def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
     state = start_state(load_scene(name), nodes=5)
-    html = html_of(lone_part(WorstPart), state)
+    html = html_of(lone_part(WorstPanel), state)
     if "No error acts" in html:
         return
     html = html.replace("−", "-")
@@ -183,7 +183,7 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
 
 
 def test_the_worst_point_of_the_thesis_and_another_one():
-    part = lone_part(WorstPart)
+    part = lone_part(WorstPanel)
     assert "why 51.7 µm" in html_of(part)
     assert re.search(r'title="squareness of Z to Y[^"]*">EA0Z</b></th><td>\+49.1', html_of(part))
     typed = part.take(START, "set.at", "X 0 Y 0 Z −280")
@@ -199,7 +199,7 @@ def test_the_worst_point_of_the_thesis_and_another_one():
 
 
 def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_holds():
-    part = lone_part(BestPart)
+    part = lone_part(BestPanel)
     assert "Searching" in html_of(part)
     wait(part)
     html = html_of(part)
@@ -221,7 +221,7 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
 
 def test_an_excluded_error_is_neither_adjusted_nor_lost():
     state = put(START, "exclusions.excluded", "+EA0Z")
-    part = lone_part(BestPart)
+    part = lone_part(BestPanel)
     html_of(part, state)
     wait(part)
     assert "EA0Z" not in html_of(part, state)
@@ -233,7 +233,7 @@ def test_nothing_is_adjusted_where_all_errors_are_excluded():
     state = START
     for key in START.amplitudes:
         state = put(state, "exclusions.excluded", f"+{key}")
-    part = lone_part(BestPart)
+    part = lone_part(BestPanel)
     html_of(part, state)
     wait(part)
     assert "No adjustment helps." in html_of(part, state)
@@ -241,10 +241,10 @@ def test_nothing_is_adjusted_where_all_errors_are_excluded():
 
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     opened = replace(START, page=replace(START.page, open=frozenset({"volume", "gains"})))
-    html = html_of(lone_part(VolumePart), opened)
+    html = html_of(lone_part(VolumePanel), opened)
     for words in ("30.89 µm", "51.72 µm", "550 × 450 × 400 mm"):
         assert words in html
-    part = lone_part(AnalysisPart, "gains")
+    part = lone_part(AnalysisPanel, "gains")
     html_of(part, opened)
     wait(part)
     middle = html_of(part, opened)
@@ -266,7 +266,7 @@ def measuring(**points):
         page=replace(START.page, open=START.page.open | {"distance"}),
         forms={f"distance.{name}": text for name, text in points.items()},
     )
-    return Alone(DistancePart, state, entry)
+    return Alone(DistancePanel, state, entry)
 
 
 def click(alone, at, **more):

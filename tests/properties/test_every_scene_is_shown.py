@@ -24,7 +24,7 @@ from warpspace.app.evaluation.compare import with_pin
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.point_explanation import pick, with_picked
 from warpspace.app.panels.conventions import ConventionsSection
-from warpspace.app.panels.explanation import WorstPart
+from warpspace.app.panels.explanation import WorstPanel
 from warpspace.app.panels.machine_editor import RotarySection
 from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.look import QUANTITIES, SURFACES
@@ -121,7 +121,7 @@ def test_every_panel_has_words_for_it(state):
         " ".join((numbers_words(picture), kept_words(picture)[0], *subject_words(picture))),
         lone_part(RotarySection).body(picture),
         lone_part(ConventionsSection).body(picture),
-        *WorstPart(None).pieces(asked).values(),
+        *WorstPanel(None).pieces(asked).values(),
     ]
     for html in said:
         assert not {"nan", "inf"} & set(html.replace("<", " ").replace(">", " ").split())

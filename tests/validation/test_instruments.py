@@ -137,7 +137,7 @@ def test_a_scale_widens_a_slope_and_a_zero_only_what_no_set_up_takes_up(own, ses
     # four degrees of freedom of the scatter; the least of what is found counts
     rows = [(scatter, zero + scale**2)] if session else [(scatter, zero + scale**2), (0.8, 3.0)]
     freedom = min((a + b) ** 2 / (a**2 / 4.0) for a, b in rows)
-    assert found.scene.covariance.freedom == pytest.approx(freedom)
+    assert found.scene.covariance.dof == pytest.approx(freedom)
     told = found.as_json()["instrument"]
     assert [round(one["share_of_map"], 9) >= 0.0 for one in told["contributions"]] == [True] * 3
     assert sum(one["share_of_map"] for one in told["contributions"]) == pytest.approx(1.0)
@@ -308,7 +308,7 @@ def held_by_planted_machines(name, trials):
             0.0, 8.0 / LIMITS
         )
         for limit in wanted.norm_um + sure.u_norm_um * away:
-            stated = sure.doubt.within(own.norm_um, sure.u95_norm_um, -np.inf, limit)
+            stated = sure.doubt.probability_within(own.norm_um, sure.u95_norm_um, -np.inf, limit)
             verdicts.append((float(stated), wanted.norm_um <= limit))
         volume = volume_uncertainty(found.scene, scene.view(), 5)
         off = volume.norm_um - evaluate(truth, grid=5).norm_um

@@ -51,7 +51,7 @@ def test_squareness_of_an_axis_that_stood_still_is_open_and_makes_the_map_unknow
     u = {one.key: one.standard_uncertainty for one in found.parameters}
     y = readings.coordinates["Y"]
     assert u["EC0Y"] == pytest.approx(1e6 * found.sigma_mm / np.sqrt(np.sum(y**2)), rel=1e-3)
-    assert known.reach["Z"] == (-150.0, -150.0)
+    assert known.measured_range["Z"] == (-150.0, -150.0)
     back = parse_scene(scene_to_toml(found.scene), "s")
     assert back.covariance == known
     assert set(volume_uncertainty(back, back.view(), 3).statistics().values()) == {None}

@@ -9,7 +9,7 @@ from products import first
 from warpspace import evaluate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.instruments import load_instrument
-from warpspace.calibration.kinds import Guess
+from warpspace.calibration.kinds import Prediction
 from warpspace.calibration.positions import Positions
 from warpspace.calibration.readings import find_data, parse_readings
 from warpspace.exceptions import OptionError, SceneError
@@ -82,7 +82,7 @@ def test_planted_errors_place_and_reflector_are_found_from_two_stations():
         coordinates=coordinates, session=tuple(stations), lines=tuple(range(60)),
     )  # fmt: skip
     errors = ErrorSet({key: Constant((-1.0, 1.0), value) for key, value in planted.items()})
-    guess = Guess(errors, Positions().unknowns(like), setup)
+    guess = Prediction(errors, Positions().unknowns(like), setup)
     seen = Positions().observe(UR10, like, guess)
     lines = [
         f"{one},{','.join(map(repr, map(float, at)))}"

@@ -98,9 +98,9 @@ def test_numbers_move_by_one_standard_uncertainty_up_and_down():
     gain = np.array([[1.0, 2.0], [0.5, -1.0]])
     matrix = np.array([[4.0, 3.0], [3.0, 9.0]])
     expected = 2.0 * np.sqrt(np.diagonal(gain @ matrix @ gain.T))
-    assert doubt.through(lambda way: 7.0 + gain @ way) == pytest.approx(expected)
+    assert doubt.propagate(lambda way: 7.0 + gain @ way) == pytest.approx(expected)
     # a width at its least goes up on both sides: no gradient tells its uncertainty
-    assert doubt.through(lambda way: np.abs(way[:1])) == pytest.approx([4.0])
+    assert doubt.propagate(lambda way: np.abs(way[:1])) == pytest.approx([4.0])
 
 
 def test_what_is_not_stated_leaves_all_of_it_unknown():

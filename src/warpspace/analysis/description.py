@@ -76,7 +76,7 @@ class Result(ABC):
 
     def as_plain(self) -> dict[str, Any]:
         """Give that, but for what the first order leaves out."""
-        said = plain(self)
+        said = to_json(self)
         said.pop("second_order", None)
         return said
 
@@ -180,7 +180,7 @@ def count_progress(watch: ProgressCallback, total: float) -> ProgressCallback:
     return advance
 
 
-def plain(value: Any) -> Any:
+def to_json(value: Any) -> Any:
     """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class.
 
     What a mapping `sure` of theirs holds stands beside their other keys.
@@ -189,14 +189,14 @@ def plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): to_json(one) for key, one in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
         names = keys or [entry.name for entry in fields(value)]
-        found = {name: plain(getattr(value, name)) for name in names if name != "sure"}
+        found = {name: to_json(getattr(value, name)) for name in names if name != "sure"}
         sure = getattr(value, "sure", None)
-        return found | plain(sure) if isinstance(sure, Mapping) else found
+        return found | to_json(sure) if isinstance(sure, Mapping) else found
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(one) for one in value]
+        return [to_json(one) for one in value]
     return value

@@ -198,7 +198,7 @@ class BenchResult(Result):
             return np.array([one.value for one in found.quantities])
 
         keys = (one.key for one in run.outcome.quantities)
-        return dict(zip(keys, doubt.through(ask), strict=True))
+        return dict(zip(keys, doubt.propagate(ask), strict=True))
 
     @property
     def charts(self) -> tuple[Lines, ...]:

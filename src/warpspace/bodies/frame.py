@@ -35,7 +35,7 @@ _LONG = 1.5
 """Ratio of travels from which a machine is a gantry on rails instead of a saddle on a wall."""
 
 
-class _Frame:
+class _ToolSide:
     """The tool side while it is built: what all of its bodies are placed by."""
 
     i: int  # index of the direction across: 0 or 1
@@ -84,7 +84,7 @@ class _Frame:
         self.box(frame, what, self.around(inner + thick), j, (z[1], z[1] + roof * self.u))
 
 
-class _Behind(_Frame):
+class _Behind(_ToolSide):
     """What carries a level head from behind: headstock, ram, and a column that may travel."""
 
     def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:
@@ -154,7 +154,7 @@ class _Rear:
     reach: float = 0.0  # half travel along i (or upwards) that the next body has to cover, mm
 
 
-class _Overhead(_Frame):
+class _Overhead(_ToolSide):
     """What carries a head from above."""
 
     def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:

@@ -15,7 +15,7 @@ from warpspace.calibration.calibration_result import (
     TARGETS,
     Calibration,
     Combination,
-    Found,
+    FittedParameter,
     Residuals,
     Target,
     target_words,
@@ -34,10 +34,10 @@ from warpspace.calibration.next_best import next_best, observability, separating
 from warpspace.calibration.readings import Readings, read_readings
 from warpspace.calibration.solve import (
     MAD,
+    FitParameters,
     MeasurementModel,
     Rank,
     Solved,
-    Terms,
     Watch,
     automatic,
     build_terms,
@@ -323,14 +323,14 @@ def _fit(
     rows = tuple(map(tuple, ((covariance + covariance.T) / 2.0).tolist()))
     least, missed = float(degrees.min(initial=np.inf)), (lack or 0.0) if lack_notes else 0.0
     told_together = Covariance(part.keys, rows, least, lack_of_fit=missed)
-    ways = () if request.priors else rank.open_ways
+    ways = () if request.priors else rank.null_space
     title = f"{scene.title.removesuffix(CALIBRATED)}{CALIBRATED}"[:MAX_TEXT]
     fitted_scene = replace(
         scene,
         title=title,
         errors=errors,
         uncertainty={key: one for key, one in scene.uncertainty.items() if key not in part.keys},
-        covariance=_covariance(scene, terms, ways, told_together.reaching(stack.positions)),
+        covariance=_covariance(scene, terms, ways, told_together.extended(stack.positions)),
     )
     outliers = _outliers(stack, after)
     held, coverage, held_notes = _predict(
@@ -393,7 +393,7 @@ def _moved(instrument: Instrument, stack: MeasurementModel, solved: Solved) -> l
     return [-answer @ (weights * common_mode(stack, one)) for one in instrument.shared]
 
 
-def _rank(stack: MeasurementModel, terms: Terms, unknown: Array) -> Rank:
+def _rank(stack: MeasurementModel, terms: FitParameters, unknown: Array) -> Rank:
     by_parameter, by_unknown = stack.derivatives(terms, terms.start, unknown)
     weights = np.concatenate(stack.weights())[:, None]
     return find_rank(terms.keys, weights * by_parameter, weights * by_unknown, stack.blind)
@@ -426,7 +426,7 @@ def _prior(scene: Scene, keys: Sequence[str]) -> tuple[Array, Array]:
 
 
 def _covariance(
-    scene: Scene, terms: Terms, ways: Sequence[Mapping[str, float]], found: Covariance
+    scene: Scene, terms: FitParameters, ways: Sequence[Mapping[str, float]], found: Covariance
 ) -> Covariance | None:
     """Join what was found with what the scene knew of other errors, and say what is left open.
 
@@ -435,7 +435,7 @@ def _covariance(
     """
     known = (scene.covariance or Covariance((), ())).without(found.keys)
     stated = {*scene.uncertainty} - {*found.keys} | {*known.keys}
-    ends, draw = found.reaching(scene.workspace.ranges).reach, np.random.default_rng(0)
+    ends, draw = found.extended(scene.workspace.ranges).measured_range, np.random.default_rng(0)
     poses = {axis: draw.uniform(*ends[axis], POSES) for axis in ends}
     undetermined: dict[str, float] = {}
     for loop in (Loop.TOOL, Loop.RELATIVE) if ways else ():
@@ -450,42 +450,44 @@ def _covariance(
         return None
     matrix, cut = np.zeros((len(keys),) * 2), len(found.keys)
     matrix[:cut, :cut], matrix[cut:, cut:] = found.matrix, known.matrix
-    rows, freedom = tuple(map(tuple, matrix.tolist())), min(found.freedom, known.freedom)
+    rows, freedom = tuple(map(tuple, matrix.tolist())), min(found.dof, known.dof)
     lack = max(found.lack_of_fit, known.lack_of_fit)
-    whole = Covariance(keys, rows, freedom, known.reach, tuple(dict.fromkeys(left)), lack)
-    return whole.reaching(found.reach)
+    whole = Covariance(keys, rows, freedom, known.measured_range, tuple(dict.fromkeys(left)), lack)
+    return whole.extended(found.measured_range)
 
 
 def _found(
-    terms: Terms,
-    part: Terms,
+    terms: FitParameters,
+    part: FitParameters,
     rank: Rank,
     solved: Solved,
     covariance: Array,
     degrees: Array,
     *,
     has_prior: bool,
-) -> tuple[tuple[Found, ...], tuple[Combination, ...]]:
+) -> tuple[tuple[FittedParameter, ...], tuple[Combination, ...]]:
     from scipy.stats import t
 
     factors = t.ppf(0.975, degrees)
     held = dict(zip(terms.keys, terms.start.tolist(), strict=True))
-    rows: list[Found] = []
+    rows: list[FittedParameter] = []
     sums: list[Combination] = []
     for at, key in enumerate(terms.keys):
         before = float(terms.start[at])
         if key not in part.keys:
-            rows.append(Found(key, before, before, None, None, "no"))
+            rows.append(FittedParameter(key, before, before, None, None, "no"))
             continue
         own = part.keys.index(key)
         value, width = float(solved.amplitudes[own]), float(np.sqrt(covariance[own, own]))
         half = float(factors[own]) * width
         told = "yes" if rank.is_identifiable(key) else "in part"
         if told == "yes" or has_prior:
-            rows.append(Found(key, before, value, width, (value - half, value + half), told))
+            rows.append(
+                FittedParameter(key, before, value, width, (value - half, value + half), told)
+            )
             continue
-        rows.append(Found(key, before, value, None, None, told))
-        shares = rank.told_with(key)
+        rows.append(FittedParameter(key, before, value, None, None, told))
+        shares = rank.confounded_with(key)
         total = value + sum(shares[other] * held[other] for other in shares if other != key)
         sums.append(Combination(shares, total, width, (total - half, total + half)))
     return tuple(rows), tuple(sums)
@@ -506,8 +508,8 @@ def _outliers(stack: MeasurementModel, after: Sequence[Array]) -> list[tuple[int
 
 def _predict(
     stack: MeasurementModel,
-    terms: Terms,
-    part: Terms,
+    terms: FitParameters,
+    part: FitParameters,
     predict: Sequence[Readings],
     begin: Solved,
     solved: Solved,

@@ -19,7 +19,7 @@ from warpspace.analysis.blocks import (
     Table,
     number_columns,
 )
-from warpspace.analysis.description import Change, Result, plain
+from warpspace.analysis.description import Change, Result, to_json
 from warpspace.analysis.options import place_words
 from warpspace.calibration.instruments import budget_blocks
 from warpspace.calibration.readings import Circle, Readings
@@ -44,7 +44,7 @@ MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their un
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FittedParameter:
     """One parameter after a calibration."""
 
     keys: ClassVar[tuple[str, ...]] = (
@@ -178,7 +178,7 @@ class Calibration(Result):
 
     scene: Scene  # with the errors found
     title: str  # of the scene before
-    parameters: tuple[Found, ...]
+    parameters: tuple[FittedParameter, ...]
     combinations: tuple[Combination, ...]  # what is told of the parameters that are told in part
     rank: Rank
     slopes: frozenset[str]  # parameters of which a slope was looked for
@@ -227,10 +227,10 @@ class Calibration(Result):
 
     def as_json(self) -> dict[str, Any]:
         return {
-            "parameters": plain(self.parameters),
-            "combinations": plain(self.combinations),
+            "parameters": to_json(self.parameters),
+            "combinations": to_json(self.combinations),
             "rank": self.rank.rank,
-            "confounded": plain(self.rank.confounded),
+            "confounded": to_json(self.rank.confounded),
             "unseen": list(self.rank.unseen),
             "cannot_tell": list(spell_rank(self.rank, self.slopes)),
             "separated_by": [
@@ -240,11 +240,11 @@ class Calibration(Result):
             "degrees_of_freedom": self.freedom,
             "set_up_mm": dict(self.unknowns),
             "correlation": {"keys": list(self.fit), "matrix": self.correlation.tolist()},
-            "circles": plain(self.circles),
+            "circles": to_json(self.circles),
             "lack_of_fit": self.lack_of_fit,
             "instrument": self.instrument,
             "merit": dict(self.merit),
-            "next": plain(self.steps),
+            "next": to_json(self.steps),
             "fitted": [group.as_json() for group in self.fitted],
             "predicted": [group.as_json() for group in self.predicted],
             "notes": list(self.notes),
@@ -397,13 +397,13 @@ class Calibration(Result):
         title = "Residuals, observed − predicted, by reading"
         return Lines("lines", title, "reading", "length [µm]", tuple(curves), bands)
 
-    def _told(self) -> Iterator[Found]:
+    def _told(self) -> Iterator[FittedParameter]:
         together = {next(iter(one.factors)): one for one in self.combinations}
         for one in self.parameters:
             if (total := together.get(one.key)) is not None:
                 before = total.value - one.value + one.before
                 width, interval = total.standard_uncertainty, total.interval_95
-                yield Found(one.key, before, total.value, width, interval, one.told)
+                yield FittedParameter(one.key, before, total.value, width, interval, one.told)
             elif one.interval_95 is not None:
                 yield one
 

@@ -34,7 +34,7 @@ VIEW = View(Loop.RELATIVE, "workpiece")
 
 
 @dataclass(frozen=True, slots=True)
-class Guess:
+class Prediction:
     """What readings are predicted from: errors, and what the set-ups leave unknown."""
 
     errors: ErrorSet
@@ -80,12 +80,12 @@ class MeasurementKind(ABC):
         return np.zeros(len(self.unknowns(readings)))
 
     @abstractmethod
-    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
+    def observe(self, scene: Scene, readings: Readings, guess: Prediction) -> Array:
         """Give the readings that errors would lead to, with the exact model, [n, d], mm."""
 
     @abstractmethod
     def slopes(
-        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
+        self, scene: Scene, readings: Readings, guess: Prediction, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         """Differentiate the readings, [n, d, K], mm per µm or µrad, and by unknowns, [n, d, m]."""
 
@@ -100,18 +100,18 @@ class FromVectors(MeasurementKind):
 
     @abstractmethod
     def predict(
-        self, readings: Readings, error_mm: Array, guess: Guess
+        self, readings: Readings, error_mm: Array, guess: Prediction
     ) -> tuple[Array, Array, Array]:
         """Give the readings, [n, d], mm, that errors, [n, 3], mm, would lead to.
 
         Beside them their derivatives: by the error, [n, d, 3], and by unknowns, [n, d, m].
         """
 
-    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
+    def observe(self, scene: Scene, readings: Readings, guess: Prediction) -> Array:
         return self.predict(readings, _error_mm(scene, readings, guess), guess)[0]
 
     def slopes(
-        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
+        self, scene: Scene, readings: Readings, guess: Prediction, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         error_mm = _error_mm(scene, readings, guess)
         _, by_error, by_unknown = self.predict(readings, error_mm, guess)
@@ -120,7 +120,7 @@ class FromVectors(MeasurementKind):
         return gains, by_unknown
 
 
-def _error_mm(scene: Scene, readings: Readings, guess: Guess) -> Array:
+def _error_mm(scene: Scene, readings: Readings, guess: Prediction) -> Array:
     field = evaluate_exact(scene.model, guess.errors, readings.coordinates, VIEW)
     return field.error_um * MM_PER_UM
 
@@ -144,7 +144,7 @@ class FreePlacementKind(FromVectors):
         return total / np.maximum(member.sum(axis=(0, 1)), 1.0)
 
     def predict(
-        self, readings: Readings, error_mm: Array, guess: Guess
+        self, readings: Readings, error_mm: Array, guess: Prediction
     ) -> tuple[Array, Array, Array]:
         member = self._members(readings, guess.unknowns)
         by_error = np.broadcast_to(self.sign * np.eye(3), (*error_mm.shape, 3))
@@ -324,7 +324,7 @@ class Lengths(FromVectors):
         )
 
     def predict(
-        self, readings: Readings, error_mm: Array, guess: Guess
+        self, readings: Readings, error_mm: Array, guess: Prediction
     ) -> tuple[Array, Array, Array]:
         index = {name: at for at, name in enumerate(guess.unknowns)}
         first = np.array([index[f"station {name} x"] for name in readings.session])

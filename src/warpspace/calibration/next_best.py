@@ -242,7 +242,7 @@ def separating(
 
 def _information(
     stack: solve.MeasurementModel,
-    terms: solve.Terms,
+    terms: solve.FitParameters,
     noise_mm: float,
     instrument: Instrument = NO_INSTRUMENT,
 ) -> Array:
@@ -275,7 +275,7 @@ def _covariance(known: Array) -> Array:
 FACTOR = coverage_factor(np.inf)
 
 
-def u95_at(scene: Scene, terms: solve.Terms, target: Target) -> Callable[[Array], float]:
+def u95_at(scene: Scene, terms: solve.FitParameters, target: Target) -> Callable[[Array], float]:
     """Give what tells U95 of a position error, µm, by the covariance of the parameters.
 
     Of the map the root mean square over the volume, of its corners the largest at a node; of the
@@ -302,7 +302,7 @@ def u95_at(scene: Scene, terms: solve.Terms, target: Target) -> Callable[[Array]
     return told
 
 
-def _u95_of_part(scene: Scene, terms: solve.Terms, target: str) -> Callable[[Array], float]:
+def _u95_of_part(scene: Scene, terms: solve.FitParameters, target: str) -> Callable[[Array], float]:
     from warpspace.parts.inspection import measure_changes
     from warpspace.parts.workpiece import fit_out, load_part, make_points, place_part, point_basis
 

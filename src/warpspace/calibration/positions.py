@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpspace.calibration.kinds import Guess, MeasurementKind
+from warpspace.calibration.kinds import MeasurementKind, Prediction
 from warpspace.calibration.readings import (
     Readings,
     ReadingTable,
@@ -56,7 +56,7 @@ class Positions(MeasurementKind):
         check_poses(coordinates, table.source)
         readings = take_readings(self.name, scene, table, coordinates, observed, notes)
         readings = replace(readings, first_fit=_first_fit(scene, readings))
-        guess = Guess(scene.errors, self.unknowns(readings), np.array(readings.first_fit))
+        guess = Prediction(scene.errors, self.unknowns(readings), np.array(readings.first_fit))
         missed = observed - self.observe(scene, readings, guess)
         hint = "Are they in mm, angles in degrees, and is the machine that of the scene?"
         check_spread(float(np.abs(missed).max()), SPREAD_MM, table.source, hint)
@@ -73,11 +73,11 @@ class Positions(MeasurementKind):
     def start(self, readings: Readings) -> Array:
         return np.array(readings.first_fit)
 
-    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
+    def observe(self, scene: Scene, readings: Readings, guess: Prediction) -> Array:
         return _seen(scene, readings, guess, _poses(scene, readings, guess.errors))
 
     def slopes(
-        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
+        self, scene: Scene, readings: Readings, guess: Prediction, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         """Differentiate by differences: errors of a robot are too large for the first order."""
         pose = _poses(scene, readings, guess.errors)
@@ -108,7 +108,7 @@ def _poses(scene: Scene, readings: Readings, errors: ErrorSet) -> Array:
     return transforms.inverse(workpiece) @ tool
 
 
-def _seen(scene: Scene, readings: Readings, guess: Guess, pose: Array) -> Array:
+def _seen(scene: Scene, readings: Readings, guess: Prediction, pose: Array) -> Array:
     known = dict(zip(guess.unknowns, guess.values, strict=True))
     sessions, row = np.unique(readings.session, return_inverse=True)
 

@@ -11,7 +11,7 @@ from warpspace.analysis.options import Option
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
 from warpspace.bench.plan import TestPlan, respond, simulate
-from warpspace.calibration.kinds import Guess, Lengths, MeasurementKind, Points, Tracker
+from warpspace.calibration.kinds import Lengths, MeasurementKind, Points, Prediction, Tracker
 from warpspace.calibration.positions import Positions
 from warpspace.calibration.readings import Readings, ReadingTable, check_spread
 from warpspace.calibration.spheres import SphereKind, SphereTcp
@@ -87,13 +87,13 @@ class TestReadings(MeasurementKind):
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         return tuple(f"{readings.source} {name}" for name in _plan(readings).setup)
 
-    def observe(self, scene: Scene, readings: Readings, guess: Guess) -> Array:
+    def observe(self, scene: Scene, readings: Readings, guess: Prediction) -> Array:
         machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
         taken = simulate(machine, _plan(readings)) * MM_PER_UM
         return (taken + _set_up(readings, guess.unknowns) @ guess.values)[:, None]
 
     def slopes(
-        self, scene: Scene, readings: Readings, guess: Guess, keys: tuple[str, ...]
+        self, scene: Scene, readings: Readings, guess: Prediction, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
         matrix = respond(machine, _plan(readings), keys) * MM_PER_UM

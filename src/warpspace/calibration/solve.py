@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpspace.calibration.kinds import BLIND, Guess
+from warpspace.calibration.kinds import BLIND, Prediction
 from warpspace.calibration.readings import Readings
 from warpspace.calibration.registry import find_kind
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -37,7 +37,7 @@ class Rank:
         return key in self.kept and not any(key in group for group in self.confounded)
 
     @property
-    def open_ways(self) -> list[dict[str, float]]:
+    def null_space(self) -> list[dict[str, float]]:
         """Sums of parameters that do not show in the readings."""
         alike = [
             {first: 1.0, **{key: -share for key, share in row.items()}}
@@ -45,7 +45,7 @@ class Rank:
         ]
         return [*({key: 1.0} for key in self.unseen), *alike]
 
-    def told_with(self, key: str) -> dict[str, float]:
+    def confounded_with(self, key: str) -> dict[str, float]:
         """Give the sum of parameters that the readings tell where they tell one of them in part."""
         others = {first: row[key] for first, row in self.alike.items() if key in row}
         return {key: 1.0, **others}
@@ -131,7 +131,7 @@ CURVES = ("constant", "ramp")
 
 
 @dataclass(frozen=True, slots=True)
-class Terms:
+class FitParameters:
     """Parameters to be found, and the errors that their amplitudes give."""
 
     keys: tuple[str, ...]  # (K,)
@@ -144,7 +144,7 @@ class Terms:
             functions[key] = functions[key].with_amplitude(float(value))
         return ErrorSet(functions)
 
-    def only(self, keys: Sequence[str]) -> "Terms":
+    def only(self, keys: Sequence[str]) -> "FitParameters":
         start = np.array([self.start[self.keys.index(key)] for key in keys], dtype=float)
         return replace(self, keys=tuple(keys), start=start)
 
@@ -158,7 +158,7 @@ class Terms:
         return tuple(parameter(key) for key in self.keys)
 
 
-def build_terms(scene: Scene, keys: Sequence[str]) -> Terms:
+def build_terms(scene: Scene, keys: Sequence[str]) -> FitParameters:
     """Give each parameter a curve: the scene's own, else what its kind suggests."""
     functions = dict(scene.errors.functions)
     names: list[str] = []
@@ -178,7 +178,9 @@ def build_terms(scene: Scene, keys: Sequence[str]) -> Terms:
             kind = Ramp if ramp and not row.is_constant else Constant
             functions[key] = kind(scene.axis_span(row.axis))
     errors = ErrorSet(functions)
-    return Terms(tuple(names), errors, np.array([errors.amplitude(key) for key in names], float))
+    return FitParameters(
+        tuple(names), errors, np.array([errors.amplitude(key) for key in names], float)
+    )
 
 
 def read_keys(text: str, _scene: Scene) -> tuple[str, ...] | None:
@@ -254,19 +256,21 @@ class MeasurementModel:
                 values.setdefault(name, float(value))
         return np.array([values[name] for name in self.unknowns])
 
-    def residuals(self, terms: Terms, amplitudes: Array, unknown: Array) -> list[Array]:
+    def residuals(self, terms: FitParameters, amplitudes: Array, unknown: Array) -> list[Array]:
         """Give observed − predicted of each set with the exact model, [n, d] each, mm."""
         self.watch()
-        guess = Guess(terms.errors_with(amplitudes), self.unknowns, unknown)
+        guess = Prediction(terms.errors_with(amplitudes), self.unknowns, unknown)
         return [
             one.observed_mm - find_kind(one.kind).observe(self.scene, one, guess)
             for one in self.sets
         ]
 
-    def derivatives(self, terms: Terms, amplitudes: Array, unknown: Array) -> tuple[Array, Array]:
+    def derivatives(
+        self, terms: FitParameters, amplitudes: Array, unknown: Array
+    ) -> tuple[Array, Array]:
         """Give the change of all predictions, [N, K] per µm or µrad and [N, m] per mm."""
         self.watch()
-        guess = Guess(terms.errors_with(amplitudes), self.unknowns, unknown)
+        guess = Prediction(terms.errors_with(amplitudes), self.unknowns, unknown)
         by_parameter: list[Array] = []
         by_unknown: list[Array] = []
         for one in self.sets:
@@ -332,7 +336,7 @@ class Solved:
 
 def solve(
     stack: MeasurementModel,
-    terms: Terms,
+    terms: FitParameters,
     prior: tuple[Array, Array] | None = None,
     unknown: Array | None = None,
     *,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from warpspace.analysis.commands.concepts import Concepts, ConceptsResult
-    from warpspace.analysis.commands.montecarlo import Machines, MachinesResult
+    from warpspace.analysis.commands.montecarlo import MonteCarlo, MonteCarloResult
     from warpspace.analysis.description import ProgressCallback
     from warpspace.analysis.sampling.machine_sampling import Take
     from warpspace.scene.model import Scene
@@ -62,7 +62,7 @@ def draw_beside(
 
 
 def sample(
-    asked: "Machines",
+    asked: "MonteCarlo",
     scenes: "Sequence[Scene]",
     watch: "ProgressCallback",
     *,
@@ -72,7 +72,7 @@ def sample(
     output: str | None,
     plot: str | None,
     force: bool,
-) -> "MachinesResult":
+) -> "MonteCarloResult":
     """Sample on whatever does the work; write |E| of machines as they are sampled, or the rows."""
     asked.check_against(len(scenes))
     if plot is not None and (len(scenes) > 1 or asked.in_rows):

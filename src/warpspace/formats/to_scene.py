@@ -83,7 +83,7 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
     covariance = base.covariance and base.covariance.without(curves)
     if uncertainty:
-        covariance = (covariance or Covariance((), ())).reaching(_ranges(found))
+        covariance = (covariance or Covariance((), ())).extended(_ranges(found))
     scene = replace(
         base,
         model=model,

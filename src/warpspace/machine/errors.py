@@ -96,9 +96,11 @@ class Covariance:
 
     keys: tuple[str, ...]  # (K,)
     rows: tuple[tuple[float, ...], ...]  # (K, K); products of µm and µrad
-    freedom: float = np.inf  # degrees of freedom of what it was found from
+    dof: float = np.inf  # degrees of freedom of what it was found from
     # positions between which axes stood, mm or degrees; beyond them nothing was measured
-    reach: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    measured_range: Mapping[str, tuple[float, float]] = field(
+        default_factory=dict[str, tuple[float, float]]
+    )
     undetermined: tuple[str, ...] = ()  # other errors, which the data left open although they act
     lack_of_fit: float = 0.0  # how many times as far residuals scattered as readings; 0: not seen
 
@@ -115,9 +117,9 @@ class Covariance:
             self, keys=tuple(self.keys[at] for at in kept), rows=rows, undetermined=undetermined
         )
 
-    def reaching(self, places: Mapping[str, ArrayLike]) -> "Covariance":
+    def extended(self, places: Mapping[str, ArrayLike]) -> "Covariance":
         """Count positions where axes stood as measured, mm or degrees."""
-        reach = dict(self.reach)
+        reach = dict(self.measured_range)
         for axis, at in places.items():
             every = np.append(at, reach.get(axis, ()))
             low, high = float(every.min()), float(every.max())
@@ -127,7 +129,7 @@ class Covariance:
     def outside(self, at: Mapping[str, Array], shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Tell where axes stand outside what was reached, of a shape."""
         found = np.zeros(shape, dtype=bool)
-        for axis, (low, high) in self.reach.items():
+        for axis, (low, high) in self.measured_range.items():
             found |= (at[axis] < low - MIN_SPAN) | (at[axis] > high + MIN_SPAN)
         return found
 

@@ -112,7 +112,9 @@ class Clamp(OfPart):
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
         if is_large or not scene_uncertainty(scene, Loop.RELATIVE):
             return result
-        return result.said_of(*(_doubts(scene, mesh, one.place) for one in (now, first)))
+        return result.with_expanded_uncertainty(
+            *(_doubts(scene, mesh, one.place) for one in (now, first))
+        )
 
 
 def _judge(scene: Scene, part: PartMesh) -> Clamping:
@@ -125,7 +127,7 @@ def _judge(scene: Scene, part: PartMesh) -> Clamping:
 def _doubts(scene: Scene, mesh: PartMesh, place: Sequence[float]) -> list[FieldUncertainty]:
     made = make_points(scene, place_part(mesh, scene, place).vertices_mm)
     found = made_doubt(scene, made)
-    return [found, found.seen(partial(fit_out, made.point_mm))] if found else []
+    return [found, found.transform(partial(fit_out, made.point_mm))] if found else []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +144,7 @@ class ClampResult(Result):
     warnings: tuple[str, ...]  # of the mesh
     sure: Numbers = field(default_factory=dict[str, float | None])  # U95 of what is gained
 
-    def said_of(self, *each: list[FieldUncertainty]) -> "ClampResult":
+    def with_expanded_uncertainty(self, *each: list[FieldUncertainty]) -> "ClampResult":
         """Say U95 at present, at the best place and of the gain."""
         before, after = (found[self.placed] for found in each)
         gain = before.u95(before.gradients[-1] - after.gradients[-1])

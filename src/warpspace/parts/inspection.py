@@ -312,7 +312,7 @@ def inspect(
     u95: list[float | None] = [None] * len(wanted)
     if sure is not None:
         changes = fit_out(points, sure.response @ turn)
-        u95 = sure.doubt.through(
+        u95 = sure.doubt.propagate(
             lambda change: take(placed[:1] + np.tensordot(change, changes, 1))[0]
         )
     measures = [dict[str, Mapping[str, Any]]() for _ in features]
@@ -390,7 +390,7 @@ def _numbers(
         left_out += 0.0 if kind.is_angle else between_um
         share = float(beyond <= 0.0)
         if doubt is not None:
-            share = None if u95 is None else float(doubt.within(placed, u95, *band))
+            share = None if u95 is None else float(doubt.probability_within(placed, u95, *band))
             found["probability"] = share
         verdict = "kept" if (share or 0.0) >= SURE else "missed"
         if share is None or 1.0 - SURE < share < SURE:

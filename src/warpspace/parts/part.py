@@ -88,7 +88,7 @@ class Part(OfPart):
         unseen = between if between > SEEN_UM else 0.0
         fit = partial(fit_out, made.point_mm)
         sure = None if is_large else made_doubt(scene, made)
-        both = (made.error_um, sure), (fit(made.error_um), sure and sure.seen(fit))
+        both = (made.error_um, sure), (fit(made.error_um), sure and sure.transform(fit))
         cut, placed = _off(part, made, *both)
         return PartResult(
             vertices=len(mesh.vertices_mm),
@@ -145,7 +145,10 @@ def _off(
             normal[name] = value
             if sure is not None:
                 normal[f"u95_{name}"] = sure.u95_along(vertex, way)
-        yield Off(deviation=sure.said_of(deviation) if sure else deviation, normal=normal)
+        yield Off(
+            deviation=sure.with_expanded_uncertainty(deviation) if sure else deviation,
+            normal=normal,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.contributions import budget_words, explain
-from warpspace.analysis.description import Analysis, ProgressCallback, Result, plain
+from warpspace.analysis.description import Analysis, ProgressCallback, Result, to_json
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Statistics
 from warpspace.analysis.uncertainty.propagation import (
@@ -97,7 +97,7 @@ class ToolPath:
             at = int(np.argmax(um))
             x, y, z = self.tip_mm[at].tolist()
             found = Statistics(mean, square**0.5, p95, float(um[at]), (x, y, z), self.axes_at(at))
-            yield self.sure.seen(seen).said_of(found) if self.sure else found
+            yield self.sure.transform(seen).with_expanded_uncertainty(found) if self.sure else found
 
     @cached_property
     def shares(self) -> Array:
@@ -295,8 +295,8 @@ class ProgramResult(Result):
 
     def as_plain(self) -> dict[str, Any]:
         refused = [{"line": line, "word": word} for line, word in self.read.refused.items()]
-        said = {"blocks": self.read.blocks, "refused": refused, **plain(self)}
-        return said | ({"line": plain(self.line)} if self.line else {})
+        said = {"blocks": self.read.blocks, "refused": refused, **to_json(self)}
+        return said | ({"line": to_json(self.line)} if self.line else {})
 
     def doubts(self) -> Iterator[str]:
         if refused := [f"line {line} {word}" for line, word in self.read.refused.items()]:

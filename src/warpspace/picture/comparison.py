@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import plain
+from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
@@ -64,7 +64,7 @@ class DifferencePicture(ScenePicture):
             "scene": self.scene.name,
             "title": self.scene.title,
             "settings": self.settings,
-            "statistics": plain(self.statistics),
+            "statistics": to_json(self.statistics),
             "statistics_of": DIFFERENCE_LENGTH,
             "change": statistics_change(self.a.statistics, self.b.statistics),
             "a": self.a.provenance,

@@ -83,7 +83,7 @@ def length_words(found: FieldUncertainty | None, point: int = 0) -> str:
 
 def beyond_words(scene: Scene, loop: Loop) -> str:
     """Say where axes of a loop stood at no time while a scene was measured: ``Z below −300``."""
-    reach = scene.covariance.reach if scene.covariance else {}
+    reach = scene.covariance.measured_range if scene.covariance else {}
     axes = loop_axes(scene.model, loop)
     said: list[str] = []
     for axis, (low, high) in reach.items():

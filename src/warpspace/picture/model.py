@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.commands.concepts import Concept, expected_um
-from warpspace.analysis.description import plain
+from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import SURE, FieldUncertainty, field_uncertainty
 from warpspace.exceptions import OptionError
@@ -381,7 +381,7 @@ class ScenePicture(Picture):
             "machine": scene.machine.title,
             "chain": str(scene.machine.chain),
             "settings": self.settings,
-            "statistics": plain(self.statistics),
+            "statistics": to_json(self.statistics),
             "parameters": {
                 key: {"amplitude": scene.errors.amplitude(key), "unit": parameter(key).unit}
                 for key in scene.errors

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max
 from warpspace.analysis.sampling.cases import Case, SamplingPlan
 from warpspace.analysis.sampling.distribution import Distribution, build_draws, loop_keys
-from warpspace.analysis.sampling.machine_sampling import MonteCarlo, montecarlo
+from warpspace.analysis.sampling.machine_sampling import SampleStatistics, montecarlo
 from warpspace.analysis.tolerance_check import Check, check_errors, measured
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop, Model
@@ -171,7 +171,7 @@ def table_4_5() -> Iterator[Row]:
 SAMPLES, SEED = 100_000, 0  # as many as the thesis has
 
 
-def sampled(case: ThesisCase, name: str, distribution: str) -> MonteCarlo:
+def sampled(case: ThesisCase, name: str, distribution: str) -> SampleStatistics:
     side, _, which = name.partition("_")
     loop, model = Loop(side), case.model
     scene = case.general if which == "general" else case.proposed

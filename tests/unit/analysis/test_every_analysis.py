@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from warpspace import load_scene
 from warpspace.analysis import Analysis, Column, Result, Table, option, register, unregister
 from warpspace.analysis.blocks import Bars, Histogram, Lines
-from warpspace.analysis.description import ignore_progress, plain
+from warpspace.analysis.description import ignore_progress, to_json
 from warpspace.analysis.options import options_of
 from warpspace.analysis.registry import TASKS, entries, first_line
 from warpspace.cli.analyses import command_of, print_blocks
@@ -95,7 +95,7 @@ def test_text_page_and_json_say_the_result(entry, scene, capsys):
         own = [one.name for one in fields(result) if one.name != "second_order"]
         keys = list(result.keys or own)
         assert list(spelled) == keys + ["second_order_um"] * bool(result.second_order)
-    assert json.loads(json.dumps(spelled, allow_nan=False)) == plain(spelled)
+    assert json.loads(json.dumps(spelled, allow_nan=False)) == to_json(spelled)
     print_blocks(result.blocks())
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80

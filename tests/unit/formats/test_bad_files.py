@@ -208,9 +208,9 @@ reach = { X = [-10, 20], Y = 7 }
     assert (scene.covariance.keys, scene.covariance.rows) == (("EC0Y",), ((9.0,),))
     assert set(scene.uncertainty) == ({"EXX"} if u else set())
     assert scene_uncertainty(scene, Loop.RELATIVE).unknown == (() if u else ("EXX",))
-    assert scene.covariance.reach["X"] == ((-100.0, 100.0) if u else (-10.0, 20.0))
+    assert scene.covariance.measured_range["X"] == ((-100.0, 100.0) if u else (-10.0, 20.0))
     alone = into_scene(reading, None, "", "x.csv").scene
-    assert (alone.covariance.reach if u else alone.covariance) == (
+    assert (alone.covariance.measured_range if u else alone.covariance) == (
         {"X": (-100.0, 100.0)} if u else None
     )
 

@@ -183,4 +183,4 @@ def test_a_file_of_numpy_that_cannot_be_read_is_named(tmp_path, write):
 
 
 def test_degrees_of_freedom_that_are_not_given_are_infinite():
-    assert parse_scene(SCENE, "s").covariance.freedom == math.inf
+    assert parse_scene(SCENE, "s").covariance.dof == math.inf

@@ -371,8 +371,12 @@ def _with_doubt(found: AdjustResult, before: FieldUncertainty, basis: ErrorBasis
     def sure(adjust: Mapping[str, float]) -> Numbers:
         values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
-        helps = {"probability": before.falls(after, f"{found.objective}_um")} if adjust else {}
-        return {**after.said_of(found.before).expanded_uncertainty, **helps}
+        helps = (
+            {"probability": before.probability_of_improvement(after, f"{found.objective}_um")}
+            if adjust
+            else {}
+        )
+        return {**after.with_expanded_uncertainty(found.before).expanded_uncertainty, **helps}
 
     def sure_effect(one: Effect) -> Effect:
         best = replace(one.best, sure=sure({one.key: one.best.value}))

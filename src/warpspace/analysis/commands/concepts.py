@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.commands.contributions import Share, SharesResult, variance_contributions
+from warpspace.analysis.commands.contributions import (
+    ContributionsResult,
+    Share,
+    variance_contributions,
+)
 from warpspace.analysis.commands.montecarlo import sampled_second_order
 from warpspace.analysis.description import ProgressCallback, Result, count_progress
 from warpspace.analysis.options import option
-from warpspace.analysis.sampling.machine_sampling import MonteCarlo, Progress, montecarlo
+from warpspace.analysis.sampling.machine_sampling import Progress, SampleStatistics, montecarlo
 from warpspace.analysis.sampling.sampling_options import KeptLimit
 from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import build_basis
@@ -34,9 +38,9 @@ class Concept:
     """One machine among others."""
 
     scene: Scene  # with the tolerances that were taken, its errors absolute
-    sampled: MonteCarlo  # |E| of machines within tolerance
+    sampled: SampleStatistics  # |E| of machines within tolerance
     # what each tolerance adds to the variance of E, the largest first
-    shares: SharesResult
+    shares: ContributionsResult
 
     @property
     def leading(self) -> tuple[Share, ...]:

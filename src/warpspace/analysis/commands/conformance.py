@@ -69,7 +69,7 @@ class Conformance(Analysis):
             return np.array([100.0 * share_below(moved, self.limit_um), *keeps])
 
         percent, *keeps_um = ask(field.error_um).tolist()
-        u95, *u95_um = sure.through(ask) if sure else [None] * (1 + len(SHARES))
+        u95, *u95_um = sure.propagate(ask) if sure else [None] * (1 + len(SHARES))
         names = [f"{part:.0%}" for part in SHARES]
         told = {"u95_percent": u95, "u95_keeps_um": dict(zip(names, u95_um, strict=True))}
         return ConformanceResult(

@@ -69,7 +69,7 @@ def _average_gains(case: Case) -> Array:
     return case.responses(case.site.average())
 
 
-def variance_contributions(case: Case, sobol: int | None = None) -> "SharesResult":
+def variance_contributions(case: Case, sobol: int | None = None) -> "ContributionsResult":
     draws = case.draws
     variance, offset = expected_square(case)
     total = float(variance.sum())
@@ -89,7 +89,7 @@ def variance_contributions(case: Case, sobol: int | None = None) -> "SharesResul
         for index, key in enumerate(draws.keys)
     ]
     rows.sort(key=lambda row: -row.share)
-    return SharesResult(
+    return ContributionsResult(
         contributions=tuple(rows), variance_um2=total, rms_um=float(np.sqrt(total + offset))
     )
 
@@ -139,7 +139,7 @@ def _sobol(case: Case, base: int) -> Mapping[str, tuple[float, float, float]]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shares(Sampled):
+class Contributions(Sampled):
     """Show which tolerances the volumetric error comes from.
 
     The variance of the volumetric error is shared out over the tolerances of SCENE, in percent.
@@ -160,7 +160,7 @@ class Shares(Sampled):
         unset="none",
     )
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "SharesResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "ContributionsResult":
         if self.sobol is not None and self.sobol < 2:
             raise OptionError(f"{{sobol}} {self.sobol}; expected a power of two, 2 or above")
         plan = SamplingPlan(seed=self.seed, cylinder=self.cylinder)
@@ -172,7 +172,7 @@ class Shares(Sampled):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SharesResult(Result):
+class ContributionsResult(Result):
     """Shares of the variance by parameter, largest first."""
 
     keys = ("contributions", "variance_um2", "rms_um")

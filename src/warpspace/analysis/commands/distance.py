@@ -57,7 +57,7 @@ class Distance(Between):
             off = self.between(scene, at, replace(field, error_um=error_um))
             return np.array([off.difference_um, off.deviation_urad or 0.0, *off.along_um])
 
-        distance, angle, *along = sure.through(ask)
+        distance, angle, *along = sure.propagate(ask)
         told = {"u95_difference_um": distance, "u95_along_um": along}
         return replace(found, sure=told | ({"u95_deviation_urad": angle} if self.corner else {}))
 

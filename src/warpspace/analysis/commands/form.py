@@ -70,7 +70,7 @@ class Form(Analysis):
             watch((asked := asked + 1) / count)
             return np.array([one.value for one in _deviations(axes, grid.nominal_mm, error_um)])
 
-        each = zip(found, sure.through(ask), strict=True)
+        each = zip(found, sure.propagate(ask), strict=True)
         told = tuple(replace(one, sure={"u95": u95}) for one, u95 in each)
         return FormResult(deviations=told, title=scene.title, uncertainty=sure.doubt)
 

@@ -12,10 +12,15 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_columns
-from warpspace.analysis.description import ProgressCallback, Result, count_progress, plain
+from warpspace.analysis.description import ProgressCallback, Result, count_progress, to_json
 from warpspace.analysis.options import Grammar, option
 from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Over, both_orders
-from warpspace.analysis.sampling.machine_sampling import MonteCarlo, Progress, Take, montecarlo_each
+from warpspace.analysis.sampling.machine_sampling import (
+    Progress,
+    SampleStatistics,
+    Take,
+    montecarlo_each,
+)
 from warpspace.analysis.sampling.sampling_options import SampledMachines
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.field.evaluate import SecondOrder, compare_orders
@@ -67,7 +72,7 @@ class SweepPoint:
 
     scene: Scene  # with the tolerances that were taken
     half_widths: Mapping[str, float]  # µm or µrad; those that are swept, by key or class
-    sampled: MonteCarlo
+    sampled: SampleStatistics
 
     @property
     def row(self) -> dict[str, Any]:
@@ -87,7 +92,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Machines(SampledMachines):
+class MonteCarlo(SampledMachines):
     """Show how large |E| gets on machines within tolerance.
 
     Machines are sampled from the tolerances of each SCENE (a folder stands for the scenes in it;
@@ -132,7 +137,7 @@ class Machines(SampledMachines):
         False, "A row for each scene, as --tolerance gives for each combination of half widths"
     )
 
-    def run(self, scene: Scene, watch: ProgressCallback, /) -> "MachinesResult":
+    def run(self, scene: Scene, watch: ProgressCallback, /) -> "MonteCarloResult":
         return self.run_all((scene,), watch)
 
     def run_all(
@@ -145,7 +150,7 @@ class Machines(SampledMachines):
         workers: int | None = None,
         progress: Progress | None = None,
         take: Take | None = None,
-    ) -> "MachinesResult":
+    ) -> "MonteCarloResult":
         self.check_against(len(scenes))
         counted = count_progress(watch, self.machines(len(scenes)))
 
@@ -166,7 +171,7 @@ class Machines(SampledMachines):
                 kept.append(point)
             if point.sampled.max_um > widest.sampled.max_um:
                 widest = point
-        return MachinesResult(
+        return MonteCarloResult(
             asked=self,
             points=tuple(kept),
             rows=tuple(rows),
@@ -227,14 +232,14 @@ class Machines(SampledMachines):
 
 
 @dataclass(frozen=True, kw_only=True)
-class MachinesResult(Result):
+class MonteCarloResult(Result):
     """The distribution of |E| of the machines of one scene or several."""
 
     keys = (
         "samples", "seed", "distribution", "loop", "over", "mean_um", "mode_um", "median_um",
         "p95_um", "p99_um", "max_um", "histogram",
     )  # fmt: skip
-    asked: Machines
+    asked: MonteCarlo
     points: tuple[SweepPoint, ...]  # of each scene; of many rows only the first
     rows: tuple[Mapping[str, Any], ...]  # for each combination, where these were asked for
 
@@ -247,7 +252,7 @@ class MachinesResult(Result):
     def as_plain(self) -> dict[str, Any]:
         asked = self.asked
         if asked.in_rows:
-            return {"tolerances": plain(dict(asked.tolerance)), "rows": [*self.rows]}
+            return {"tolerances": to_json(dict(asked.tolerance)), "rows": [*self.rows]}
         if len(self.points) == 1:
             return _numbers(self.points[0].sampled)
         each = [
@@ -294,7 +299,7 @@ class MachinesResult(Result):
         if (left := len(rows) - PRINTED) > 0:
             yield f"… and {left:,} {'rows' if asked.in_rows else 'scenes'} more"
 
-    def _one(self, scene: Scene, found: MonteCarlo) -> Iterator[Block]:
+    def _one(self, scene: Scene, found: SampleStatistics) -> Iterator[Block]:
         from warpspace.analysis.commands.contributions import expected_square
 
         asked = self.asked
@@ -328,7 +333,7 @@ class MachinesResult(Result):
             yield "  quantiles to 0.002 % of their value"
         yield sampled_histogram(found, scene.title, told, printed)
 
-    def _words(self, found: MonteCarlo) -> str:
+    def _words(self, found: SampleStatistics) -> str:
         asked, drawn = self.asked, str(found.draws.distribution)
         if drawn == "normal":
             drawn = "normal, 3σ = half width" + (", clipped" if found.draws.clip else "")
@@ -338,10 +343,10 @@ class MachinesResult(Result):
         )
 
 
-def _numbers(found: MonteCarlo) -> dict[str, Any]:
-    plan, names = found.plan, MachinesResult.keys[5:]
+def _numbers(found: SampleStatistics) -> dict[str, Any]:
+    plan, names = found.plan, MonteCarloResult.keys[5:]
     kept = {} if found.probability is None else {"specification": found.probability}
-    return plain(
+    return to_json(
         {
             "samples": plan.samples,
             "seed": plan.seed,
@@ -355,7 +360,7 @@ def _numbers(found: MonteCarlo) -> dict[str, Any]:
 
 
 def sampled_histogram(
-    found: MonteCarlo, title: str, subtitle: str, printed: float | None = None
+    found: SampleStatistics, title: str, subtitle: str, printed: float | None = None
 ) -> Histogram:
     edges, kept = found.histogram.edges_um, found.probability
     marks = [("mode", found.mode_um), ("mean", found.mean_um), ("P95", found.p95_um)]
@@ -377,7 +382,7 @@ def sampled_histogram(
     )
 
 
-def printed_um(scene: Scene, found: MonteCarlo) -> float | None:
+def printed_um(scene: Scene, found: SampleStatistics) -> float | None:
     from warpspace.thesis.rows import printed_tables
 
     name = f"{found.view.loop}_{scene.name.removeprefix('dvf5000_')}"
@@ -386,12 +391,12 @@ def printed_um(scene: Scene, found: MonteCarlo) -> float | None:
     return float(printed) if printed and here and found.plan.over == Over.SAMPLED else None
 
 
-def sampled_second_order(*found: tuple[Scene, MonteCarlo]) -> SecondOrder:
+def sampled_second_order(*found: tuple[Scene, SampleStatistics]) -> SecondOrder:
     """Compare first order and exact chain on machines drawn for the scene with the largest |E|."""
     return compare_orders(*both_orders(case_of(*max(found, key=lambda one: one[1].max_um))))
 
 
-def case_of(scene: Scene, found: MonteCarlo) -> Case:
+def case_of(scene: Scene, found: SampleStatistics) -> Case:
     return Case(scene.model, found.draws, scene.workspace, found.view, found.plan)
 
 
@@ -438,7 +443,7 @@ def sweep(
         If an argument is out of range, or a scene has no such parameter.
     """
     steps = tuple((key, tuple(values)) for key, values in (half_widths or {}).items())
-    asked = Machines(tolerance=steps, **options)
+    asked = MonteCarlo(tolerance=steps, **options)
     asked.check_against(1)
     yield from asked.points(
         scenes, workers=workers, executor=executor, progress=progress, take=take

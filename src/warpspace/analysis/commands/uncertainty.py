@@ -63,7 +63,7 @@ class Uncertainty(Analysis):
         beyond = (scene.covariance or Covariance((), ())).outside(grid.coordinates, grid.shape)
         result = UncertaintyResult(
             limit_um=limit,
-            statistics=found.said_of(statistics) if found else statistics,
+            statistics=found.with_expanded_uncertainty(statistics) if found else statistics,
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
             k=found and found.doubt.factor,
             unknown=found.doubt.unknown if found else [*scene.errors],
@@ -106,12 +106,12 @@ def _spread(drawn: Array) -> Mapping[str, float]:
 
 def _shares(found: FieldUncertainty) -> list[Mapping[str, Any]]:
     mean, _, _, largest = found.gradients
-    of_mean, doubt = found.parts_of(mean), found.doubt
+    of_mean, doubt = found.variance_shares(mean), found.doubt
     u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))
     return [
         {"key": key, "u": float(u[key]), "percent_of_max": 100.0 * part,
          "percent_of_mean": 100.0 * of_mean[key]}
-        for key, part in found.parts_of(largest).items()
+        for key, part in found.variance_shares(largest).items()
     ]  # fmt: skip
 
 

@@ -42,7 +42,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MonteCarlo(Summary):
+class SampleStatistics(Summary):
     """Distribution of |E| over sampled machines."""
 
     plan: SamplingPlan
@@ -63,7 +63,7 @@ def montecarlo(
     *,
     executor: Executor | None = None,
     take: Take | None = None,
-) -> MonteCarlo:
+) -> SampleStatistics:
     (found,) = montecarlo_each(
         [case], workers=case.plan.workers, executor=executor, progress=progress, take=take
     )
@@ -77,7 +77,7 @@ def montecarlo_each(
     executor: Executor | None = None,
     progress: Progress | None = None,
     take: Take | None = None,
-) -> Iterator[MonteCarlo]:
+) -> Iterator[SampleStatistics]:
     if executor is not None:
         in_flight = 2 * (workers or EXECUTOR_WORKERS)
         yield from _collect(_tasks(cases, take, sent=True), executor, in_flight, progress, take)
@@ -113,7 +113,9 @@ def _tasks(cases: Iterable[Case], take: Take | None, *, sent: bool) -> Iterator[
             yield case, first, min(first + size, blocks), take is not None, job
 
 
-def _run(case: Case, first: int, end: int, keep: bool, job: Job | None) -> PartialSums | MonteCarlo:
+def _run(
+    case: Case, first: int, end: int, keep: bool, job: Job | None
+) -> PartialSums | SampleStatistics:
     part = sample_blocks(case, first, end, keep=keep, job=job)
     if keep or job is not None or case.plan.blocks > LEAST_BLOCKS:
         return part
@@ -128,10 +130,10 @@ def _collect(
     in_flight: int,
     progress: Progress | None,
     take: Take | None,
-) -> Iterator[MonteCarlo]:
+) -> Iterator[SampleStatistics]:
     number, stream = 0, None
     for (case, _, end, _, _), found in run_in_order(_run, tasks, executor, in_flight):
-        if isinstance(found, MonteCarlo):
+        if isinstance(found, SampleStatistics):
             done, result = case.plan.samples, found
         else:
             stream = Stream(case.plan.samples, case.plan.spec_um) if stream is None else stream
@@ -147,8 +149,8 @@ def _collect(
             number, stream = number + 1, None
 
 
-def _finish(case: Case, stream: Stream) -> MonteCarlo:
-    return MonteCarlo(
+def _finish(case: Case, stream: Stream) -> SampleStatistics:
+    return SampleStatistics(
         plan=case.plan,
         draws=case.draws,
         view=case.view,

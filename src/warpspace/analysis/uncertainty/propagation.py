@@ -105,7 +105,9 @@ class ErrorUncertainty:
         at = self.keys.index(key) if key in self.keys else None
         return None if at is None else float(self.expanded[at, at]) ** 0.5
 
-    def within(self, value: Array | float, u95: Array | float, low: float, high: float) -> Array:
+    def probability_within(
+        self, value: Array | float, u95: Array | float, low: float, high: float
+    ) -> Array:
         """Give the probability that numbers lie between two, by their U95."""
         from scipy.stats import t
 
@@ -122,7 +124,7 @@ class ErrorUncertainty:
             )
         return found
 
-    def through(self, ask: Callable[[Array], Array]) -> list[float | None]:
+    def propagate(self, ask: Callable[[Array], Array]) -> list[float | None]:
         """Give U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
 
         Notes
@@ -175,7 +177,7 @@ def scene_uncertainty(scene: Scene, loop: Loop = Loop.TOOL) -> ErrorUncertainty 
         own = [key for key in keys if key in together]
         rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
         covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
-        freedoms[rows] = joint.freedom
+        freedoms[rows] = joint.dof
     known = joint or Covariance((), ())
     undetermined = tuple(key for key in known.undetermined if parameter(key).axis in axes)
     acting = (
@@ -282,13 +284,13 @@ class FieldUncertainty:
         """Give U95 of a number by its growth per unit of each amplitude, [K]."""
         return float(_root(gradient @ self.doubt.expanded @ gradient))
 
-    def through(self, ask: Callable[[Array], Array]) -> list[float | None]:
+    def propagate(self, ask: Callable[[Array], Array]) -> list[float | None]:
         """Give U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
-        return self.doubt.through(
+        return self.doubt.propagate(
             lambda change: ask(self.error_um + np.tensordot(change, self.response, 1))
         )
 
-    def parts_of(self, gradient: Array) -> dict[str, float]:
+    def variance_shares(self, gradient: Array) -> dict[str, float]:
         """Split the variance of a number into shares of errors, the largest first.
 
         They add up to one; a share is below zero where a correlation makes the variance smaller.
@@ -327,7 +329,7 @@ class FieldUncertainty:
             u95 = np.add(u95, more).tolist()
         return dict(zip(NAMES, u95, strict=True))
 
-    def said_of(self, numbers: S) -> S:
+    def with_expanded_uncertainty(self, numbers: S) -> S:
         """Say U95 beside statistics of the field."""
         u95 = {f"u95_{name}": value for name, value in self.statistics().items()}
         return replace(numbers, sure=u95)
@@ -337,7 +339,7 @@ class FieldUncertainty:
         size = self.norm_um.size
         return np.full(size, 1.0 / size) if self.shares is None else self.shares.reshape(-1)
 
-    def seen(self, linear: Callable[[Array], Array]) -> "FieldUncertainty":
+    def transform(self, linear: Callable[[Array], Array]) -> "FieldUncertainty":
         """Give the same of what a linear function makes of position errors, [..., n, 3]."""
         return combine(self.doubt, linear(self.response), linear(self.error_um), self.shares)
 
@@ -365,7 +367,7 @@ class FieldUncertainty:
             found.append(response[:, few].reshape(len(response), own.size) @ own)
         return np.stack(found)
 
-    def falls(self, after: "FieldUncertainty", name: str) -> float | None:
+    def probability_of_improvement(self, after: "FieldUncertainty", name: str) -> float | None:
         """Give the probability that RMS or max of |E| is smaller with other errors of the points.
 
         Squares are compared: that of the RMS is linear in what is not sure, however large that is.
@@ -378,7 +380,7 @@ class FieldUncertainty:
             squares[index] = square.max() if name == "max_um" else self.weights @ square
             ways.append(2.0 * squares[index] ** 0.5 * one.gradients[[*NAMES].index(name)])
         way, fall = ways[1] - ways[0], float(squares[0] - squares[1])
-        return float(self.doubt.within(fall, self.u95(way), 0.0, np.inf))
+        return float(self.doubt.probability_within(fall, self.u95(way), 0.0, np.inf))
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
         """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""

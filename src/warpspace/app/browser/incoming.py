@@ -34,17 +34,17 @@ EventValue = Annotated[str, Meta(max_length=15_500_000)]
 Vector = tuple[Number, Number, Number]
 
 
-class _Said(Struct, tag_field="type", forbid_unknown_fields=True):
+class _BrowserMessage(Struct, tag_field="type", forbid_unknown_fields=True):
     pass
 
 
-class Events(_Said, tag="WarpspaceEvents"):
+class Events(_BrowserMessage, tag="WarpspaceEvents"):
     """What a user has done, in order."""
 
     events: Annotated[list[tuple[EventName, EventValue]], Meta(max_length=MOST_EVENTS)]
 
 
-class CameraMoved(_Said, tag="ViewerCameraMessage"):
+class CameraMoved(_BrowserMessage, tag="ViewerCameraMessage"):
     """The page's camera; the first one opens the session."""
 
     wxyz: tuple[Number, Number, Number, Number]
@@ -58,7 +58,7 @@ class CameraMoved(_Said, tag="ViewerCameraMessage"):
     up_direction: Vector
 
 
-class DrawingClicked(_Said, tag="ScenePointerMessage"):
+class DrawingClicked(_BrowserMessage, tag="ScenePointerMessage"):
     event_type: Annotated[str, Meta(pattern="^click$")]
     ray_origin: Vector
     ray_direction: Vector
@@ -66,7 +66,7 @@ class DrawingClicked(_Said, tag="ScenePointerMessage"):
     modifier: Annotated[str, Meta(max_length=40)] | None
 
 
-class PartHeld(_Said, tag="TransformControlsDragStartMessage", kw_only=True):
+class PartHeld(_BrowserMessage, tag="TransformControlsDragStartMessage", kw_only=True):
     """What moves the part, as it is seized."""
 
     name: Annotated[str, Meta(pattern="^/part/gizmo$")]
@@ -84,7 +84,7 @@ class PartMoved(PartHeld, tag="TransformControlsUpdateMessage", kw_only=True):
     position: Vector
 
 
-class PictureRendered(_Said, tag="GetRenderResponseMessage"):
+class PictureRendered(_BrowserMessage, tag="GetRenderResponseMessage"):
     """The picture that the app has asked for, a PNG."""
 
     payload: bytes

@@ -69,7 +69,7 @@ class AnalysisOutcome(NamedTuple):
     took_s: float = 0.0
 
 
-class AnalysisPart(Section):
+class AnalysisPanel(Section):
     """One analysis: a section of its task."""
 
     at_once = False  # whether it runs by itself as soon as it is unfolded

@@ -35,7 +35,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
-from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPart, Question
+from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, Question
 from warpspace.app.panels.block_html import histogram_html
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.state import edits
@@ -66,7 +66,7 @@ def percent(share: float) -> str:
     return "0.1" if value == "0.0" and share > 0.0 else value
 
 
-class TolerancesPart(AnalysisPart):
+class TolerancesPanel(AnalysisPanel):
     """Limit and probability, the machines within tolerance, and each tolerance by its share."""
 
     sentence = "How likely machines within tolerance keep the limit, and which tolerances"
@@ -269,7 +269,7 @@ PRESENT = "the present machine"  # the one that is steered, among those that are
 ADD = "Compare with …"
 
 
-class ConceptsPart(AnalysisPart):
+class ConceptsPanel(AnalysisPanel):
     """Machines side by side: chosen by title, compared as soon as there are two."""
 
     at_once = True

@@ -252,7 +252,7 @@ OF_ALL = {
 """What can be done with all errors: words and hint by event of the page."""
 
 
-class ErrorsPart(Panel):
+class ErrorsPanel(Panel):
     """Search, rows by effect, and those that are zero folded away.
 
     Order, scale of the bars and ranges of the sliders stay until the hand has left the column

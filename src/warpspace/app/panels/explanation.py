@@ -32,7 +32,7 @@ from warpspace.app.evaluation.point_explanation import (
     pick_worst,
     with_picked,
 )
-from warpspace.app.panels.analysis_panel import AnalysisPart
+from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.block_html import block_html
 from warpspace.app.panels.panel import Section, actions
 from warpspace.app.state.app_state import AppState
@@ -57,7 +57,7 @@ ELSEWHERE = (
 )
 
 
-class WorstPart(Section):
+class WorstPanel(Section):
     """The error of the worst point, or of the one that was asked about, taken apart."""
 
     name, task, title = "worst", "understand", "Worst point"
@@ -151,7 +151,7 @@ def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
     if sure is None or not sure.doubt.is_known:
         words = [] if sure is None else sure.doubt.remarks()
         return join(tag("p", said, class_="ws-tiny") for said in words)
-    parts = sure.parts_of(sure.response @ sure.direction)
+    parts = sure.variance_shares(sure.response @ sure.direction)
     named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]
     named = [(key, share) for key, share in named if share != "0 %"]
     said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
@@ -201,7 +201,7 @@ def _lever(part: PointContribution) -> Markup:
     return tag("p", join((f"{part.key}: {signed(part.value)} {row.unit} {how} ", look)))
 
 
-class DistancePart(AnalysisPart):
+class DistancePanel(AnalysisPanel):
     """Distance and angle between points that are picked on the map."""
 
     def concerns(self, picture: LivePicture) -> tuple[object, ...]:
@@ -231,7 +231,7 @@ class DistancePart(AnalysisPart):
         return replace(state, forms={**others, **points})
 
 
-class VolumePart(Section):
+class VolumePanel(Section):
     """Mean, RMS, P95 and max of the position error, and the tilt of the tool."""
 
     name, task, title = "volume", "understand", "Volume in numbers"

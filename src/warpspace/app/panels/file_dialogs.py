@@ -36,7 +36,7 @@ def accepted_endings() -> str:
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
 
-class JobWindow(Window):
+class JobDialog(Window):
     """A window that makes files, one at a time, with its progress and a way to cancel."""
 
     def __init__(self, context: Context) -> None:
@@ -66,7 +66,7 @@ class JobWindow(Window):
         return state
 
 
-class FilesWindow(JobWindow):
+class FilesDialog(JobDialog):
     """Save and export; opening files and links goes this way too."""
 
     name, title = "files", "Save and export"
@@ -249,7 +249,7 @@ ALWAYS = (
 )
 
 
-class ReportWindow(JobWindow):
+class ReportDialog(JobDialog):
     name, title = "report", "Report"
 
     def body(self, picture: LivePicture) -> Markup:

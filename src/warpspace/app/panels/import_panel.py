@@ -22,7 +22,7 @@ from warpspace.analysis.registry import Entry
 from warpspace.app.browser.html import EMPTY, tag, upload_button
 from warpspace.app.panels.block_html import details_html
 from warpspace.app.panels.file_dialogs import accepted_endings
-from warpspace.app.panels.measurement import FilesPart, UploadedFile
+from warpspace.app.panels.measurement import FilesPanel, UploadedFile
 from warpspace.app.panels.panel import Context
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import read_form
@@ -144,7 +144,7 @@ def _without_options(text: str) -> str:
 # --- The section ----------------------------------------------------------------------------------
 
 
-class ImportPart(FilesPart):
+class ImportPanel(FilesPanel):
     """Files that are read together, what they do not say, and what they bring."""
 
     def __init__(self, context: Context) -> None:

@@ -18,7 +18,7 @@ from warpspace.analysis.registry import entries
 from warpspace.app.browser.html import EMPTY, button, choice, join, tag
 from warpspace.app.evaluation.compare import pinned_side, with_before, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.analysis_panel import RECORD, AnalysisPart, Question
+from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, Question
 from warpspace.app.panels.block_html import details_html, result_html
 from warpspace.app.panels.panel import Context
 from warpspace.app.state.app_state import AppState
@@ -43,7 +43,7 @@ class IncludedRepair(Adjust):
         return [key for key in scene.parameter_keys if key in self.keys]
 
 
-class RepairPart(AnalysisPart):
+class RepairPanel(AnalysisPanel):
     """The best sets of adjustments, found as soon as the task is open."""
 
     at_once = True
@@ -90,7 +90,7 @@ class RepairPart(AnalysisPart):
         return details_html(blocks, "Each error alone")
 
 
-class BestPart(RepairPart):
+class BestPanel(RepairPanel):
     """The best adjustment of one error for the largest one, below the worst point."""
 
     follows = "at rest"
@@ -139,7 +139,7 @@ MACHINE, BOTH, LEFT = "machine", "both", "left"
 BOXES = {MACHINE: "as it is", BOTH: "before and after", LEFT: "what is left"}
 
 
-class CompensatePart(AnalysisPart):
+class CompensatePanel(AnalysisPanel):
     """A table for a control: computed when one is chosen; saved, the box is drawn with it."""
 
     at_once = True

@@ -384,7 +384,7 @@ def _source(source: BodySource) -> str:
 WIDTH_PX = 240  # of a small picture: it is shown smaller, sharp on fine screens too
 
 
-class MachinesWindow(Window):
+class MachinesDialog(Window):
     name, title = "machines", "Start from a machine"
 
     def body(self, picture: LivePicture) -> Markup:

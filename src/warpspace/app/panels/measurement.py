@@ -32,7 +32,7 @@ from warpspace.app.drawing.around import residuals
 from warpspace.app.drawing.shapes import Nodes, Shapes
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
-from warpspace.app.panels.analysis_panel import AnalysisPart, Question
+from warpspace.app.panels.analysis_panel import AnalysisPanel, Question
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.panel import Context
 from warpspace.app.state import edits
@@ -63,7 +63,7 @@ class UploadedFile:
     count: int = 0  # readings
 
 
-class FilesPart(AnalysisPart):
+class FilesPanel(AnalysisPanel):
     """An analysis of files that a page has sent."""
 
     most_bytes, what = MOST_BYTES, WHAT
@@ -124,7 +124,7 @@ class FilesPart(AnalysisPart):
 # --- Standard tests -------------------------------------------------------------------------------
 
 
-class TestsPart(FilesPart):
+class TestsPanel(FilesPanel):
     """A standard test on the model as it would be on the machine, its path drawn in the box."""
 
     __test__ = False
@@ -246,7 +246,7 @@ def take_file(
     return UploadedFile(unlike, text, words, kind, len(readings))
 
 
-class CalibratePart(FilesPart):
+class CalibratePanel(FilesPanel):
     """Readings of a page, what is fitted, and residuals as arrows in the box."""
 
     def __init__(self, context: Context, entry: Entry) -> None:

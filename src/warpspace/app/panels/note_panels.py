@@ -43,7 +43,7 @@ def clean(text: str) -> str:
     return "".join(sign for sign in lines if sign in "\n\t" or sign.isprintable())
 
 
-class NotesPart(Panel):
+class NotesPanel(Panel):
     """The list of notes, in the column of the tasks."""
 
     name = "notes"
@@ -304,7 +304,7 @@ def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
     ))  # fmt: skip
 
 
-class NoteNumbersPart(Panel):
+class NoteNumbersPanel(Panel):
     """What the numbers of notes have become."""
 
     name = "note-numbers"
@@ -335,7 +335,7 @@ class NoteNumbersPart(Panel):
 GLIDE_MS = 600  # from step to step
 
 
-class StoryPart(Panel):
+class StoryPanel(Panel):
     """Tells the story of a scene's notes; the state is not changed by it, only what is shown."""
 
     name = "story"

@@ -35,7 +35,7 @@ from warpspace.picture.map_mesh import isoline_labels
 from warpspace.units import Array, spell_short
 
 
-class HeadPart(Panel):
+class HeadPanel(Panel):
     """Mean and max with the place of the latter."""
 
     name = "head"
@@ -55,7 +55,7 @@ class HeadPart(Panel):
         return {"head": head}
 
 
-class LegendPart(Panel):
+class LegendPanel(Panel):
     """The colour bar, and how much of the volume keeps the limit."""
 
     name = "legend"
@@ -77,7 +77,7 @@ class LegendPart(Panel):
         return {"head.kept": kept, "legend": legend_html(picture)}
 
 
-class OrderPart(Panel):
+class OrderPanel(Panel):
     """What machines within tolerance reach, what the first order leaves out, errors left behind.
 
     All but the last are too slow for every move.
@@ -94,7 +94,7 @@ class OrderPart(Panel):
                 "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
 
 
-class RoomPart(Panel):
+class RoomPanel(Panel):
     """What the page places by itself as the camera moves, and how large the drawing is."""
 
     name = "room"
@@ -175,7 +175,7 @@ MOST_QUEUED = 8  # messages that wait for a page; one that takes none is sent no
 Tabs = Callable[[], Iterable[Context]]
 
 
-class PointerPart(Panel):
+class PointerPanel(Panel):
     """Takes where the mouse is over the map: ``pointer:at``, a name, then a ray of six numbers."""
 
     name = "pointer"

@@ -7,33 +7,33 @@ from markupsafe import Markup
 from warpspace.analysis.registry import entries
 from warpspace.app.browser.html import join, tag
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.analysis_panel import AnalysisPart
+from warpspace.app.panels.analysis_panel import AnalysisPanel
 from warpspace.app.panels.conventions import ConventionsSection
-from warpspace.app.panels.design import ConceptsPart, TolerancesPart
-from warpspace.app.panels.error_list import ErrorsPart
-from warpspace.app.panels.explanation import DistancePart, VolumePart, WorstPart
-from warpspace.app.panels.file_dialogs import FilesWindow, ReportWindow
-from warpspace.app.panels.import_panel import ImportPart
-from warpspace.app.panels.improve import BestPart, CompensatePart, RepairPart
+from warpspace.app.panels.design import ConceptsPanel, TolerancesPanel
+from warpspace.app.panels.error_list import ErrorsPanel
+from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
+from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
+from warpspace.app.panels.import_panel import ImportPanel
+from warpspace.app.panels.improve import BestPanel, CompensatePanel, RepairPanel
 from warpspace.app.panels.machine_editor import (
     EditorSection,
-    MachinesWindow,
+    MachinesDialog,
     PositionsSection,
     RotarySection,
 )
-from warpspace.app.panels.measurement import CalibratePart, TestsPart
-from warpspace.app.panels.note_panels import NoteNumbersPart, NotesPart, StoryPart
-from warpspace.app.panels.overlay import HeadPart, LegendPart, OrderPart, RoomPart
+from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
+from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
+from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel, RoomPanel
 from warpspace.app.panels.panel import Context, Panel, Section
-from warpspace.app.panels.part_panels import PartPart, ProgramPart
-from warpspace.app.panels.toolbar import ComparePart, ControlsPart
-from warpspace.app.panels.top_bar import HelpWindow, PagePart, ScenesWindow, StatePart, TopPart
+from warpspace.app.panels.part_panels import PartPanel, ProgramPanel
+from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel
+from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, StatePanel, TopPanel
 from warpspace.app.state.app_state import TASKS
 
-HOOKS: dict[str, type[AnalysisPart]] = {
-    "calibrate": CalibratePart, "repair": RepairPart, "compensate": CompensatePart,
-    "allocate": TolerancesPart, "concepts": ConceptsPart, "distance": DistancePart,
-    "part": PartPart, "program": ProgramPart,
+HOOKS: dict[str, type[AnalysisPanel]] = {
+    "calibrate": CalibratePanel, "repair": RepairPanel, "compensate": CompensatePanel,
+    "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
+    "part": PartPanel, "program": ProgramPanel,
 }  # fmt: skip
 """Parts of analyses that do more than their description says, by name."""
 FIRST = ("compensate", "concepts", "allocate")
@@ -44,7 +44,7 @@ RARE = frozenset(
 """Sections that stand under "More analyses", so that a task is calm at first sight."""
 
 
-class TasksPart(Panel):
+class TasksPanel(Panel):
     """The column at the right: five tasks, one open, each a list of sections that unfold."""
 
     name = "tasks"
@@ -84,17 +84,17 @@ def _places(names: Iterable[str]) -> Markup:
 
 
 def build_parts(context: Context) -> list[Panel]:
-    of_tasks = (WorstPart, VolumePart, ImportPart, TestsPart)
+    of_tasks = (WorstPanel, VolumePanel, ImportPanel, TestsPanel)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     found: list[Section] = [
         *(kind(context) for kind in of_tasks),
-        *(HOOKS.get(one.name, AnalysisPart)(context, one) for one in entries()),
+        *(HOOKS.get(one.name, AnalysisPanel)(context, one) for one in entries()),
         *(kind(context) for kind in of_machine),
     ]
     kinds = (
-        TopPart, HeadPart, LegendPart, OrderPart, ControlsPart, ComparePart, ErrorsPart, RoomPart,
-        StatePart, PagePart, NotesPart, NoteNumbersPart, ScenesWindow, MachinesWindow,
-        FilesWindow, ReportWindow, HelpWindow, StoryPart,
+        TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel, RoomPanel,
+        StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog, MachinesDialog,
+        FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
     others = [kind(context) for kind in kinds]
-    return [*others, TasksPart(context, found), *found, BestPart(context)]
+    return [*others, TasksPanel(context, found), *found, BestPanel(context)]

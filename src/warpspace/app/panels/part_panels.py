@@ -20,7 +20,7 @@ from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_i
 from warpspace.app.panels.analysis_panel import Question
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.measurement import MOST_BYTES, FilesPart, UploadedFile
+from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
 from warpspace.app.panels.panel import actions
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState, PartLook
@@ -33,7 +33,7 @@ from warpspace.scene.model import Scene
 MOST_LETTERS = 200  # of a line that is shown
 
 
-class InBoxPart(FilesPart):
+class InBoxPanel(FilesPanel):
     """Something to be made, which a page has sent: it stands in the box."""
 
     at_once = True
@@ -89,7 +89,7 @@ class InBoxPart(FilesPart):
         return self.hold(state, None, "") if is_removed else super().take(state, word, value)
 
 
-class PartPart(InBoxPart):
+class PartPanel(InBoxPanel):
     """A part: clamped, and measured as it is cut."""
 
     holds = ("mesh", "name")
@@ -142,7 +142,7 @@ class PartPart(InBoxPart):
         self.show(mesh, name, place=tuple(place.tolist()))
 
 
-class ProgramPart(InBoxPart):
+class ProgramPanel(InBoxPanel):
     """A program: a line and its place in the drawing find each other."""
 
     most_bytes = MOST_BYTES  # longer ones would hold up other tabs

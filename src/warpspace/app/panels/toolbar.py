@@ -61,7 +61,7 @@ def chosen_map(state: AppState) -> str:
     return "limit" if state.look.pass_fail and chosen == "position.norm" else chosen
 
 
-class ControlsPart(Panel):
+class ControlsPanel(Panel):
     name = "controls"
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
@@ -171,7 +171,7 @@ def _machine(state: AppState) -> Markup:
 # --- Comparing ------------------------------------------------------------------------------------
 
 
-class ComparePart(Panel):
+class ComparePanel(Panel):
     """Which two are compared and which of them is drawn, and the numbers of both."""
 
     name = "compare"

@@ -19,7 +19,7 @@ from warpspace.machine.limits import MAX_UPLOAD_BYTES
 LONGEST_SENTENCE = 110
 
 
-class StatePart(Panel):
+class StatePanel(Panel):
     """Sets a field of the state to what the page says: ``state:set.PATH``."""
 
     name = "state"
@@ -28,7 +28,7 @@ class StatePart(Panel):
         return put(state, word.removeprefix("set."), value)
 
 
-class TopPart(Panel):
+class TopPanel(Panel):
     """Scene, open, save, share, report, help; notes, undo and redo where there are any."""
 
     name = "top"
@@ -68,7 +68,7 @@ class TopPart(Panel):
         }  # fmt: skip
 
 
-class ScenesWindow(Window):
+class ScenesDialog(Window):
     """The scenes there are: title, machine, what each shows."""
 
     name, title = "scenes", "Choose a scene"
@@ -178,7 +178,7 @@ def _found(query: str) -> list[Command]:
     return [one for one in COMMANDS if all(word in one.label.lower() for word in words)]
 
 
-class HelpWindow(Window):
+class HelpDialog(Window):
     """All commands, found by their words; what the mouse does, and what is drawn."""
 
     name, title = "help", "Help"
@@ -214,7 +214,7 @@ class HelpWindow(Window):
         return self.closed(state)
 
 
-class PagePart(Panel):
+class PagePanel(Panel):
     """What acts on the page as a whole: tasks, sections, windows, undo, redo, and all errors."""
 
     name = "page"

@@ -33,7 +33,7 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick, pick_line, with_clicked
-from warpspace.app.panels.overlay import PointerPart, Tabs
+from warpspace.app.panels.overlay import PointerPanel, Tabs
 from warpspace.app.panels.page_panels import build_parts
 from warpspace.app.panels.panel import PAUSE_S, Context, Panel, Window
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
@@ -251,7 +251,7 @@ class Session:
                 self._turn()
         finally:
             self.context.store.unsubscribe(self.context.changed)
-            if pointer := self.display.parts.get(PointerPart.name):
+            if pointer := self.display.parts.get(PointerPanel.name):
                 pointer.take(self.state, "gone", "")
 
     def _turn(self) -> None:
@@ -302,7 +302,7 @@ class Session:
             context.camera.place(picture)
             context.page.call("stage", "opening")
             layers = [BoxLayer(self._client.scene, context.page, picture)]
-            pointer = [PointerPart(context, self._others)] if self._others else []
+            pointer = [PointerPanel(context, self._others)] if self._others else []
             self.display.add(picture, layers, [*build_parts(context), self._keeper, *pointer])
             context.page.call("drawn")
         self._around_at = time.monotonic() + ANSWER_S

@@ -134,7 +134,7 @@ def check(
     stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
     affine fit to the predicted map: which plane became a rhombus.
     """
-    from warpspace.analysis.description import plain
+    from warpspace.analysis.description import to_json
     from warpspace.analysis.tolerance_check import measured
     from warpspace.scene.library import load_scene
 
@@ -154,8 +154,8 @@ def check(
                     {
                         "scene": scene.name,
                         "checks": [{**asdict(row), "passes": row.passes} for row in result.checks],
-                        "predicted": plain(result.predicted),
-                        "statistics_nodes": plain(result.predicted_nodes),
+                        "predicted": to_json(result.predicted),
+                        "statistics_nodes": to_json(result.predicted_nodes),
                         "measured_um": laser_tracer_um(scene),
                         "shear_urad": result.shear_urad,
                     }

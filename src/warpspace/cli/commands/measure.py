@@ -197,7 +197,7 @@ def import_(
         _import_robot(files, output, tool or "", workpiece or "", mesh_root, force=force)
         return
 
-    from warpspace.analysis.description import plain
+    from warpspace.analysis.description import to_json
     from warpspace.formats.measured import summaries, summary_table
     from warpspace.formats.registry import ReadOptions, open_files, parse_axis_options, read_errors
     from warpspace.formats.to_scene import base_scene, into_scene
@@ -228,7 +228,7 @@ def import_(
                 "machine": made.scene.machine.name,
                 "chain": str(made.scene.machine.chain),
                 "units": list(reading.found.units),
-                "errors": plain(summaries(reading.found)),
+                "errors": to_json(summaries(reading.found)),
                 "assumed": list(reading.found.assumed),
                 "notes": notes,
                 "output": str(output),

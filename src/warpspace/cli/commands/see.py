@@ -212,7 +212,7 @@ def compare(
     same working volume. With -o both and the change are drawn on one sheet, with one colour scale
     and one exaggeration.
     """
-    from warpspace.analysis.description import plain
+    from warpspace.analysis.description import to_json
     from warpspace.analysis.statistics import statistics
     from warpspace.analysis.uncertainty.propagation import u95_lines, volume_uncertainty
     from warpspace.picture.comparison import scene_change, statistics_blocks, statistics_change
@@ -235,8 +235,8 @@ def compare(
         names = ("a", "b", "difference")
         nodes = [statistics(picture.field, picture.grid.coordinates) for picture in compared]
         change = {"change": statistics_change(found[0], found[1])}
-        at_nodes = {"statistics_nodes": plain(dict(zip(names, nodes, strict=True)))}
-        print_json({**plain(dict(zip(names, found, strict=True))), **change, **at_nodes})
+        at_nodes = {"statistics_nodes": to_json(dict(zip(names, nodes, strict=True)))}
+        print_json({**to_json(dict(zip(names, found, strict=True))), **change, **at_nodes})
         return
     for letter, scene in zip("AB", scenes, strict=True):
         print_text(f"{letter}  {scene.name}: {scene.title}")

@@ -68,7 +68,7 @@ def field(
     axis, in µrad. Without --at the grid of the working volume is evaluated. Where SCENE states how
     sure its errors are, U95 of each point stands beside them, in files too.
     """
-    from warpspace.analysis.description import plain
+    from warpspace.analysis.description import to_json
     from warpspace.analysis.statistics import statistics, volume_statistics
     from warpspace.analysis.uncertainty.propagation import (
         field_uncertainty,
@@ -106,7 +106,7 @@ def field(
             summary = volume_statistics(result, nodes)
             if files or as_json:
                 u95 = u95_columns(loaded, result, axes, view, nodes.point_mm)
-        summary = over.said_of(summary) if over else summary
+        summary = over.with_expanded_uncertainty(summary) if over else summary
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
         from warpspace.picture.model import field_remarks
@@ -117,11 +117,11 @@ def field(
                 write_field(FieldRecord(axes, result, about, u95), path, overwrite=force)
     if as_json:
         found: dict[str, object] = {"loop": loop, "frame": frame}
-        found["statistics"] = plain(summary)
+        found["statistics"] = to_json(summary)
         found |= {} if view.placed_over is None else {"placement": "fitted out"}
         found |= said if view.reference is None else {**said, "reference": dict(view.reference)}
         if nodes is not None:
-            found["statistics_nodes"] = plain(even)
+            found["statistics_nodes"] = to_json(even)
         if output is not None:
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(shared_options.spell_json({**size, **found}))

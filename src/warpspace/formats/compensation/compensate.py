@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import Analysis, ProgressCallback, Result, plain
+from warpspace.analysis.description import Analysis, ProgressCallback, Result, to_json
 from warpspace.analysis.options import PLACED_HELP, Grammar, option
 from warpspace.analysis.statistics import Statistics
 from warpspace.analysis.uncertainty.propagation import u95_lines
@@ -236,8 +236,8 @@ class Compensation(BeforeAfter, Result):
             "points": dict(self.points) if not self.format.grid.startswith("none") else {},
             "numbers": self.size,
             "files": [],
-            "before": plain(self.before_statistics),
-            "after": plain(after) | self.expected,
+            "before": to_json(self.before_statistics),
+            "after": to_json(after) | self.expected,
             "worst_after_um": after.max_um,
             "orientation": {
                 word: dict(zip(("mean_urad", "max_urad"), self.tilt_urad(field), strict=True))
@@ -245,8 +245,8 @@ class Compensation(BeforeAfter, Result):
             },
             "directions": {
                 way: {
-                    "before": plain(one.before_statistics),
-                    "after": plain(one.after_statistics),
+                    "before": to_json(one.before_statistics),
+                    "after": to_json(one.after_statistics),
                 }
                 for way, one in self.directions.items()
             },
@@ -430,8 +430,8 @@ class Sweep(Result):
     left_out: tuple[str, ...]  # formats of which no table can be made, and why
 
     def as_json(self) -> dict[str, Any]:
-        steps = plain(self.steps)
-        return {"before": plain(self.before), "sweep": steps, "left_out": list(self.left_out)}
+        steps = to_json(self.steps)
+        return {"before": to_json(self.before), "sweep": steps, "left_out": list(self.left_out)}
 
     def blocks(self) -> Iterator[Block]:
         mean, rms, p95, largest = (f"{number:.3f}" for number in self.before.four)

@@ -216,7 +216,11 @@ class BeforeAfter:
 
     def _summed_up(self, field: ErrorField) -> Statistics:
         found = volume_statistics(field, self.grid)
-        return replace(self.sure, error_um=field.error_um).said_of(found) if self.sure else found
+        return (
+            replace(self.sure, error_um=field.error_um).with_expanded_uncertainty(found)
+            if self.sure
+            else found
+        )
 
     def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
         """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""

@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from warpspace.analysis.commands.gains import Gains
-from warpspace.analysis.commands.montecarlo import Machines, sampled_histogram
+from warpspace.analysis.commands.montecarlo import MonteCarlo, sampled_histogram
 from warpspace.analysis.description import ignore_progress
 from warpspace.analysis.sampling.cases import SamplingPlan
 from warpspace.analysis.sampling.machine_sampling import montecarlo
@@ -42,7 +42,7 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    found = montecarlo(Machines(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
+    found = montecarlo(MonteCarlo(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
     title = f"Machines within tolerance: {scene.title}"
     loop = " · ".join((_loop(scene, settings), *placed_words(found.view)))
     what = (

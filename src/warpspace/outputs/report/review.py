@@ -8,9 +8,9 @@ import numpy as np
 from warpspace.analysis.adjustment_search import Objective
 from warpspace.analysis.blocks import Column, Mark, Table, number_columns
 from warpspace.analysis.commands.adjust import Adjust, AdjustResult
-from warpspace.analysis.commands.contributions import Explanation, Shares, explain
+from warpspace.analysis.commands.contributions import Contributions, Explanation, explain
 from warpspace.analysis.commands.gains import Gains
-from warpspace.analysis.commands.montecarlo import Machines
+from warpspace.analysis.commands.montecarlo import MonteCarlo
 from warpspace.analysis.description import Analysis, Result, ignore_progress
 from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, SamplingPlan
 from warpspace.analysis.sampling.distribution import choose_distribution
@@ -50,8 +50,8 @@ class ReportSettings:
         loop, seed = Loop(self.loop), self.seed
         drawn = choose_distribution(self.distribution)
 
-        def machines(over: Over) -> Machines:
-            return Machines(
+        def machines(over: Over) -> MonteCarlo:
+            return MonteCarlo(
                 loop=loop, distribution=drawn, seed=seed, samples=self.samples, over=over,
                 limit_um=limit_um,
             )  # fmt: skip
@@ -63,7 +63,7 @@ class ReportSettings:
             "gains": Gains(loop=loop, over_travel=True),
             "worst": machines(LIMIT_OVER),
             "sampled": machines(Over.SAMPLED),
-            "shares": Shares(loop=loop, distribution=drawn, seed=seed),
+            "shares": Contributions(loop=loop, distribution=drawn, seed=seed),
         }
 
 
@@ -93,7 +93,7 @@ class Reviewed:
     @property
     def statistics(self) -> Statistics:
         found = self.picture.statistics
-        return self.sure.said_of(found) if self.sure else found
+        return self.sure.with_expanded_uncertainty(found) if self.sure else found
 
     @property
     def largest(self) -> str:
@@ -107,7 +107,7 @@ class Reviewed:
         u95 = found.expanded_uncertainty.get("u95_max_um")
         if self.sure is None or u95 is None or limit is None:
             return True
-        kept = float(self.sure.doubt.within(found.max_um, u95, -np.inf, limit))
+        kept = float(self.sure.doubt.probability_within(found.max_um, u95, -np.inf, limit))
         return not 1.0 - SURE < kept < SURE
 
     @property
