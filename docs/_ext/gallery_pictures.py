@@ -27,7 +27,7 @@ ORDER = (
     "error_curves",
     "gains",
     "montecarlo",
-    "repair",
+    "adjust",
     "ballbar",
     "concepts",
     "animation",

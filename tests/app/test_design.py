@@ -47,15 +47,15 @@ def ran(part, state):
 
 
 def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
-    part = lone_part(RepairPanel, "repair")
-    state = replace(START, forms={"repair.objective": "rms", "repair.grid": "9"})
+    part = lone_part(RepairPanel, "adjust")
+    state = replace(START, forms={"adjust.objective": "rms", "adjust.grid": "9"})
     ran(part, state)
     found = part._answer.found
     said = Adjust(grid=9).run(FIRST, lambda _: None)
     assert [one.adjust for one in found.repairs] == [one.adjust for one in said.repairs]
     assert part.offered(found) == [0, 1]  # of sets of one, two and three
     shown = section(part, state)
-    assert shown.count("repair:apply") == 2
+    assert shown.count("adjust:apply") == 2
     assert re.search(r"<b>EC0Y 23\.1 → [\d.]+ µrad</b>.*max</th><td>51\.7 → ", shown)
     applied = part.take(state, "apply", "1")
     assert applied.comparison.a.title == "before repair"

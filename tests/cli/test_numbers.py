@@ -23,7 +23,7 @@ def test_a_placed_part_is_asked_for_in_the_relative_loop(warpspace):
     assert same["error_um"] == pytest.approx(node["error_um"], abs=1e-9)
     compared = warpspace("compare", "dvf5000_nominal", *scene, "--json").json
     assert compared["b"]["rms_um"] == pytest.approx(placed["statistics"]["rms_um"])
-    repair = warpspace("repair", *scene, "--count", 1, "--json").json
+    repair = warpspace("adjust", *scene, "--count", 1, "--json").json
     assert repair["before"]["rms_um"] == pytest.approx(placed["statistics"]["rms_um"])
     out = " ".join(warpspace("field", *scene, "--grid", 3).out.split())
     assert "relative loop · placement of the workpiece fitted out" in out
@@ -65,7 +65,7 @@ COMMANDS = {
     "field": ("--grid", "5"),
     "field at": ("--at", "X=275,Y=225,Z=-480"),
     "compare": ("dvf5000_first", "--grid", "5"),
-    "repair": ("--grid", "5"),
+    "adjust": ("--grid", "5"),
     "measured": (),
     "ballbar": ("--plane", "XY", "--radius", "100"),
     "montecarlo": QUICK,
@@ -115,8 +115,8 @@ def test_the_exact_field_says_nothing(warpspace, gantry):
 
 
 def test_a_repair_is_verified_with_the_exact_chain(warpspace, gantry):
-    wide = ("repair", gantry, "--limit", "9000", "--count", "1", "--grid", "5")
-    (found,) = warpspace(*wide, "--json").json["repairs"]
+    wide = ("adjust", gantry, "--limit", "9000", "--count", "1", "--grid", "5")
+    (found,) = warpspace(*wide, "--json").json["adjustments"]
     text = GANTRY
     for key, value in found["adjust"].items():
         text = text.replace(f"{key} = 3000\n", f"{key} = {value!r}\n", 1)

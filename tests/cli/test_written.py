@@ -37,7 +37,7 @@ WRITERS = {
     "export": (("export", "{scene}", "-o"), "x.csv"),
     "thesis": (("thesis", "--markdown"), "x.md"),
     "new machine": (("new-machine", "wFXt", "-o"), "x.toml"),
-    "repair": (("repair", "{scene}", "--grid", "3", "-o"), "x.toml"),
+    "adjust": (("adjust", "{scene}", "--grid", "3", "-o"), "x.toml"),
     "concepts": (("concepts", "{scene}", "{scene}", "--samples", "200", "--csv"), "x.csv"),
     "convert": (("convert", "{scene}", "--to", "squareness=over_90", "-o"), "x.toml"),
     "template": (("import", "--template", "X", "-o"), "x.csv"),

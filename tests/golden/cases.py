@@ -20,8 +20,8 @@ _EACH = {
     "field-csv": "field {scene} --grid 2 -o {out}/field.csv",
     "gains-json": "gains {scene} --json",
     "gains-text": "gains {scene} --csv {out}/gains.csv",
-    "repair-json": "repair {scene} --grid 3 --count 2 --json",
-    "repair-text": "repair {scene} --grid 3 --count 2 -o {out}/repaired.toml",
+    "adjust-json": "adjust {scene} --grid 3 --count 2 --json",
+    "adjust-text": "adjust {scene} --grid 3 --count 2 -o {out}/repaired.toml",
     "compensate": "compensate {scene} --grid 3 --format csv -o {out}/table.csv --json",
     "vts": "export {scene} --grid 3 -o {out}/field.vts",
     "glb": "export {scene} --grid 3 -o {out}/field.glb",
@@ -62,9 +62,9 @@ _ONCE = {
     "report": "report teach_squareness --grid 5 -o {out}/report.html",
     "field-points": "field dvf5000_first " + " ".join(f"--at X={x}" for x in range(25)),
     "field-relative": "field teach_tilted_c --at X=9,B=-30,C=60 --loop relative --frame workpiece",
-    "repair-limits": "repair dvf5000_first --objective max --adjustable all --count 2 --grid 3"
+    "adjust-limits": "adjust dvf5000_first --objective max --adjustable all --count 2 --grid 3"
     " --limit ±50 --limit ea0z=±10,EAY=20 --json",
-    "repair-none": "repair dvf5000_nominal --grid 3",
+    "adjust-none": "adjust dvf5000_nominal --grid 3",
     "allocate-fixed": f"allocate dvf5000_proposed --limit 60 --fixed EXX,eyx --fixed EZX {FEW}"
     " --cost EA0Z=20,EB0Z=20 --loop relative --json",
     **{
@@ -85,7 +85,7 @@ _ONCE = {
     "template-positions": "import --template c --positions 1,2,4 -o {out}/u.csv",
     "gains-max": "gains dvf5000_first --max --json",
     "no-scene": "field dvf5000_frist",
-    "bad-option": "repair dvf5000_first --limit fourty",
+    "bad-option": "adjust dvf5000_first --limit fourty",
 }
 CASES: dict[str, str] = {
     **{

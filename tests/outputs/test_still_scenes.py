@@ -29,7 +29,7 @@ REFUSED = {
 DRAWN = ("wFXt", "wXFt", "wCFt, traces", "only X moves", "nothing moves")
 """Drawing takes a second each: a line and a point carried by either side, with traces."""
 FEW = ("wFXt", "wCFt, traces", "nothing moves")
-ALWAYS = {"error-map", "orientation-map", "error-curves", "machine", "repair"}
+ALWAYS = {"error-map", "orientation-map", "error-curves", "machine", "adjust"}
 
 
 def test_every_kind_of_figure_is_looked_at():

@@ -34,7 +34,7 @@ def test_a_budget_is_that_of_gtc(name, length_mm):
     for one in instrument.contributions:
         factor = length_mm / 1000.0 if one.acts == "scale" else 1.0
         u = one.value / DIVISORS[one.distribution]
-        total += one.sensitivity * factor * GTC.ureal(0.0, u, one.freedom)
+        total += one.sensitivity * factor * GTC.ureal(0.0, u, one.dof)
     u_um, freedom = instrument.budget(length_mm)
     assert u_um == pytest.approx(GTC.uncertainty(total), rel=1e-9)
     assert freedom == pytest.approx(GTC.dof(total), rel=1e-9)
@@ -81,7 +81,7 @@ distribution = "normal"
 value = 2.0
 unit = "µm"
 sensitivity = 1.0
-freedom = 4
+dof = 4
 acts = "each"
 [[contributions]]
 name = "zero"
@@ -161,7 +161,7 @@ def test_a_scale_shows_along_the_line_a_laser_measures(own):
         ("value = 2.0", "value = -2.0", "contributions[0].value = -2.0: expected at least 1e-09"),
         ("sensitivity = 11.5\n", "", "contributions[2].sensitivity: is missing"),
         ('"u-shaped"', '"arcsine"', "contributions[2].distribution"),
-        ("freedom", "freedoms", "contributions[0].freedoms: unknown key"),
+        ("dof", "dofs", "contributions[0].dofs: unknown key"),
         ("[[contributions]]", "[[contribution]]", "contributions: is missing"),
     ],
 )

@@ -28,7 +28,7 @@ Z = [-100, 100]
 EC0Y = 20
 """
 STATED = MACHINE + "[uncertainty]\nEC0Y = 1.5\n"
-FEW = MACHINE + '[uncertainty.covariance]\nkeys = ["EC0Y"]\nmatrix = [[2.25]]\nfreedom = 5\n'
+FEW = MACHINE + '[uncertainty.covariance]\nkeys = ["EC0Y"]\nmatrix = [[2.25]]\ndof = 5\n'
 U, PLACE = 1.5, (0.0, 0.0, 0.0)
 TOLERANCE = """[[features]]
 is = "plane"

@@ -57,7 +57,7 @@ def test_one_squareness(limit):
 
 
 def test_one_squareness_of_few_degrees_of_freedom():
-    covariance = "[uncertainty.covariance]\nkeys = ['EC0Y']\nmatrix = [[2.25]]\nfreedom = 4\n"
+    covariance = "[uncertainty.covariance]\nkeys = ['EC0Y']\nmatrix = [[2.25]]\ndof = 4\n"
     text = ONE.partition("[uncertainty]")[0] + covariance
     found = trust(text, limit_um=2.25, verify=True)
     assert found.as_json()["statistics"]["u95_max_um"] == pytest.approx(coverage_factor(4) * 0.15)
@@ -86,7 +86,9 @@ def test_two_translations(between, second):
 
 
 def test_beyond_the_data_nothing_was_measured():
-    text = TWO.format(between=0.0, second=4.0) + "reach = { X = [-100, 0], Y = [-50, 100] }\n"
+    text = (
+        TWO.format(between=0.0, second=4.0) + "measured_range = { X = [-100, 0], Y = [-50, 100] }\n"
+    )
     found = trust(text)
     # of five nodes an axis with weights 1 2 2 2 1: X 50 and 100 are beyond, and Y -100
     assert found.never_measured_percent == pytest.approx(100 * (1 - 5 / 8 * 7 / 8))
@@ -120,7 +122,7 @@ def test_an_adjustment_helps_where_the_error_is_beyond_half_of_it(objective):
     said = found.as_json()
     assert said["errors"][0]["u95_present"] == pytest.approx(30.0)
     assert said["errors"][0]["best"]["probability"] == pytest.approx(expected, abs=1e-4)
-    assert said["repairs"][0]["probability"] == pytest.approx(expected, abs=1e-4)
+    assert said["adjustments"][0]["probability"] == pytest.approx(expected, abs=1e-4)
     assert said["before"]["u95_max_um"] == pytest.approx(2 * 15e-3 * 100.0)
     unsure = found.scene.errors.with_amplitude("EXX", 1.0, (0.0, 1.0))
     found = Adjust(grid=5, count=1).run(replace(scene, errors=unsure))
@@ -153,7 +155,7 @@ EXX = 4
 [uncertainty.covariance]
 keys = ["EYY"]
 matrix = [[0.0001]]
-freedom = 3
+dof = 3
 """
 )
 

@@ -65,7 +65,7 @@ class Result(ABC):
         """Say what a reader should doubt of its numbers."""
         return self.uncertainty.remarks() if self.uncertainty else ()
 
-    def files(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
         """Give the files that -o writes, by what is added to its name: "", "_X.COM"."""
         return {}
 
@@ -180,6 +180,9 @@ def count_progress(watch: ProgressCallback, total: float) -> ProgressCallback:
     return advance
 
 
+U95 = ("sure", "expanded_uncertainty")
+
+
 def to_json(value: Any) -> Any:
     """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class.
 
@@ -194,8 +197,12 @@ def to_json(value: Any) -> Any:
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
         names = keys or [entry.name for entry in fields(value)]
-        found = {name: to_json(getattr(value, name)) for name in names if name != "sure"}
-        sure = getattr(value, "sure", None)
+        found = {
+            name: to_json(getattr(value, name))
+            for name in names
+            if name not in ("sure", "expanded_uncertainty")
+        }
+        sure = getattr(value, "sure", getattr(value, "expanded_uncertainty", None))
         return found | to_json(sure) if isinstance(sure, Mapping) else found
     if isinstance(value, (list, tuple, set, frozenset)):
         return [to_json(one) for one in value]

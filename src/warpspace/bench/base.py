@@ -338,7 +338,7 @@ _TESTS: Registry[type[BenchTest] | str] = Registry(
         "straightness": f"{_HERE}.straightness:Straightness",
         "squareness": f"{_HERE}.straightness:Squareness",
         "rotary-axis": f"{_HERE}.rotary_axis:RotaryAxis",
-        "sphere": f"{_HERE}.rotary_axis:Sphere",
+        "sphere": f"{_HERE}.rotary_axis:RTest",
         "ball-plate": f"{_HERE}.ball_plate:BallPlate",
         "cone-frustum": f"{_HERE}.cone_frustum:ConeFrustum",
     },

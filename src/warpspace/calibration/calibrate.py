@@ -305,7 +305,7 @@ def _fit(
     if stack.has_uncertainties:
         own = instrument.scatter[1] if is_assumed else np.inf
     variances = np.diagonal(np.stack([scattered, *shared]), axis1=1, axis2=2)
-    degrees = effective_freedom(variances, [own, *(one.freedom for one in instrument.shared)])
+    degrees = effective_freedom(variances, [own, *(one.dof for one in instrument.shared)])
     told = u95_at(scene, part, "map")
     whole_map = told(covariance) or 1.0  # nothing acts there
     shares = [(told(one) / whole_map) ** 2 for one in (scattered * is_assumed, *shared)]

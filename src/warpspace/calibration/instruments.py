@@ -37,7 +37,7 @@ class Contribution:
     unit: str
     sensitivity: float  # µm per unit, or µm/m per unit of a scale
     acts: str  # each, all or scale
-    freedom: float  # degrees of freedom
+    dof: float  # degrees of freedom
     source: str
 
     def at(self, length_mm: float) -> float:
@@ -68,7 +68,7 @@ class Instrument:
         """Give the standard uncertainty of a reading, µm, and its degrees of freedom."""
         rows = [one for one in self.contributions if one.acts in acts]
         variances = np.array([one.at(length_mm) ** 2 for one in rows])
-        freedom = effective_freedom(variances, [one.freedom for one in rows])
+        freedom = effective_freedom(variances, [one.dof for one in rows])
         return float(np.sqrt(variances.sum())), float(freedom)
 
 
@@ -151,7 +151,7 @@ def share_out(
         of_map = scatter * (own / each) ** 2 if one.acts == "each" else common.pop(0)
         row = (
             one.name, one.type, one.distribution, one.acts, u, one.unit, one.sensitivity, own,
-            (own / width) ** 2, of_map, _finite(one.freedom), one.source,
+            (own / width) ** 2, of_map, _finite(one.dof), one.source,
         )  # fmt: skip
         rows.append({column.key: value for column, value in zip(BUDGET, row, strict=True)})
     return {

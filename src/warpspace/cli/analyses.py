@@ -163,7 +163,7 @@ def write_result(
         from warpspace.scene.scene_writer import scene_files
 
         path, changes = Path(output), found.changes()
-        if texts := found.files(path.suffix.lower()):
+        if texts := found.output_files(path.suffix.lower()):
             wrote = write_texts(texts, path, force=force)
         elif changes:
             _, *beside = write_texts(scene_files(changes[-1].scene, path.stem), path, force=force)

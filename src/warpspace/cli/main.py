@@ -39,7 +39,7 @@ Shell completion (bash; zsh and fish likewise):
 BUNDLED: "dict[Task, str]" = {
     "see": "view draw compare export report",
     "understand": "field",
-    "measure": "test import piece",
+    "measure": "test import test-piece",
     "machine": "check notes merge list new-machine thesis",
 }
 """Commands that are made from no analysis, by their task; `warpspace.cli.commands` has them."""

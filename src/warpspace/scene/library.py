@@ -421,7 +421,9 @@ class _Document:
         keys, rows, count = found["keys"], found["matrix"], len(found["keys"])
         every = *keys, *found["undetermined"]
         problems.only(f"{where}.keys", every, self.machine.allowed_keys, "error parameter")
-        problems.only(f"{where}.reach", found["reach"], self.machine.axes, OF_MACHINE)
+        problems.only(
+            f"{where}.measured_range", found["measured_range"], self.machine.axes, OF_MACHINE
+        )
         for at, key in enumerate(every):
             self.check_free(f"{where}.keys", key, key)
             if key in every[:at] or key in alone:

@@ -183,8 +183,8 @@ def _covariance(found: Covariance | None, matrix: str) -> dict[str, object]:
     values: dict[str, object] = {
         "keys": found.keys,
         "matrix": matrix or [row[: at + 1] for at, row in enumerate(found.rows)],
-        "freedom": 0.0 if isinf(found.dof) else found.dof,
-        "reach": _ranges(found.measured_range),
+        "dof": 0.0 if isinf(found.dof) else found.dof,
+        "measured_range": _ranges(found.measured_range),
         "undetermined": found.undetermined,
         "lack_of_fit": found.lack_of_fit,
     }

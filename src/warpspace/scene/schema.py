@@ -300,8 +300,8 @@ COVARIANCE = TableSchema(
     {
         "keys": (_KEYS, ()),
         "matrix": (_list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE), ()),
-        "freedom": (_number(1.0, 1e9), math.inf),
-        "reach": (_by_name(workspace_range), {}),
+        "dof": (_number(1.0, 1e9), math.inf),
+        "measured_range": (_by_name(workspace_range), {}),
         "undetermined": (_KEYS, ()),
         "lack_of_fit": (_number(0.0, 1e9), 0.0),
     }
@@ -317,7 +317,7 @@ _CONTRIBUTION = TableSchema(
         "unit": (_text(20, 1), MISSING),
         "acts": (_one_of(ACTS), MISSING),
         "sensitivity": (_number(1e-9, limits.MAX_ERROR), MISSING),
-        "freedom": (_number(1.0, 1e9), math.inf),
+        "dof": (_number(1.0, 1e9), math.inf),
         "source": (_text(limits.MAX_TEXT), ""),
     }
 )

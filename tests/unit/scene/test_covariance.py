@@ -101,7 +101,11 @@ def test_an_axis_that_stood_still_was_measured_nowhere_else():
         ("matrix", 'undetermined = ["EA0Z"]\nmatrix', 'keys = "EA0Z": expected each error once'),
         ("matrix", 'undetermined = ["EA0Q"]\nmatrix', "EA0Q: unknown error parameter"),
         ("matrix", "lack_of_fit = -1\nmatrix", "lack_of_fit = -1: expected at least 0"),
-        ("matrix", "reach = { X = [5, 4] }\nmatrix", r"reach.X = \[5, 4\]: expected"),
+        (
+            "matrix",
+            "measured_range = { X = [5, 4] }\nmatrix",
+            r"measured_range.X = \[5, 4\]: expected",
+        ),
     ],
 )
 def test_what_is_wrong_is_said_with_its_row_and_value(old, new, said):

@@ -90,7 +90,7 @@ class Adjust(Analysis):
     grid weighs its share of the volume.
     """
 
-    name = "repair"
+    name = "adjust"
     task = "improve"
     doing = "searching"
     has_chart = True
@@ -173,7 +173,7 @@ class Adjust(Analysis):
 class AdjustResult(Result):
     """What repairs a machine."""
 
-    keys = ("objective", "before", "errors", "adjustable", "repairs", "all_sets_compared")
+    keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
     no_change = "there is nothing to adjust in this loop"
     asked: Adjust
     scene: Scene

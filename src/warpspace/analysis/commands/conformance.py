@@ -25,14 +25,14 @@ SHARES = (0.25, 0.5, 0.75, 1.0)  # parts of the volume whose limit the table say
 
 @dataclass(frozen=True, kw_only=True)
 class Conformance(Analysis):
-    """Say which part of the volume of SCENE keeps a limit.
+    """Compute the share of the volume of SCENE within a limit.
 
     The volume is cut into boxes between the nodes of a grid; a box keeps the limit if all its
     corners do. Said are the share of the volume, the largest box of axis ranges that keeps it
     everywhere, and the limits that parts of the volume keep.
     """
 
-    name = "reach"
+    name = "conformance"
     task = "understand"
     has_table = True
     limit_um: float = option(

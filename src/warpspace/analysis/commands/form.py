@@ -37,7 +37,7 @@ class FormDeviation:
 
 @dataclass(frozen=True, kw_only=True)
 class Form(Analysis):
-    """Certify flatness, straightness, squareness of SCENE.
+    """Evaluate flatness, straightness and squareness of SCENE.
 
     What an inspector would find on a part that the bent volume is copied to. Flatness and
     straightness are the widths of the zone between two parallel planes or lines that
@@ -45,7 +45,7 @@ class Form(Analysis):
     lines through the middle of the volume, positive where their angle is above 90°.
     """
 
-    name = "certify"
+    name = "form"
     task = "understand"
     has_table = True
     nodes: int = option(11, "Nodes per axis of the working volume", low=3, high=41, flag="--grid")

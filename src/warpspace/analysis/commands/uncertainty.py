@@ -32,7 +32,7 @@ UNSTATED = "the scene does not state how sure its errors are; expected [uncertai
 
 @dataclass(frozen=True, kw_only=True)
 class Uncertainty(Analysis):
-    """Say how sure the map of SCENE is.
+    """Report the expanded uncertainty of the error map.
 
     U95 of mean, RMS, P95 and max of |E| from what the scene states of the uncertainty of its
     errors; the probability that the machine keeps a limit, at its worst point and everywhere, by
@@ -40,7 +40,7 @@ class Uncertainty(Analysis):
     lies beyond the positions that were measured; and which errors the uncertainty comes from.
     """
 
-    name = "trust"
+    name = "uncertainty"
     task = "understand"
     doing = "drawing machines"
     has_table = True

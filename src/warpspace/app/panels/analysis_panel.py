@@ -44,9 +44,9 @@ from warpspace.scene.model import Scene
 
 TITLES = {
     "gains": "Error gains", "line": "Along a line",
-    "distance": "Distance and angle", "reach": "Volume within a limit",
-    "trust": "Uncertainty of the map",
-    "certify": "Flatness, straightness, squareness", "convert": "Another convention",
+    "distance": "Distance and angle", "conformance": "Volume within a limit",
+    "uncertainty": "Uncertainty of the map",
+    "form": "Flatness, straightness, squareness", "convert": "Another convention",
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
     "allocate": "Tolerances", "concepts": "Machines side by side",
 }  # fmt: skip

@@ -31,7 +31,7 @@ from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, St
 from warpspace.app.state.app_state import TASKS
 
 HOOKS: dict[str, type[AnalysisPanel]] = {
-    "calibrate": CalibratePanel, "repair": RepairPanel, "compensate": CompensatePanel,
+    "calibrate": CalibratePanel, "adjust": RepairPanel, "compensate": CompensatePanel,
     "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
     "part": PartPanel, "program": ProgramPanel,
 }  # fmt: skip
@@ -39,7 +39,17 @@ HOOKS: dict[str, type[AnalysisPanel]] = {
 FIRST = ("compensate", "concepts", "allocate")
 """Sections that stand first in their task, short ones before long ones."""
 RARE = frozenset(
-    {"volume", "gains", "line", "distance", "reach", "trust", "certify", "convert", "contributions"}
+    {
+        "volume",
+        "gains",
+        "line",
+        "distance",
+        "conformance",
+        "uncertainty",
+        "form",
+        "convert",
+        "contributions",
+    }
 )
 """Sections that stand under "More analyses", so that a task is calm at first sight."""
 
@@ -92,8 +102,8 @@ def build_parts(context: Context) -> list[Panel]:
         *(kind(context) for kind in of_machine),
     ]
     kinds = (
-        TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel, RoomPanel,
-        StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog, MachinesDialog,
+        TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel,
+        RoomPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog, MachinesDialog,
         FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
     others = [kind(context) for kind in kinds]

@@ -218,7 +218,7 @@ class PartLook:
 class PageLook:
     task: str = described("understand", "Task", choices=TASKS, linked="")
     open: frozenset[str] = described(
-        frozenset({"worst", "compensate", "repair", "concepts", "allocate", "import"}),
+        frozenset({"worst", "compensate", "adjust", "concepts", "allocate", "import"}),
         "Open sections",
         linked="",
     )

@@ -153,7 +153,9 @@ class BallPlate(BenchTest):
         quantities = (
             TestQuantity("length_error_um", "largest error of a distance",
                      worst("length_error_um"), "µm"),
-            TestQuantity("squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"),
+            TestQuantity(
+                "squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"
+            ),
             *(
                 TestQuantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
                          mean(f"scale_{axis}_um_per_m"), "µm/m")

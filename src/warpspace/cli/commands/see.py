@@ -228,7 +228,7 @@ def compare(
     say_first_order(settings.loop, *scenes)
     sure = [*(volume_uncertainty(one.scene, one.view, settings.grid) for one in pictures), None]
     both = zip(sure, (picture.statistics for picture in compared), strict=True)
-    found = [one.said_of(numbers) if one else numbers for one, numbers in both]
+    found = [one.with_expanded_uncertainty(numbers) if one else numbers for one, numbers in both]
     if output is not None:
         draw_figure_file("comparison", scenes, settings, output, force=force, silent=as_json)
     if as_json:

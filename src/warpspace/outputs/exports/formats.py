@@ -40,7 +40,7 @@ for _form in (
     ExportFormat(
         ".urdf",
         "robot simulators: joints, limits, meshes",
-        f"{_HERE}.urdf:write_urdf",
+        f"{_HERE}.urdf_export:write_urdf",
         in_app=False,
         left_out="errors, tolerances, conventions, gantries, working volume, functional points and"
         " view have no place in a URDF file: the machine is nominal",

@@ -118,7 +118,7 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
             canvas.text(x, y, text, ha="right")
 
 
-def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
+def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
     found = Adjust(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
     after = found.changes()[-1].scene if found.repairs else scene
@@ -127,7 +127,7 @@ def draw_repair(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         replace(after, title="after", name=f"{scene.name}_repaired"),
     )
     title = f"Repair: {scene.title}"
-    return _draw_pair("repair", title, pair, settings, [_adjusted(found)], exact=exact)
+    return _draw_pair("adjust", title, pair, settings, [_adjusted(found)], exact=exact)
 
 
 def _adjusted(found: AdjustResult) -> str:

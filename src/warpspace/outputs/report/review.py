@@ -59,7 +59,7 @@ class ReportSettings:
         repair = Adjust(loop=loop, grid=min(self.grid, REPAIR_NODES[1]))
         return {
             "advice": replace(repair, objective=Objective.MAX, count=1),
-            "repair": repair,
+            "adjust": repair,
             "gains": Gains(loop=loop, over_travel=True),
             "worst": machines(LIMIT_OVER),
             "sampled": machines(Over.SAMPLED),

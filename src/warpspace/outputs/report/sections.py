@@ -63,7 +63,7 @@ from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.units import spell, spell_short, spell_signed
 
 HEIGHT_PX = 400
-OTHER_PX = {"comparison": 490, "slices": 490, "error-curves": 490, "concepts": 490, "repair": 490}
+OTHER_PX = {"comparison": 490, "slices": 490, "error-curves": 490, "concepts": 490, "adjust": 490}
 CHART = "warpspace.outputs.charts.block_charts:chart_figure"
 LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they are drawn
 Chart = Bars | Lines | Histogram
@@ -206,7 +206,7 @@ def build_report(
         found = {
             "Where the error is": where(review, painter, embed),
             "Error budget at the worst point": map(explanation, review.scenes),
-            "Repair": told(review, painter, "repair"),
+            "Repair": told(review, painter, "adjust"),
             **({"What differs": differences(review)} if len(scenes) == 2 else {}),
             "Errors and tolerances": map(parameters, review.scenes),
             "How errors arrive at the point": told(review, painter, "gains"),
@@ -316,13 +316,13 @@ def told(review: Review, painter: ReportFigures, *names: str) -> Iterator[Block]
             before = numbers
             title, *blocks = found.blocks()
             yield Text(reviewed.titled(str(title)), "heading")
-            if name != "repair":
+            if name != "adjust":
                 yield from said(blocks, painter)
                 continue
             yield from said(blocks)
             if found.changes():
                 caption = "Before, after the last set of the table, and their difference."
-                yield painter.begin("repair", [reviewed.scene], reviewed.titled(caption))()
+                yield painter.begin("adjust", [reviewed.scene], reviewed.titled(caption))()
 
 
 def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterator[Block]:

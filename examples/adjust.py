@@ -1,5 +1,5 @@
 """
-What to repair
+What to adjust
 ==============
 
 Before and after the best adjustments, and what each error does to the volume.
@@ -12,5 +12,5 @@ import sys
 from warpspace import load_scene
 from warpspace.outputs.figure_files import write_figure
 
-target = sys.argv[1] if len(sys.argv) > 1 else "repair.png"
-write_figure(target, "repair", [load_scene("dvf5000_first")])
+target = sys.argv[1] if len(sys.argv) > 1 else "adjust.png"
+write_figure(target, "adjust", [load_scene("dvf5000_first")])
