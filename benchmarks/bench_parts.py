@@ -11,7 +11,8 @@ from timing import best
 
 from warpspace import load_scene
 from warpspace.analysis.description import ignore_progress
-from warpspace.parts.workpiece import Part, load_part, make_points, point_basis
+from warpspace.parts.part import Part
+from warpspace.parts.workpiece import load_part, make_points, point_basis
 
 AROUND = 1000  # vertices of a million
 GROWING = (400, 566, 800, 1000)  # above what features are looked for in
@@ -47,7 +48,8 @@ def measure() -> Section:
         for around, path in zip(GROWING, files, strict=True):
             ball(around).export(path)
         costs = [
-            best(lambda: Part(file=str(path)).run(scene, ignore_progress), 3) for path in files
+            best(lambda: Part(file=str(path)).run(scene, ignore_progress), 3)  # noqa: B023
+            for path in files
         ]
         files.append(files[-1].with_suffix(".stl"))
         ball(AROUND).export(files[-1])

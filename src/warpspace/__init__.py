@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from warpspace.resources import __version__
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.model import Scene, evaluate
-    from warpspace.thesis.rows import thesis
+    from warpspace.thesis_example.rows import thesis
 
     allocate: Verb[AllocateResult]
     contributions: Verb[ContributionsResult]
@@ -41,7 +41,7 @@ _HOME = {
     "measured": "warpspace.analysis.tolerance_check",
     "run_test": "warpspace.bench.base",
     "sweep": "warpspace.analysis.commands.montecarlo",
-    "thesis": "warpspace.thesis.rows",
+    "thesis": "warpspace.thesis_example.rows",
     "to_pyvista": "warpspace.outputs.exports.meshes",
     "load_scene": "warpspace.scene.library",
     "scene_names": "warpspace.scene.library",

@@ -52,7 +52,7 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     ran(part, state)
     found = part._answer.found
     said = Adjust(grid=9).run(FIRST, lambda _: None)
-    assert [one.adjust for one in found.repairs] == [one.adjust for one in said.repairs]
+    assert [one.adjust for one in found.adjustments] == [one.adjust for one in said.adjustments]
     assert part.offered(found) == [0, 1]  # of sets of one, two and three
     shown = section(part, state)
     assert shown.count("adjust:apply") == 2

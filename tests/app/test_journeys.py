@@ -34,7 +34,7 @@ def test_the_first_screen_is_calm(tab):
 
 def test_why_the_worst_corner_is_off_and_the_best_adjustment_in_two_actions(tab):
     start = start_state(SCENES[0])
-    found = Adjust(objective=Objective.MAX, count=1).run(SCENES[0], lambda _: None).repairs[0]
+    found = Adjust(objective=Objective.MAX, count=1).run(SCENES[0], lambda _: None).adjustments[0]
     tab.says("Worst point: why 51.7 µm")
     assert "+49.1" in tab.page.inner_text(".ws-causes")
     tab.says("51.7 → 46.1 µm")

@@ -29,7 +29,7 @@ from warpspace.app.state.app_state import start_state
 from warpspace.app.state.edits import with_curve
 from warpspace.bench.base import BenchTest, bench_names, register_test, unregister_test
 from warpspace.bench.data import DataColumn
-from warpspace.bench.plan import Outcome, TestQuantity, build_plan
+from warpspace.bench.plan import BenchQuantity, Outcome, build_plan
 from warpspace.cli.services import build_services, write_export
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
 from warpspace.kinematics.chain import jacobian, nominal_point
@@ -155,7 +155,7 @@ class Corner(BenchTest):
         return self.plan(scene), table["x_um"]
 
     def evaluate(self, plan, readings):
-        return Outcome((TestQuantity("x_um", "reading", float(readings.mean()), "µm"),))
+        return Outcome((BenchQuantity("x_um", "reading", float(readings.mean()), "µm"),))
 
     def charts(self, runs):
         curves = tuple(

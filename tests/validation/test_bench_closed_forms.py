@@ -5,7 +5,7 @@ import pytest
 
 import warpspace
 from bench_scenes import scene_with
-from warpspace.bench.base import TestRun, run_test
+from warpspace.bench.base import BenchRun, run_test
 from warpspace.bench.kinds.ball_plate import BallPlate
 from warpspace.bench.kinds.circular import Circular
 from warpspace.bench.kinds.cone_frustum import ConeFrustum
@@ -23,7 +23,7 @@ EXACT = {"rel": 1e-6, "abs": 1e-9}
 def run(scene, test, *, exact=False):
     plan = test.plan(scene)
     readings = simulate(scene, plan, exact=exact)
-    return TestRun("model", plan, readings, test.evaluate(plan, readings))
+    return BenchRun("model", plan, readings, test.evaluate(plan, readings))
 
 
 def backlash(value):

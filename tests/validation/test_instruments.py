@@ -308,7 +308,7 @@ def held_by_planted_machines(name, trials):
             0.0, 8.0 / LIMITS
         )
         for limit in wanted.norm_um + sure.u_norm_um * away:
-            stated = sure.doubt.probability_within(own.norm_um, sure.u95_norm_um, -np.inf, limit)
+            stated = sure.errors.probability_within(own.norm_um, sure.u95_norm_um, -np.inf, limit)
             verdicts.append((float(stated), wanted.norm_um <= limit))
         volume = volume_uncertainty(found.scene, scene.view(), 5)
         off = volume.norm_um - evaluate(truth, grid=5).norm_um

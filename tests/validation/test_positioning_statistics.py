@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bench_scenes import scene_with
-from warpspace.bench.base import TestRun
+from warpspace.bench.base import BenchRun
 from warpspace.bench.data import parse_table
 from warpspace.bench.kinds.positioning import Positioning
 
@@ -37,7 +37,7 @@ def evaluated(text):
     scene = scene_with()
     table = parse_table(text, TEST.data_columns(scene), "data.csv")
     plan, readings = TEST.plan_data(scene, table)
-    return TestRun("measured", plan, readings, TEST.evaluate(plan, readings))
+    return BenchRun("measured", plan, readings, TEST.evaluate(plan, readings))
 
 
 def test_every_number_of_the_standard():

@@ -14,8 +14,9 @@ from scipy.stats import norm, t
 from warpspace.analysis.commands.distance import Distance
 from warpspace.analysis.description import ignore_progress
 from warpspace.formats.compensation.compensate import Compensate
+from warpspace.parts.part import Part
 from warpspace.parts.program import Program
-from warpspace.parts.workpiece import Part, PartMesh
+from warpspace.parts.workpiece import PartMesh
 from warpspace.scene.library import parse_scene
 
 MACHINE = """[machine]

@@ -126,7 +126,7 @@ def test_an_adjustment_helps_where_the_error_is_beyond_half_of_it(objective):
     assert said["before"]["u95_max_um"] == pytest.approx(2 * 15e-3 * 100.0)
     unsure = found.scene.errors.with_amplitude("EXX", 1.0, (0.0, 1.0))
     found = Adjust(grid=5, count=1).run(replace(scene, errors=unsure))
-    assert found.repairs[0].expanded_uncertainty["probability"] is None
+    assert found.adjustments[0].expanded_uncertainty["probability"] is None
     assert "± ?" in str([*found.blocks()])
 
 

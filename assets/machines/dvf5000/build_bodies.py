@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from trimesh import util
 
-from warpspace.bodies.gltf import Material, Part, build_gltf
+from warpspace.bodies.gltf import GltfNode, Material, build_gltf
 from warpspace.bodies.mesh import DARK, LIGHT, METAL, MIDDLE, Body, build_body
 from warpspace.bodies.schematic import BODY_FILE, LINES, Shape, box, cone, cylinder, frame_of
 from warpspace.kinematics.chain import body_motions
@@ -111,14 +111,14 @@ def write_bodies(
     path: Path, bodies: Sequence[Body], lines_mm: Mapping[str, Array] | None = None
 ) -> None:
     """Write a file of bodies."""
-    parts: list[Part] = []
+    parts: list[GltfNode] = []
     for body in bodies:
         material = Material(body.name, body.colour)
-        parts.append(Part(body.name, body.vertices_mm, body.triangles, material))
+        parts.append(GltfNode(body.name, body.vertices_mm, body.triangles, material))
         further = (lines_mm or {}).get(body.name)
         if further is not None:
             pairs = np.arange(2 * len(further)).reshape(-1, 2)
-            parts.append(Part(body.name + LINES, further.reshape(-1, 3), pairs, material))
+            parts.append(GltfNode(body.name + LINES, further.reshape(-1, 3), pairs, material))
     path.write_bytes(build_gltf(parts, root="bodies, mm, Z up"))
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from warpspace.analysis.options import Grammar, Keys, Limits, Place, option
     from warpspace.analysis.registry import find_analysis, register, unregister
 
-_HOMES = ("blocks", "catalogue", "description", "options")
+_HOMES = ("blocks", "registry", "description", "options")
 
 __all__ = [
     "Analysis",

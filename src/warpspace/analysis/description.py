@@ -180,13 +180,10 @@ def count_progress(watch: ProgressCallback, total: float) -> ProgressCallback:
     return advance
 
 
-U95 = ("sure", "expanded_uncertainty")
-
-
 def to_json(value: Any) -> Any:
     """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class.
 
-    What a mapping `sure` of theirs holds stands beside their other keys.
+    What a mapping `expanded_uncertainty` of theirs holds stands beside their other keys.
     """
     keys: Sequence[str] = getattr(type(value), "keys", ())
     if isinstance(value, Enum):
@@ -200,9 +197,9 @@ def to_json(value: Any) -> Any:
         found = {
             name: to_json(getattr(value, name))
             for name in names
-            if name not in ("sure", "expanded_uncertainty")
+            if name != "expanded_uncertainty"
         }
-        sure = getattr(value, "sure", getattr(value, "expanded_uncertainty", None))
+        sure = getattr(value, "expanded_uncertainty", None)
         return found | to_json(sure) if isinstance(sure, Mapping) else found
     if isinstance(value, (list, tuple, set, frozenset)):
         return [to_json(one) for one in value]

@@ -17,7 +17,7 @@ from warpspace.analysis.sampling.distribution import round_width
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty
 from warpspace.bench.data import DataColumn, read_table, unit_notes
 from warpspace.bench.data import ReadingsFile as DataTable
-from warpspace.bench.plan import Outcome, TestPlan, fit_setup, respond, simulate
+from warpspace.bench.plan import BenchPlan, Outcome, fit_setup, respond, simulate
 from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.plugins import Registry, load_plugins
 from warpspace.scene.model import Scene
@@ -28,11 +28,11 @@ SHARED = 3  # options that every test has, the first fields of the base class
 
 
 @dataclass(frozen=True, slots=True)
-class TestRun:
+class BenchRun:
     """Readings of a test and what they come to."""
 
     who: str  # "model" or "measured"
-    plan: TestPlan
+    plan: BenchPlan
     readings: Array  # [m], µm or µrad
     outcome: Outcome
 
@@ -103,7 +103,7 @@ class BenchTest(Analysis):
         return run_test(scene, self, self.data)
 
     @abstractmethod
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         """Lay the path of the test on a machine.
 
         Raises
@@ -113,7 +113,7 @@ class BenchTest(Analysis):
         """
 
     @abstractmethod
-    def plan_data(self, scene: Scene, table: DataTable) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: DataTable) -> tuple[BenchPlan, Array]:
         """Lay the path along which readings were taken, and give these in its order, [m].
 
         Raises
@@ -123,11 +123,11 @@ class BenchTest(Analysis):
         """
 
     @abstractmethod
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         """Evaluate readings, [m], µm or µrad, by the formulas of the standard."""
 
     @abstractmethod
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         """Lay out the customary figure of runs, the model first."""
 
     def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:  # noqa: ARG002 - for others
@@ -163,15 +163,15 @@ class BenchResult(Result):
     drawn_by: ClassVar[str] = "warpspace.outputs.charts.result_charts:bench_chart"
     test: BenchTest
     scene: Scene
-    runs: tuple[TestRun, ...]  # the model; behind it what was measured, if anything
+    runs: tuple[BenchRun, ...]  # the model; behind it what was measured, if anything
     notes: tuple[str, ...] = ()  # what a reader should doubt
 
     @property
-    def model(self) -> TestRun:
+    def model(self) -> BenchRun:
         return self.runs[0]
 
     @property
-    def measured(self) -> TestRun | None:
+    def measured(self) -> BenchRun | None:
         return self.runs[1] if len(self.runs) > 1 else None
 
     @property
@@ -284,7 +284,7 @@ def run_test(
     )
     plan, measured = (test.plan(scene), None) if table is None else test.plan_data(scene, table)
     readings = simulate(scene, plan, exact=exact)
-    runs = (TestRun("model", plan, readings, test.evaluate(plan, readings)),)
+    runs = (BenchRun("model", plan, readings, test.evaluate(plan, readings)),)
     if table is None or measured is None:
         return BenchResult(test, scene, runs)
     angular = any(name.endswith("_urad") for name in table.columns)
@@ -292,7 +292,7 @@ def run_test(
     return BenchResult(
         test,
         scene,
-        (*runs, TestRun("measured", plan, measured, test.evaluate(plan, measured))),
+        (*runs, BenchRun("measured", plan, measured, test.evaluate(plan, measured))),
         (*table.notes, *test.data_notes(table), *notes),
     )
 

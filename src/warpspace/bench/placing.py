@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.bench.plan import TestPlan, build_plan
+from warpspace.bench.plan import BenchPlan, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import AxisFrames, branch_frames, branch_pose, nominal_point
@@ -313,7 +313,7 @@ def lay_followed(
     stand: Mapping[str, Array],
     angle_deg: Array,
     sense: Array,
-) -> TestPlan:
+) -> BenchPlan:
     axis = rotary_axis(scene.machine, name)
     ball = default_ball(scene, model, axis, stand, radius_mm)
     coordinates = followed(scene, model, axis, angle_deg, ball, stand)

@@ -21,7 +21,7 @@ DEPENDENT = 1e-9
 
 
 @dataclass(frozen=True)
-class TestPlan:
+class BenchPlan:
     """Path and sensing of a test on one machine.
 
     A site is a pose and a point that counts there. The error of a site is that of the tool against
@@ -65,13 +65,13 @@ def build_plan(
     travel: Mapping[str, Array] | None = None,
     setup: Mapping[str, Array] | None = None,
     path: tuple[Whole, ...] | None = None,
-) -> TestPlan:
+) -> BenchPlan:
     """Put a plan together; by default each site gives one reading of a fixed direction."""
     sites = len(point_mm)
     rows = np.arange(sites) if site is None else site
     count = len(rows)
     full = {name: np.broadcast_to(values, (sites,)) for name, values in coordinates.items()}
-    return TestPlan(
+    return BenchPlan(
         full,
         point_mm,
         travel or {},
@@ -102,7 +102,7 @@ def _independent(setup: Mapping[str, Array]) -> dict[str, Array]:
 
 
 @dataclass(frozen=True, slots=True)
-class TestQuantity:
+class BenchQuantity:
     """One number of a standard."""
 
     key: str  # in JSON; ends in its unit
@@ -115,7 +115,7 @@ class TestQuantity:
 class Outcome:
     """What readings come to."""
 
-    quantities: tuple[TestQuantity, ...]  # the most important first
+    quantities: tuple[BenchQuantity, ...]  # the most important first
     # what else JSON has: lists of numbers, ready to be spelled
     details: Mapping[str, object] = field(default_factory=dict[str, object])
 
@@ -126,7 +126,7 @@ class Outcome:
 RELATIVE = View(Loop.RELATIVE)
 
 
-def simulate(scene: Scene, plan: TestPlan, *, exact: bool = True) -> Array:
+def simulate(scene: Scene, plan: BenchPlan, *, exact: bool = True) -> Array:
     """Take the readings of a plan on the model of a scene, [m], µm (angles: µrad)."""
     if not exact:
         amplitudes = [scene.errors.amplitude(key) for key in scene.parameter_keys]
@@ -140,7 +140,7 @@ def simulate(scene: Scene, plan: TestPlan, *, exact: bool = True) -> Array:
     return sense(plan, found)
 
 
-def sense(plan: TestPlan, error_um: Array) -> Array:
+def sense(plan: BenchPlan, error_um: Array) -> Array:
     """Give what the sensors of a plan read, [m], of the errors of its sites, [n, 3], µm."""
     shift = _differences(plan, error_um)
     along = np.sum(shift * plan.direction, axis=-1)
@@ -153,7 +153,7 @@ def sense(plan: TestPlan, error_um: Array) -> Array:
     return plan.gain * along
 
 
-def respond(scene: Scene, plan: TestPlan, keys: Sequence[str]) -> Array:
+def respond(scene: Scene, plan: BenchPlan, keys: Sequence[str]) -> Array:
     """Give the readings of a plan as a linear function of errors, [m, K], µm or µrad per unit.
 
     The curve of each parameter along its axis is folded in, as in an `ErrorBasis`.
@@ -163,7 +163,7 @@ def respond(scene: Scene, plan: TestPlan, keys: Sequence[str]) -> Array:
     return (along * plan.gain).T
 
 
-def respond_sites(scene: Scene, plan: TestPlan, keys: Sequence[str]) -> Array:
+def respond_sites(scene: Scene, plan: BenchPlan, keys: Sequence[str]) -> Array:
     """Give the errors of all sites as a linear function of errors, [K, n, 3], µm per unit."""
     position = np.zeros((len(keys), len(plan.point_mm), 3))
     model = _both_ways(scene)
@@ -175,7 +175,7 @@ def respond_sites(scene: Scene, plan: TestPlan, keys: Sequence[str]) -> Array:
     return position
 
 
-def fit_setup(plan: TestPlan, readings: Array) -> tuple[Array, Array]:
+def fit_setup(plan: BenchPlan, readings: Array) -> tuple[Array, Array]:
     """Fit the unknowns of the set-up; give them and what is left of the readings, [m]."""
     if not plan.setup:
         return np.zeros(0), readings
@@ -184,14 +184,14 @@ def fit_setup(plan: TestPlan, readings: Array) -> tuple[Array, Array]:
     return found, readings - design @ found
 
 
-def _differences(plan: TestPlan, values: Array) -> Array:
+def _differences(plan: BenchPlan, values: Array) -> Array:
     shift = values[..., plan.site, :].copy()
     held = plan.against != NONE
     shift[..., held, :] -= values[..., plan.against[held], :]
     return shift
 
 
-def _by_travel(errors: ErrorSet, plan: TestPlan) -> Iterator[tuple[Whole, ErrorSet]]:
+def _by_travel(errors: ErrorSet, plan: BenchPlan) -> Iterator[tuple[Whole, ErrorSet]]:
     every = np.arange(len(plan.point_mm))
     functions = errors.functions.items()
     directional = {parameter(key).axis for key, one in functions if isinstance(one, Directional)}

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from warpspace.bench.placing import ball_point
-from warpspace.bench.plan import TestPlan
+from warpspace.bench.plan import BenchPlan
 from warpspace.exceptions import OptionError, SceneError, near_miss
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_CSV_BYTES
@@ -154,7 +154,7 @@ class Readings:
     circles: tuple[Circle, ...] = ()  # about rotary axes, where the readings are such
     # "machine" or "workpiece": what vectors were read in; they are kept in the latter
     frame: str = ""
-    plan: TestPlan | None = None  # of the test they were taken with, along its path
+    plan: BenchPlan | None = None  # of the test they were taken with, along its path
     # what the set-up leaves unknown, as a first fit has it; where a kind makes one on reading
     first_fit: tuple[float, ...] = ()
 

@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.analysis.options import Option
 from warpspace.bench.base import BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table
-from warpspace.bench.plan import TestPlan, respond, simulate
+from warpspace.bench.plan import BenchPlan, respond, simulate
 from warpspace.calibration.kinds import Lengths, MeasurementKind, Points, Prediction, Tracker
 from warpspace.calibration.positions import Positions
 from warpspace.calibration.readings import Readings, ReadingTable, check_spread
@@ -69,7 +69,7 @@ class TestReadings(MeasurementKind):
         return self._readings(plan, np.zeros(plan.readings), self._text, lines)
 
     def _readings(
-        self, plan: TestPlan, read_um: Array, source: str, lines: tuple[int, ...]
+        self, plan: BenchPlan, read_um: Array, source: str, lines: tuple[int, ...]
     ) -> Readings:
         return Readings(
             self._text,
@@ -100,7 +100,7 @@ class TestReadings(MeasurementKind):
         return matrix[:, None, :], _set_up(readings, guess.unknowns)[:, None, :]
 
 
-def _plan(readings: Readings) -> TestPlan:
+def _plan(readings: Readings) -> BenchPlan:
     if readings.plan is None:
         raise OptionError(f"{readings.source}: expected readings of a test")
     return readings.plan

@@ -124,7 +124,7 @@ class Covariance:
             every = np.append(at, reach.get(axis, ()))
             low, high = float(every.min()), float(every.max())
             reach[axis] = low, high if high - low >= MIN_SPAN else low
-        return replace(self, reach=reach)
+        return replace(self, measured_range=reach)
 
     def outside(self, at: Mapping[str, Array], shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Tell where axes stand outside what was reached, of a shape."""

@@ -42,7 +42,9 @@ class Clamping:
     max_um: float
     placed_um: float  # after the best rigid fit
     outside: int  # vertices beyond the travel
-    sure: Numbers = field(default_factory=dict[str, float | None])  # U95, where that is stated
+    expanded_uncertainty: Numbers = field(
+        default_factory=dict[str, float | None]
+    )  # U95, where that is stated
 
 
 JUDGED = attrgetter("max_um"), attrgetter("placed_um")
@@ -142,26 +144,37 @@ class ClampResult(Result):
     title: str
     placed: bool
     warnings: tuple[str, ...]  # of the mesh
-    sure: Numbers = field(default_factory=dict[str, float | None])  # U95 of what is gained
+    expanded_uncertainty: Numbers = field(
+        default_factory=dict[str, float | None]
+    )  # U95 of what is gained
 
     def with_expanded_uncertainty(self, *each: list[FieldUncertainty]) -> "ClampResult":
         """Say U95 at present, at the best place and of the gain."""
         before, after = (found[self.placed] for found in each)
         gain = before.u95(before.gradients[-1] - after.gradients[-1])
-        told = {"u95_gain_um": gain if before.doubt.is_known else None}
+        told = {"u95_gain_um": gain if before.errors.is_known else None}
         now, best = (
-            replace(at, sure=dict(zip(U95, [x.statistics()["max_um"] for x in found], strict=True)))
+            replace(
+                at,
+                expanded_uncertainty=dict(
+                    zip(U95, [x.statistics()["max_um"] for x in found], strict=True)
+                ),
+            )
             for at, found in zip((self.present, self.best), each, strict=True)
         )
-        return replace(self, present=now, best=best, sure=told, doubt=before.doubt)
+        return replace(
+            self, present=now, best=best, expanded_uncertainty=told, uncertainty=before.errors
+        )
 
     def blocks(self) -> Iterator[Block]:
         judged = "largest |E|" + " after the best rigid fit" * self.placed
         yield f"{self.title}: {len(self.places):,} places"
         yield f"  the best one gains {self.gain_um:.2f} µm of the {judged}"
-        if self.sure:
-            name, gain = U95[self.placed], plus_minus(self.sure["u95_gain_um"])
-            now, best = (plus_minus(one.sure[name]) for one in (self.present, self.best))
+        if self.expanded_uncertainty:
+            name, gain = U95[self.placed], plus_minus(self.expanded_uncertainty["u95_gain_um"])
+            now, best = (
+                plus_minus(one.expanded_uncertainty[name]) for one in (self.present, self.best)
+            )
             yield f"  U95 of that: at present {now}, at the best {best}, of the gain {gain} µm"
         yield "  Geometry only: no forces, heat, wear or servo"
         columns = (

@@ -312,14 +312,14 @@ def inspect(
     u95: list[float | None] = [None] * len(wanted)
     if sure is not None:
         changes = fit_out(points, sure.response @ turn)
-        u95 = sure.doubt.propagate(
+        u95 = sure.errors.propagate(
             lambda change: take(placed[:1] + np.tensordot(change, changes, 1))[0]
         )
     measures = [dict[str, Mapping[str, Any]]() for _ in features]
     for index, ((kind, of), band) in enumerate(wanted.items()):
         to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
         split = {key: float(part[index]) for key, part in budget.items()}
-        known = (sure.doubt, u95[index]) if sure else None
+        known = (sure.errors, u95[index]) if sure else None
         told = KINDS[kind], values[:, index], band, split, known, between_um
         measures[of[0]][kind + to] = _numbers(*told)
     results: list[FeatureResult] = []

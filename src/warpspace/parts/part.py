@@ -96,7 +96,7 @@ class Part(OfPart):
             **vars(cut),
             placed=placed,
             features=() if is_large else inspect(scene, mesh, made, tolerances, sure, unseen),
-            uncertainty=sure and sure.doubt,
+            uncertainty=sure and sure.errors,
             unseen_um=unseen,
             part=part,
             made=made,

@@ -67,7 +67,7 @@ class ToolPath:
     error_um: Array  # [n, 3], relative, actual − nominal, w
     outside: NDArray[np.bool_]  # [n], beyond the travel; errors are continued
     step_mm: Array  # [n, 3], from the sample before; zero where the path begins or a tool changes
-    sure: FieldUncertainty | None  # how sure its errors are; statistics over the way
+    uncertainty: FieldUncertainty | None  # how sure its errors are; statistics over the way
 
     @cached_property
     def norm_um(self) -> Array:
@@ -97,7 +97,11 @@ class ToolPath:
             at = int(np.argmax(um))
             x, y, z = self.tip_mm[at].tolist()
             found = Statistics(mean, square**0.5, p95, float(um[at]), (x, y, z), self.axes_at(at))
-            yield self.sure.transform(seen).with_expanded_uncertainty(found) if self.sure else found
+            yield (
+                self.uncertainty.transform(seen).with_expanded_uncertainty(found)
+                if self.uncertainty
+                else found
+            )
 
     @cached_property
     def shares(self) -> Array:
@@ -121,7 +125,7 @@ def trace_program(read: interpreter.ReadProgram, chord_mm: float = CHORD_MM) -> 
     step = np.diff(tip, axis=0, prepend=tip[:1]) * same_tool[:, None]
     outside = ~within_travel(read.scene.machine, at)
     found = ToolPath(read.line[move], move, at, tip, error, outside, step, None)
-    return replace(found, sure=_path_doubt(read, found))
+    return replace(found, uncertainty=_path_doubt(read, found))
 
 
 def _path_doubt(read: interpreter.ReadProgram, path: ToolPath) -> FieldUncertainty | None:
@@ -200,7 +204,7 @@ class PathPoint:
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
     budget: Mapping[str, float]  # µm of |E| by parameter, which add up to it, the largest first
-    sure: Mapping[str, float | None]  # u95_um of |E|; empty where nothing is stated
+    expanded_uncertainty: Mapping[str, float | None]  # u95_um of |E|; empty where nothing is stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,7 +255,9 @@ class Program(interpreter.Setup, Analysis):
             ranked = sorted(parts, key=lambda part: -part.along_um)
             budget, um = {part.key: part.along_um for part in ranked}, float(path.norm_um[sample])
             at = int(path.line[sample]), um, axes, path.error_um[sample], budget
-            return PathPoint(*at, {"u95_um": path.sure.u95_at(sample)} if path.sure else {})
+            return PathPoint(
+                *at, {"u95_um": path.uncertainty.u95_at(sample)} if path.uncertainty else {}
+            )
 
         ends = np.flatnonzero(path.line == self.at_line)
         if self.at_line and not len(ends):
@@ -313,8 +319,8 @@ class ProgramResult(Result):
         names = {"error": self.deviation, "along the path": self.along, "across it": self.across}
         rows = [(name, *astuple(one)[:4]) for name, one in names.items()]
         yield Table((Column("", leads=True), *heads), rows)
-        sure = self.path.sure
-        yield from u95_lines(sure and sure.doubt, names)
+        sure = self.path.uncertainty
+        yield from u95_lines(sure and sure.errors, names)
         columns = (
             Column("line", "d", leads=True),
             *number_columns(("|E|", "x", "y", "z"), ".2f", "µm"),
@@ -323,7 +329,10 @@ class ProgramResult(Result):
             Column("most of it", budget_words, "µm", wraps=True),
         )
         told = [*self.worst, *([self.line] if self.line else [])]
-        rows = [(one.line, one.um, *one.error_um, one.sure, one.axes, one.budget) for one in told]
+        rows = [
+            (one.line, one.um, *one.error_um, one.expanded_uncertainty, one.axes, one.budget)
+            for one in told
+        ]
         title = "Worst blocks" + ", and the line asked for" * bool(self.line)
         yield Table(columns, rows, title)
 

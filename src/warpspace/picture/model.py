@@ -166,7 +166,7 @@ class Picture:
     def u95_um(self) -> Array | None:
         """U95 of the component of position errors, [nx, ny, nz]; None where it is not known."""
         found = self.uncertainty
-        if found is None or not found.doubt.is_known:
+        if found is None or not found.errors.is_known:
             return None
         if self.component == "norm":
             return found.u95_norm_um
@@ -433,8 +433,8 @@ def evaluate_picture(
         uncertainty = field_uncertainty(
             scene, field.error_um, nodes.coordinates, view, nodes.point_mm
         )
-        if uncertainty is None or not uncertainty.doubt.is_known:
-            remarks = () if uncertainty is None else uncertainty.doubt.remarks()
+        if uncertainty is None or not uncertainty.errors.is_known:
+            remarks = () if uncertainty is None else uncertainty.errors.remarks()
             raise OptionError("; ".join(remarks) or NOT_STATED)
     return ScenePicture(
         view=view,

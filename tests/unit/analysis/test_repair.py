@@ -92,7 +92,7 @@ def test_leaving_one_out_is_what_direct_evaluation_gives():
 
 @pytest.mark.parametrize("size", [1, 2, 3])
 def test_rms_is_the_least_squares_optimum_over_all_sets(size):
-    found = Adjust(grid=NODES).run(FIRST).repairs[size - 1]
+    found = Adjust(grid=NODES).run(FIRST).adjustments[size - 1]
     best = np.inf
     for keys in combinations(SQUARENESS, size):
         matrix, present, weights = response(keys)
@@ -110,7 +110,7 @@ def test_rms_is_the_least_squares_optimum_over_all_sets(size):
 def test_rms_within_limits_is_the_bounded_optimum():
     keys, limit = ("EXX", "EYX", "EZX", "EAY", "EA0Z"), 4.0
     plan = Adjust(count=5, adjustable=keys, limit={"all": limit, "EA0Z": 1.5}, grid=NODES)
-    found = plan.run(FIRST).repairs[-1]
+    found = plan.run(FIRST).adjustments[-1]
     matrix, present, weights = response(keys)
     root = np.sqrt(weights)
     high = np.array([1.5 if key == "EA0Z" else limit for key in keys])
@@ -141,7 +141,7 @@ def test_max_is_what_a_second_solver_finds(keys, limit):
     plan = Adjust(
         objective="max", count=len(keys), adjustable=keys, limit={"all": limit}, grid=NODES
     )
-    found = plan.run(FIRST).repairs[-1]
+    found = plan.run(FIRST).adjustments[-1]
     assert found.max_um == pytest.approx(least_max(keys, -limit, limit), abs=1e-3)
     assert outcome_of(repaired(FIRST, found.adjust))[3] == pytest.approx(found.max_um, abs=1e-9)
     for key, value in found.adjust.items():
@@ -152,8 +152,8 @@ def test_max_is_what_a_second_solver_finds(keys, limit):
 def test_more_adjustments_are_never_worse(objective):
     plan = Adjust(objective=objective, count=4, adjustable=("all",), grid=5)
     found = plan.run(FIRST)
-    values = [getattr(one, f"{objective}_um") for one in found.repairs]
-    assert [len(one.adjust) for one in found.repairs] == [1, 2, 3, 4]
+    values = [getattr(one, f"{objective}_um") for one in found.adjustments]
+    assert [len(one.adjust) for one in found.adjustments] == [1, 2, 3, 4]
     assert all(b <= a + 1e-3 for a, b in pairwise(values))
     assert values[0] < getattr(found.before, f"{objective}_um")
 
@@ -164,8 +164,8 @@ def test_sets_that_are_built_up_say_so_and_are_near_the_best(objective, monkeypa
     every = plan.run(FIRST)
     monkeypatch.setattr(adjustment_search, "MOST_SETS", dict.fromkeys(Objective, 21))
     built = plan.run(FIRST)
-    assert [one.proven for one in built.repairs] == [True, False, False]
-    for one, best in zip(built.repairs, every.repairs, strict=True):
+    assert [one.proven for one in built.adjustments] == [True, False, False]
+    for one, best in zip(built.adjustments, every.adjustments, strict=True):
         value = getattr(one, f"{objective}_um")
         least = getattr(best, f"{objective}_um")
         assert least - 1e-3 <= value < 1.25 * least + 1e-3
@@ -173,11 +173,11 @@ def test_sets_that_are_built_up_say_so_and_are_near_the_best(objective, monkeypa
 
 def test_nothing_to_repair():
     found = Adjust(grid=5).run(load_scene("dvf5000_nominal"))
-    assert (found.before.max_um, found.errors, found.repairs) == (0.0, (), ())
+    assert (found.before.max_um, found.errors, found.adjustments) == (0.0, (), ())
 
 
 def test_a_loop_without_alignment_has_no_sets():
     scene = parse_scene('[machine]\nchain = "wFXt"\n[errors]\nEXX = { ramp = 5 }\n', "x")
     found = Adjust(grid=5).run(scene)
-    assert found.repairs == ()
+    assert found.adjustments == ()
     assert found.errors != ()

@@ -11,8 +11,9 @@ from warpspace import load_scene
 from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
+from warpspace.parts.part import Part
 from warpspace.parts.program import Program
-from warpspace.parts.workpiece import Part, fit_out, load_part, make_points, place_part, point_basis
+from warpspace.parts.workpiece import fit_out, load_part, make_points, place_part, point_basis
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.scene_writer import scene_to_toml

@@ -56,7 +56,7 @@ class Effect:
     present: float  # µm or µrad
     left_out: Summary
     best: Best
-    sure: Numbers = attribute(default_factory=dict[str, float | None])
+    expanded_uncertainty: Numbers = attribute(default_factory=dict[str, float | None])
 
     @property
     def parameter(self) -> Parameter:
@@ -151,10 +151,10 @@ class Adjust(Analysis):
         ]
         sets = [
             replace(one, exact=Summary(*numbers.four))
-            for one, numbers in zip(found.repairs, exact, strict=True)
+            for one, numbers in zip(found.adjustments, exact, strict=True)
         ]
         left_out = second_order(scene, self.seen_loop)
-        found = replace(found, repairs=tuple(sets), second_order=left_out)
+        found = replace(found, adjustments=tuple(sets), second_order=left_out)
         error = basis.evaluate(values, orientation=False).error_um
         at = nodes.coordinates, view, nodes.point_mm, nodes.weights
         doubt = field_uncertainty(scene, error, *at)
@@ -182,7 +182,7 @@ class AdjustResult(Result):
     # objective most comes first
     errors: tuple[Effect, ...]
     # the best sets of one, two, three … adjustments; none where no point is off
-    repairs: tuple[AdjustedSet, ...]
+    adjustments: tuple[AdjustedSet, ...]
     adjustable: Mapping[str, float]  # largest change of each error that was tried, µm or µrad
     present: Mapping[str, float]  # value of each of them now, µm or µrad
 
@@ -192,12 +192,12 @@ class AdjustResult(Result):
 
     @property
     def all_sets_compared(self) -> list[bool]:
-        return [one.proven for one in self.repairs]
+        return [one.proven for one in self.adjustments]
 
     def changes(self) -> Sequence[Change]:
         return [
             Change(f"after repair: {_values(one)}", repaired(self.scene, one.adjust))
-            for one in self.repairs
+            for one in self.adjustments
         ]
 
     def blocks(self) -> Iterator[Block]:
@@ -227,7 +227,7 @@ class AdjustResult(Result):
         yield from self._set_blocks()
         for one in self.errors:
             if (share := one.best.expanded_uncertainty.get("probability")) is not None:
-                now = f"{one.key} {one.present:.4g} {plus_minus(one.sure['u95_present'], '.3g')}"
+                now = f"{one.key} {one.present:.4g} {plus_minus(one.expanded_uncertainty['u95_present'], '.3g')}"
                 yield f"  {now} {one.unit}: best value {one.best.value:.1f} helps with {share:.1%}"
         yield self.bars()
 
@@ -244,7 +244,7 @@ class AdjustResult(Result):
         if not self.before.max_um:
             yield "The error is zero everywhere in this loop: there is nothing to repair."
             return
-        if not self.repairs:
+        if not self.adjustments:
             yield "No squareness or alignment acts in this loop; other errors can be adjusted."
             return
         columns = (
@@ -252,7 +252,7 @@ class AdjustResult(Result):
             *number_columns(("mean", "RMS", "P95", "max"), unit="µm"),
             Column("adjust", wraps=True),
         )
-        rows = [(len(one.adjust), *one.four, self._adjustments(one)) for one in self.repairs]
+        rows = [(len(one.adjust), *one.four, self._adjustments(one)) for one in self.adjustments]
         yield Table(columns, rows, title="Best sets of adjustments:")
         if len(set(self.adjustable.values())) == 1:
             said = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
@@ -260,7 +260,7 @@ class AdjustResult(Result):
             each = (f"{key} ±{limit:g}" for key, limit in self.adjustable.items())
             said = f"by at most {', '.join(each)}"
         yield f"  adjusted: {', '.join(self.adjustable)}; {said}"
-        sizes = [str(len(one.adjust)) for one in self.repairs if not one.proven]
+        sizes = [str(len(one.adjust)) for one in self.adjustments if not one.proven]
         yield (
             "  all sets compared"
             if not sizes
@@ -270,7 +270,7 @@ class AdjustResult(Result):
         name = f"{self.objective}_um"
         exact = [
             f"set {len(one.adjust)}: {value:.3f} µm ({round(value - first, 3) + 0.0:+.3f})"
-            for one in self.repairs
+            for one in self.adjustments
             if one.exact is not None
             for value, first in ((getattr(one.exact, name), getattr(one, name)),)
         ]
@@ -285,7 +285,7 @@ class AdjustResult(Result):
         )
 
     def bars(self) -> Bars:
-        errors, sets = self.errors[:MOST_BARS], self.repairs
+        errors, sets = self.errors[:MOST_BARS], self.adjustments
         none = [None] * len(sets), [None] * len(errors)
         panels = tuple(
             Panel(
@@ -361,7 +361,7 @@ def find_adjustments(
         scene=scene,
         before=Summary(*volume.statistics(amplitudes).four),
         errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
-        repairs=tuple(sets),
+        adjustments=tuple(sets),
         adjustable={key: asked.limit_of(key) for key in keys},
         present={key: float(amplitudes[i]) for key, i in zip(keys, candidates, strict=True)},
     )
@@ -379,14 +379,18 @@ def _with_doubt(found: AdjustResult, before: FieldUncertainty, basis: ErrorBasis
         return {**after.with_expanded_uncertainty(found.before).expanded_uncertainty, **helps}
 
     def sure_effect(one: Effect) -> Effect:
-        best = replace(one.best, sure=sure({one.key: one.best.value}))
-        return replace(one, best=best, sure={"u95_present": before.doubt.u95_of(one.key)})
+        best = replace(one.best, expanded_uncertainty=sure({one.key: one.best.value}))
+        return replace(
+            one, best=best, expanded_uncertainty={"u95_present": before.errors.u95_of(one.key)}
+        )
 
     return replace(
         found,
-        before=replace(found.before, sure=sure({})),
+        before=replace(found.before, expanded_uncertainty=sure({})),
         errors=tuple(map(sure_effect, found.errors)),
-        repairs=tuple(replace(one, sure=sure(one.adjust)) for one in found.repairs),
+        adjustments=tuple(
+            replace(one, expanded_uncertainty=sure(one.adjust)) for one in found.adjustments
+        ),
     )
 
 

@@ -77,8 +77,8 @@ class Conformance(Analysis):
             percent=percent,
             box=box,
             keeps_um=dict(zip(names, keeps_um, strict=True)),
-            sure=told if sure else {},
-            uncertainty=sure and sure.doubt,
+            expanded_uncertainty=told if sure else {},
+            uncertainty=sure and sure.errors,
             title=scene.title,
             ranges={axis: ranges[axis] for axis in axes if axis},
         )
@@ -93,12 +93,16 @@ class ConformanceResult(Result):
     percent: float  # of the volume
     box: Mapping[str, tuple[float, float]] | None  # axis ranges, mm or degrees
     keeps_um: Mapping[str, float]  # limit by part of the volume
-    sure: Mapping[str, Any]  # U95 of percent and of these
+    expanded_uncertainty: Mapping[str, Any]  # U95 of percent and of these
     title: str
     ranges: Mapping[str, tuple[float, float]]
 
     def blocks(self) -> Iterator[Block]:
-        about = f" {plus_minus(self.sure['u95_percent'], '.1f')}" if self.sure else ""
+        about = (
+            f" {plus_minus(self.expanded_uncertainty['u95_percent'], '.1f')}"
+            if self.expanded_uncertainty
+            else ""
+        )
         share = f"{self.percent:.1f}{about} %"
         yield f"{self.title} · {share} of the volume within {self.limit_um:g} µm"
         if self.box is None:
@@ -118,9 +122,12 @@ class ConformanceResult(Result):
             yield Table(columns, rows, title="Largest box that keeps it everywhere:")
         columns = (Column("of the volume", leads=True), Column("keeps", ".2f", "µm"))
         rows = [*self.keeps_um.items()]
-        if self.sure:
+        if self.expanded_uncertainty:
             columns += (Column("U95", unit="µm"),)
-            rows = [(*row, plus_minus(self.sure["u95_keeps_um"][row[0]])) for row in rows]
+            rows = [
+                (*row, plus_minus(self.expanded_uncertainty["u95_keeps_um"][row[0]]))
+                for row in rows
+            ]
         yield Table(columns, rows, title="What parts of the volume keep:")
 
 

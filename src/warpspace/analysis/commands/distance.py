@@ -59,7 +59,10 @@ class Distance(Between):
 
         distance, angle, *along = sure.propagate(ask)
         told = {"u95_difference_um": distance, "u95_along_um": along}
-        return replace(found, sure=told | ({"u95_deviation_urad": angle} if self.corner else {}))
+        return replace(
+            found,
+            expanded_uncertainty=told | ({"u95_deviation_urad": angle} if self.corner else {}),
+        )
 
     def between(self, scene: Scene, at: Coordinates, field: ErrorField) -> "DistanceResult":
         """Measure between points, [n], of a field in R."""
@@ -111,7 +114,9 @@ class DistanceResult(Result):
     deviation_urad: float | None
     is_squareness: bool
     title: str
-    sure: Mapping[str, Any] = attribute(default_factory=dict[str, Any])  # U95 of what differs
+    expanded_uncertainty: Mapping[str, Any] = attribute(
+        default_factory=dict[str, Any]
+    )  # U95 of what differs
 
     def words(self) -> list[str]:
         """Say it in short: the distance, its parts, and the angle where there is one."""
@@ -136,20 +141,27 @@ class DistanceResult(Result):
             (name, float(mm), float(mm + um / UM_PER_MM), float(um))
             for name, mm, um in zip(names, nominal_mm, added_um, strict=True)
         ]
-        if self.sure:
-            u95 = self.sure["u95_difference_um"], *self.sure["u95_along_um"]
+        if self.expanded_uncertainty:
+            u95 = (
+                self.expanded_uncertainty["u95_difference_um"],
+                *self.expanded_uncertainty["u95_along_um"],
+            )
             rows = [(*row, plus_minus(one)) for row, one in zip(rows, u95, strict=True)]
         columns = (
             Column(key="of", leads=True),
             *number_columns(("nominal", "actual"), ".4f", "mm", ("nominal_mm", "actual_mm")),
             Column("difference", "+.2f", "µm", key="difference_um"),
-            *([Column("U95", unit="µm", key="u95_um")] if self.sure else []),
+            *([Column("U95", unit="µm", key="u95_um")] if self.expanded_uncertainty else []),
         )
         yield Table(columns, rows)
         if self.angle_deg is not None:
             nominal, actual = self.angle_deg
             kind = "squareness" if self.is_squareness else "deviation"
-            angle = f" {plus_minus(self.sure['u95_deviation_urad'])}" if self.sure else ""
+            angle = (
+                f" {plus_minus(self.expanded_uncertainty['u95_deviation_urad'])}"
+                if self.expanded_uncertainty
+                else ""
+            )
             yield f"angle at {place_words(self.at[2])}: {nominal:.6f}° → {actual:.6f}°"
             yield (
                 f"  {kind} of the edge to {end} against the edge to {start}:"

@@ -32,7 +32,9 @@ class FormDeviation:
     at: str  # where the other axes stand
     value: float
     unit: str
-    sure: Numbers = field(default_factory=dict[str, float | None])  # u95, where that is stated
+    expanded_uncertainty: Numbers = field(
+        default_factory=dict[str, float | None]
+    )  # u95, where that is stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +62,7 @@ class Form(Analysis):
         error = evaluate_grid(scene, grid, view).error_um
         found, asked = [*_deviations(axes, grid.nominal_mm, error)], 1
         sure = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
-        count = 2 * (1 + len(sure.doubt.keys)) if sure else 1
+        count = 2 * (1 + len(sure.errors.keys)) if sure else 1
         watch(1 / count)
         if sure is None:
             return FormResult(deviations=tuple(found), title=scene.title)
@@ -71,8 +73,8 @@ class Form(Analysis):
             return np.array([one.value for one in _deviations(axes, grid.nominal_mm, error_um)])
 
         each = zip(found, sure.propagate(ask), strict=True)
-        told = tuple(replace(one, sure={"u95": u95}) for one, u95 in each)
-        return FormResult(deviations=told, title=scene.title, uncertainty=sure.doubt)
+        told = tuple(replace(one, expanded_uncertainty={"u95": u95}) for one, u95 in each)
+        return FormResult(deviations=told, title=scene.title, uncertainty=sure.errors)
 
 
 def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[FormDeviation]:
@@ -110,7 +112,7 @@ class FormResult(Result):
                 d.unit,
             )
             for d in self.deviations
-            for u95 in [d.sure.get("u95")]
+            for u95 in [d.expanded_uncertainty.get("u95")]
         ]
         yield Table(columns, rows)
 

@@ -377,7 +377,7 @@ class GainsResult(Result, Sequence[Gain]):
 
 def thesis_keys(machine: str) -> tuple[str, ...]:
     """Give the key errors of the thesis (table 4-7) for its machine, none for any other."""
-    from warpspace.thesis.rows import printed_tables
+    from warpspace.thesis_example.rows import printed_tables
 
     if machine != "dvf5000":
         return ()

@@ -79,7 +79,7 @@ class Line(Between):
             orientation_urad=field.orientation_urad,
             title=f"{scene.title} · {self.loop} loop",
             uncertainty=scene_uncertainty(scene, self.loop),
-            sure=u95_columns(scene, field, axes, scene.view(self.loop)),
+            expanded_uncertainty=u95_columns(scene, field, axes, scene.view(self.loop)),
         )
 
 
@@ -97,14 +97,14 @@ class LineResult(Result):
     error_um: Array  # [n, 3], in R
     orientation_urad: Array  # [n, 3], in R
     title: str
-    sure: Mapping[str, Array]  # U95 of these, by name; empty where it is not known
+    expanded_uncertainty: Mapping[str, Array]  # U95 of these, by name; empty where it is not known
 
     def blocks(self) -> Iterator[Block]:
         norm = np.linalg.norm(self.error_um, axis=1)
         worst = int(np.argmax(norm))
         place = {name: float(at[worst]) for name, at in self.axes.items()}
         yield f"{self.title} · {self.length_mm:.1f} mm"
-        u95 = [self.sure["u95_norm_um"]] if self.sure else []
+        u95 = [self.expanded_uncertainty["u95_norm_um"]] if self.expanded_uncertainty else []
         about = f" {plus_minus(u95[0][worst] if u95 else None)}" if self.uncertainty else ""
         yield f"  largest |E| {norm[worst]:.2f}{about} µm at {place_words(place)}"
         columns = self.along_mm, *self.axes.values(), norm, *u95

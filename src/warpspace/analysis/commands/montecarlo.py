@@ -383,7 +383,7 @@ def sampled_histogram(
 
 
 def printed_um(scene: Scene, found: SampleStatistics) -> float | None:
-    from warpspace.thesis.rows import printed_tables
+    from warpspace.thesis_example.rows import printed_tables
 
     name = f"{found.view.loop}_{scene.name.removeprefix('dvf5000_')}"
     printed = printed_tables()["table_4_8"]["predicted"].get(name)

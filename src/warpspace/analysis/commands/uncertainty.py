@@ -65,12 +65,12 @@ class Uncertainty(Analysis):
             limit_um=limit,
             statistics=found.with_expanded_uncertainty(statistics) if found else statistics,
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
-            k=found and found.doubt.factor,
-            unknown=found.doubt.unknown if found else [*scene.errors],
-            remarks=tuple(found.doubt.remarks()) if found else (UNSTATED,),
+            k=found and found.errors.factor,
+            unknown=found.errors.unknown if found else [*scene.errors],
+            remarks=tuple(found.errors.remarks()) if found else (UNSTATED,),
             title=f"{scene.title} · {self.loop} loop",
         )
-        if found is None or not found.doubt.is_known:
+        if found is None or not found.errors.is_known:
             return result
         above = found.norm_um > found.u95_norm_um
         significant = 100.0 * float(grid.weights[above].sum())
@@ -106,7 +106,7 @@ def _spread(drawn: Array) -> Mapping[str, float]:
 
 def _shares(found: FieldUncertainty) -> list[Mapping[str, Any]]:
     mean, _, _, largest = found.gradients
-    of_mean, doubt = found.variance_shares(mean), found.doubt
+    of_mean, doubt = found.variance_shares(mean), found.errors
     u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))
     return [
         {"key": key, "u": float(u[key]), "percent_of_max": 100.0 * part,

@@ -213,7 +213,7 @@ def _root(variance: Array) -> Array:
 class FieldUncertainty:
     """How sure the errors of points are; `replace` error_um where only these change."""
 
-    doubt: ErrorUncertainty
+    errors: ErrorUncertainty
     response: Array  # [K, ..., 3], of the position errors to what is not sure
     expanded_um2: Array  # [..., 3, 3]: U95 along a unit vector v is the root of v · this · v
     error_um: Array  # [..., 3], position errors
@@ -227,9 +227,9 @@ class FieldUncertainty:
     @cached_property
     def covariance_um2(self) -> Array:
         """Covariance of the position errors, [..., 3, 3]."""
-        if len({*self.doubt.factors.tolist()}) == 1:  # no second product on each slider move
-            return self.expanded_um2 / self.doubt.factor**2
-        return _carry(self.doubt.covariance, self.response)
+        if len({*self.errors.factors.tolist()}) == 1:  # no second product on each slider move
+            return self.expanded_um2 / self.errors.factor**2
+        return _carry(self.errors.covariance, self.response)
 
     @property
     def u_norm_um(self) -> Array:
@@ -250,7 +250,7 @@ class FieldUncertainty:
     def columns(self) -> dict[str, Array]:
         """U95 of position errors, of their length and of orientation errors, by name."""
         turning = np.zeros_like(self.response) if self.turning is None else self.turning
-        square = np.sum(turning * np.tensordot(self.doubt.expanded, turning, 1), axis=0)
+        square = np.sum(turning * np.tensordot(self.errors.expanded, turning, 1), axis=0)
         return {
             "u95_um": self.u95_um,
             "u95_norm_um": self.u95_norm_um,
@@ -274,19 +274,19 @@ class FieldUncertainty:
     def u95_along(self, point: int, way: Array) -> float | None:
         """Give U95 of the error of a point by its number, along a unit vector, [3]."""
         square = self.expanded_um2.reshape(-1, 3, 3)[point]
-        return float(_root(way @ square @ way)) if self.doubt.is_known else None
+        return float(_root(way @ square @ way)) if self.errors.is_known else None
 
     def u95_at(self, point: int) -> float | None:
         """Give U95 of |E| at a point by its number; None where it is unknown."""
-        return self.u95_norm_um.item(point) if self.doubt.is_known else None
+        return self.u95_norm_um.item(point) if self.errors.is_known else None
 
     def u95(self, gradient: Array) -> float:
         """Give U95 of a number by its growth per unit of each amplitude, [K]."""
-        return float(_root(gradient @ self.doubt.expanded @ gradient))
+        return float(_root(gradient @ self.errors.expanded @ gradient))
 
     def propagate(self, ask: Callable[[Array], Array]) -> list[float | None]:
         """Give U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
-        return self.doubt.propagate(
+        return self.errors.propagate(
             lambda change: ask(self.error_um + np.tensordot(change, self.response, 1))
         )
 
@@ -295,9 +295,11 @@ class FieldUncertainty:
 
         They add up to one; a share is below zero where a correlation makes the variance smaller.
         """
-        parts = gradient * (self.doubt.covariance @ gradient)
-        found = dict.fromkeys(self.doubt.keys, 0.0)
-        for key, part in zip(self.doubt.keys, (parts / (parts.sum() or 1.0)).tolist(), strict=True):
+        parts = gradient * (self.errors.covariance @ gradient)
+        found = dict.fromkeys(self.errors.keys, 0.0)
+        for key, part in zip(
+            self.errors.keys, (parts / (parts.sum() or 1.0)).tolist(), strict=True
+        ):
             found[key] += part
         return dict(sorted(found.items(), key=lambda one: -abs(one[1])))
 
@@ -321,7 +323,7 @@ class FieldUncertainty:
 
         Points without an error count by U95 of their vector.
         """
-        if not self.doubt.is_known:
+        if not self.errors.is_known:
             return dict.fromkeys(NAMES)
         u95 = [self.u95(gradient) for gradient in self.gradients]
         if (none := self.norm_um.reshape(-1) == 0.0).any():
@@ -332,7 +334,7 @@ class FieldUncertainty:
     def with_expanded_uncertainty(self, numbers: S) -> S:
         """Say U95 beside statistics of the field."""
         u95 = {f"u95_{name}": value for name, value in self.statistics().items()}
-        return replace(numbers, sure=u95)
+        return replace(numbers, expanded_uncertainty=u95)
 
     @cached_property
     def weights(self) -> Array:
@@ -341,7 +343,7 @@ class FieldUncertainty:
 
     def transform(self, linear: Callable[[Array], Array]) -> "FieldUncertainty":
         """Give the same of what a linear function makes of position errors, [..., n, 3]."""
-        return combine(self.doubt, linear(self.response), linear(self.error_um), self.shares)
+        return combine(self.errors, linear(self.response), linear(self.error_um), self.shares)
 
     @cached_property
     def counts(self) -> Array:
@@ -372,7 +374,7 @@ class FieldUncertainty:
 
         Squares are compared: that of the RMS is linear in what is not sure, however large that is.
         """
-        if not self.doubt.is_known:
+        if not self.errors.is_known:
             return None
         squares, ways = np.zeros(2), list[Array]()
         for index, one in enumerate((self, after)):
@@ -380,7 +382,7 @@ class FieldUncertainty:
             squares[index] = square.max() if name == "max_um" else self.weights @ square
             ways.append(2.0 * squares[index] ** 0.5 * one.gradients[[*NAMES].index(name)])
         way, fall = ways[1] - ways[0], float(squares[0] - squares[1])
-        return float(self.doubt.probability_within(fall, self.u95(way), 0.0, np.inf))
+        return float(self.errors.probability_within(fall, self.u95(way), 0.0, np.inf))
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
         """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""
@@ -388,7 +390,7 @@ class FieldUncertainty:
         gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
         present = self.error_um.reshape(points, 3).T
         for start in range(0, count, step := max(1, MOST_DRAWN // points)):
-            change = self.doubt.draw(rng, min(step, count - start))
+            change = self.errors.draw(rng, min(step, count - start))
             parts = (change @ gain + own for gain, own in zip(gains, present, strict=True))
             yield np.sqrt(sum(part**2 for part in parts))
 

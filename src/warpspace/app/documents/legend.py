@@ -140,7 +140,7 @@ def numbers_words(picture: LivePicture) -> str:
     if found is not None:
         u95 = found.statistics()
         sure = {name: formatting.u95_behind(u95[f"{name}_um"]) for name in numbers}
-        factor = f" (k = {found.doubt.factor:.3g})"
+        factor = f" (k = {found.errors.factor:.3g})"
     said = (f"{name} {number(value)}{sure[name]} µm" for name, value in numbers.items())
     return f"{change}{' · '.join(said)}{factor}"
 

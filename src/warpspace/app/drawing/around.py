@@ -204,7 +204,7 @@ def _uncertainty(picture: LivePicture) -> Shapes:
         seen = surface[outside.reshape(-1)[surface]]
         at = picture.drawn_mm.reshape(-1, 3)[seen]
         shapes["/uncertainty/unmeasured"] = dots(at, UNMEASURED * picture.size_mm, GREY)
-    if found is None or not found.doubt.is_known or not look.ellipsoids:
+    if found is None or not found.errors.is_known or not look.ellipsoids:
         return shapes
     chosen, picked = corners(picture.shape), picture.state.picked
     at = [*picture.drawn_mm.reshape(-1, 3)[chosen]]

@@ -59,7 +59,7 @@ class LiveModel:
             state.exaggeration, None, float(field.norm_um.max()), size
         )
         uncertainty, quantity = self._uncertainty(state, grid, field), state.look.quantity
-        if quantity == "uncertainty" and not (uncertainty and uncertainty.doubt.is_known):
+        if quantity == "uncertainty" and not (uncertainty and uncertainty.errors.is_known):
             quantity = "position"
         common: dict[str, Any] = {
             "view": state.view(),
@@ -111,11 +111,11 @@ class LiveModel:
 
         key = "uncertainty", Identity(grid), _place(state)
         found: FieldUncertainty = self._kept.get(key, build, lambda one: 3 * one.response.nbytes)
-        axes, known = loop_axes(scene.model, state.loop), found.doubt.keys
+        axes, known = loop_axes(scene.model, state.loop), found.errors.keys
         acting = (key for key, value in state.active.items() if value and key not in known)
         unknown = [key for key in acting if parameter(key).axis in axes]
-        doubt = replace(found.doubt, unknown=tuple(unknown))
-        return replace(found, doubt=doubt, error_um=field.error_um, shares=grid.weights)
+        doubt = replace(found.errors, unknown=tuple(unknown))
+        return replace(found, errors=doubt, error_um=field.error_um, shares=grid.weights)
 
     def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)

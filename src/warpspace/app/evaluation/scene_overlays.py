@@ -15,7 +15,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, option_values, read_form
 from warpspace.app.state.leaf import Identity
 from warpspace.bench.base import BenchTest, bench_names, find_test
-from warpspace.bench.plan import TestPlan, respond_sites
+from warpspace.bench.plan import BenchPlan, respond_sites
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.field.grid import seen_from_workpiece
 from warpspace.kinematics import transforms
@@ -150,7 +150,7 @@ def chosen_test(state: AppState) -> type[BenchTest] | None:
     return find_test(name) if name in bench_names() else None
 
 
-def plan_test(test: BenchTest, scene: Scene) -> TestPlan:
+def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
     """Lay the path of a test on a machine."""
     plan = test.plan(scene)
     if len(plan.point_mm) > MOST_SITES:

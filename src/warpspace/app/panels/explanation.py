@@ -148,8 +148,8 @@ def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
     Shares are below zero where correlations make it smaller; all of them add up to 100 %.
     """
     sure = found.uncertainty
-    if sure is None or not sure.doubt.is_known:
-        words = [] if sure is None else sure.doubt.remarks()
+    if sure is None or not sure.errors.is_known:
+        words = [] if sure is None else sure.errors.remarks()
         return join(tag("p", said, class_="ws-tiny") for said in words)
     parts = sure.variance_shares(sure.response @ sure.direction)
     named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]

@@ -79,7 +79,7 @@ class RepairPanel(AnalysisPanel):
         """Offer the sets that gain something over the smaller ones, which come first."""
         name, kept = f"{found.objective}_um", list[int]()
         least: float = getattr(found.before, name)
-        for index, one in enumerate(found.repairs):
+        for index, one in enumerate(found.adjustments):
             if least - getattr(one, name) >= NO_GAIN_UM:
                 kept.append(index)
                 least = getattr(one, name)

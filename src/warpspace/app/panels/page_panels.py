@@ -103,8 +103,8 @@ def build_parts(context: Context) -> list[Panel]:
     ]
     kinds = (
         TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel,
-        RoomPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog, MachinesDialog,
-        FilesDialog, ReportDialog, HelpDialog, StoryPanel,
+        RoomPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
+        MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
     others = [kind(context) for kind in kinds]
     return [*others, TasksPanel(context, found), *found, BestPanel(context)]

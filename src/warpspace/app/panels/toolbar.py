@@ -123,8 +123,8 @@ def _colours(picture: LivePicture) -> Markup:
     words: object = limit
     for quantity, title in QUANTITIES.items():
         names = {key: lowered(said) for key, said in COMPONENT_NAMES[quantity].items()}
-        if quantity == "uncertainty" and (found is None or not found.doubt.is_known):
-            said = NOT_STATED if found is None else "; ".join(found.doubt.remarks())
+        if quantity == "uncertainty" and (found is None or not found.errors.is_known):
+            said = NOT_STATED if found is None else "; ".join(found.errors.remarks())
             if not picture.is_difference:
                 body += [tag("h3", title), tag("p", said, class_="ws-tiny")]
             continue

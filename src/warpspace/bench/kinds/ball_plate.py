@@ -9,9 +9,9 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import XYZ, DataColumn, ReadingsFile
-from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan, fit_setup
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan, fit_setup
 from warpspace.exceptions import OptionError
 from warpspace.geometry.surfaces import round_down
 from warpspace.scene.model import Scene
@@ -42,12 +42,12 @@ class BallPlate(BenchTest):
     )
     positions: int = option(3, "Positions of the plate along the third axis", low=1, high=10)
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         balls = np.arange(self.balls)
         grid = np.meshgrid(np.arange(self.positions), balls, balls, indexing="ij")
         return self._lay(scene, *(part.reshape(-1).astype(float) for part in grid))
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         problems: list[str] = []
         given: dict[str, Array] = {}
         for name, most in (
@@ -72,7 +72,7 @@ class BallPlate(BenchTest):
         readings = np.concatenate([table["x_um"], table["y_um"], table["z_um"]])
         return self._lay(scene, given["position"], given["row"], given["column"]), readings
 
-    def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> TestPlan:
+    def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> BenchPlan:
         first, second, _ = placing.plane_axes(scene.machine, self.plane)
         names = placing.following_axes(scene.model)
         third = next(name for name in names if name not in (first, second))
@@ -120,7 +120,7 @@ class BallPlate(BenchTest):
             )
         return (low + high) / 2.0 + pitch * (index - (self.balls - 1) / 2.0)
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         rest = left_over(plan, readings)
         first, second, key = placing.PLANES[self.plane]
         sign = float(plan.marks["gain_sign"][0])
@@ -151,22 +151,22 @@ class BallPlate(BenchTest):
             return float(np.mean([float(str(row[name])) for row in rows]))
 
         quantities = (
-            TestQuantity("length_error_um", "largest error of a distance",
+            BenchQuantity("length_error_um", "largest error of a distance",
                      worst("length_error_um"), "µm"),
-            TestQuantity(
+            BenchQuantity(
                 "squareness_urad", f"squareness {key}, mean", mean("squareness_urad"), "µrad"
             ),
             *(
-                TestQuantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
+                BenchQuantity(f"scale_{axis}_um_per_m", f"scale of {axis}, mean",
                          mean(f"scale_{axis}_um_per_m"), "µm/m")
                 for axis in (first, second)
             ),
-            TestQuantity("flatness_um", "largest height of the plate", worst("flatness_um"), "µm"),
-            TestQuantity("rms_um", "RMS of a position, mean", mean("rms_um"), "µm"),
+            BenchQuantity("flatness_um", "largest height of the plate", worst("flatness_um"), "µm"),
+            BenchQuantity("rms_um", "RMS of a position, mean", mean("rms_um"), "µm"),
         )  # fmt: skip
         return Outcome(quantities, {"positions": rows, "squareness_key": key})
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         first, second = placing.PLANES[self.plane][:2]
         columns = ["XYZ".index(name) for name in (first, second)]
         largest = max(float(np.abs(left_over(run.plan, run.readings)).max()) for run in runs)
@@ -197,7 +197,7 @@ class BallPlate(BenchTest):
         return tuple(charts)
 
 
-def left_over(plan: TestPlan, readings: Array) -> Array:
+def left_over(plan: BenchPlan, readings: Array) -> Array:
     """Give the deviations of the balls once the place of the plate is fitted, [b, 3], µm."""
     return fit_setup(plan, readings)[1].reshape(3, -1).T
 

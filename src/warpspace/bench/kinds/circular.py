@@ -11,9 +11,9 @@ from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.description import ProgressCallback
 from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchResult, BenchTest, TestRun, run_test
+from warpspace.bench.base import BenchResult, BenchRun, BenchTest, run_test
 from warpspace.bench.data import ANGLE, DIRECTION, DataColumn, ReadingsFile
-from warpspace.bench.plan import RELATIVE, Outcome, TestPlan, TestQuantity, build_plan, simulate
+from warpspace.bench.plan import RELATIVE, BenchPlan, BenchQuantity, Outcome, build_plan, simulate
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import Workspace
@@ -67,7 +67,7 @@ def is_full(angle_deg: Array) -> bool:
     return covered_deg(angle_deg) >= FULL_DEG
 
 
-def fit_circle_readings(plan: TestPlan, readings: Array) -> CircleFit:
+def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
     """Fit centre, radius and ellipse to the readings, [m], µm, of a circular plan.
 
     Its marks are angle_deg, sense, along and up (the direction of the bar along the two axes of the
@@ -148,7 +148,7 @@ class Circular(BenchTest):
         "radial", "Direction of the bar, with --rotary"
     )
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         span = self.end_deg - self.start_deg
         if not 0.0 < span <= TURN:
             raise OptionError(
@@ -159,7 +159,7 @@ class Circular(BenchTest):
         angle, sense = np.concatenate([angle, angle[::-1]]), np.repeat([1.0, -1.0], self.points)
         return self._lay(scene, angle, sense)
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         if len(table) < MIN_POINTS:
             raise table.refuse(f"has {len(table)} readings; expected at least {MIN_POINTS}")
         if np.ptp(table["angle_deg"]) < 1.0:
@@ -177,7 +177,7 @@ class Circular(BenchTest):
         run = f"the readings run {ends[0]:g} … {ends[1]:g}°, the test is set to"
         return (f"{run} {self.start_deg:g} … {self.end_deg:g}°: the figures are of the readings",)
 
-    def _lay(self, scene: Scene, angle_deg: Array, sense: Array) -> TestPlan:
+    def _lay(self, scene: Scene, angle_deg: Array, sense: Array) -> BenchPlan:
         if self.rotary:
             how = self.rotary, self.radius_mm, self.bar, self.stand(scene)
             return placing.lay_followed(scene, self.model(scene), *how, angle_deg, sense)
@@ -223,40 +223,40 @@ class Circular(BenchTest):
             path=(np.arange(count),),
         )  # fmt: skip
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         fit = fit_circle_readings(plan, readings)
         letter = "G" if fit.mean_radial_um is None else "G(b)"
         deviation = fit.deviation_um
         quantities = [
-            TestQuantity("circular_deviation_um", f"circular deviation {letter}", deviation, "µm")
+            BenchQuantity("circular_deviation_um", f"circular deviation {letter}", deviation, "µm")
         ]
         for sense, value in fit.by_sense.items():
             word = SENSES[sense].replace("-", "_")
             quantities.append(
-                TestQuantity(f"circular_deviation_{word}_um", f"G, {SENSES[sense]}", value, "µm")
+                BenchQuantity(f"circular_deviation_{word}_um", f"G, {SENSES[sense]}", value, "µm")
             )
         most, least = float(readings.max()), float(readings.min())
         bar = self.bar if self.rotary else "radial"
         quantities += [
-            TestQuantity("radial_deviation_max_um", f"{bar} deviation Fmax", most, "µm"),
-            TestQuantity("radial_deviation_min_um", f"{bar} deviation Fmin", least, "µm"),
+            BenchQuantity("radial_deviation_max_um", f"{bar} deviation Fmax", most, "µm"),
+            BenchQuantity("radial_deviation_min_um", f"{bar} deviation Fmin", least, "µm"),
         ]
         if fit.mean_radial_um is not None and fit.hysteresis_um is not None:
             label = f"mean bi-directional {bar} deviation D"
             quantities += [
-                TestQuantity("mean_radial_deviation_um", label, fit.mean_radial_um, "µm"),
-                TestQuantity("hysteresis_um", "hysteresis H", fit.hysteresis_um, "µm"),
+                BenchQuantity("mean_radial_deviation_um", label, fit.mean_radial_um, "µm"),
+                BenchQuantity("hysteresis_um", "hysteresis H", fit.hysteresis_um, "µm"),
             ]
         radius = fit.radius_um
-        quantities.append(TestQuantity("radius_um", "mean radius − nominal", radius, "µm"))
+        quantities.append(BenchQuantity("radius_um", "mean radius − nominal", radius, "µm"))
         details: dict[str, object] = {}
         if fit.shear_um is not None and not self.rotary:
             first, second, key = placing.PLANES[self.plane]
             lever = plan.marks["gain_sign"][0] * self.radius_mm * UM_PER_MM_URAD
             squareness = float(2.0 * fit.shear_um / lever)
             quantities += [
-                TestQuantity("squareness_urad", f"squareness {key}", squareness, "µrad"),
-                TestQuantity(
+                BenchQuantity("squareness_urad", f"squareness {key}", squareness, "µrad"),
+                BenchQuantity(
                     "scale_difference_um", f"{first} longer than {second}",
                     fit.scale_difference_um, "µm",
                 ),
@@ -267,7 +267,7 @@ class Circular(BenchTest):
         details["radial_um"] = fit.radial_um.tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             fit = fit_circle_readings(run.plan, run.readings)

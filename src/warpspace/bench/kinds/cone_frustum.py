@@ -8,10 +8,10 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Vector, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, DataColumn, ReadingsFile
 from warpspace.bench.kinds.circular import fit_circle_readings
-from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, tool_axis
@@ -114,17 +114,17 @@ class ConeFrustum(BenchTest):
     )
     points: int = option(72, "Points of the circle", low=8, high=720)
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         return self._lay(scene, np.linspace(0.0, 360.0, self.points, endpoint=False))
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         if len(table) > MOST:
             raise table.refuse(f"has {len(table):,} readings; expected at most {MOST:,}")
         table.check_angles(8, "circle", "readings")
         order = np.argsort(table["angle_deg"], kind="stable")
         return self._lay(scene, table["angle_deg"][order]), table["radial_um"][order]
 
-    def _lay(self, scene: Scene, angle_deg: Array) -> TestPlan:
+    def _lay(self, scene: Scene, angle_deg: Array) -> BenchPlan:
         if not 0.0 < self.radius_mm < 1e4:
             raise OptionError(f"{{radius_mm}} {self.radius_mm:g} mm; expected above 0")
         if not 0.0 <= self.half_apex_deg < 90.0 or not -90.0 < self.tilt_deg < 90.0:
@@ -170,12 +170,12 @@ class ConeFrustum(BenchTest):
             },
         )  # fmt: skip
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         fit = fit_circle_readings(plan, readings)
         return Outcome(
             (
-                TestQuantity("circular_deviation_um", "circularity", fit.deviation_um, "µm"),
-                TestQuantity("radius_um", "mean radius − nominal", fit.radius_um, "µm"),
+                BenchQuantity("circular_deviation_um", "circularity", fit.deviation_um, "µm"),
+                BenchQuantity("radius_um", "mean radius − nominal", fit.radius_um, "µm"),
             ),
             {
                 "centre_um": list(fit.centre_um),
@@ -184,7 +184,7 @@ class ConeFrustum(BenchTest):
             },
         )
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             fit = fit_circle_readings(run.plan, run.readings)

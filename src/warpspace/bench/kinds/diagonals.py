@@ -8,11 +8,11 @@ import numpy as np
 
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import option
-from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
 from warpspace.bench.kinds.positioning import target_statistics
 from warpspace.bench.placing import PLANES, find_plane, following_axes, relative_point, tool_points
-from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, Whole, build_plan
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, Whole, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import Array
@@ -45,7 +45,7 @@ def means_along(position: Array, way: Array, readings: Array) -> dict[str, Array
 
 
 def squareness_of_diagonals(
-    plan: TestPlan, names: Sequence[str], lengths: Array
+    plan: BenchPlan, names: Sequence[str], lengths: Array
 ) -> dict[str, float]:
     """Squareness errors that the lengths of diagonals look like, µrad.
 
@@ -90,7 +90,7 @@ class Diagonals(BenchTest):
     def names(self) -> tuple[str, ...]:
         return FACES if self.kind == "face" else BODY
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         share = np.linspace(0.0, 1.0, self.targets)
         if self.kind == "step":
             return self._steps(scene)
@@ -102,7 +102,7 @@ class Diagonals(BenchTest):
             np.tile(np.concatenate([share, share[::-1]]), count),
         )
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         names = self.names
         problems = table.unknown_words("diagonal", names, f"one of {', '.join(names)}")
         if problems:
@@ -144,13 +144,13 @@ class Diagonals(BenchTest):
         end = np.where(signs > 0.0, high, np.where(signs < 0.0, low, here))
         return start, end
 
-    def _lay(self, scene: Scene, number: Array, way: Array, share: Array) -> TestPlan:
+    def _lay(self, scene: Scene, number: Array, way: Array, share: Array) -> BenchPlan:
         start, end = self._ends(scene)
         index = number.astype(np.intp)
         positions = start[index] + share[:, None] * (end - start)[index]
         return self._plan(scene, positions, index, {"diagonal": number, "way": way})
 
-    def _steps(self, scene: Scene) -> TestPlan:
+    def _steps(self, scene: Scene) -> BenchPlan:
         start, end = self._ends(scene)
         steps = self.targets - 1
         done = np.zeros((3 * steps + 1, 3))
@@ -169,7 +169,7 @@ class Diagonals(BenchTest):
 
     def _step_data(
         self, scene: Scene, table: ReadingsFile, number: Array
-    ) -> tuple[TestPlan, Array]:
+    ) -> tuple[BenchPlan, Array]:
         plan = self._steps(scene)
         values: list[Array] = []
         each = plan.readings // len(BODY)
@@ -185,7 +185,7 @@ class Diagonals(BenchTest):
 
     def _plan(
         self, scene: Scene, positions: Array, index: Whole, marks: dict[str, Array]
-    ) -> TestPlan:
+    ) -> BenchPlan:
         model, axes = self.model(scene), following_axes(scene.model)
         start, end = self._ends(scene)
         signs = diagonal_signs(self.names)
@@ -223,7 +223,7 @@ class Diagonals(BenchTest):
             path=tuple(np.split(rows, ends[:-1])),
         )  # fmt: skip
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         names = self.names
         number, way = plan.marks["diagonal"], plan.marks["way"]
         position = plan.marks["position_mm"]
@@ -251,25 +251,25 @@ class Diagonals(BenchTest):
                 row["by_axis_um"] = {x: float(steps[axis == i].sum()) for i, x in enumerate("XYZ")}
             rows.append(row)
         quantities = [
-            TestQuantity("E_um", "largest systematic deviation E", _largest(rows, "E_um"), "µm"),
-            TestQuantity(
+            BenchQuantity("E_um", "largest systematic deviation E", _largest(rows, "E_um"), "µm"),
+            BenchQuantity(
                 "length_difference_um", "longest less shortest deviation of length",
                 float(np.ptp(lengths[np.isfinite(lengths)])), "µm",
             ),
         ]  # fmt: skip
         if any("B_um" in row for row in rows):
             quantities.append(
-                TestQuantity("B_um", "largest reversal B", _largest(rows, "B_um"), "µm")
+                BenchQuantity("B_um", "largest reversal B", _largest(rows, "B_um"), "µm")
             )
         squareness = squareness_of_diagonals(plan, names, lengths)
         words = "squareness {} that it looks like"
         quantities += [
-            TestQuantity(f"squareness_{key}_urad", words.format(key), value, "µrad")
+            BenchQuantity(f"squareness_{key}_urad", words.format(key), value, "µrad")
             for key, value in squareness.items()
         ]
         return Outcome(tuple(quantities), {"diagonals": rows})
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             marks = run.plan.marks
@@ -292,7 +292,7 @@ class Diagonals(BenchTest):
         )  # fmt: skip
 
 
-def _alike(run: TestRun, index: int) -> bool:
+def _alike(run: BenchRun, index: int) -> bool:
     marks = run.plan.marks
     there, back = (
         run.readings[(marks["diagonal"] == index) & (marks["way"] == way)] for way in (1.0, -1.0)

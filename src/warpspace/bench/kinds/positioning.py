@@ -7,10 +7,10 @@ import numpy as np
 
 from warpspace.analysis.blocks import Band, Curve, Lines
 from warpspace.analysis.options import Axis, option
-from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import DataColumn, ReadingsFile
 from warpspace.bench.placing import axis_line, motion_direction, tool_points
-from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
 from warpspace.exceptions import OptionError, UnknownNameError
 from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene
@@ -84,7 +84,7 @@ class Positioning(BenchTest):
             return self.columns
         return (*self.columns[:2], DataColumn("target_deg", "number"), DataColumn("deviation_urad"))
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         axis = self.own_axis(scene)
         low, high = scene.axis_span(axis)
         low = low if self.start is None else self.start
@@ -95,7 +95,7 @@ class Positioning(BenchTest):
         way = np.repeat([FORWARD, BACKWARD], self.targets)
         return self._lay(scene, np.concatenate([targets, targets[::-1]]), way, np.ones(len(way)))
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         linear = is_linear(self.own_axis(scene))
         target = table["target_mm" if linear else "target_deg"]
         readings = table["deviation_um" if linear else "deviation_urad"]
@@ -118,7 +118,7 @@ class Positioning(BenchTest):
             raise table.refuse(*problems)
         return self._lay(scene, target, table["direction"], table["run"]), readings
 
-    def _lay(self, scene: Scene, target: Array, way: Array, run: Array) -> TestPlan:
+    def _lay(self, scene: Scene, target: Array, way: Array, run: Array) -> BenchPlan:
         axis, model = self.own_axis(scene), self.model(scene)
         coordinates = {**self.stand(scene), axis: target}
         marks = {"target": target, "way": way, "run": run}
@@ -147,18 +147,18 @@ class Positioning(BenchTest):
             travel={axis: np.tile(way, 2)}, setup=zero, path=(both,),
         )  # fmt: skip
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         found = target_statistics(plan.marks["target"], plan.marks["way"], readings)
         unit = "µm" if "zero_um" in plan.setup else "µrad"
         suffix = "um" if unit == "µm" else "urad"
         quantities = [
-            TestQuantity(f"{key}_{suffix}", name, value, unit)
+            BenchQuantity(f"{key}_{suffix}", name, value, unit)
             for key, name, value in _numbers(found)
             if np.isfinite(value)
         ]
         return Outcome(tuple(quantities), {"targets": _target_rows(found, unit)})
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         bands: list[Band] = []
         note = ""

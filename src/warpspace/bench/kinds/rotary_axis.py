@@ -9,10 +9,10 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, Vector, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, XYZ, DataColumn, ReadingsFile
 from warpspace.bench.kinds.circular import is_full
-from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan, fit_setup
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan, fit_setup
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose
 from warpspace.scene.model import Scene
@@ -65,19 +65,19 @@ class RotaryAxis(BenchTest):
     )
     points: int = option(72, "Positions along the turn", low=8, high=3_600)
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         axis = placing.rotary_axis(scene.machine, self.axis)
         low, high = scene.machine.axes[axis].travel
         full = high - low >= 360.0
         end = low + 360.0 if full else high
         return self._lay(scene, np.linspace(low, end, self.points, endpoint=not full))
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         table.check_angles(8, "turn")
         readings = np.concatenate([table[name] for name in CHANNELS])
         return self._lay(scene, table["angle_deg"]), readings
 
-    def _lay(self, scene: Scene, angle_deg: Array) -> TestPlan:
+    def _lay(self, scene: Scene, angle_deg: Array) -> BenchPlan:
         axis, model = placing.rotary_axis(scene.machine, self.axis), self.model(scene)
         stand = self.stand(scene)
         line = placing.axis_line(model, stand, axis)
@@ -125,14 +125,14 @@ class RotaryAxis(BenchTest):
             path=(one,),
         )  # fmt: skip
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         found = motions(plan, readings)
         axis = plan.place.partition(" ")[0]
         quantities = [
-            TestQuantity("radial_um", "radial error motion", float(np.ptp(found.radial)), "µm"),
-            TestQuantity("axial_um", "axial error motion", float(np.ptp(found.axial)), "µm"),
-            TestQuantity("tilt_urad", "tilt error motion", float(np.ptp(found.tilt)), "µrad"),
-            TestQuantity(
+            BenchQuantity("radial_um", "radial error motion", float(np.ptp(found.radial)), "µm"),
+            BenchQuantity("axial_um", "axial error motion", float(np.ptp(found.axial)), "µm"),
+            BenchQuantity("tilt_urad", "tilt error motion", float(np.ptp(found.tilt)), "µrad"),
+            BenchQuantity(
                 "angular_urad", "angular positioning", float(np.ptp(found.angular)), "µrad"
             ),
         ]
@@ -141,13 +141,13 @@ class RotaryAxis(BenchTest):
         parts += [("abc"["xyz".index(a)].upper(), f"orientation about {a}", "µrad") for a in across]
         for (letter, word, unit), value in zip(parts, found.average_line, strict=True):
             key, suffix = f"E{letter}0{axis}", "um" if unit == "µm" else "urad"
-            quantities.append(TestQuantity(f"{key}_{suffix}", f"{word} ({key})", value, unit))
+            quantities.append(BenchQuantity(f"{key}_{suffix}", f"{word} ({key})", value, unit))
         details: dict[str, object] = {"angle_deg": found.angle_deg.tolist()}
         for name in ("radial", "axial", "tilt", "angular"):
             details[f"{name}_motion"] = getattr(found, name).tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         axis = runs[0].plan.place.partition(" ")[0]
         charts: list[Lines] = []
         units = {"radial": "µm", "tilt": "µrad", "axial": "µm", "angular": "µrad"}
@@ -165,7 +165,7 @@ class RotaryAxis(BenchTest):
         return tuple(charts)
 
 
-def motions(plan: TestPlan, readings: Array) -> Motions:
+def motions(plan: BenchPlan, readings: Array) -> Motions:
     """Take the readings of the six channels, [6 n], apart."""
     channels = readings.reshape(6, -1)
     angle_deg = plan.marks["angle_deg"][: channels.shape[1]]
@@ -241,12 +241,12 @@ class RTest(BenchTest):
     points: int = option(73, "Positions along the way", low=4, high=3_600)
     frame: Literal["machine", "workpiece"] = option("machine", "Directions of the readings")
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         axis, ball = self._set_up(scene)
         where = scene, self.model(scene), axis, ball, self.stand(scene)
         return self._lay(scene, placing.reachable(*where, self.start, self.end, self.points))
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         table.check_angles(4, "way")
         readings = np.concatenate([table[f"{name}_um"] for name in AXES])
         return self._lay(scene, table["angle_deg"]), readings
@@ -257,7 +257,7 @@ class RTest(BenchTest):
             return axis, np.asarray(self.ball, dtype=float)
         return axis, placing.default_ball(scene, self.model(scene), axis, self.stand(scene), None)
 
-    def _lay(self, scene: Scene, angle_deg: Array) -> TestPlan:
+    def _lay(self, scene: Scene, angle_deg: Array) -> BenchPlan:
         axis, ball = self._set_up(scene)
         model = self.model(scene)
         coordinates = placing.followed(scene, model, axis, angle_deg, ball, self.stand(scene))
@@ -283,15 +283,15 @@ class RTest(BenchTest):
             setup=placing.ball_columns(model, coordinates, direction),
         )
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         place, rest = fit_setup(plan, readings)
         raw, left = readings.reshape(3, -1), rest.reshape(3, -1)
         quantities = [
-            TestQuantity(f"{name}_um", f"range in {name}", float(np.ptp(raw[index])), "µm")
+            BenchQuantity(f"{name}_um", f"range in {name}", float(np.ptp(raw[index])), "µm")
             for index, name in enumerate(AXES)
         ]
         quantities += [
-            TestQuantity(
+            BenchQuantity(
                 f"{name}_fitted_um", f"range in {name}, ball's place fitted",
                 float(np.ptp(left[index])), "µm",
             )
@@ -299,7 +299,7 @@ class RTest(BenchTest):
         ]  # fmt: skip
         norm = np.linalg.norm(left, axis=0)
         rms = float(np.sqrt(np.mean(norm**2)))
-        quantities.append(TestQuantity("rms_fitted_um", "RMS distance, place fitted", rms, "µm"))
+        quantities.append(BenchQuantity("rms_fitted_um", "RMS distance, place fitted", rms, "µm"))
         details: dict[str, object] = {
             "ball_um": place.tolist(),
             "angle_deg": plan.marks["angle_deg"][: raw.shape[1]].tolist(),
@@ -308,7 +308,7 @@ class RTest(BenchTest):
             details[f"{name}_readings_um"] = raw[index].tolist()
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             rows = run.readings.reshape(3, -1)

@@ -9,9 +9,9 @@ import numpy as np
 from warpspace.analysis.blocks import Curve, Lines
 from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchTest, TestRun
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
-from warpspace.bench.plan import Outcome, TestPlan, TestQuantity, build_plan
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.conversion import fit_line
 from warpspace.scene.model import Scene
@@ -57,7 +57,7 @@ def lay_lines(
     position: Array,
     way: Array,
     unknowns: Sequence[str],
-) -> TestPlan:
+) -> BenchPlan:
     """Lay the plan of axes that run along straight edges, a probe sensing across them.
 
     Lines are axes with the direction across each, [3] in R; of each site is given on which line it
@@ -131,7 +131,7 @@ class Straightness(BenchTest):
             )
         return axis, "xyz".index(self.across) if self.across else (own + 1) % 3
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         axis, _ = self.directions(scene)
         position = np.linspace(*scene.axis_span(axis), self.points)
         return self._lay(
@@ -140,22 +140,22 @@ class Straightness(BenchTest):
             np.repeat([1.0, -1.0], self.points),
         )
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         places = len(np.unique(np.round(table["position_mm"], 6)))
         if places < 3:
             raise table.refuse(f"has {places} positions; expected at least 3")
         return self._lay(scene, table["position_mm"], table["direction"]), table["deviation_um"]
 
-    def _lay(self, scene: Scene, position: Array, way: Array) -> TestPlan:
+    def _lay(self, scene: Scene, position: Array, way: Array) -> BenchPlan:
         axis, across = self.directions(scene)
         lines, which = {axis: np.eye(3)[across]}, np.zeros(len(position))
         return lay_lines(self, scene, lines, which, position, way, ("zero_um", "tilt_urad"))
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         position, mean = mean_by_position(plan.marks["along_mm"], readings)
         found = reference_lines(position, mean)
         quantities = [
-            TestQuantity(f"{name}_um", f"straightness, {WORDS[name]}", line.deviation_um, "µm")
+            BenchQuantity(f"{name}_um", f"straightness, {WORDS[name]}", line.deviation_um, "µm")
             for name, line in found.items()
         ]
         slopes = {name: line.slope for name, line in found.items()}
@@ -166,7 +166,7 @@ class Straightness(BenchTest):
         }
         return Outcome(tuple(quantities), details)
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
         for run in runs:
             position, mean = mean_by_position(run.plan.marks["along_mm"], run.readings)
@@ -214,7 +214,7 @@ class Squareness(BenchTest):
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the two axes")
     points: int = option(21, "Positions along each axis", low=3, high=2_000)
 
-    def plan(self, scene: Scene) -> TestPlan:
+    def plan(self, scene: Scene) -> BenchPlan:
         axes = placing.plane_axes(scene.machine, self.plane)[:2]
         positions = [np.linspace(*scene.axis_span(axis), self.points) for axis in axes]
         return self._lay(
@@ -224,7 +224,7 @@ class Squareness(BenchTest):
             np.tile(np.repeat([1.0, -1.0], self.points), 2),
         )
 
-    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[TestPlan, Array]:
+    def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         axes = placing.plane_axes(scene.machine, self.plane)[:2]
         expected = f"{axes[0]} or {axes[1]} (--plane {self.plane})"
         problems = table.unknown_words("line", axes, expected)
@@ -241,7 +241,7 @@ class Squareness(BenchTest):
         )
         return plan, table["deviation_um"][order]
 
-    def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> TestPlan:
+    def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> BenchPlan:
         plane = placing.find_plane(self.model(scene), self.stand(scene), self.plane)
         lines = {plane.first: plane.up, plane.second: plane.along}
         unknowns = (*(f"zero_{axis}_um" for axis in lines), "turned_urad")
@@ -249,23 +249,23 @@ class Squareness(BenchTest):
         marks = {**plan.marks, "gain_sign": np.full(len(which), plane.sign), "line": which}
         return replace(plan, place=f"{self.plane} · {plan.place}", marks=marks)
 
-    def evaluate(self, plan: TestPlan, readings: Array) -> Outcome:
+    def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         key, sign = placing.PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
         lines = [found for _, _, found in _arms(plan, readings)]
-        quantities: list[TestQuantity] = []
+        quantities: list[BenchQuantity] = []
         for name in REFERENCES:
             angle = sign * (lines[0][name].slope + lines[1][name].slope)
             quantities.append(
-                TestQuantity(f"{name}_urad", f"squareness {key}, {WORDS[name]}", angle, "µrad")
+                BenchQuantity(f"{name}_urad", f"squareness {key}, {WORDS[name]}", angle, "µrad")
             )
         for index, axis in enumerate(self.plane):
             height = lines[index]["least_squares"].deviation_um
             quantities.append(
-                TestQuantity(f"straightness_{axis}_um", f"straightness of {axis}", height, "µm")
+                BenchQuantity(f"straightness_{axis}_um", f"straightness of {axis}", height, "µm")
             )
         return Outcome(tuple(quantities), {"squareness_key": key})
 
-    def charts(self, runs: Sequence[TestRun]) -> tuple[Lines, ...]:
+    def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         charts: list[Lines] = []
         for index, axis in enumerate(self.plane):
             curves: list[Curve] = []
@@ -285,7 +285,7 @@ class Squareness(BenchTest):
         return tuple(charts)
 
 
-def _arms(plan: TestPlan, readings: Array) -> list[tuple[Array, Array, dict[str, FittedLine]]]:
+def _arms(plan: BenchPlan, readings: Array) -> list[tuple[Array, Array, dict[str, FittedLine]]]:
     arms = [plan.marks["line"] == index for index in (0.0, 1.0)]
     along = plan.marks["along_mm"]
     means = [mean_by_position(along[chosen], readings[chosen]) for chosen in arms]

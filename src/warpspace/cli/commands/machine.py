@@ -33,7 +33,7 @@ from warpspace.exceptions import OptionError
 if TYPE_CHECKING:
     from warpspace.analysis.tolerance_check import Check, Measured
     from warpspace.scene.model import Scene
-    from warpspace.thesis.rows import Row
+    from warpspace.thesis_example.rows import Row
 
 OWN = "own"
 CHECKED = ("id", "kind", "stale", "numbers", "now")  # what `check` tells of a note
@@ -340,7 +340,7 @@ def merge(first: str, second: str, output: str, *, force: bool) -> None:
 
 
 def laser_tracer_um(scene: "Scene") -> float | None:
-    from warpspace.thesis.rows import MACHINES, printed_tables
+    from warpspace.thesis_example.rows import MACHINES, printed_tables
 
     names = [f"dvf5000_{name}" for name in MACHINES]
     if scene.name not in names:
@@ -388,7 +388,7 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     A number agrees where it lies within half of the last printed digit. Rows that do not agree say
     why. Nothing is tuned to agree.
     """
-    from warpspace.thesis.rows import thesis as compare
+    from warpspace.thesis_example.rows import thesis as compare
 
     with progress("computing", silent=as_json):
         rows = compare()

@@ -377,7 +377,7 @@ def _list_formats(*, as_json: bool) -> None:
     print_table((Column(leads=True), Column(), Column(wraps=True)), rows, indent=0)
 
 
-@click.command()
+@click.command("test-piece")
 @click.argument("name", type=click.Choice(("contour", "cone", "plate", "cube")))
 @output_option(
     "File to write: mesh .stl, program .ngc, or features .toml.", ".stl", ".ngc", ".toml"
@@ -388,7 +388,7 @@ def _list_formats(*, as_json: bool) -> None:
     help="Its length or diameter across, mm.  [100 to 240, by piece]",
 )
 @force_option
-def piece(name: str, output: str, size: float | None, *, force: bool) -> None:
+def test_piece(name: str, output: str, size: float | None, *, force: bool) -> None:
     """Write a piece to start with: mesh, program or features.
 
     contour is a circle on a diamond on a square (after ISO 10791-7), cone a frustum (after NAS

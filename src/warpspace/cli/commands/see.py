@@ -242,7 +242,7 @@ def compare(
         print_text(f"{letter}  {scene.name}: {scene.title}")
     print_blocks(statistics_blocks(scenes[0], "AB", found))
     for letter, one, numbers in zip("AB", sure, found, strict=False):
-        print_blocks(u95_lines(one and one.doubt, {letter: numbers}))
+        print_blocks(u95_lines(one and one.errors, {letter: numbers}))
     if output is not None:
         echo(f"wrote {output}")
 

@@ -100,7 +100,7 @@ def field(
         u95 = {}
         if nodes is None:
             over, summary = field_uncertainty(loaded, result.error_um, axes, view), even
-            u95 = over.columns if over and over.doubt.is_known else {}
+            u95 = over.columns if over and over.errors.is_known else {}
         else:
             over = volume_uncertainty(loaded, view, max(nodes.shape))
             summary = volume_statistics(result, nodes)
@@ -126,7 +126,7 @@ def field(
             size = {"output": output, "points_written": result.norm_um.size}
             click.echo(shared_options.spell_json({**size, **found}))
             return
-        found |= {"unknown": over.doubt.unknown} if over and over.doubt.unknown else {}
+        found |= {"unknown": over.errors.unknown} if over and over.errors.unknown else {}
         if nodes is None and over and u95:
             u95["covariance_um2"] = over.covariance_um2
             u95 |= {} if loaded.limit_um is None else {"probability": over.keeps(loaded.limit_um)}
@@ -143,7 +143,7 @@ def field(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
-    for said in u95_lines(over and over.doubt, {"": summary}):
+    for said in u95_lines(over and over.errors, {"": summary}):
         print_text(said)
     if nodes is not None:
         print_text(f"  each node counted once: mean {even.mean_um:.2f} µm")

@@ -209,11 +209,13 @@ class Compensation(BeforeAfter, Result):
     @property
     def expected(self) -> dict[str, float | None]:
         """RMS that the machine has to be expected to keep, as its errors are not known better."""
-        if self.sure is None:
+        if self.field_uncertainty is None:
             return {}
-        square = self.after.norm_um**2 + np.trace(self.sure.covariance_um2, axis1=-2, axis2=-1)
+        square = self.after.norm_um**2 + np.trace(
+            self.field_uncertainty.covariance_um2, axis1=-2, axis2=-1
+        )
         rms = float(np.sqrt(np.sum(self.grid.weights * square)))
-        return {"expected_rms_um": rms if self.sure.doubt.is_known else None}
+        return {"expected_rms_um": rms if self.field_uncertainty.errors.is_known else None}
 
     @property
     def points_words(self) -> str:
@@ -271,7 +273,7 @@ class Compensation(BeforeAfter, Result):
         ]
         yield Table(columns, rows)
         named = {"before": self.before_statistics, "after": self.after_statistics}
-        yield from u95_lines(self.sure and self.sure.doubt, named)
+        yield from u95_lines(self.field_uncertainty and self.field_uncertainty.errors, named)
         if (rms := self.expected.get("expected_rms_um")) is not None:
             yield f"  expected on the machine: RMS {rms:.2f} µm, as its errors are not known better"
         yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_words}"
@@ -350,7 +352,7 @@ def compensate(
         reversal = reversal_notes(there, back, scene.errors, scene.model.direction)
         watch()
     return Compensation(
-        own.before, own.after, grid, own.sure, kind, files, points, controller, directions,
+        own.before, own.after, grid, own.field_uncertainty, kind, files, points, controller, directions,
         reversal, asked.resolution,
     )  # fmt: skip
 

@@ -204,7 +204,9 @@ class BeforeAfter:
     before: ErrorField
     after: ErrorField
     grid: Grid
-    sure: FieldUncertainty | None  # how sure the errors before are; those after are no surer
+    field_uncertainty: (
+        FieldUncertainty | None
+    )  # how sure the errors before are; those after are no surer
 
     @property
     def before_statistics(self) -> Statistics:
@@ -217,8 +219,10 @@ class BeforeAfter:
     def _summed_up(self, field: ErrorField) -> Statistics:
         found = volume_statistics(field, self.grid)
         return (
-            replace(self.sure, error_um=field.error_um).with_expanded_uncertainty(found)
-            if self.sure
+            replace(self.field_uncertainty, error_um=field.error_um).with_expanded_uncertainty(
+                found
+            )
+            if self.field_uncertainty
             else found
         )
 

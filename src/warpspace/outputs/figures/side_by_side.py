@@ -121,7 +121,7 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
 def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
     found = Adjust(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
-    after = found.changes()[-1].scene if found.repairs else scene
+    after = found.changes()[-1].scene if found.adjustments else scene
     pair = (
         replace(scene, title="before"),
         replace(after, title="after", name=f"{scene.name}_repaired"),
@@ -131,11 +131,11 @@ def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
 
 
 def _adjusted(found: AdjustResult) -> str:
-    if not found.repairs:
+    if not found.adjustments:
         return "nothing to adjust"
     parts = ", ".join(
         f"{key} {found.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
-        for key, value in found.repairs[-1].adjust.items()
+        for key, value in found.adjustments[-1].adjust.items()
     )
     return f"adjusted for the smallest {found.objective.upper()}: {parts}"
 

@@ -78,7 +78,7 @@ class Reviewed:
     results: Mapping[str, Result | str]  # of each analysis; why there is none
     within: float  # share of the volume within the limit; 0 where there is none
     advice: str  # the one thing to do
-    sure: FieldUncertainty | None  # how sure its errors are
+    uncertainty: FieldUncertainty | None  # how sure its errors are
 
     @property
     def keeps(self) -> bool:
@@ -93,7 +93,7 @@ class Reviewed:
     @property
     def statistics(self) -> Statistics:
         found = self.picture.statistics
-        return self.sure.with_expanded_uncertainty(found) if self.sure else found
+        return self.uncertainty.with_expanded_uncertainty(found) if self.uncertainty else found
 
     @property
     def largest(self) -> str:
@@ -105,9 +105,9 @@ class Reviewed:
         """Whether the limit is kept, or missed, with enough probability (ISO 14253-1)."""
         found, limit = self.statistics, self.scene.limit_um
         u95 = found.expanded_uncertainty.get("u95_max_um")
-        if self.sure is None or u95 is None or limit is None:
+        if self.uncertainty is None or u95 is None or limit is None:
             return True
-        kept = float(self.sure.doubt.probability_within(found.max_um, u95, -np.inf, limit))
+        kept = float(self.uncertainty.errors.probability_within(found.max_um, u95, -np.inf, limit))
         return not 1.0 - SURE < kept < SURE
 
     @property
@@ -261,13 +261,13 @@ def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings
         return "Nothing to adjust: the error is zero."
     if limit is not None and before <= limit:
         return "Nothing to adjust: the limit is kept."
-    if not isinstance(found, AdjustResult) or not found.repairs:
+    if not isinstance(found, AdjustResult) or not found.adjustments:
         return "Nothing to adjust: no squareness or alignment acts in this loop."
     after = evaluate_picture(found.changes()[0].scene, grid=settings.grid, loop=settings.loop)
     largest = after.statistics.max_um
     if not largest < (1.0 - _WORTH) * before:
         return "No single adjustment lowers the largest error; several together may: see Repair."
-    ((key, value),) = found.repairs[0].adjust.items()
+    ((key, value),) = found.adjustments[0].adjust.items()
     row = parameter(key)
     then = ""
     if limit is not None:

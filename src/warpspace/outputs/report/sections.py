@@ -335,7 +335,9 @@ def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterat
     blocks = statistics_blocks(review.scenes[0].scene, names, found)
     yield from said(block for block in blocks if not str(block).startswith("  --at"))
     for one in review.scenes:
-        yield from said(u95_lines(one.sure and one.sure.doubt, {one.letter: one.statistics}))
+        yield from said(
+            u95_lines(one.uncertainty and one.uncertainty.errors, {one.letter: one.statistics})
+        )
     for number, reviewed in enumerate(review.scenes):
         if embed is not None:
             page = embed(

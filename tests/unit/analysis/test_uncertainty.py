@@ -24,7 +24,8 @@ from warpspace.field.grid import build_grid
 from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.errors import Covariance
 from warpspace.parts.clamp import Clamp
-from warpspace.parts.workpiece import OfPart, Part
+from warpspace.parts.part import Part
+from warpspace.parts.workpiece import OfPart
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.scene_writer import scene_to_toml
@@ -198,7 +199,7 @@ def test_statistics_move_by_their_gradient():
         of = volume_statistics(field, grid)
         return np.array([getattr(of, name) for name in names])
 
-    slope = np.array([(numbers(k, 1e-3) - numbers(k, -1e-3)) / 2e-3 for k in found.doubt.keys])
+    slope = np.array([(numbers(k, 1e-3) - numbers(k, -1e-3)) / 2e-3 for k in found.errors.keys])
     matrix = np.array([[4.0, 3.0], [3.0, 9.0]])
     expected = coverage_factor(12) * np.sqrt(np.einsum("kn,kl,ln->n", slope, matrix, slope))
     np.testing.assert_allclose([found.statistics()[n] for n in names], expected, rtol=1e-4)
@@ -214,9 +215,9 @@ def test_k_is_two_or_what_student_says():
 def test_what_is_not_stated_is_unknown_and_not_zero():
     scene = parse_scene(TWO.replace("EA0Z = -30", "EA0Z = -30\nEXX = 4"), "s")
     found = volume_uncertainty(scene, scene.view(), 5)
-    assert found.doubt.unknown == ("EXX",)
+    assert found.errors.unknown == ("EXX",)
     assert set(found.statistics().values()) == {None}
-    assert "EXX" in " ".join(found.doubt.remarks())
+    assert "EXX" in " ".join(found.errors.remarks())
     assert scene_uncertainty(load_scene("dvf5000_first")) is None
 
 
