@@ -1,13 +1,15 @@
 """The command `warpspace`: its group, its commands, and the place where errors become messages."""
 
 import io
+import logging
 import os
 import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
@@ -24,7 +26,7 @@ from warpspace.resources import __version__
 if TYPE_CHECKING:
     from warpspace.analysis.description import Task
 
-BAD_INPUT = 2
+DEFECT, BAD_INPUT = 1, 2
 NO_MEMORY = "not enough memory for this; try a smaller grid"
 SIGNS_OF_NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 """How libraries that cannot be loaded, and threads that cannot be started, say so."""
@@ -127,6 +129,8 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; every foreseen error is one message on stderr and exit status 2."""
+    _open_standard_streams()
+    _silence_libraries()
     with handle_signals() as ending:
         try:
             Path.cwd()  # a folder that is gone breaks libraries in ways nobody could read
@@ -139,32 +143,66 @@ def main() -> None:
         except click.ClickException as error:
             page = io.StringIO()
             error.show(file=page)
-            click.echo(plain(page.getvalue()), err=True, nl=False)
-            sys.exit(BAD_INPUT)
+            _exit(page.getvalue().removesuffix("\n"))
         except (click.exceptions.Abort, KeyboardInterrupt):
             _end(ending)
         except WarpspaceError as error:
             if ending.number:  # because its renderer was ended
                 _end(ending)
             _refuse(str(error))
-        except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            sys.exit(0)
         except OSError as error:
             if _is_nowhere():
                 _refuse("the working folder does not exist any more; change to another one")
             _refuse(f"{error.filename or 'output'}: {error.strerror or error}")
         except MemoryError:
             _refuse(NO_MEMORY)
-        except (ImportError, RuntimeError) as error:
-            if not any(sign in str(error) for sign in SIGNS_OF_NO_MEMORY):
-                raise
-            _refuse(NO_MEMORY)
+        except Exception as error:  # noqa: BLE001 - a defect; its text may steer the terminal
+            if any(sign in str(error) for sign in SIGNS_OF_NO_MEMORY):
+                _refuse(NO_MEMORY)
+            _exit(traceback.format_exc(), DEFECT)
+
+
+class PlainFormatter(logging.Formatter):
+    """Lines of the log without characters that would steer the terminal."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return plain(super().format(record))
+
+
+def _open_standard_streams() -> None:
+    """Connect closed streams to the null device; files opened later would take their numbers."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            number = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(number, True)
+            setattr(sys, name, os.fdopen(number, mode))
+
+
+def _silence_libraries() -> None:
+    """Show no warnings of libraries on the terminal; show the log as plain text.
+
+    The option -W of Python and the variable PYTHONWARNINGS show warnings all the same.
+    """
+    if not sys.warnoptions:
+        logging.captureWarnings(True)
+    terminal = logging.lastResort
+    if terminal is not None:
+        terminal.setFormatter(PlainFormatter())
+        terminal.addFilter(_is_for_users)
+
+
+def _is_for_users(record: logging.LogRecord) -> bool:
+    return record.name.startswith("warpspace") or record.levelno >= logging.ERROR
 
 
 def _refuse(message: str) -> NoReturn:
-    echo(f"warpspace: {message}", err=True)
-    sys.exit(BAD_INPUT)
+    _exit(f"warpspace: {message}")
+
+
+def _exit(text: str, status: int = BAD_INPUT) -> NoReturn:
+    with suppress(OSError):  # nobody reads it
+        echo(text, err=True)
+    sys.exit(status)
 
 
 def _end(ending: "Ending") -> NoReturn:
