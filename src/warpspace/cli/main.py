@@ -170,12 +170,17 @@ class PlainFormatter(logging.Formatter):
 
 
 def _open_standard_streams() -> None:
-    """Connect closed streams to the null device; files opened later would take their numbers."""
+    """Connect closed streams to the null device; files opened later would take their numbers.
+
+    Where the output has an encoding without a character, its code is written.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             number = os.open(os.devnull, os.O_RDWR)
             os.set_inheritable(number, True)
             setattr(sys, name, os.fdopen(number, mode))
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _silence_libraries() -> None:
@@ -189,10 +194,12 @@ def _silence_libraries() -> None:
     if terminal is not None:
         terminal.setFormatter(PlainFormatter())
         terminal.addFilter(_is_for_users)
+        logging.getLogger().addHandler(terminal)  # a library then adds none
 
 
 def _is_for_users(record: logging.LogRecord) -> bool:
-    return record.name.startswith("warpspace") or record.levelno >= logging.ERROR
+    """Tell whether a message is of this package, or of its server."""
+    return record.name.partition(".")[0] in {"warpspace", "asyncio", "websockets"}
 
 
 def _refuse(message: str) -> NoReturn:
