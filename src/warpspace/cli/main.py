@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -26,7 +26,7 @@ from warpspace.resources import __version__
 if TYPE_CHECKING:
     from warpspace.analysis.description import Task
 
-DEFECT, BAD_INPUT = 1, 2
+BAD_INPUT = 2
 NO_MEMORY = "not enough memory for this; try a smaller grid"
 SIGNS_OF_NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 """How libraries that cannot be loaded, and threads that cannot be started, say so."""
@@ -156,10 +156,10 @@ def main() -> None:
             _refuse(f"{error.filename or 'output'}: {error.strerror or error}")
         except MemoryError:
             _refuse(NO_MEMORY)
-        except Exception as error:  # noqa: BLE001 - a defect; its text may steer the terminal
-            if any(sign in str(error) for sign in SIGNS_OF_NO_MEMORY):
-                _refuse(NO_MEMORY)
-            _exit(traceback.format_exc(), DEFECT)
+        except (ImportError, RuntimeError) as error:
+            if not any(sign in str(error) for sign in SIGNS_OF_NO_MEMORY):
+                raise
+            _refuse(NO_MEMORY)
 
 
 class PlainFormatter(logging.Formatter):
@@ -184,17 +184,22 @@ def _open_standard_streams() -> None:
 
 
 def _silence_libraries() -> None:
-    """Show no warnings of libraries on the terminal; show the log as plain text.
+    """Show no warnings of libraries on the terminal; show the log and tracebacks as plain text.
 
     The option -W of Python and the variable PYTHONWARNINGS show warnings all the same.
     """
     if not sys.warnoptions:
         logging.captureWarnings(True)
+    sys.excepthook = _show_traceback
     terminal = logging.lastResort
     if terminal is not None:
         terminal.setFormatter(PlainFormatter())
         terminal.addFilter(_is_for_users)
         logging.getLogger().addHandler(terminal)  # a library then adds none
+
+
+def _show_traceback(*raised: Any) -> None:
+    echo("".join(traceback.format_exception(*raised)), err=True, nl=False)
 
 
 def _is_for_users(record: logging.LogRecord) -> bool:
@@ -206,10 +211,10 @@ def _refuse(message: str) -> NoReturn:
     _exit(f"warpspace: {message}")
 
 
-def _exit(text: str, status: int = BAD_INPUT) -> NoReturn:
+def _exit(text: str) -> NoReturn:
     with suppress(OSError):  # nobody reads it
         echo(text, err=True)
-    sys.exit(status)
+    sys.exit(BAD_INPUT)
 
 
 def _end(ending: "Ending") -> NoReturn:

@@ -379,7 +379,7 @@ def report(
     beside = [load_scene(scene) for scene in concepts]
     asked = {name: _asked(name) for name in others}
     say_first_order(settings.loop, *loaded)
-    with progress("writing the review"):
+    with progress("writing the review", total=1.0) as bar:
         written = write_report(
             loaded,
             output,
@@ -394,6 +394,7 @@ def report(
             },
             files=[scene_path(scene) for scene in (*scenes, *concepts)],
             overwrite=force,
+            watch=bar.reach,
         )
     titles = " and ".join(scene.title for scene in loaded)
     echo(f"{output}: design review of {titles}, {size_text(output)}")

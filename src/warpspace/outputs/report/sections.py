@@ -14,7 +14,7 @@ import numpy as np
 from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Mark, Table, number_columns
 from warpspace.analysis.blocks import Block as AnyBlock
 from warpspace.analysis.concepts import Concepts
-from warpspace.analysis.description import Result, silent
+from warpspace.analysis.description import Result, Watch, silent
 from warpspace.analysis.distribution import choose_distribution
 from warpspace.analysis.doubt import u95_lines
 from warpspace.analysis.reviewing import notes_table
@@ -85,8 +85,10 @@ class ReportFigures:
         loop: str,
         grid: int,
         form: str,
+        watch: Watch = silent,
     ) -> None:
-        self._worker, self._form = worker, form
+        self._worker, self._form, self._watch = worker, form, watch
+        self._begun = self._done = 0
         self._loop, self._grid, self._factor = loop, grid, pictures[0].exaggeration
         self.missing: list[str] = []
         scenes = [picture.scene for picture in pictures]
@@ -133,8 +135,11 @@ class ReportFigures:
         chosen = replace(chosen, size=size, printed=True)
         begin = partial(self._worker.begin, name, scenes, chosen, self._form)
         begun = begin()
+        self._begun += 1
 
         def drawn() -> Block:
+            self._watch(self._done / self._begun)
+            self._done += 1
             for first_or_second in (lambda: begun, begin):
                 try:
                     return Picture(name, caption, first_or_second()(), self._form)
@@ -194,13 +199,15 @@ def build_report(
     concepts: Sequence[Scene] = (),
     results: Mapping[str, Result] | None = None,
     files: Sequence[Path] = (),
+    watch: Watch = silent,
 ) -> Report:
+    """Build a report; `watch` is called with the share of its figures that are drawn."""
     if form not in ("svg", "pdf"):
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
     settings = settings or ReportSettings()
     pictures = share_pictures(scenes, settings)
     with FigureWorker() as worker:
-        painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form)
+        painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
         review = build_review(scenes, settings, pictures)
         beside = {"Concepts side by side": concept_blocks(review, concepts, painter)}
         found = {
