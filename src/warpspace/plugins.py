@@ -36,10 +36,7 @@ def load_plugins() -> None:
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Tell a signal from a `KeyboardInterrupt` that a plug-in raises.
-
-    The command line has a handler that raises a class of its own.
-    """
+    """Tell a signal, for which commands have a class, from what a plug-in raises."""
     if type(error) is KeyboardInterrupt:
         return signal.getsignal(signal.SIGINT) is signal.default_int_handler
     return isinstance(error, KeyboardInterrupt)

@@ -184,7 +184,7 @@ main()
 """
     done = run(code=code)
     assert done.returncode == 1
-    assert done.stderr.endswith(b"ValueError: \\x1b[31m\n")
+    assert done.stderr.strip().endswith(b"ValueError: \\x1b[31m")
 
 
 @pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2)], ids=str)

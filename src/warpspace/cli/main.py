@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
@@ -170,16 +170,13 @@ class PlainFormatter(logging.Formatter):
 
 
 def _open_standard_streams() -> None:
-    """Connect closed streams to the null device; files opened later would take their numbers.
-
-    Where the output has an encoding without a character, its code is written.
-    """
+    """Connect closed streams to the null device: files opened later would take their numbers."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             number = os.open(os.devnull, os.O_RDWR)
             os.set_inheritable(number, True)
             setattr(sys, name, os.fdopen(number, mode))
-    if isinstance(sys.stdout, io.TextIOWrapper):
+    if isinstance(sys.stdout, io.TextIOWrapper):  # its encoding may have no Greek letters
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
@@ -190,16 +187,12 @@ def _silence_libraries() -> None:
     """
     if not sys.warnoptions:
         logging.captureWarnings(True)
-    sys.excepthook = _show_traceback
+    sys.excepthook = lambda *raised: echo("".join(traceback.format_exception(*raised)), err=True)
     terminal = logging.lastResort
     if terminal is not None:
         terminal.setFormatter(PlainFormatter())
         terminal.addFilter(_is_for_users)
         logging.getLogger().addHandler(terminal)  # a library then adds none
-
-
-def _show_traceback(*raised: Any) -> None:
-    echo("".join(traceback.format_exception(*raised)), err=True, nl=False)
 
 
 def _is_for_users(record: logging.LogRecord) -> bool:
