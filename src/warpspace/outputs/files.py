@@ -59,26 +59,75 @@ def check_target(
 
 
 @contextmanager
-def write_atomically(path: str | Path, *, overwrite: bool = True) -> Generator[Path]:
-    """Give a temporary file beside the target; rename it onto the target when all went well."""
-    target = check_target(path, overwrite=overwrite)
-    # named before it is there: a signal that comes right then leaves nothing behind
-    temporary = target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
-    try:
-        clear_leftovers(target.parent)
-        temporary.touch(mode=0o600, exist_ok=False)
+def write_atomically(
+    path: str | Path, *, overwrite: bool = True, original: bytes | None = None
+) -> Generator[Path]:
+    """Provide a temporary file beside the target; rename it onto the target when all went well.
+
+    Where the content is derived from the target, `original` is what was read of it: a target that
+    somebody has changed since is refused.
+    """
+    with write_together([path], overwrite=overwrite, original=original) as (temporary,):
         yield temporary
-        check_target(path, overwrite=overwrite)
-        temporary.chmod(_mode(target))
-        _flush(temporary)
-        temporary.replace(target)
+
+
+@contextmanager
+def write_together(
+    paths: Iterable[str | Path], *, overwrite: bool = True, original: bytes | None = None
+) -> Generator[list[Path]]:
+    """Provide a temporary file beside each target; replace all targets in this order, or none.
+
+    A process that is killed between two of the renames leaves the first targets replaced.
+    """
+    targets = [check_target(path, overwrite=overwrite) for path in paths]
+    # named before they are there: a signal that comes right then leaves nothing behind
+    temporaries, backups = (
+        [target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
+         for target in targets] for _ in range(2)
+    )  # fmt: skip
+    replaced: list[tuple[Path, Path]] = []
+    try:
+        for temporary in temporaries:
+            clear_leftovers(temporary.parent)
+            temporary.touch(mode=0o600, exist_ok=False)
+        yield temporaries
+        for target, temporary, backup in zip(targets, temporaries, backups, strict=True):
+            check_target(target, overwrite=overwrite)
+            temporary.chmod(_mode(target))
+            _flush(temporary)
+            if target != targets[-1] and target.exists():
+                shutil.copy2(target, backup)
+        if original is not None and targets[0].read_bytes() != original:
+            text = "has changed since it was read, and stays as it is; repeat the command"
+            raise OutputError(f"{targets[0]}: {text}")
+        try:
+            for target, temporary, backup in zip(targets, temporaries, backups, strict=True):
+                replaced.append((target, backup))
+                temporary.replace(target)
+        except BaseException:
+            if any(temporary.exists() for temporary in temporaries):
+                _restore(replaced, temporaries)
+            raise
         with suppress(OSError):  # not every system opens folders
-            _flush(target.parent)
+            for folder in {target.parent for target in targets}:
+                _flush(folder)
     except OSError as error:
-        raise OutputError(f"{target}: cannot be written: {_reason(error)}") from error
+        names = ", ".join(map(str, targets))
+        raise OutputError(f"{names}: cannot be written: {_reason(error)}") from error
     finally:
+        for path in (*temporaries, *backups):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+def _restore(replaced: Iterable[tuple[Path, Path]], temporaries: Iterable[Path]) -> None:
+    """Undo renames: what was replaced comes back, what was new is removed."""
+    for (target, backup), temporary in zip(replaced, temporaries, strict=False):
         with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+            if backup.exists():
+                backup.replace(target)
+            elif not temporary.exists():
+                target.unlink()
 
 
 def _exists(path: Path) -> bool:
@@ -183,7 +232,12 @@ def mesh_files(
     return files
 
 
-def write_meshes(files: Mapping[str, Path], meshes: Mapping[str, Any], *, overwrite: bool) -> None:
-    for frame, file in files.items():
-        with write_atomically(file, overwrite=overwrite) as temporary:
+def write_with_meshes(
+    target: Path, text: bytes, files: Mapping[str, Path], meshes: Mapping[str, Any], *,
+    overwrite: bool,
+) -> None:  # fmt: skip
+    """Write a file and the meshes it names, or nothing."""
+    with write_together([*files.values(), target], overwrite=overwrite) as temporaries:
+        for temporary, frame in zip(temporaries, files, strict=False):
             meshes[frame].export(temporary, file_type="stl")
+        temporaries[-1].write_bytes(text)

@@ -2,15 +2,19 @@
 
 import csv
 import math
+import os
 import re
+import sys
+import time as clock
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from datetime import date, time
 from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
-from warpspace.exceptions import SceneError
+from warpspace.exceptions import OutputError, SceneError
 from warpspace.machine.limits import (
     MAX_CSV_COLUMNS,
     MAX_CSV_LINE,
@@ -19,7 +23,13 @@ from warpspace.machine.limits import (
     MAX_KEYS,
     MAX_MARKS,
     MAX_NESTING,
+    MAX_SCENE_BYTES,
 )
+
+if sys.platform != "win32":
+    import fcntl
+
+LOCK_WAIT_S = 60.0
 
 # A TOML reader's memory grows with the square of the parts of one key, and each table costs far
 # more memory than its two brackets. One pass over the text counts what would be expensive; it takes
@@ -102,6 +112,34 @@ def check_file(path: Path, limit_bytes: int, source: str) -> None:
         raise SceneError(
             source, [f"is {size:,} bytes long; expected at most {limit_bytes:,} bytes"]
         )
+
+
+@contextmanager
+def lock_file(path: Path) -> Generator[None]:
+    """Lock a file while it is read, changed and replaced; the lock ends with the process.
+
+    Others that lock it wait. Where there are no locks (Windows, some network drives), pass what was
+    read to `warpspace.outputs.files.write_atomically`, which refuses a file that has changed.
+    """
+    check_file(path, MAX_SCENE_BYTES, str(path))
+    last_s = clock.monotonic() + LOCK_WAIT_S
+    with ExitStack() as opened:
+        while sys.platform != "win32":
+            try:
+                file = opened.enter_context(path.open("rb"))
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                    break  # else it was replaced meanwhile
+            except BlockingIOError:
+                pass
+            except OSError:
+                break
+            opened.close()
+            if clock.monotonic() > last_s:
+                text = f"{path}: locked by another process for {LOCK_WAIT_S:g} s; try again"
+                raise OutputError(text)
+            clock.sleep(0.02)
+        yield
 
 
 def parse_toml(text: str, source: str) -> dict[str, object]:
