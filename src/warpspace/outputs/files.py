@@ -16,6 +16,7 @@ import time
 import zlib
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -62,11 +63,7 @@ def check_target(
 def write_atomically(
     path: str | Path, *, overwrite: bool = True, original: bytes | None = None
 ) -> Generator[Path]:
-    """Provide a temporary file beside the target; rename it onto the target when all went well.
-
-    Where the content is derived from the target, `original` is what was read of it: a target that
-    somebody has changed since is refused.
-    """
+    """Provide a temporary file beside the target; rename it onto the target when all went well."""
     with write_together([path], overwrite=overwrite, original=original) as (temporary,):
         yield temporary
 
@@ -75,17 +72,16 @@ def write_atomically(
 def write_together(
     paths: Iterable[str | Path], *, overwrite: bool = True, original: bytes | None = None
 ) -> Generator[list[Path]]:
-    """Provide a temporary file beside each target; replace all targets in this order, or none.
+    """Provide temporary files beside targets; replace all targets in their order, or none.
 
-    A process that is killed between two of the renames leaves the first targets replaced.
+    `original` is what was read of the first target, where its new content is derived from that: a
+    target that has changed since is refused.
     """
     targets = [check_target(path, overwrite=overwrite) for path in paths]
     # named before they are there: a signal that comes right then leaves nothing behind
     temporaries, backups = (
-        [target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
-         for target in targets] for _ in range(2)
+        [_temporary(target) for target in targets], [_temporary(target) for target in targets]
     )  # fmt: skip
-    replaced: list[tuple[Path, Path]] = []
     try:
         for temporary in temporaries:
             clear_leftovers(temporary.parent)
@@ -98,15 +94,15 @@ def write_together(
             if target != targets[-1] and target.exists():
                 shutil.copy2(target, backup)
         if original is not None and targets[0].read_bytes() != original:
-            text = "has changed since it was read, and stays as it is; repeat the command"
-            raise OutputError(f"{targets[0]}: {text}")
+            raise OutputError(f"{targets[0]}: has changed since it was read; repeat the command")
         try:
-            for target, temporary, backup in zip(targets, temporaries, backups, strict=True):
-                replaced.append((target, backup))
+            for target, temporary in zip(targets, temporaries, strict=True):
                 temporary.replace(target)
         except BaseException:
-            if any(temporary.exists() for temporary in temporaries):
-                _restore(replaced, temporaries)
+            moved = [not temporary.exists() for temporary in temporaries]
+            pairs = () if all(moved) else zip(targets, backups, strict=True)
+            for target, backup in compress(pairs, moved):
+                backup.replace(target) if backup.exists() else target.unlink()
             raise
         with suppress(OSError):  # not every system opens folders
             for folder in {target.parent for target in targets}:
@@ -120,14 +116,8 @@ def write_together(
                 path.unlink(missing_ok=True)
 
 
-def _restore(replaced: Iterable[tuple[Path, Path]], temporaries: Iterable[Path]) -> None:
-    """Undo renames: what was replaced comes back, what was new is removed."""
-    for (target, backup), temporary in zip(replaced, temporaries, strict=False):
-        with suppress(OSError):
-            if backup.exists():
-                backup.replace(target)
-            elif not temporary.exists():
-                target.unlink()
+def _temporary(target: Path) -> Path:
+    return target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
 
 
 def _exists(path: Path) -> bool:
@@ -168,7 +158,7 @@ def _flush(path: Path) -> None:
 
 _NAME = re.compile(r"\.warpspace-([0-9a-f]{8})-(\d{1,10})-")
 _OLD_S = 24 * 3600.0
-"""Nothing is written for so long: older files are left over, whichever machine wrote them."""
+"""Nothing is written for so long: older files of other machines are left over."""
 
 
 def temporary_prefix() -> str:
@@ -201,14 +191,12 @@ def _is_left_over(path: Path) -> bool:
     name, about = _NAME.match(path.name), path.lstat()
     if name is None or (hasattr(os, "geteuid") and about.st_uid != os.geteuid()):
         return False
-    if time.time() - about.st_mtime > _OLD_S:
-        return True
-    return name[1] == _machine() and not _runs(int(name[2]))
+    if name[1] == _machine() and sys.platform != "win32":  # whatever the clock says
+        return not _runs(int(name[2]))
+    return time.time() - about.st_mtime > _OLD_S
 
 
 def _runs(process: int) -> bool:
-    if sys.platform == "win32":  # asking would end it
-        return True
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -233,9 +221,13 @@ def mesh_files(
 
 
 def write_with_meshes(
-    target: Path, text: bytes, files: Mapping[str, Path], meshes: Mapping[str, Any], *,
+    target: Path,
+    text: bytes,
+    files: Mapping[str, Path],
+    meshes: Mapping[str, Any],
+    *,
     overwrite: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Write a file and the meshes it names, or nothing."""
     with write_together([*files.values(), target], overwrite=overwrite) as temporaries:
         for temporary, frame in zip(temporaries, files, strict=False):

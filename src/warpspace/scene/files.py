@@ -81,18 +81,25 @@ def check_outline(text: str, source: str) -> None:
 
 def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:
     source = source or str(path)
+    try:
+        return read_bytes(path, limit_bytes, source).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        text = f"is not UTF-8 text (byte {error.start}); expected a UTF-8 file"
+        raise SceneError(source, [text]) from None
+
+
+def read_bytes(path: Path, limit_bytes: int, source: str | None = None) -> bytes:
+    """Read a file of limited size; a device or a pipe is refused before it is opened."""
+    source = source or str(path)
     check_file(path, limit_bytes, source)
     try:
         with path.open("rb") as file:
             content = file.read(limit_bytes + 1)
-        if len(content) > limit_bytes:  # some files of the system say that they are empty
-            raise SceneError(source, [f"is too long; expected at most {limit_bytes:,} bytes"])
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        text = f"is not UTF-8 text (byte {error.start}); expected a UTF-8 file"
-        raise SceneError(source, [text]) from None
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
+    if len(content) > limit_bytes:  # some files of the system say that they are empty
+        raise SceneError(source, [f"is too long; expected at most {limit_bytes:,} bytes"])
+    return content
 
 
 def check_file(path: Path, limit_bytes: int, source: str) -> None:

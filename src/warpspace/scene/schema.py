@@ -294,6 +294,7 @@ COVARIANCE = Section(
     {
         "keys": (_KEYS, ()),
         "matrix": (_list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE), ()),
+        "sha256": (_text(64), ""),
         "freedom": (_number(1.0, 1e9), math.inf),
         "reach": (_by_name(workspace_range), {}),
         "undetermined": (_KEYS, ()),
@@ -311,6 +312,7 @@ _CONTRIBUTION = Section(
         "unit": (_text(20, 1), MISSING),
         "acts": (_one_of(ACTS), MISSING),
         "sensitivity": (_number(1e-9, limits.MAX_ERROR), MISSING),
+        "sha256": (_text(64), ""),
         "freedom": (_number(1.0, 1e9), math.inf),
         "source": (_text(limits.MAX_TEXT), ""),
     }

@@ -68,7 +68,7 @@ def test_a_given_unit_holds_for_every_format(ending, unit, factor, tmp_path):
 
 @pytest.mark.parametrize("ending", FORMATS)
 def test_missing_empty_and_damaged_files_are_named(ending, tmp_path):
-    with pytest.raises(OptionError, match=rf"none\{ending}: there is no such file"):
+    with pytest.raises(OptionError, match=rf"none\{ending}: no such file"):
         load_mesh(tmp_path / f"none{ending}", "R")
     (tmp_path / f"empty{ending}").touch()
     with pytest.raises(OptionError, match=rf"empty\{ending}: the file is empty"):
@@ -83,7 +83,7 @@ def test_missing_empty_and_damaged_files_are_named(ending, tmp_path):
     with pytest.raises(OptionError, match=rf"half\{ending}: "):
         load_mesh(half, "R")
     (tmp_path / f"folder{ending}").mkdir()
-    with pytest.raises(OptionError, match=rf"folder\{ending}: cannot be read"):
+    with pytest.raises(OptionError, match=rf"folder\{ending}: is a folder"):
         load_mesh(tmp_path / f"folder{ending}", "R")
 
 

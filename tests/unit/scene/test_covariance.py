@@ -27,7 +27,7 @@ EA0Z = -30
 keys = ["EC0Y", "EA0Z"]
 matrix = [[4.0], [3.0, 9.0]]
 """
-SAID = "expected a file of numpy of at most 4,194,304 bytes with the arrays keys and matrix"
+SAID = "expected a file of numpy with the arrays keys and matrix"
 WHOLE = Covariance(
     ("EC0Y", "EA0Z"),
     ((4.0, 3.0), (3.0, 9.0)),

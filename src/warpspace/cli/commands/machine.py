@@ -289,14 +289,14 @@ def notes(
 def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: Any) -> "Scene":
     from warpspace.analysis.reviewing import note_numbers
     from warpspace.machine.limits import MAX_SCENE_BYTES
-    from warpspace.scene.files import lock_file, read_text
+    from warpspace.scene.files import lock_file, read_bytes, read_text
     from warpspace.scene.library import load_scene, parse_scene, scene_path
     from warpspace.scene.notes import Note
     from warpspace.scene.save import spell_note
 
     file = scene_path(name)
     with lock_file(file):
-        original, scene = file.read_bytes(), load_scene(file)
+        original, scene = read_bytes(file, MAX_SCENE_BYTES), load_scene(file)
         at = {} if point is None else parse_point(point, scene.machine.axes)
         if not path.endswith(".toml"):
             expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
