@@ -467,8 +467,10 @@ def test_pictures_of_a_glb_file_are_not_opened(tmp_path, monkeypatch):
     }
     path = tmp_path / "a.glb"
     path.write_bytes(glb(**held))
-    monkeypatch.setattr(PIL.Image, "open", lambda *_: pytest.fail("a picture is opened"))
+    opened = list[Any]()
+    monkeypatch.setattr(PIL.Image, "open", opened.append)
     assert len(load_mesh(path, "X", unit="mm").triangles) == 1
+    assert opened == []
 
 
 def test_a_mesh_that_is_a_pipe_or_a_device_is_refused_unread(tmp_path):
