@@ -30,7 +30,6 @@ from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.save import Notation, matrix_digest, read_errors, turn_covariance
 from warpspace.scene.schema import Problems
-from warpspace.units import Array
 
 
 def scene_names() -> tuple[str, ...]:
@@ -287,8 +286,8 @@ NPZ_ARRAYS = {"keys.npy": (1, "U", 4 * 64), "matrix.npy": (2, "fiu", 8)}
 """Arrays of a file of numpy: dimensions, kinds and largest size of an entry, bytes."""
 
 
-def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Array] | None:
-    """Read a covariance from a file of numpy; note what is wrong with it."""
+def read_npz(path: Path, where: str, problems: Problems) -> dict[str, object] | None:
+    """Read the arrays of a covariance as lists; note what is wrong with it."""
     data = BytesIO(read_bytes(path, limits.MAX_SCENE_BYTES))
     damaged = BadZipFile, zlib.error, OSError, ValueError, EOFError, RuntimeError
     with suppress(*damaged, MemoryError, KeyError, TypeError), ZipFile(data) as packed:
@@ -298,7 +297,7 @@ def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Array] | N
     return None
 
 
-def _read_array(packed: ZipFile, name: str) -> Array:
+def _read_array(packed: ZipFile, name: str) -> list[Any]:
     """Read an array whose header states dimensions and a kind that a covariance has."""
     dimensions, kinds, most = NPZ_ARRAYS[name]
     with packed.open(name) as file:
@@ -308,7 +307,7 @@ def _read_array(packed: ZipFile, name: str) -> Array:
         if not (is_usual and fits) or dtype.kind not in kinds or not 0 < dtype.itemsize <= most:
             raise ValueError(f"{name}: {dtype} {shape}")
         content = file.read(math.prod(shape) * dtype.itemsize)
-    return np.frombuffer(content, dtype).reshape(shape, order="F" if is_fortran else "C")
+    return np.frombuffer(content, dtype).reshape(shape, order="F" if is_fortran else "C").tolist()
 
 
 @dataclass(frozen=True)
@@ -417,13 +416,11 @@ class _Document:
         spelled = raw if isinstance(raw, dict) else {"matrix": raw}
         if isinstance(name := spelled.get("matrix"), str):
             path = machines.path_beside(name, where, self.folder, problems)
-            arrays = read_npz(Path(path), where, problems) if path else None
-            if arrays is not None:
-                self._check_digest(arrays["matrix"], spelled, name)
-                raw = {key: array.tolist() for key, array in arrays.items()}
-                raw |= {key: value for key, value in spelled.items() if key != "matrix"}
-            else:
-                raw = None
+            raw = read_npz(Path(path), where, problems) if path else None
+            if raw and spelled.get("sha256", "") not in ("", matrix_digest(raw["matrix"])):
+                expected = "is not the matrix of this scene (its SHA-256 differs); expected the"
+                problems.add(f"{where}.matrix", f"{expected} file written with the scene", name)
+            raw = raw and raw | spelled | {"matrix": raw["matrix"]}
         if raw is None:
             return None
         before = len(problems.lines)
@@ -468,13 +465,6 @@ class _Document:
             return None
         del found["matrix"], found["sha256"]
         return Covariance(**found, rows=tuple(map(tuple, matrix.tolist())))
-
-    def _check_digest(self, matrix: Array, spelled: Mapping[str, object], name: str) -> None:
-        """Refuse the matrix of another calibration than that of the scene."""
-        if spelled.get("sha256", "") not in ("", matrix_digest(matrix)):
-            expected = "is not the matrix of this scene (its SHA-256 differs); expected the file"
-            where = "uncertainty.covariance.matrix"
-            self.problems.add(where, f"{expected} that was written with the scene", name)
 
     def measurements(self) -> dict[str, Measurement]:
         found: dict[str, Measurement] = {}

@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 import tomli_w
+from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.grid import Workspace
@@ -23,7 +24,6 @@ from warpspace.scene.files import spell_key
 from warpspace.scene.machines import load_machine, machine_names
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import Note, note_to_toml
-from warpspace.units import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,11 +118,11 @@ def scene_files(scene: Scene, stem: str) -> dict[str, str | bytes]:
     return {"": text, ".npz": packed.getvalue()}
 
 
-def matrix_digest(matrix: Array) -> str:
+def matrix_digest(matrix: ArrayLike) -> str:
     """Compute the SHA-256 of a matrix that stands in a file of its own."""
     from hashlib import sha256  # slow to import, and few scenes have one
 
-    return sha256(np.ascontiguousarray(matrix, "<f8").tobytes()).hexdigest()
+    return sha256(np.asarray(matrix, "<f8").tobytes()).hexdigest()
 
 
 def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = "") -> str:

@@ -312,7 +312,6 @@ _CONTRIBUTION = Section(
         "unit": (_text(20, 1), MISSING),
         "acts": (_one_of(ACTS), MISSING),
         "sensitivity": (_number(1e-9, limits.MAX_ERROR), MISSING),
-        "sha256": (_text(64), ""),
         "freedom": (_number(1.0, 1e9), math.inf),
         "source": (_text(limits.MAX_TEXT), ""),
     }
