@@ -210,6 +210,12 @@ def deep_header(path):
     packed(path, keys=text, matrix=text)
 
 
+def unfinished_header(path):
+    text = b"{'descr': '<f8', 'shape': (2, 2"
+    text = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    packed(path, keys=text, matrix=text)
+
+
 def other_arrays(path):
     np.savez(path, keys=np.array(["EC0Y"]), matrix=[[1.0]], more=np.zeros(10))
 
@@ -218,7 +224,7 @@ def other_arrays(path):
     "write",
     [
         *(plain_bytes, enormous, damaged, locked, without_bytes, entries_without_bytes, texts),
-        *(deep_header, other_arrays),
+        *(deep_header, unfinished_header, other_arrays),
     ],
 )
 def test_a_file_of_numpy_that_cannot_be_read_is_named(tmp_path, write):
