@@ -285,7 +285,7 @@ NPZ_ARRAYS = {"keys.npy": (1, "U", 4 * 64), "matrix.npy": (2, "fiu", 8)}
 """Arrays of a file of numpy: dimensions, kinds and largest size of an entry, bytes."""
 
 
-def read_npz(path: Path, where: str, problems: Problems) -> dict[str, object] | None:
+def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | None:
     """Read the arrays of a covariance as lists; note what is wrong with it."""
     data = BytesIO(read_bytes(path, limits.MAX_SCENE_BYTES))
     with suppress(Exception), ZipFile(data) as packed:  # whatever a damaged file leads to
