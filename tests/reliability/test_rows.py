@@ -25,6 +25,8 @@ NGINX = pytest.mark.skipif(not nginx_is_there(), reason="needs nginx and openssl
         ("files", 100),
         ("scenes", 100),
         ("kills", 8),
+        ("updates", 8),
+        ("sets", 30),
         pytest.param("messages", 3000, marks=NIGHTLY),
         pytest.param("surroundings", 8, marks=NIGHTLY),
         pytest.param("soak", 1, marks=NIGHTLY),

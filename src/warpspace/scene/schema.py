@@ -294,6 +294,7 @@ COVARIANCE = Section(
     {
         "keys": (_KEYS, ()),
         "matrix": (_list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE), ()),
+        "sha256": (_text(64), ""),
         "freedom": (_number(1.0, 1e9), math.inf),
         "reach": (_by_name(workspace_range), {}),
         "undetermined": (_KEYS, ()),

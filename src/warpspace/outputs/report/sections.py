@@ -20,7 +20,7 @@ from warpspace.analysis.doubt import u95_lines
 from warpspace.analysis.reviewing import notes_table
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
-from warpspace.machine.limits import MOST_CONCEPTS
+from warpspace.machine.limits import MAX_CSV_BYTES, MOST_CONCEPTS
 from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
 from warpspace.outputs.figures.catalogue import figure_kinds
 from warpspace.outputs.files import check_target, write_atomically
@@ -58,6 +58,7 @@ from warpspace.picture.words import (
     spell_point,
 )
 from warpspace.resources import __version__
+from warpspace.scene.files import read_bytes
 from warpspace.scene.model import Scene
 from warpspace.scene.save import scene_to_toml
 from warpspace.units import spell, spell_short, spell_signed
@@ -517,7 +518,7 @@ def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
     texts = [scene_to_toml(one.scene).encode() for one in review.scenes]
     inputs = [
         *zip((one.titled(f"scene {one.scene.name}") for one in review.scenes), texts, strict=True),
-        *((f"file {path.name}", path.read_bytes()) for path in files),
+        *((f"file {path.name}", read_bytes(path, MAX_CSV_BYTES)) for path in files),
     ]
     rows += [(name, f"SHA-256 {hashlib.sha256(data).hexdigest()}") for name, data in inputs]
     yield Table((Column("what"), Column("value")), rows, "Program, settings and input.")
