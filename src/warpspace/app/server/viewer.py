@@ -243,7 +243,8 @@ class Viewer:
             allow_hosts=access.allow_hosts,
             token=self.token,
         )
-        self._start = start or start_state(scene)
+        start = start or start_state(scene)
+        self._start, self._notes = start.without_notes(), start.notes
         self._scenes = _with(scene, scenes or {})
         self._live = LiveModel()
         self._sessions: dict[int, Session] = {}
@@ -296,6 +297,7 @@ class Viewer:
         store = self._shared.joined() if self._shared else StateStore(self._start)
         scenes = SceneList(self._scenes)
         context = Context(self._server, client, store, scenes, self._services)
+        context.notes += self._notes
         others = (lambda: [one.context for one in self.sessions]) if self._shared else None
         session = Session(context, self._live, self._claim, others=others)
         with self._lock:

@@ -100,7 +100,7 @@ class PartPart(InBoxPart):
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked: Any = super().ask(state, values, scenes)
-        own, part = PartLook.of_scene(state.scene), state.part
+        (own, _), part = PartLook.of_scene(state.scene), state.part
         beside = state.scene.part.path("features") if part.mesh is own.mesh else None
         told = next(((one.name, one.content) for one in self._files), None)
         return replace(asked, place=part.place, mesh=part.mesh, features=beside, tolerances=told)
