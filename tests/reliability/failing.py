@@ -1,6 +1,7 @@
 """States that cannot be evaluated: an exception at each stage, in a review of two tabs."""
 
 import random
+import time
 from collections import Counter
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
@@ -24,6 +25,7 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.library import load_scene
 
 SCENE = "part_on_dvf5000"
+PATIENCE_S = 20.0
 BAD = 13.25
 """Value of EXX that makes a state fail."""
 STAGES: dict[str, tuple[object, str]] = {
@@ -71,7 +73,8 @@ class Review:
     """Two tabs of a shared review."""
 
     wires: tuple[Wire, Wire]
-    session: Session
+    sessions: tuple[Session, ...]
+    edits: int = 0
 
     def set(self, key: str, value: float, tab: int = 0) -> bool:
         """Set an error from one tab; tell whether both show it."""
@@ -80,43 +83,51 @@ class Review:
 
     def shown(self, key: str, value: float) -> bool:
         text = f'data-text="{value:g}"'
-        return all(
-            wire.read_until(lambda wire=wire: text in wire.pieces.get(f"error.{key}", ""), 3.0)
-            for wire in self.wires
-        )
+        return self.until(lambda wire: text in wire.pieces.get(f"error.{key}", ""))
 
-    def fail(self, stage: str, raised: Callable[[], Exception], way: str, value: float) -> list[str]:
+    def until(self, fine: Callable[[Wire], bool]) -> bool:
+        """Read both tabs in turn, so that neither is held up, until something holds of them."""
+        end = time.monotonic() + PATIENCE_S
+        while not all(map(fine, self.wires)):
+            if time.monotonic() > end:
+                return False
+            for wire in self.wires:
+                wire.read_until(lambda wire=wire: fine(wire), 0.0)
+        return True
+
+    def fail(
+        self, stage: str, raised: Callable[[], Exception], way: str, value: float
+    ) -> list[str]:
         """Make a state fail; list what does not go on as it should."""
         first, faults = self.wires[0], list[str]()
         if not self.set("EXX", value):
             return ["the tabs do not follow"]
-        if way != "edit":
-            # the state that fails later is made while nothing fails yet
+        if way != "edit":  # the state that fails later is made while nothing fails yet
+            # between two changes of one slider others stand, so that each is a step
+            self.set("EZX", value)
             self.set("EXX", BAD)
-            self.session.context.changed_at -= 10.0
-            first.say("state:set.component", "x")
-            first.say("state:set.component", "norm")
-            if way == "undo":
-                self.set("EXX", value + 1.0)
-                value += 1.0
-            else:
-                for _ in range(3):
-                    first.say("page:undo")
-                self.shown("EXX", value)
+            self.set("EZX", value + 1.0)
+        if way == "undo":
+            value += 1.0
+            self.set("EXX", value)
+        elif way == "redo":
+            first.say("page:undo")
+            first.say("page:undo")
+            self.shown("EXX", value)
         for wire in self.wires:
             wire.toasts.clear()
+        if not self.until(lambda _: all(one.display.due_in_s is None for one in self.sessions)):
+            faults.append("the tabs do not come to rest")
+        time.sleep(0.05)  # the last part may still be written
         with failing(stage, raised):
-            if way == "edit":
-                first.say("errors:set.EXX", f"{BAD:g}")
-            else:
-                first.say(f"page:{way}")
-            for number, wire in enumerate(self.wires):
-                if not wire.read_until(lambda wire=wire: has_message(wire), 3.0):
-                    faults.append(f"tab {number + 1} has no message")
-            if not self.shown("EXX", value) or self.session.state.amplitudes["EXX"] != value:
+            first.say(*(("errors:set.EXX", f"{BAD:g}") if way == "edit" else (f"page:{way}",)))
+            if not self.until(has_message):
+                faults.append("a tab has no message")
+            if not self.shown("EXX", value) or self.sessions[0].state.amplitudes["EXX"] != value:
                 faults.append("the state is not reverted")
-            for tab in (0, 1):
-                if not self.set("EYX", value + tab + 0.5, tab):
+            for tab, key in enumerate(("EYX", "EBX")):
+                self.edits += 1
+                if not self.set(key, self.edits % 90 + 0.5, tab):
                     faults.append(f"edits of tab {tab + 1} have no effect")
         return [f"{stage}, {way}, {type(raised()).__name__}: {fault}" for fault in faults]
 
@@ -132,7 +143,7 @@ def reviewed() -> Generator[Review]:
         wires = [Wire(stack.enter_context(dial(viewer))) for _ in range(2)]
         for wire in wires:
             assert wire.read_until(lambda wire=wire: wire.is_open, 60.0)
-        yield Review((wires[0], wires[1]), viewer.sessions[0])
+        yield Review((wires[0], wires[1]), viewer.sessions)
         end_work(viewer)
 
 

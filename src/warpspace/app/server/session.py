@@ -326,7 +326,8 @@ class Session:
             return True  # another tab has replaced it
         else:
             context.unfolded = good.page
-            context.store.back_to(good.mark, failed.mark.state)
+            if not context.store.back_to(good.mark, failed.mark.state):
+                return True
         self._report(error, self._tabs, title="The change was reverted")
         context.wake()
         return True
