@@ -1,6 +1,7 @@
 """States that cannot be evaluated are reverted, and a scene whose part cannot be read opens."""
 
 import logging
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from app.wire import opened
-from reliability.failing import ERRORS, STAGES, WAYS, Review, failing, reviewed
+from reliability.failing import ERRORS, STAGES, WAYS, Review, reviewed
 from warpspace.app.evaluation import live_picture
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
@@ -79,13 +80,9 @@ def test_a_scene_whose_part_cannot_be_evaluated_opens_without_it(
 
 
 def test_a_scene_whose_part_cannot_be_read_opens_with_a_message(tmp_path: Path) -> None:
-    for source in scenes_dir().glob("part_on_dvf5000*"):
-        (tmp_path / source.name).write_bytes(source.read_bytes())
-    scene = load_scene("part_on_dvf5000")
-    text = (scenes_dir() / "part_on_dvf5000.toml").read_text("utf-8")
-    (tmp_path / "mine.toml").write_text(text, "utf-8")
-    (tmp_path / scene.part.file).parent.mkdir(exist_ok=True, parents=True)
-    (tmp_path / scene.part.file).write_bytes(b"solid \0")
+    shutil.copytree(scenes_dir() / "parts", tmp_path / "parts")
+    shutil.copy(scenes_dir() / "part_on_dvf5000.toml", tmp_path / "mine.toml")
+    (tmp_path / "parts" / "contour.stl").write_bytes(b"solid \0")
     with opened(load_scene(str(tmp_path / "mine.toml"))) as (wire, _):
         assert wire.read_until(lambda: bool(wire.toasts))
-        assert Path(scene.part.file).name in wire.toasts[0][2]
+        assert "contour.stl" in wire.toasts[0][2]

@@ -471,7 +471,7 @@ class Session:
         try:
             step()
             self._failing.discard(part)
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - logged and shown
             if part in self._failing or not self._go_back(error, self._shown, self._settled):
                 self._failing.add(part)
                 self._report(error, [self.context])
