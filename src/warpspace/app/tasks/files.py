@@ -71,6 +71,10 @@ class FilesWindow(JobWindow):
 
     name, title = "files", "Save and export"
 
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._uploads = Jobs(self, self.renew, context.page.report)
+
     def body(self, picture: LivePicture) -> Markup:
         services = self.context.services
         figures = {"": "as the drawing is coloured"}
@@ -130,6 +134,10 @@ class FilesWindow(JobWindow):
         if part := next((part for part, ends in files.IN_BOX.items() if told.endswith(ends)), ""):
             self.context.send(f"{part}:file", value)
             return
+        self._uploads.queue("Opening", partial(self._parse, value))
+
+    def _parse(self, value: str, job: Job) -> None:
+        """Parse a file beside the session."""
         name, content = files.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
@@ -137,12 +145,13 @@ class FilesWindow(JobWindow):
         elif name.lower().endswith(".toml"):
             text = files.upload_text(content, name)
         else:
-            self.context.offer_import(name, content)
+            self.context.act(partial(self.context.offer_import, name, content))
             return
         opened, camera = scene_file.open_text(text, files.safe_name(name), name)
         whole = is_robot or scene_file.settings_of(text) != ""
-        self.context.show_opened(opened, camera, whole=whole)
-        self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
+        if not job.is_set():
+            self.context.act(partial(self.context.show_opened, opened, camera, whole=whole))
+            self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, word: str) -> None:
         opened = scene_file.open_link(files.unpack(word), self.context.scenes.fixed)
