@@ -52,7 +52,7 @@ def test_the_error_of_a_file_stands_in_its_section(held) -> None:
     go_on, _ = held
     go_on.set()
     with opened(load_scene("part_on_dvf5000")) as (wire, _):
-        wire.say("page:task", "machine")
+        wire.say("page:task", "measure")
         wire.say("page:fold", "part")
         event, value = upload("bad.stl", STL)
         wire.say(event.replace("files:", "part:"), value)
