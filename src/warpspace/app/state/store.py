@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple, TypeAlias
@@ -81,17 +82,10 @@ _MERGED = (Exclusions, Look, MachineLook, PartLook, RotaryLook, Shown, Specifica
 _MISSING = object()
 
 
-class _ConflictError(Exception):
-    """A value that has been changed since."""
-
-
 def carried(old: AppState, new: AppState, present: AppState) -> AppState:
     """Apply the change from an old state to a new one to the present state; its page stays.
 
-    Raises
-    ------
-    _ConflictError
-        Where the present state differs from both in what has changed.
+    Raises `OptionError` where somebody else has changed the same.
     """
     names = [entry.name for entry in _COMPARED if entry.name != "review"]
     values = {name: _carried(*(getattr(s, name) for s in (old, new, present))) for name in names}
@@ -114,7 +108,7 @@ def _carried(old: Any, new: Any, present: Any) -> Any:
         entries = {key: _carried(*(one.get(key, _MISSING) for one in states)) for key in order}
         return {key: entry for key, entry in entries.items() if entry is not _MISSING}
     if not isinstance(old, _MERGED) or not type(old) is type(new) is type(present):
-        raise _ConflictError
+        raise OptionError("somebody else has changed the same since; it stays as it is")
     names = [entry.name for entry in fields(old)]
     values = {name: _carried(*(getattr(one, name) for one in states)) for name in names}
     return replace(present, **values)
@@ -262,11 +256,8 @@ class StateStore:
         steps, alone = self.past, {"scene", "review"} & what.keys()
         same = steps and not self.future and steps[-1].what == what and not alone
         if same and at - self._changed_at < SAME_STEP_S:
-            try:  # without what others have changed meanwhile
-                before = carried(steps[-1].after, steps[-1].before, before)
-                steps = steps[:-1]
-            except _ConflictError:
-                pass
+            with suppress(OptionError):  # with what others have changed meanwhile
+                before, steps = carried(steps[-1].after, steps[-1].before, before), steps[:-1]
         step = Step(before, state, what, _size_bytes(before, state))
         self.past, self.future, self._changed_at = _bounded((*steps, step)), (), at
         document.state, document.is_edited = state, True
@@ -274,41 +265,33 @@ class StateStore:
     def undo(self) -> str:
         """Take the latest change of this tab back; give what it was.
 
-        Raises
-        ------
-        OptionError
-            Where somebody else has changed the same since; that step is then forgotten.
+        Where somebody else has changed the same since, the step is forgotten with an `OptionError`.
         """
-        with self._document.lock:
-            if not self.past:
-                return ""
-            *rest, step = self.past
-            self.past = tuple(rest)
-            self._travel(step.after, step.before, step.words)
-            self.future = (*self.future, step)
-        self._notify(None)
-        return step.words
+        return self._travel(back=True)
 
     def redo(self) -> str:
         """Do again what was undone; give what it was; raises as `undo`."""
+        return self._travel(back=False)
+
+    def _travel(self, *, back: bool) -> str:
         with self._document.lock:
-            if not self.future:
+            self._changed_at = float("-inf")
+            steps = self.past if back else self.future
+            if not steps:
                 return ""
-            *rest, step = self.future
-            self.future = tuple(rest)
-            self._travel(step.before, step.after, step.words)
-            self.past = (*self.past, step)
+            step, left = steps[-1], steps[:-1]
+            sides = (step.after, step.before) if back else (step.before, step.after)
+            self.past, self.future = (left, self.future) if back else (self.past, left)
+            try:
+                self._document.state = carried(*sides, self.state)
+            except OptionError as error:
+                raise OptionError(f"{step.words}: {error}") from None
+            if back:
+                self.future = (*self.future, step)
+            else:
+                self.past = (*self.past, step)
         self._notify(None)
         return step.words
-
-    def _travel(self, old: AppState, new: AppState, words: str) -> None:
-        self._changed_at = float("-inf")
-        try:
-            self._document.state = carried(old, new, self.state)
-        except _ConflictError:
-            raise OptionError(
-                f"{words}: somebody else has changed the same since; it stays as it is"
-            ) from None
 
     def mark(self) -> Mark:
         """Return what `back_to` goes back to."""
