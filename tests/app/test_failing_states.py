@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 from app.wire import opened
 from reliability.failing import ERRORS, STAGES, WAYS, Review, reviewed
 from warpspace.app.evaluation import live_picture
+from warpspace.app.evaluation.evaluate import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import AppState
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
 
@@ -86,3 +89,24 @@ def test_a_scene_whose_part_cannot_be_read_opens_with_a_message(tmp_path: Path) 
     with opened(load_scene(str(tmp_path / "mine.toml"))) as (wire, _):
         assert wire.read_until(lambda: bool(wire.toasts))
         assert "contour.stl" in wire.toasts[0][2]
+
+
+def test_a_story_whose_step_cannot_be_evaluated_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    evaluate = LiveModel.evaluate
+
+    def fail(self: LiveModel, state: AppState) -> LivePicture:
+        if is_told:
+            raise MemoryError
+        return evaluate(self, state)
+
+    is_told = list[bool]()
+    monkeypatch.setattr(LiveModel, "evaluate", fail)
+    with opened(load_scene("review_dvf5000")) as (wire, session):
+        before = session.state
+        is_told.append(True)
+        wire.say("story:start")
+        assert wire.read_until(lambda: bool(wire.toasts))
+        is_told.clear()
+        wire.say("errors:set.EXX", "3")
+        assert wire.read_until(lambda: 'data-text="3"' in wire.pieces["error.EXX"])
+        assert session.state.amplitudes == {**before.amplitudes, "EXX": 3.0}

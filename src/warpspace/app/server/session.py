@@ -317,8 +317,9 @@ class Session:
 
     def _go_back(self, error: Exception, failed: Good, good: Good) -> bool:
         """Replace a state that cannot be evaluated, with a message; tell whether that helps."""
-        context = self.context
+        context, tabs = self.context, self._tabs
         if context.telling is not None:
+            tabs = [context]
             self._guarded(partial(self.display.parts[StoryPart.name].take, self.state, "end", ""))
         elif failed.mark.state is good.mark.state and failed.page is good.page:
             return False
@@ -328,7 +329,7 @@ class Session:
             context.unfolded = good.page
             if not context.store.back_to(good.mark, failed.mark.state):
                 return True
-        self._report(error, self._tabs, title="The change was reverted")
+        self._report(error, tabs, title="The change was reverted")
         context.wake()
         return True
 
