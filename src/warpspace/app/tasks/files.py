@@ -25,6 +25,10 @@ from warpspace.scene.notes import story
 
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
+CHANGED = (
+    "Somebody has changed it since it was opened here, and what is saved does not hold that change."
+    " Save it beside that file, not over it; “warpspace merge” unites the notes of both."
+)
 Write = Callable[[LivePicture, Job], bytes]
 PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
@@ -163,6 +167,8 @@ class FilesWindow(JobWindow):
         state, camera = self.context.state, self.context.camera.remember()
         text = self._alone_if_large(lambda one: scene_file.state_to_toml(one, camera))
         self.context.save_file(f"{files.safe_name(state.scene.name)}.toml", text)
+        if not self.context.services.is_current(state.origin):
+            self.context.notify("The file of this scene has changed", CHANGED, "stays")
 
     def _share(self, *, with_token: bool) -> None:
         context = self.context
