@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from reliability import doors, kills, messages, proxy, surroundings, together
+from reliability import doors, failing, kills, messages, proxy, surroundings, together
 from reliability.outcome import Outcome
 from reliability.reading import read_many
 
@@ -52,6 +52,7 @@ ROWS = {
     "soak": Row(60, "minutes", soak),
     "doors": Row(20_000, "attempts", doors.run),
     "proxy": Row(200, "visitors", proxy.run),
+    "failing states": Row(2_000, "states", failing.run),
 }
 
 

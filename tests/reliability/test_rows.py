@@ -32,6 +32,7 @@ NGINX = pytest.mark.skipif(not nginx_is_there(), reason="needs nginx and openssl
         pytest.param("soak", 1, marks=NIGHTLY),
         pytest.param("doors", 1200, marks=NIGHTLY),  # every file that is built to exhaust
         pytest.param("proxy", 20, marks=[NIGHTLY, NGINX]),
+        pytest.param("failing states", 66, marks=NIGHTLY),
     ],
 )
 def test_a_small_count_of_a_row_holds(name, count):

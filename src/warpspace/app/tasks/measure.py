@@ -37,14 +37,14 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.forms import TEST, read_form, with_form
 from warpspace.app.tasks.analysis import AnalysisPart, Question
 from warpspace.app.tasks.charts import block_html, details_html
-from warpspace.app.tasks.parts import Context
+from warpspace.app.tasks.parts import Context, Job, Jobs
 from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.readings import bundled_data, find_data, parse_readings, parse_table
 from warpspace.calibration.registry import KINDS, RENAMED, test_kinds
 from warpspace.calibration.results import Calibration
-from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -72,6 +72,7 @@ class FilesPart(AnalysisPart):
         super().__init__(context, entry)
         self._files: tuple[Held, ...] = ()
         self._trouble = ""
+        self._uploads = Jobs(self, self.renew, self._refuse)
 
     def question(self, state: AppState) -> Question:
         return (*super().question(state), self._files)
@@ -79,8 +80,12 @@ class FilesPart(AnalysisPart):
     def is_ready(self, state: AppState) -> bool:
         return bool(self._files)
 
-    def received(self, name: str, content: bytes) -> None:
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse a file beside the session; return what the session does with it."""
         raise NotImplementedError
+
+    def _hold(self, files: tuple[Held, ...]) -> None:
+        self._files = files
 
     def files_html(self) -> Markup:
         """List the files, and say why the last one is not among them."""
@@ -90,33 +95,42 @@ class FilesPart(AnalysisPart):
             for at, one in enumerate(self._files)
         ]  # fmt: skip
         problem = tag("p", self._trouble, class_="ws-problem", role="alert")
-        return join(((problem if self._trouble else EMPTY), rows(lines) if lines else EMPTY))
+        found = rows(lines) if lines else EMPTY
+        return join((problem if self._trouble else EMPTY, found, self._uploads.html()))
 
     def upload_html(self, words: str) -> Markup:
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
         upload = upload_button(words, self.name, MOST_BYTES, ".csv", hint=hint)
         return tag("div", upload, class_="ws-actions")
 
-    def attempt(self, action: Callable[[], None]) -> None:
-        """Do something in the session; what it raises is said above the files."""
+    def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
+        """Parse a file beside the session, one after the other; errors stand above the files."""
 
-        def attempted() -> None:
-            self._trouble = ""
-            try:
-                action()
-            except WarpspaceError as error:
-                self._trouble = error_words(error)
-            self.renew()
+        def work(job: Job) -> None:
+            take_in = self.parse(*read())
+            if not job.is_set():
+                self.context.act(partial(self._take_in, take_in))
 
-        self.context.act(attempted)
+        self._uploads.queue("Reading", work)
+
+    def _take_in(self, take_in: Callable[[], None]) -> None:
+        self._trouble = ""
+        take_in()
+        self.renew()
+
+    def _refuse(self, error: Exception) -> None:
+        self._trouble = error_words(error)
+        self.renew()
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "file":
-            self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
+            self.receive(partial(read_upload, value, self.most_bytes, self.what))
         elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
             self.context.act(self.renew)
         else:
+            if word == "cancel":
+                self._uploads.cancel()
             return super().take(state, word, value)
         return state
 
@@ -197,8 +211,8 @@ class TestsPart(FilesPart):
             return with_form(state, "test.path", value)
         return super().take(state, word, value)
 
-    def received(self, name: str, content: bytes) -> None:
-        self._files = (Held(name, upload_text(content, name, WHAT)),)
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        return partial(self._hold, (Held(name, upload_text(content, name, WHAT)),))
 
 
 # --- Calibration ----------------------------------------------------------------------------------
@@ -311,7 +325,7 @@ class CalibratePart(FilesPart):
             name = self._kind_of_next.partition(":")[0]
             self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
         elif word == "bundled" and value in bundled_data():
-            self.attempt(partial(self.received, value, find_data(value).read_bytes()))
+            self.receive(lambda: (value, find_data(value).read_bytes()))
         elif word == "arrows":
             self._arrows = value if value in ARROWS else ""
             state = edits.with_sight(state, inside=bool(self._arrows))
@@ -320,10 +334,10 @@ class CalibratePart(FilesPart):
         self.context.act(self.renew)
         return state
 
-    def received(self, name: str, content: bytes) -> None:
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
         text = upload_text(content, name, WHAT)
-        scene, kind = self.context.state.active_scene(), self._kind_of_next or None
-        self._files = (*self._files, take_file(scene, text, name, kind, self._files))
+        scene, kind, files = self.context.state.active_scene(), self._kind_of_next, self._files
+        return partial(self._hold, (*files, take_file(scene, text, name, kind or None, files)))
 
     # --- arrows ----------------------------------------------------------------------------------
 
