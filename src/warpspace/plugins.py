@@ -1,7 +1,10 @@
 """Additions of other packages: analyses, figures, formats, curves and conventions they register."""
 
 import logging
+import signal
+import sys
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from functools import cache
 from typing import Generic, TypeVar
 
@@ -17,15 +20,26 @@ def load_plugins() -> None:
     """Import, once, the modules that installed packages name in the entry point group.
 
     A module registers what it adds when it is imported, see `docs/architecture.md`. One that
-    cannot be imported is left out, and logged.
+    cannot be imported, or ends the program then, is left out, and logged. What it prints goes to
+    stderr: stdout may be read by a program.
     """
     from importlib.metadata import entry_points  # a sixth of the start of a short command
 
     for entry in entry_points(group=GROUP):
         try:
-            entry.load()
-        except Exception:
+            with redirect_stdout(sys.stderr):
+                entry.load()
+        except BaseException as error:
+            if _is_interrupt(error):
+                raise
             logger.exception("the plug-in %s cannot be loaded and is left out", entry.name)
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    """Tell a signal, for which commands have a class, from what a plug-in raises."""
+    if type(error) is KeyboardInterrupt:
+        return signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    return isinstance(error, KeyboardInterrupt)
 
 
 class Registry(dict[str, T], Generic[T]):

@@ -49,7 +49,8 @@ class Alone:
             send=lambda *event: self.sent.append(event), closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
             offers={}, page=SimpleNamespace(
-                report=None, call=lambda *what: self.called.append(what)
+                report=lambda error: self.said.append(("", str(error))),
+                call=lambda *what: self.called.append(what),
             ),
             camera=SimpleNamespace(remember=lambda: None),
             client=SimpleNamespace(flush=lambda: None), **given,
@@ -65,6 +66,8 @@ class Alone:
     def do(self, word: str, value: str = "") -> Any:
         """Do what an event says; give what is shown then."""
         self.store.apply(lambda state: self.part.take(state, word, value))
+        while word in ("file", "bundled", "set.unit") and self.context.jobs:
+            time.sleep(0.01)  # files are parsed beside the session
         self.context.shown = LIVE.evaluate(self.store.state)
         return self.store.state
 

@@ -1,12 +1,17 @@
 """Host and port, arrivals, the memory of tabs."""
 
 import errno
+import gc
 import socket
 import threading
+import time
+import weakref
 from collections import deque
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.wire import Wire, dial, end_work
@@ -14,6 +19,7 @@ from warpspace.app.browser.incoming import LONGEST_VALUE, Events
 from warpspace.app.panels.panel import MOST_FILES, Context
 from warpspace.app.server import viewer
 from warpspace.app.server.tab_keeper import (
+    KEPT_BYTES,
     KEPT_SECONDS,
     KEPT_TABS,
     TabMemory,
@@ -25,6 +31,7 @@ from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_h
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
+from warpspace.parts.workpiece import PartMesh
 from warpspace.scene.library import load_scene
 
 
@@ -106,6 +113,45 @@ def test_what_is_kept_is_bounded_in_time_and_number():
     now[0] = KEPT_SECONDS + 1.0
     assert memory.take(tokens[-1]) is None
     assert len(memory._left) == 0
+
+
+def test_what_is_kept_is_bounded_in_memory_and_released_once_it_is_too_old():
+    now, meshes = [0.0], []
+    memory = TabMemory(clock=lambda: now[0])
+    for _ in range(KEPT_BYTES // 48_000_000 + 4):
+        store = StateStore(STATE)
+        mesh = PartMesh("x", np.zeros((2_000_000, 3)), np.zeros((1, 3), "i4"))
+        look = replace(STATE.part, mesh=mesh)
+        store.apply(lambda state, look=look: replace(state, part=look))
+        memory.keep(new_token(), TabRecord(store, None))
+        meshes.append(weakref.ref(mesh))
+        del store, mesh, look
+    gc.collect()
+    assert 1 < sum(mesh() is not None for mesh in meshes) <= KEPT_BYTES // 48_000_000
+    now[0] = KEPT_SECONDS + 1.0
+    memory.forget()
+    gc.collect()
+    assert not any(mesh() for mesh in meshes)
+
+
+def test_a_tab_that_is_closed_leaves_only_its_record():
+    with viewer.Viewer(load_scene("part_on_dvf5000")) as running:
+        with dial(running) as socket:
+            wire = Wire(socket)
+            assert wire.read_until(lambda: wire.is_open, seconds=60.0)
+            (session,) = running.sessions
+            left = [
+                weakref.ref(session),
+                weakref.ref(session.context),
+                weakref.ref(session.display),
+            ]
+            end_work(running)
+            del session
+        end = time.monotonic() + 20.0
+        while any(one() is not None for one in left) and time.monotonic() < end:
+            gc.collect()
+            time.sleep(0.1)
+        assert [one() for one in left] == [None] * len(left)
 
 
 @pytest.mark.parametrize(

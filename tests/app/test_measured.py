@@ -287,7 +287,7 @@ TABLE = b"X [mm],EXX [um]\n-275,0\n0,5\n275,10\n"
 
 def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     column = Column(ImportPanel, replace(STATE, forms={"import.axis": "Y"}))
-    column.part.received(HOSTILE, TABLE)
+    column.part.parse(HOSTILE, TABLE)()
     assert (column.state.page.task, column.state.forms) == ("measure", {})
     html = column.settle()
     assert "<img" not in html
@@ -303,19 +303,19 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert applied.amplitudes["EXX"] == pytest.approx(10.0)
     assert applied.comparison.a.title == "before import"
     assert "Applied" in column.html
-    column.part.received("y.csv", TABLE.replace(b"EXX", b"EYX"))
+    column.part.parse("y.csv", TABLE.replace(b"EXX", b"EYX"))()
     html = column.settle()
     assert "It adds EYX." in html
-    column.part.received("x.csv", TABLE)
+    column.part.parse("x.csv", TABLE)()
     assert "It replaces EXX and adds EYX." in column.settle()
     with pytest.raises(SceneError, match="does not say which axis"):
-        column.part.received("other.comp", COMP.encode())
+        column.part.parse("other.comp", COMP.encode())()
     assert [one.name for one in column.part._files] == ["y.csv", "x.csv"]
 
 
 def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_page():
     column = Column(ImportPanel, STATE)
-    column.part.received("unnamed.comp", COMP.encode())
+    column.part.parse("unnamed.comp", COMP.encode())()
     html = column.settle()
     assert 'role="alert"' in html
     assert 'class="ws-options" open' in html
@@ -326,7 +326,7 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     assert "<img" not in column.settle()
     assert len(column.part._problem[1]) <= 1500
     column.do("remove", "0")
-    column.part.received("data.dat", b"0\t0.001\t0.002\n")
+    column.part.parse("data.dat", b"0\t0.001\t0.002\n")()
     assert "no format that is known" in column.settle()
     for word, value, said in (
         ("set.format", "linuxcnc-comp", "which axis"),
@@ -339,4 +339,4 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     column.do("remove", "0")
     assert "Files can also be dropped" in column.html
     with pytest.raises(SceneError):
-        column.part.received("nothing.bin", b"\0\1\2")
+        column.part.parse("nothing.bin", b"\0\1\2")()

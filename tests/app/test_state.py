@@ -1,6 +1,8 @@
 """State of a session: pure updates, stores, undo, exclusions, edits."""
 
+import gc
 import threading
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +13,15 @@ from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.machine_edits import with_word
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Exclusions, start_state
-from warpspace.app.state.store import SAME_STEP_S, STEPS, StateStore, changes
+from warpspace.app.state.store import SAME_STEP_S, STEPS, STEPS_BYTES, StateStore, changes
 from warpspace.app.state.tree import put, spell
+from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Constant, Ramp, TableCurve
 from warpspace.machine.limits import MAX_ERROR
+from warpspace.parts.workpiece import PartMesh
 from warpspace.scene.library import load_scene
+from warpspace.scene.notes import Note, with_note
 
 FIRST = start_state(load_scene("dvf5000_first"))
 
@@ -284,3 +289,84 @@ def test_reset_brings_curves_back_and_forgets_that_any_was_edited():
     assert whole.curve("EAX") == FIRST.curve("EAX")
     assert whole.scene is FIRST.scene
     assert whole.loaded is None
+
+
+def shared():
+    """Build stores of two tabs of a shared review, and that of its server."""
+    whole = StateStore(FIRST)
+    return whole.joined(), whole.joined()
+
+
+def test_undo_takes_back_the_last_change_of_its_own_tab():
+    mine, yours = shared()
+    mine.apply(moved("EAX", 1.0))
+    yours.apply(moved("EBX", 2.0))
+    yours.apply(lambda state: put(state, "component", "z"))
+    assert (mine.undoes, yours.undoes) == ("roll of X", "component")
+    assert mine.undo() == "roll of X"
+    assert (mine.undoes, mine.redoes) == ("", "roll of X")
+    assert yours.state.amplitudes == {**FIRST.amplitudes, "EBX": 2.0}
+    assert [*yours.state.amplitudes] == [*FIRST.amplitudes]
+    assert yours.state.component == "z"
+    mine.redo()
+    assert yours.undo() == "component"
+    assert yours.state == FIRST.with_amplitude("EAX", 1.0).with_amplitude("EBX", 2.0)
+
+
+@pytest.mark.parametrize("back", [True, False])
+def test_undo_and_redo_leave_what_somebody_else_has_changed_since_and_say_so(back):
+    mine, yours = shared()
+    mine.apply(moved("EBX", 1.0))
+    mine.apply(moved("EAX", 1.0))
+    if not back:
+        mine.undo()
+    yours.apply(moved("EAX", 2.0))
+    with pytest.raises(OptionError, match="roll of X: somebody else has changed"):
+        mine.undo() if back else mine.redo()
+    assert mine.state.amplitudes["EAX"] == 2.0
+    assert mine.undo() == "pitch of X"  # the step that holds no more is forgotten
+    assert mine.state == FIRST.with_amplitude("EAX", 2.0)
+
+
+def test_two_tabs_that_exclude_errors_and_write_notes_undo_their_own():
+    mine, yours = shared()
+    for number, store in enumerate((mine, yours)):
+        note = Note(text=f"{number}", author="", id=f"n{number}")
+        store.apply(
+            lambda state, key=f"E{'AB'[number]}X": put(state, "exclusions.excluded", f"+{key}")
+        )
+        store.apply(lambda state, note=note: replace(state, review=with_note(state.review, note)))
+    for _ in range(2):
+        mine.undo()
+    assert mine.state.exclusions.excluded == {"EBX"}
+    assert [note.id for note in mine.state.review] == ["n1"]
+
+
+def test_a_drag_beside_another_drag_is_one_step_without_the_other():
+    mine, yours = shared()
+    for tick in range(10):
+        pushed(mine, "EAX", tick + 1.0, 0.1 * tick)
+        pushed(yours, "EBX", tick + 2.0, 0.1 * tick)
+    assert (len(mine.past), len(yours.past)) == (1, 1)
+    mine.undo()
+    assert mine.state == FIRST.with_amplitude("EBX", 11.0)
+
+
+def with_mesh(number):
+    mesh = PartMesh("x", np.full((1_000_000, 3), float(number)), np.zeros((1, 3), "i4"))
+    return lambda state: replace(state, part=replace(state.part, mesh=mesh, name=f"{number}"))
+
+
+def test_the_past_is_bounded_in_memory_and_what_it_forgets_is_released():
+    store, meshes = StateStore(FIRST), []
+    for number in range(14):  # of 24 MB each
+        store.apply(with_mesh(number))
+        meshes.append(weakref.ref(store.state.part.mesh))
+    gc.collect()
+    alive = sum(mesh() is not None for mesh in meshes)
+    assert alive <= STEPS_BYTES // 24_000_000 + 2
+    assert store.size_bytes <= STEPS_BYTES
+    assert store.undo() != ""
+    del store
+    gc.collect()
+    assert [mesh() for mesh in meshes] == [None] * 14

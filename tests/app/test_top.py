@@ -3,6 +3,8 @@
 import random
 from dataclasses import replace
 
+import pytest
+
 from app.parts import Alone, wait
 from warpspace.app.documents.output_services import Services
 from warpspace.app.documents.scene_file import SceneList, open_link
@@ -127,3 +129,12 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
     assert (author, questions) == (HOSTILE, ("one", "two"))
     assert list(results) == ["Gains", "Gains (2)"]
     assert window.saved == [("dvf5000_first_report.pdf", b"%PDF")]
+
+
+@pytest.mark.parametrize("is_current", [True, False])
+def test_a_scene_is_saved_with_a_warning_where_its_file_has_changed(is_current):
+    services = Services(is_current=lambda _: is_current)
+    window = Alone(FilesWindow, STATE, services=services)
+    window.do("save")
+    assert len(window.saved) == 1
+    assert ["has changed" in one[0] for one in window.said] == [True] * (not is_current)

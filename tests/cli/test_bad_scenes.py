@@ -115,3 +115,19 @@ def test_a_header_may_have_a_line_break_in_a_name(tmp_path):
     path = tmp_path / "x.csv"
     path.write_text('"q\n[mm]",pitch\n0,1\n', encoding="utf-8")
     assert read_csv_column(path, "pitch") == [(0.0, 1.0)]
+
+
+CIRCULAR = {
+    "part.file": '[part]\nfile = "a.stl"\n',
+    "bodies.X": '[bodies]\nX = "a.stl"\n',
+    "uncertainty.covariance": '[uncertainty]\ncovariance = "a.stl"\n',
+}
+
+
+@pytest.mark.parametrize("key", CIRCULAR)
+def test_links_in_a_circle_are_no_file(key, tmp_path, warpspace):
+    (tmp_path / "a.stl").symlink_to(tmp_path / "b.stl")
+    (tmp_path / "b.stl").symlink_to(tmp_path / "a.stl")
+    path = tmp_path / "scene.toml"
+    path.write_text(DVF + CIRCULAR[key], encoding="utf-8")
+    warpspace("check", path).refused(f'{path}: {key} = "a.stl": there is no such file')

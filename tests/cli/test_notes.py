@@ -2,11 +2,14 @@
 
 import csv
 import re
+import subprocess
+import sys
 import tomllib
 
 import pytest
 
 from warpspace import load_scene
+from warpspace.analysis import reviewing
 from warpspace.scene.library import scene_path
 
 CORNER = {"X": 275.0, "Y": -225.0, "Z": -480.0}
@@ -179,3 +182,35 @@ def test_a_merge_says_what_else_differs_and_refuses_notes_that_do_not_fit(
     other.write_text(f'machine = "gantry_mill"\n[[notes]]\n{NOTE}at = {{ A = 1 }}\n')
     warpspace("merge", mine, other, "-o", tmp_path / "none.toml").refused("notes[0].at")
     assert not (tmp_path / "none.toml").exists()
+
+
+def test_notes_that_are_added_at_once_are_all_stored(mine):
+    commands = [
+        [sys.executable, "-m", "warpspace", "notes", str(mine), "--add", f"note {number}"]
+        for number in range(8)
+    ]
+    started = [subprocess.Popen(line, stdout=subprocess.PIPE) for line in commands]
+    for process in started:
+        process.communicate()
+    assert [process.returncode for process in started] == [0] * 8
+    assert {note.text for note in load_scene(mine).review} == {f"note {n}" for n in range(8)}
+    assert list(mine.parent.iterdir()) == [mine]
+
+
+def test_a_note_replaces_no_edit_made_while_it_was_computed_and_no_link(
+    warpspace, mine, monkeypatch
+):
+    link = mine.with_name("link.toml")
+    link.symlink_to(mine)
+    assert warpspace("notes", link, "--add", "first").status == 0
+    assert link.is_symlink()
+    compute = reviewing.note_numbers
+
+    def edit_meanwhile(scene, review):
+        mine.write_text(mine.read_text("utf-8") + "# edited\n", encoding="utf-8")
+        return compute(scene, review)
+
+    monkeypatch.setattr(reviewing, "note_numbers", edit_meanwhile)
+    warpspace("notes", mine, "--add", "second").refused("has changed since it was read")
+    assert mine.read_text("utf-8").endswith("# edited\n")
+    assert [note.text for note in load_scene(mine).review] == ["first"]

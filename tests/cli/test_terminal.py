@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -133,3 +134,118 @@ def test_an_unknown_window_of_vtk(tmp_path):
     )
     is_refusal(done, "VTK_DEFAULT_OPENGL_WINDOW is 'bogus'", "unset it")
     assert b"apt-get" not in done.stderr
+
+
+def add_plug_in(folder, *lines):
+    """Write a package whose only module is a plug-in; return the variable that installs it."""
+    about = folder / "additions-1.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: additions\nVersion: 1\n", "utf-8")
+    (about / "entry_points.txt").write_text("[warpspace.plugins]\nadded = additions\n", "utf-8")
+    (folder / "additions.py").write_text("\n".join(lines), "utf-8")
+    return {"PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (("raise SystemExit(5)",), "SystemExit: 5"),
+        (("raise KeyboardInterrupt",), "KeyboardInterrupt"),
+        (("raise ValueError('a\\x1b[31mb')",), r"ValueError: a\x1b[31mb"),
+        (("print('hello')",), "hello\n"),
+        (("import warnings", "warnings.warn('a\\x1b[31mb')"), ""),
+        (("import logging", "logging.warning('a\\x1b[31mb')"), ""),
+    ],
+    ids=["exit", "interrupt", "escape", "print", "warning", "log"],
+)
+def test_a_plug_in_neither_ends_the_program_nor_mixes_with_its_output(lines, message, tmp_path):
+    done = run("list", "--json", **add_plug_in(tmp_path, *lines))
+    text = done.stderr.decode()
+    assert done.returncode == 0, text
+    assert json.loads(done.stdout)["scenes"]
+    assert message in text if message else not text
+    assert "\x1b" not in text
+    assert ("the plug-in added cannot be loaded" in text) == ("raise" in lines[0])
+
+
+def test_a_signal_while_a_plug_in_is_imported_ends_the_program(tmp_path):
+    lines = "import os, signal, time", "os.kill(os.getpid(), signal.SIGTERM)", "time.sleep(0.1)"
+    done = run("list", **add_plug_in(tmp_path, *lines))
+    assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, b"\nwarpspace: terminated\n")
+
+
+def test_a_defect_shows_its_traceback_as_plain_text():
+    code = """
+from warpspace.cli.main import cli, main
+def fail(**options):
+    raise ValueError(chr(27) + "[31m")
+cli.main = fail
+main()
+"""
+    done = run(code=code)
+    assert done.returncode == 1
+    assert done.stderr.strip().endswith(b"ValueError: \\x1b[31m")
+
+
+@pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2)], ids=str)
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        (("gains", "dvf5000_first"), 0),
+        (("field", "dvf5000_first", "--grid", "3", "--csv", "x.csv"), 0),
+        (("check", "nothing"), 2),
+        pytest.param(("report", "dvf5000_first", "--grid", "3", "-o", "x.html"), 0,
+                     marks=pytest.mark.nightly),
+    ],
+    ids=lambda value: value[0] if isinstance(value, tuple) else "",
+)  # fmt: skip
+def test_a_stream_that_is_closed_at_the_start(arguments, status, closed, tmp_path):
+    done = run(*arguments, cwd=tmp_path, start=lambda: [os.close(number) for number in closed])
+    assert done.returncode == status, done.stderr
+    assert b"Traceback" not in done.stderr
+    written = [path.name for path in tmp_path.iterdir()]
+    assert written == [name for name in arguments if name.startswith("x.")]
+
+
+@pytest.mark.parametrize("arguments", [("gains", "dvf5000_first"), ("list", "--json"), ("--help",)])
+def test_a_reader_that_has_ended(arguments):
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-c", MAIN, *arguments]
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False, timeout=120)
+    os.close(writing)
+    assert done.stderr == b""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+def test_a_message_that_cannot_be_written_changes_no_exit_status():
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-c", MAIN, "check", "nothing"]
+        assert subprocess.run(command, stderr=full, check=False, timeout=120).returncode == 2
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_an_output_without_greek_letters(encoding):
+    done = run("gains", "dvf5000_first", LC_ALL="C", PYTHONIOENCODING=encoding)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert ("α_YZ" if encoding == "ascii" else r"\u03b1_YZ").encode() in done.stdout
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems draw without EGL")
+@pytest.mark.parametrize("arguments", [("draw", "-o", "x.png"), ("report", "-o", "x.html")])
+def test_a_machine_without_egl(arguments, tmp_path):
+    command, *output = arguments
+    empty = {"__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path / "none")}
+    done = run(command, "dvf5000_first", "--grid", "3", *output, cwd=tmp_path, **empty)
+    is_refusal(done, "VTK cannot draw off screen here", "apt-get install libegl1")
+    assert done.stderr.count(b"\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_folders_that_cannot_be_written(tmp_path):
+    nowhere = str(tmp_path / "none" / "none")
+    places = dict.fromkeys(("HOME", "TMPDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"), nowhere)
+    places["MPLCONFIGDIR"] = "/dev/null/none"
+    done = run("gains", "dvf5000_first", "--plot", "x.svg", cwd=tmp_path, **places)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"wrote x.svg" in done.stdout

@@ -3,6 +3,9 @@
 import csv
 import io
 import stat
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -199,3 +202,65 @@ def test_existing_files_and_the_scene_itself_stay(tmp_path, warpspace):
     warpspace(*arguments).refused("t_X.COM", "exists already")
     assert table.read_text(encoding="utf-8") == "mine"
     assert not target.exists()
+
+
+def test_tables_are_replaced_together_or_not_at_all(tmp_path, warpspace, monkeypatch):
+    command = ("compensate", "dvf5000_first", "--format", "linuxcnc-comp", "--force", "-o")
+    assert warpspace(*command, tmp_path / "t.comp").status == 0
+    paths = sorted(tmp_path.iterdir())
+    assert len(paths) > 1
+    for path in paths:
+        path.write_bytes(b"old")
+    replace, targets = Path.replace, list[Path]()
+
+    def fill_the_disk(path, target):
+        targets.append(target)
+        if len(targets) == len(paths):
+            raise OSError(28, "No space left on device")
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", fill_the_disk)
+    warpspace(*command, tmp_path / "t.comp").refused("No space left")
+    assert sorted(tmp_path.iterdir()) == paths
+    assert {path.read_bytes() for path in paths} == {b"old"}
+
+
+WRITE_AND_DIE = """
+import os, sys
+from pathlib import Path
+import numpy as np
+from warpspace.cli.shared_options import write_texts
+from warpspace.scene.library import load_scene
+from dataclasses import replace
+from warpspace.machine.errors import Covariance
+from warpspace.scene.scene_writer import scene_files
+
+folder, scale, last = Path(sys.argv[1]), float(sys.argv[2]), int(sys.argv[3])
+scene = load_scene("dvf5000_first")
+rows = tuple(map(tuple, (scale * np.eye(31)).tolist()))
+covariance = Covariance(scene.parameter_keys[:31], rows)
+texts = scene_files(replace(scene, covariance=covariance), "x")
+move, count = Path.replace, 0
+def move_or_die(path, target):
+    global count
+    count += 1
+    if count > last:
+        os._exit(9)
+    return move(path, target)
+Path.replace = move_or_die
+write_texts({folder / "x.npz": texts[".npz"], folder / "x.toml": texts[""]}, force=True)
+"""
+
+
+def test_a_scene_is_refused_with_the_covariance_of_another_calibration(tmp_path, warpspace):
+    def write(scale, last):
+        line = [sys.executable, "-c", WRITE_AND_DIE, str(tmp_path), str(scale), str(last)]
+        return subprocess.run(line, check=False).returncode
+
+    assert write(1.0, 2) == 0
+    assert warpspace("check", tmp_path / "x.toml").status == 0
+    assert write(2.0, 1) == 9  # ended between the two files
+    warpspace("check", tmp_path / "x.toml").refused("x.npz", "is not the matrix of this scene")
+    assert write(2.0, 2) == 0
+    assert warpspace("check", tmp_path / "x.toml").status == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["x.npz", "x.toml"]

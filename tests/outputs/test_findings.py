@@ -103,7 +103,10 @@ def test_findings_are_in_page_and_paper_escaped(renderer):
     hostile = f"{EVIL}#*_$[] =1+1 @x \\ <!-- ]]>"
     story = [note(hostile, step=2), note("First.", step=1, view=view_of(START, ABOVE))]
     scene = noted(*story, note(hostile, kind="question", replies=(Reply(hostile, hostile, WHEN),)))
-    report = build_report([scene], FAST, tell=tell_story)
+    shares: list[float] = []
+    report = build_report([scene], FAST, tell=tell_story, watch=shares.append)
+    assert shares == sorted(shares)
+    assert len(shares) > 2 * len(story)
     assert [part.heading for part in report.sections[:2]] == ["", "Findings and decisions"]
     assert report.sections[2].heading.startswith("Appendix A")
     drawn = [block for block in report.sections[1].blocks if isinstance(block, ReportFigure)]

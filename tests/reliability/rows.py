@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from reliability import doors, kills, messages, proxy, surroundings
+from reliability import doors, failing, kills, messages, proxy, surroundings, together
 from reliability.outcome import Outcome
 from reliability.reading import read_many
 
@@ -46,10 +46,13 @@ ROWS = {
     "scenes": Row(50_000, "scenes", partial(read_many, "hypothesis", seed=SEED)),
     "messages": Row(100_000, "messages", messages.run),
     "kills": Row(1_000, "kills", kills.run),
+    "updates": Row(400, "notes", partial(together.run, "updates")),
+    "sets": Row(2_000, "outputs", partial(together.run, "sets")),
     "surroundings": Row(160, "runs", surroundings.run),
     "soak": Row(60, "minutes", soak),
     "doors": Row(20_000, "attempts", doors.run),
     "proxy": Row(200, "visitors", proxy.run),
+    "failing states": Row(2_000, "states", failing.run),
 }
 
 

@@ -25,11 +25,14 @@ NGINX = pytest.mark.skipif(not nginx_is_there(), reason="needs nginx and openssl
         ("files", 100),
         ("scenes", 100),
         ("kills", 8),
+        ("updates", 8),
+        ("sets", 30),
         pytest.param("messages", 3000, marks=NIGHTLY),
         pytest.param("surroundings", 8, marks=NIGHTLY),
         pytest.param("soak", 1, marks=NIGHTLY),
         pytest.param("doors", 1200, marks=NIGHTLY),  # every file that is built to exhaust
         pytest.param("proxy", 20, marks=[NIGHTLY, NGINX]),
+        pytest.param("failing states", 66, marks=NIGHTLY),
     ],
 )
 def test_a_small_count_of_a_row_holds(name, count):

@@ -195,9 +195,7 @@ def to_json(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         names = keys or [entry.name for entry in fields(value)]
         found = {
-            name: to_json(getattr(value, name))
-            for name in names
-            if name != "expanded_uncertainty"
+            name: to_json(getattr(value, name)) for name in names if name != "expanded_uncertainty"
         }
         sure = getattr(value, "expanded_uncertainty", None)
         return found | to_json(sure) if isinstance(sure, Mapping) else found

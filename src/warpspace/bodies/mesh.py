@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpspace.exceptions import OptionError
+from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine import limits
+from warpspace.scene.text_files import read_bytes
 from warpspace.units import Array
 
 # A small file can ask for much.
@@ -29,6 +30,8 @@ _PLY_BYTES = {
     **dict.fromkeys(("short", "ushort", "int16", "uint16"), 2),
     **dict.fromkeys(("double", "float64"), 8),
 }
+_GLB_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_GLB_COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _DAE_REFERENCES = 20
 """Nodes of a DAE file by reference: each may hold others, so that they multiply."""
 LISTED, WORDS, BYTES = 12, 40, 200
@@ -151,6 +154,13 @@ def _count_glb(data: bytes, most: int) -> None:
     _limit(sum(accessors), LISTED * most, "points and indices")
     stored = sum(max(int(view["byteLength"]), 0) for view in held.get("bufferViews", []))
     _limit(stored, BYTES * most, "bytes in views of its data")
+    arrays = sum(
+        max(int(accessor["count"]), 0)
+        * _GLB_COLUMNS[accessor["type"]]
+        * _GLB_BYTES[accessor["componentType"]]
+        for accessor in held.get("accessors", [])
+    )
+    _limit(arrays, BYTES * most, "bytes of points and indices")
     placed = [primitive for mesh in _placed(held) for primitive in primitives[mesh]]
     _limit(len(placed), limits.MAX_MESH_PARTS, "primitives, each placing counted")
     corners = sum(
@@ -240,20 +250,18 @@ def _check_geometry(scene: Any, most: int) -> None:
 
 
 def open_meshes(
-    path: Path, what: str, most: int = limits.MAX_TRIANGLES, data: bytes | None = None
+    path: Path,
+    what: str,
+    most: int = limits.MAX_TRIANGLES,
+    data: bytes | None = None,
+    *,
+    has_materials: bool = False,
 ) -> Any:
+    """Open a mesh file; without its materials, whose pictures may need any amount of memory."""
     try:
-        size = path.stat().st_size if data is None else len(data)
-        if size > BYTES * most:
-            raise OptionError(
-                f"{path}: {size / 1e6:.0f} MB; a {what} may have up to {BYTES * most / 1e6:.0f} MB."
-                " Reduce its triangles before"
-            )
-        data = path.read_bytes() if data is None else data
-    except FileNotFoundError:
-        raise OptionError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise OptionError(f"{path}: cannot be read ({error.strerror})") from None
+        data = read_bytes(path, BYTES * most) if data is None else data
+    except SceneError as error:
+        raise OptionError(str(error)) from None
     if not data:
         raise OptionError(f"{path}: the file is empty; expected a {what}")
     import trimesh
@@ -266,7 +274,9 @@ def open_meshes(
             data = count_mesh(data, ending, most)
             merged = _merge_stl(data) if ending == ".stl" and _is_binary(data) else None
             file = io.BytesIO(data)
-            found = merged or trimesh.load_scene(file, file_type=ending[1:], process=False)
+            found = merged or trimesh.load_scene(
+                file, file_type=ending[1:], process=False, skip_materials=not has_materials
+            )
             _check_geometry(found, most)
             return found
     except OptionError as error:

@@ -21,6 +21,7 @@ FORMATS = {".stl": ("mm", "z"), ".obj": ("mm", "z"), ".ply": ("mm", "z"), ".glb"
 """Endings that are read, with the unit and the upward axis taken where none is given."""
 SMALL_MM, LARGE_MM = 10.0, 100_000.0
 """A body whose longest edge lies beyond is probably in another unit."""
+MOST_SHELL_PAIRS = 20_000_000  # of a shell and a cavity in a mesh that are looked at
 
 
 def load_mesh(path: str | Path, frame: str, unit: str | None = None) -> Body:
@@ -88,10 +89,18 @@ def read_mesh(
     volume, low, high = np.bincount(shell[one], across), *np.full((2, shell.max() + 1, 3), np.inf)
     np.minimum.at(low, shell, mesh.vertices)
     np.minimum.at(high, shell, -mesh.vertices)
-    for number in np.flatnonzero(volume < 0.0):  # a cavity is within another one
-        is_within = (low <= low[number]) & (high <= high[number])
-        if not (is_within.all(axis=1) & (volume > -volume[number])).any():
-            return mesh, (f"{path}: some of its shells face inwards; they are taken as they are",)
+    cavities, looked_at = np.flatnonzero(volume < 0.0), 0
+    for outer in np.argsort(-volume)[: int(np.sum(volume > 0.0))]:  # a cavity is within another one
+        is_within = (low[outer] <= low[cavities]) & (high[outer] <= high[cavities])
+        is_inside = is_within.all(axis=1) & (volume[outer] > -volume[cavities])
+        looked_at += len(cavities)
+        cavities = cavities[~is_inside]
+        if not len(cavities) or looked_at > MOST_SHELL_PAIRS:
+            break
+    if len(cavities) and looked_at > MOST_SHELL_PAIRS:
+        return mesh, (f"{path}: too many shells to tell if some face inwards",)
+    if len(cavities):
+        return mesh, (f"{path}: some of its shells face inwards; they are taken as they are",)
     return mesh, ()
 
 

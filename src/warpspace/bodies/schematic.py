@@ -26,7 +26,7 @@ def read_bodies(path: Path) -> tuple[Body, ...]:
     """Read a file of bodies; the result is kept, since every session draws the same."""
     if not path.is_file():
         return ()
-    scene = open_meshes(path, _WHAT)
+    scene = open_meshes(path, _WHAT, has_materials=True)
     lines = {
         name.removesuffix(LINES): np.reshape(geometry.vertices, (-1, 2, 3))
         for name, geometry in scene.geometry.items()

@@ -1,6 +1,6 @@
 """Commands made from analyses: options from their fields, output from what their results say."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ from warpspace.cli.shared_options import (
     plot_option,
     print_json,
     scene_argument,
-    write_text,
+    write_texts,
 )
 from warpspace.cli.tables import echo, progress, warn
 from warpspace.exceptions import OptionError
@@ -156,39 +156,40 @@ def print_blocks(blocks: "Iterable[Block]") -> None:
 def write_result(
     found: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
 ) -> list[str]:
+    """Write all files of a result, or none; return those of its output, the one asked for first."""
     from warpspace.scene.text_files import spell_row
 
+    files: dict[str | Path, str | bytes] = {}
     wrote: list[str] = []
     if output is not None:
         from warpspace.scene.scene_writer import scene_files
 
         path, changes = Path(output), found.changes()
-        if texts := found.output_files(path.suffix.lower()):
-            wrote = write_texts(texts, path, force=force)
-        elif changes:
-            _, *beside = write_texts(scene_files(changes[-1].scene, path.stem), path, force=force)
-            wrote = [output, *beside]
-        else:
+        output_files = found.output_files(path.suffix.lower())
+        if not output_files and changes:
+            output_files = scene_files(changes[-1].scene, path.stem)
+        if not output_files:
             raise OptionError(f"-o {output}: {found.no_change}, so no scene is written")
+        beside = {
+            path.with_name(f"{path.stem}{add}"): output_files[add] for add in output_files if add
+        }
+        check_files(click.get_current_context(), beside)
+        files |= beside
+        if "" in output_files:  # last, since it names the others
+            files[output] = output_files[""]
+        wrote = [output] * ("" in output_files) + [str(target) for target in beside]
     if csv_path is not None:
         table = found.file_table()
         rows = () if table is None else table.csv_rows()
-        write_text(csv_path, "".join(map(spell_row, rows)), force=force)
+        files[csv_path] = "".join(map(spell_row, rows))
     if plot is not None:
         from warpspace.outputs.charts.result_charts import result_chart
-        from warpspace.outputs.figure_files import write_chart
+        from warpspace.outputs.figure_files import encode_figure
 
         draw = resolve_name(found.drawn_by) if found.drawn_by else result_chart
-        write_chart(draw(found), plot, overwrite=force)
+        files[plot] = encode_figure(draw(found), Path(plot).suffix.lower().lstrip("."))
+    write_texts(files, force=force)
     return wrote
-
-
-def write_texts(texts: Mapping[str, str | bytes], path: Path, *, force: bool) -> list[str]:
-    targets = {add: path.with_name(f"{path.stem}{add}") if add else path for add in texts}
-    check_files(click.get_current_context(), [target for add, target in targets.items() if add])
-    for add, target in targets.items():
-        write_text(target, texts[add], force=force)
-    return [str(target) for target in targets.values()]
 
 
 FEW = 32  # scenes that are held in memory together

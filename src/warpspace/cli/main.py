@@ -1,13 +1,15 @@
 """The command `warpspace`: its group, its commands, and the place where errors become messages."""
 
 import io
+import logging
 import os
 import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from types import FrameType
@@ -127,6 +129,8 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line; every foreseen error is one message on stderr and exit status 2."""
+    _open_standard_streams()
+    _silence_libraries()
     with handle_signals() as ending:
         try:
             Path.cwd()  # a folder that is gone breaks libraries in ways nobody could read
@@ -139,17 +143,13 @@ def main() -> None:
         except click.ClickException as error:
             page = io.StringIO()
             error.show(file=page)
-            click.echo(plain(page.getvalue()), err=True, nl=False)
-            sys.exit(BAD_INPUT)
+            _exit(page.getvalue().removesuffix("\n"))
         except (click.exceptions.Abort, KeyboardInterrupt):
             _end(ending)
         except WarpspaceError as error:
             if ending.number:  # because its renderer was ended
                 _end(ending)
             _refuse(str(error))
-        except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            sys.exit(0)
         except OSError as error:
             if _is_nowhere():
                 _refuse("the working folder does not exist any more; change to another one")
@@ -162,8 +162,51 @@ def main() -> None:
             _refuse(NO_MEMORY)
 
 
+class PlainFormatter(logging.Formatter):
+    """Lines of the log without characters that would steer the terminal."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return plain(super().format(record))
+
+
+def _open_standard_streams() -> None:
+    """Connect closed streams to the null device: files opened later would take their numbers."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            number = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(number, True)
+            setattr(sys, name, os.fdopen(number, mode))
+    if isinstance(sys.stdout, io.TextIOWrapper):  # its encoding may have no Greek letters
+        sys.stdout.reconfigure(errors="backslashreplace")
+
+
+def _silence_libraries() -> None:
+    """Show no warnings of libraries on the terminal; show the log and tracebacks as plain text.
+
+    The option -W of Python and the variable PYTHONWARNINGS show warnings all the same.
+    """
+    if not sys.warnoptions:
+        logging.captureWarnings(True)
+    sys.excepthook = lambda *raised: echo("".join(traceback.format_exception(*raised)), err=True)
+    terminal = logging.lastResort
+    if terminal is not None:
+        terminal.setFormatter(PlainFormatter())
+        terminal.addFilter(_is_for_users)
+        logging.getLogger().addHandler(terminal)  # a library then adds none
+
+
+def _is_for_users(record: logging.LogRecord) -> bool:
+    """Tell whether a message is of this package, or of its server."""
+    return record.name.partition(".")[0] in {"warpspace", "asyncio", "websockets"}
+
+
 def _refuse(message: str) -> NoReturn:
-    echo(f"warpspace: {message}", err=True)
+    _exit(f"warpspace: {message}")
+
+
+def _exit(text: str) -> NoReturn:
+    with suppress(OSError):  # nobody reads it
+        echo(text, err=True)
     sys.exit(BAD_INPUT)
 
 

@@ -212,11 +212,21 @@ def plot_option(what: str) -> Decorator:
     return click.option("--plot", type=OutputFile(*FIGURES), help=help_text)
 
 
-def write_text(path: str | Path, text: str | bytes, *, force: bool) -> None:
-    from warpspace.outputs.file_output import write_atomically
+def write_text(
+    path: str | Path, text: str | bytes, *, force: bool, original: bytes | None = None
+) -> None:
+    write_texts({path: text}, force=force, original=original)
 
-    with write_atomically(path, overwrite=force) as temporary:
-        temporary.write_bytes(text.encode() if isinstance(text, str) else text)
+
+def write_texts(
+    texts: Mapping[str | Path, str | bytes], *, force: bool, original: bytes | None = None
+) -> None:
+    """Write all files, or none."""
+    from warpspace.outputs.file_output import write_together
+
+    with write_together(texts, overwrite=force, original=original) as temporaries:
+        for temporary, text in zip(temporaries, texts.values(), strict=True):
+            temporary.write_bytes(text.encode() if isinstance(text, str) else text)
 
 
 def size_text(path: str) -> str:

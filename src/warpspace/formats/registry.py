@@ -18,7 +18,7 @@ from warpspace.formats.terms import Tables, errors_of
 from warpspace.machine.axes import is_axis_name
 from warpspace.machine.definition import Machine
 from warpspace.plugins import Registry
-from warpspace.scene.text_files import check_file
+from warpspace.scene.text_files import read_bytes
 
 ERROR, CORRECTION = "error", "correction"
 """What the numbers of a controller's table are: the error, which it subtracts, or what it adds."""
@@ -227,15 +227,7 @@ def open_upload(name: str, content: bytes) -> Source:
 def open_files(paths: Sequence[Path]) -> list[Source]:
     if len(paths) > MOST_FILES:
         raise OptionError(f"{len(paths)} files; expected at most {MOST_FILES} an import")
-    sources: list[Source] = []
-    for path in paths:
-        name = str(path)
-        check_file(path, MAX_BYTES, name)
-        try:
-            sources.append(open_upload(name, path.read_bytes()))
-        except OSError as error:
-            raise SceneError(name, [f"cannot be read: {error.strerror or error}"]) from None
-    return sources
+    return [open_upload(str(path), read_bytes(path, MAX_BYTES)) for path in paths]
 
 
 def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: str = "") -> Reading:

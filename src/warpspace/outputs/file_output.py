@@ -16,6 +16,7 @@ import time
 import zlib
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -59,26 +60,64 @@ def check_target(
 
 
 @contextmanager
-def write_atomically(path: str | Path, *, overwrite: bool = True) -> Generator[Path]:
-    """Give a temporary file beside the target; rename it onto the target when all went well."""
-    target = check_target(path, overwrite=overwrite)
-    # named before it is there: a signal that comes right then leaves nothing behind
-    temporary = target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
-    try:
-        clear_leftovers(target.parent)
-        temporary.touch(mode=0o600, exist_ok=False)
+def write_atomically(
+    path: str | Path, *, overwrite: bool = True, original: bytes | None = None
+) -> Generator[Path]:
+    """Provide a temporary file beside the target; rename it onto the target when all went well."""
+    with write_together([path], overwrite=overwrite, original=original) as (temporary,):
         yield temporary
-        check_target(path, overwrite=overwrite)
-        temporary.chmod(_mode(target))
-        _flush(temporary)
-        temporary.replace(target)
+
+
+@contextmanager
+def write_together(
+    paths: Iterable[str | Path], *, overwrite: bool = True, original: bytes | None = None
+) -> Generator[list[Path]]:
+    """Provide temporary files beside targets; replace all targets in their order, or none.
+
+    `original` is what was read of the first target, where its new content is derived from that: a
+    target that has changed since is refused.
+    """
+    targets = [check_target(path, overwrite=overwrite) for path in paths]
+    # named before they are there: a signal that comes right then leaves nothing behind
+    temporaries, backups = (
+        [_temporary(target) for target in targets], [_temporary(target) for target in targets]
+    )  # fmt: skip
+    try:
+        for temporary in temporaries:
+            clear_leftovers(temporary.parent)
+            temporary.touch(mode=0o600, exist_ok=False)
+        yield temporaries
+        for target, temporary, backup in zip(targets, temporaries, backups, strict=True):
+            check_target(target, overwrite=overwrite)
+            temporary.chmod(_mode(target))
+            _flush(temporary)
+            if target != targets[-1] and target.exists():
+                shutil.copy2(target, backup)
+        if original is not None and targets[0].read_bytes() != original:
+            raise OutputError(f"{targets[0]}: has changed since it was read; repeat the command")
+        try:
+            for target, temporary in zip(targets, temporaries, strict=True):
+                temporary.replace(target)
+        except BaseException:
+            moved = [not temporary.exists() for temporary in temporaries]
+            pairs = () if all(moved) else zip(targets, backups, strict=True)
+            for target, backup in compress(pairs, moved):
+                backup.replace(target) if backup.exists() else target.unlink()
+            raise
         with suppress(OSError):  # not every system opens folders
-            _flush(target.parent)
+            for folder in {target.parent for target in targets}:
+                _flush(folder)
     except OSError as error:
-        raise OutputError(f"{target}: cannot be written: {_reason(error)}") from error
+        names = ", ".join(map(str, targets))
+        raise OutputError(f"{names}: cannot be written: {_reason(error)}") from error
     finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+        for path in (*temporaries, *backups):
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+def _temporary(target: Path) -> Path:
+    return target.parent / f"{temporary_prefix()}{secrets.token_hex(6)}{target.suffix}"
 
 
 def _exists(path: Path) -> bool:
@@ -119,7 +158,7 @@ def _flush(path: Path) -> None:
 
 _NAME = re.compile(r"\.warpspace-([0-9a-f]{8})-(\d{1,10})-")
 _OLD_S = 24 * 3600.0
-"""Nothing is written for so long: older files are left over, whichever machine wrote them."""
+"""Nothing is written for so long: older files of other machines are left over."""
 
 
 def temporary_prefix() -> str:
@@ -152,14 +191,12 @@ def _is_left_over(path: Path) -> bool:
     name, about = _NAME.match(path.name), path.lstat()
     if name is None or (hasattr(os, "geteuid") and about.st_uid != os.geteuid()):
         return False
-    if time.time() - about.st_mtime > _OLD_S:
-        return True
-    return name[1] == _machine() and not _runs(int(name[2]))
+    if name[1] == _machine() and sys.platform != "win32":  # whatever the clock says
+        return not _runs(int(name[2]))
+    return time.time() - about.st_mtime > _OLD_S
 
 
 def _runs(process: int) -> bool:
-    if sys.platform == "win32":  # asking would end it
-        return True
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -183,7 +220,16 @@ def mesh_files(
     return files
 
 
-def write_meshes(files: Mapping[str, Path], meshes: Mapping[str, Any], *, overwrite: bool) -> None:
-    for frame, file in files.items():
-        with write_atomically(file, overwrite=overwrite) as temporary:
+def write_with_meshes(
+    target: Path,
+    text: bytes,
+    files: Mapping[str, Path],
+    meshes: Mapping[str, Any],
+    *,
+    overwrite: bool,
+) -> None:
+    """Write a file and the meshes it names, or nothing."""
+    with write_together([*files.values(), target], overwrite=overwrite) as temporaries:
+        for temporary, frame in zip(temporaries, files, strict=False):
             meshes[frame].export(temporary, file_type="stl")
+        temporaries[-1].write_bytes(text)

@@ -16,6 +16,7 @@ from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecu
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection
+from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
@@ -209,9 +210,13 @@ def _outcome(
 def _follow_parent() -> None:
     """Prepare a process of a pool: it ignores Ctrl-C, and ends as soon as its parent has ended.
 
+    It prints nothing, nor do libraries in C: results and errors go through its pipe.
     A thread waits for the end of the parent on every system. Linux could send a signal by itself
     (PR_SET_PDEATHSIG), but it does so already when the *thread* that started the process ends.
     """
+    with Path(os.devnull).open("wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(nowhere.fileno(), 2)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

@@ -130,13 +130,14 @@ def count_crossings(part: PartMesh) -> int | None:
                 is_near &= begin + slack < end[rows, None]
             row, column = np.nonzero(is_near)
             pair = some[np.stack([rows[row], column])]
+            looked_at += is_near.size + 8 * pair.shape[1]
             for _ in pair:  # each has corners on both sides of the other's plane
                 arm = corner[pair[0]] - corner[pair[1], :1]
-                away = np.einsum("nex,nx->ne", arm, normal[pair[1]])
-                is_across = (away.max(axis=1) > slack) & (away.min(axis=1) < -slack)
+                away = np.einsum("nex,nx->en", arm, normal[pair[1]])
+                is_across = (away.max(axis=0) > slack) & (away.min(axis=0) < -slack)
                 pair = pair[::-1, is_across]
             found.append(pair[0] * len(triangles) + pair[1])
-            looked_at += is_near.size + 200 * pair.shape[1]
+            looked_at += 200 * pair.shape[1]
             if looked_at > MOST_PAIRS:
                 return None
     pair = np.stack(np.divmod(np.unique(np.concatenate(found)), len(triangles)))

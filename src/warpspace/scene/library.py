@@ -1,12 +1,13 @@
 """Finding scenes and reading them: bundled by name, or any file by path, each in one pass."""
 
-import zlib
+import math
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any, cast
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -32,9 +33,9 @@ from warpspace.scene import machine_library, schema
 from warpspace.scene.curve_reader import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
-from warpspace.scene.scene_writer import Notation, read_errors, turn_covariance
+from warpspace.scene.scene_writer import Notation, matrix_digest, read_errors, turn_covariance
 from warpspace.scene.schema import Problems
-from warpspace.scene.text_files import check_file, parse_toml, read_text
+from warpspace.scene.text_files import parse_toml, read_bytes, read_text
 
 
 def scene_names() -> tuple[str, ...]:
@@ -287,21 +288,31 @@ def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
     return found
 
 
-def read_npz(path: Path, where: str, problems: Problems) -> dict[str, object] | None:
-    """Read the arrays of a file of numpy as lists; note what is wrong with it."""
-    check_file(path, limits.MAX_SCENE_BYTES, str(path))
-    damaged = BadZipFile, zlib.error, OSError, ValueError, EOFError, RuntimeError
-    with suppress(*damaged, MemoryError, AttributeError):
-        with ZipFile(path) as packed:  # what it holds may be larger by far
-            size = sum(entry.file_size for entry in packed.infolist())
-        if size <= limits.MAX_SCENE_BYTES:
-            with np.load(path, allow_pickle=False) as arrays:
-                return {name: arrays[name].tolist() for name in arrays.files}
-    most = f"of at most {limits.MAX_SCENE_BYTES:,} bytes"
-    problems.add(
-        where, f"expected a file of numpy {most} with the arrays keys and matrix", path.name
-    )
+NPZ_ARRAYS = {"keys.npy": (1, "U", 4 * 64), "matrix.npy": (2, "fiu", 8)}
+"""Arrays of a file of numpy: dimensions, kinds and largest size of an entry, bytes."""
+
+
+def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | None:
+    """Read the arrays of a covariance as lists; note what is wrong with it."""
+    data = BytesIO(read_bytes(path, limits.MAX_SCENE_BYTES))
+    with suppress(Exception), ZipFile(data) as packed:  # whatever a damaged file leads to
+        if {"matrix.npy"} <= {*packed.namelist()} <= {*NPZ_ARRAYS}:
+            return {name[:-4]: _read_array(packed, name) for name in packed.namelist()}
+    problems.add(where, "expected a file of numpy with the arrays keys and matrix", path.name)
     return None
+
+
+def _read_array(packed: ZipFile, name: str) -> list[Any]:
+    """Read an array whose header states dimensions and a kind that a covariance has."""
+    dimensions, kinds, most = NPZ_ARRAYS[name]
+    with packed.open(name) as file:
+        is_usual = np.lib.format.read_magic(file) == (1, 0)
+        shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=1000)
+        fits = len(shape) == dimensions and max(shape) <= limits.MAX_COVARIANCE
+        if not (is_usual and fits) or dtype.kind not in kinds or not 0 < dtype.itemsize <= most:
+            raise ValueError(f"{name}: {dtype} {shape}")
+        content = file.read(math.prod(shape) * dtype.itemsize)
+    return np.frombuffer(content, dtype).reshape(shape, order="F" if is_fortran else "C").tolist()
 
 
 @dataclass(frozen=True)
@@ -411,7 +422,10 @@ class _Document:
         if isinstance(name := spelled.get("matrix"), str):
             path = machine_library.path_beside(name, where, self.folder, problems)
             raw = read_npz(Path(path), where, problems) if path else None
-            raw = raw and raw | spelled | {"matrix": raw.get("matrix")}
+            if raw and spelled.get("sha256", "") not in ("", matrix_digest(raw["matrix"])):
+                expected = "is not the matrix of this scene (its SHA-256 differs); expected the"
+                problems.add(f"{where}.matrix", f"{expected} file written with the scene", name)
+            raw = raw and raw | spelled | {"matrix": raw["matrix"]}
         if raw is None:
             return None
         before = len(problems.lines)
@@ -456,7 +470,7 @@ class _Document:
             problems.add(f"{where}[{at}]", expected, rows[at])
         if len(problems.lines) > before:
             return None
-        del found["matrix"]
+        del found["matrix"], found["sha256"]
         return Covariance(**found, rows=tuple(map(tuple, matrix.tolist())))
 
     def measurements(self) -> dict[str, Measurement]:

@@ -54,7 +54,7 @@ def path_beside(file: str, where: str, folder: Path | None, problems: Problems) 
         home = folder.resolve()
         path = (home / file).resolve()
         inside, there = path.is_relative_to(home), path.is_file()
-    except (OSError, ValueError):
+    except (OSError, ValueError, RuntimeError):  # the last of links that lead in a circle
         path, inside, there = folder, True, False
     if not inside:
         problems.add(where, "leads out of the folder of this file; expected one in it", file)

@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 import tomli_w
+from numpy.typing import ArrayLike
 
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.field.grid import Workspace
@@ -117,6 +118,13 @@ def scene_files(scene: Scene, stem: str) -> dict[str, str | bytes]:
     return {"": text, ".npz": packed.getvalue()}
 
 
+def matrix_digest(matrix: ArrayLike) -> str:
+    """Compute the SHA-256 of a matrix that stands in a file of its own."""
+    from hashlib import sha256  # slow to import, and few scenes have one
+
+    return sha256(np.asarray(matrix, "<f8").tobytes()).hexdigest()
+
+
 def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = "") -> str:
     """Spell a scene as the text of a scene file.
 
@@ -182,6 +190,7 @@ def _covariance(found: Covariance | None, matrix: str) -> dict[str, object]:
         return {}
     values: dict[str, object] = {
         "keys": found.keys,
+        "sha256": matrix_digest(found.matrix) if matrix else "",
         "matrix": matrix or [row[: at + 1] for at, row in enumerate(found.rows)],
         "dof": 0.0 if isinf(found.dof) else found.dof,
         "measured_range": _ranges(found.measured_range),

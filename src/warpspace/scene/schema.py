@@ -300,6 +300,7 @@ COVARIANCE = TableSchema(
     {
         "keys": (_KEYS, ()),
         "matrix": (_list(_list(_PRODUCT, limits.MAX_COVARIANCE, 1), limits.MAX_COVARIANCE), ()),
+        "sha256": (_text(64), ""),
         "dof": (_number(1.0, 1e9), math.inf),
         "measured_range": (_by_name(workspace_range), {}),
         "undetermined": (_KEYS, ()),

@@ -2,15 +2,19 @@
 
 import csv
 import math
+import os
 import re
+import sys
+import time as clock
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from datetime import date, time
 from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
-from warpspace.exceptions import SceneError
+from warpspace.exceptions import OutputError, SceneError
 from warpspace.machine.limits import (
     MAX_CSV_COLUMNS,
     MAX_CSV_LINE,
@@ -19,7 +23,13 @@ from warpspace.machine.limits import (
     MAX_KEYS,
     MAX_MARKS,
     MAX_NESTING,
+    MAX_SCENE_BYTES,
 )
+
+if sys.platform != "win32":
+    import fcntl
+
+LOCK_WAIT_S = 60.0
 
 # A TOML reader's memory grows with the square of the parts of one key, and each table costs far
 # more memory than its two brackets. One pass over the text counts what would be expensive; it takes
@@ -71,18 +81,25 @@ def check_outline(text: str, source: str) -> None:
 
 def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:
     source = source or str(path)
+    try:
+        return read_bytes(path, limit_bytes, source).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        text = f"is not UTF-8 text (byte {error.start}); expected a UTF-8 file"
+        raise SceneError(source, [text]) from None
+
+
+def read_bytes(path: Path, limit_bytes: int, source: str | None = None) -> bytes:
+    """Read a file of limited size; a device or a pipe is refused before it is opened."""
+    source = source or str(path)
     check_file(path, limit_bytes, source)
     try:
         with path.open("rb") as file:
             content = file.read(limit_bytes + 1)
-        if len(content) > limit_bytes:  # some files of the system say that they are empty
-            raise SceneError(source, [f"is too long; expected at most {limit_bytes:,} bytes"])
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        text = f"is not UTF-8 text (byte {error.start}); expected a UTF-8 file"
-        raise SceneError(source, [text]) from None
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
+    if len(content) > limit_bytes:  # some files of the system say that they are empty
+        raise SceneError(source, [f"is too long; expected at most {limit_bytes:,} bytes"])
+    return content
 
 
 def check_file(path: Path, limit_bytes: int, source: str) -> None:
@@ -102,6 +119,34 @@ def check_file(path: Path, limit_bytes: int, source: str) -> None:
         raise SceneError(
             source, [f"is {size:,} bytes long; expected at most {limit_bytes:,} bytes"]
         )
+
+
+@contextmanager
+def lock_file(path: Path) -> Generator[None]:
+    """Lock a file while it is read, changed and replaced; the lock ends with the process.
+
+    Others that lock it wait. Where there are no locks (Windows, some network drives), pass what was
+    read to `warpspace.outputs.file_output.write_atomically`, which refuses a file that has changed.
+    """
+    check_file(path, MAX_SCENE_BYTES, str(path))
+    last_s = clock.monotonic() + LOCK_WAIT_S
+    with ExitStack() as opened:
+        while sys.platform != "win32":
+            try:
+                file = opened.enter_context(path.open("rb"))
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                    break  # else it was replaced meanwhile
+            except BlockingIOError:
+                pass
+            except OSError:
+                break
+            opened.close()
+            if clock.monotonic() > last_s:
+                text = f"{path}: locked by another process for {LOCK_WAIT_S:g} s; try again"
+                raise OutputError(text)
+            clock.sleep(0.02)
+        yield
 
 
 def parse_toml(text: str, source: str) -> dict[str, object]:

@@ -1,8 +1,10 @@
 """Meshes of users: read as bodies from all formats, and counted before they are built."""
 
+import base64
 import copy
 import io
 import json
+import os
 import re
 import struct
 import time
@@ -10,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import PIL.Image
 import pytest
 import trimesh
 
@@ -68,7 +71,7 @@ def test_a_given_unit_holds_for_every_format(ending, unit, factor, tmp_path):
 
 @pytest.mark.parametrize("ending", FORMATS)
 def test_missing_empty_and_damaged_files_are_named(ending, tmp_path):
-    with pytest.raises(OptionError, match=rf"none\{ending}: there is no such file"):
+    with pytest.raises(OptionError, match=rf"none\{ending}: no such file"):
         load_mesh(tmp_path / f"none{ending}", "R")
     (tmp_path / f"empty{ending}").touch()
     with pytest.raises(OptionError, match=rf"empty\{ending}: the file is empty"):
@@ -83,7 +86,7 @@ def test_missing_empty_and_damaged_files_are_named(ending, tmp_path):
     with pytest.raises(OptionError, match=rf"half\{ending}: "):
         load_mesh(half, "R")
     (tmp_path / f"folder{ending}").mkdir()
-    with pytest.raises(OptionError, match=rf"folder\{ending}: cannot be read"):
+    with pytest.raises(OptionError, match=rf"folder\{ending}: is a folder"):
         load_mesh(tmp_path / f"folder{ending}", "R")
 
 
@@ -248,6 +251,12 @@ GLB = {
         {"bufferViews": [{**view, "byteLength": 44_000_000}] * 2}, "88,000,000 bytes in views"
     ),
     "accessors": ({"accessors": [{**points, "count": 2_000_000}] * 2}, "4,000,000 points and ind"),
+    "accessors without data": (
+        {"accessors": [
+            *ONE["accessors"], {"componentType": 5126, "count": 1_000_000, "type": "MAT4"}
+        ]},
+        "64,000,042 bytes of points and indices; expected at most 50,000,000",
+    ),
     "negative": (
         {"accessors": [{**points, "count": 4_000_000}, {**points, "count": -9_000_000}]},
         "4,000,000 points and indices",
@@ -445,3 +454,44 @@ def test_a_binary_stl_of_other_length_than_it_says_is_refused(stated, said, tmp_
     (tmp_path / "a.stl").write_bytes(b"\0" * 80 + stated.to_bytes(4, "little") + rows)
     with pytest.raises(OptionError, match=said):
         read_mesh(tmp_path / "a.stl", "mm")
+
+
+def test_pictures_of_a_glb_file_are_not_opened(tmp_path, monkeypatch):
+    # 400 kB of PNG may be 12 GB of pixels
+    picture = base64.b64encode(b"no picture").decode()
+    held = {
+        "images": [{"uri": f"data:image/png;base64,{picture}"}],
+        "textures": [{"source": 0}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "meshes": [{"primitives": [{**primitive, "material": 0}]}],
+    }
+    path = tmp_path / "a.glb"
+    path.write_bytes(glb(**held))
+    opened = list[Any]()
+    monkeypatch.setattr(PIL.Image, "open", opened.append)
+    assert len(load_mesh(path, "X", unit="mm").triangles) == 1
+    assert opened == []
+
+
+def test_a_mesh_that_is_a_pipe_or_a_device_is_refused_unread(tmp_path):
+    os.mkfifo(tmp_path / "pipe.stl")
+    (tmp_path / "device.stl").symlink_to("/dev/zero")
+    for name in ("pipe.stl", "device.stl"):
+        with pytest.raises(OptionError, match=rf"{name}: is no regular file"):
+            load_mesh(tmp_path / name, "X")
+
+
+def test_shells_within_shells_are_looked_at_once_each():
+    # of 72,000 cavities it took 160 s
+    box = trimesh.creation.box([1.0] * 3)
+    box.invert()
+    place = 2.0 * np.stack(np.meshgrid(*[np.arange(27)] * 3), axis=-1).reshape(-1, 3)
+    vertices = (box.vertices + place[:, None]).reshape(-1, 3)
+    faces = (box.faces + 8 * np.arange(len(place))[:, None, None]).reshape(-1, 3)
+    around = trimesh.creation.box(bounds=[[-9.0] * 3, [60.0] * 3])
+    hollow = trimesh.Trimesh(vertices, faces, process=False) + around
+    data = hollow.export(file_type="stl")
+    began = time.process_time()
+    _, warnings = read_mesh(Path("a.stl"), "mm", data=data)
+    assert time.process_time() - began < 8.0
+    assert warnings == ()

@@ -13,7 +13,15 @@ from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.model import Loop
 from warpspace.parts.part import Part
 from warpspace.parts.program import Program
-from warpspace.parts.workpiece import fit_out, load_part, make_points, place_part, point_basis
+from warpspace.parts.workpiece import (
+    PartMesh,
+    count_crossings,
+    fit_out,
+    load_part,
+    make_points,
+    place_part,
+    point_basis,
+)
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.scene_writer import scene_to_toml
@@ -252,3 +260,11 @@ def test_a_bent_file_is_as_cut_and_a_predistorted_one_is_cut_nominal(ending, tmp
     made = make_points(scene, place_part(asked, scene, place).vertices_mm)
     off = made.point_mm[:, None] + 1e-3 * made.error_um[:, None] - found.made.point_mm
     assert np.linalg.norm(off, axis=-1).min(axis=1).max() < 2e-5
+
+
+def test_triangles_that_lie_close_without_meeting_are_counted_as_looked_at():
+    # their pairs were not, so that it took 11 s before it was given up
+    stack = np.tile([[0.0, 0.0, 0.0], [100.0, 0.0, 100.0], [0.0, 100.0, 0.0]], (100_000, 1, 1))
+    stack[:, :, 2] += np.arange(len(stack))[:, None] / 3.0
+    triangles = np.arange(3 * len(stack), dtype=np.int32).reshape(-1, 3)
+    assert count_crossings(PartMesh("stack", stack.reshape(-1, 3), triangles)) is None

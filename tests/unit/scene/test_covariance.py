@@ -1,6 +1,7 @@
 """Covariances in scene files: what they keep, and what is refused by key and value."""
 
 import math
+import re
 from dataclasses import replace
 from io import BytesIO
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -27,7 +28,7 @@ EA0Z = -30
 keys = ["EC0Y", "EA0Z"]
 matrix = [[4.0], [3.0, 9.0]]
 """
-SAID = "expected a file of numpy of at most 4,194,304 bytes with the arrays keys and matrix"
+SAID = "expected a file of numpy with the arrays keys and matrix"
 WHOLE = Covariance(
     ("EC0Y", "EA0Z"),
     ((4.0, 3.0), (3.0, 9.0)),
@@ -133,6 +134,16 @@ def test_a_large_covariance_stands_beside_its_scene(tmp_path):
         data = content if isinstance(content, bytes) else content.encode()
         (tmp_path / f"large{add or '.toml'}").write_bytes(data)
     assert load_scene(tmp_path / "large.toml").covariance == scene.covariance
+    whole = (tmp_path / "large.npz").read_bytes()
+    other = replace(scene, covariance=replace(scene.covariance, rows=np.diag([4.0] * 31).tolist()))
+    (tmp_path / "large.npz").write_bytes(scene_files(other, "large")[".npz"])
+    with pytest.raises(SceneError, match=r'matrix = "large\.npz": is not the matrix of this scene'):
+        load_scene(tmp_path / "large.toml")
+    text = (tmp_path / "large.toml").read_text("utf-8")
+    (tmp_path / "old.toml").write_text(re.sub("sha256 = .*?, ", "", text), encoding="utf-8")
+    assert load_scene(tmp_path / "old.toml").covariance.matrix[0, 0] == 4.0
+    (tmp_path / "large.npz").write_bytes(whole)
+    assert load_scene(tmp_path / "large.toml").covariance == scene.covariance
     (tmp_path / "large.npz").unlink()
     with pytest.raises(SceneError, match=r"large\.npz"):
         load_scene(tmp_path / "large.toml")
@@ -176,7 +187,50 @@ def locked(path):
     path.write_bytes(content)
 
 
-@pytest.mark.parametrize("write", [plain_bytes, enormous, damaged, locked])
+def header(path, **changes):
+    head = BytesIO()
+    usual = {"descr": "<f8", "fortran_order": False, "shape": (2, 2)}
+    np.lib.format.write_array_header_1_0(head, usual | changes)
+    keys = BytesIO()
+    np.save(keys, np.array(["EC0Y", "EA0Z"]))
+    packed(path, keys=keys.getvalue(), matrix=head.getvalue() + np.eye(2).tobytes())
+
+
+def without_bytes(path):
+    header(path, descr="|V0", shape=(10**7,))
+
+
+def entries_without_bytes(path):
+    header(path, descr="|V0")
+
+
+def texts(path):
+    header(path, descr="<U2")
+
+
+def deep_header(path):
+    text = b"[" * 9000
+    text = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    packed(path, keys=text, matrix=text)
+
+
+def unfinished_header(path):
+    text = b"{'descr': '<f8', 'shape': (2, 2"
+    text = b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+    packed(path, keys=text, matrix=text)
+
+
+def other_arrays(path):
+    np.savez(path, keys=np.array(["EC0Y"]), matrix=[[1.0]], more=np.zeros(10))
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        *(plain_bytes, enormous, damaged, locked, without_bytes, entries_without_bytes, texts),
+        *(deep_header, unfinished_header, other_arrays),
+    ],
+)
 def test_a_file_of_numpy_that_cannot_be_read_is_named(tmp_path, write):
     write(tmp_path / "c.npz")
     text = SCENE[: SCENE.index("[uncertainty.")] + '[uncertainty]\ncovariance = "c.npz"\n'

@@ -71,8 +71,8 @@ class Page:
         """Show a message in this tab: "done", "warning", "problem", or one that "stays"."""
         self.call("toast", kind, title, text)
 
-    def report(self, error: Exception) -> None:
-        self.notify("That did not work", error_words(error), "problem")
+    def report(self, error: Exception, title: str = "That did not work") -> None:
+        self.notify(title, error_words(error), "problem")
 
 
 @cache

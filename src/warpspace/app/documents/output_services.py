@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.scene.model import Scene
 
 Draw = Callable[..., bytes]
 
@@ -37,4 +38,6 @@ class Services:
     draw_compensation: Draw | None = None
     figures: tuple[tuple[str, str], ...] = ()  # names of the figures of one scene, what each shows
     exports: tuple[tuple[str, str], ...] = ()  # endings of the formats, and what each is for
+    # whether the file of a scene is as it was when it was opened
+    is_current: Callable[[Scene], bool] = lambda _: True
     token: str | None = None  # what the app asks for; it goes into a link where that is asked for

@@ -25,6 +25,10 @@ from warpspace.scene.notes import story
 
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
+CHANGED = (
+    "Somebody has changed it since it was opened here, and what is saved does not hold that change."
+    " Save it beside that file, not over it; “warpspace merge” unites the notes of both."
+)
 Write = Callable[[LivePicture, Job], bytes]
 PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
 
@@ -70,6 +74,10 @@ class FilesDialog(JobDialog):
     """Save and export; opening files and links goes this way too."""
 
     name, title = "files", "Save and export"
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._uploads = Jobs(self, self.renew, context.page.report)
 
     def body(self, picture: LivePicture) -> Markup:
         services = self.context.services
@@ -132,6 +140,10 @@ class FilesDialog(JobDialog):
         ):
             self.context.send(f"{part}:file", value)
             return
+        self._uploads.queue("Opening", partial(self._parse, value))
+
+    def _parse(self, value: str, job: Job) -> None:
+        """Parse a file beside the session."""
         name, content = transfers.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
@@ -139,12 +151,13 @@ class FilesDialog(JobDialog):
         elif name.lower().endswith(".toml"):
             text = transfers.upload_text(content, name)
         else:
-            self.context.offer_import(name, content)
+            self.context.act(partial(self.context.offer_import, name, content))
             return
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
         whole = is_robot or scene_file.settings_of(text) != ""
-        self.context.show_opened(opened, camera, whole=whole)
-        self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
+        if not job.is_set():
+            self.context.act(partial(self.context.show_opened, opened, camera, whole=whole))
+            self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, word: str) -> None:
         opened = scene_file.open_link(transfers.unpack(word), self.context.scenes.fixed)
@@ -156,6 +169,8 @@ class FilesDialog(JobDialog):
         state, camera = self.context.state, self.context.camera.remember()
         text = self._alone_if_large(lambda one: scene_file.state_to_toml(one, camera))
         self.context.save_file(f"{transfers.safe_name(state.scene.name)}.toml", text)
+        if not self.context.services.is_current(state.origin):
+            self.context.notify("The file of this scene has changed", CHANGED, "stays")
 
     def _share(self, *, with_token: bool) -> None:
         context = self.context

@@ -1,7 +1,7 @@
 """Import of measured errors: what files bring and replace, and the error before and after."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Annotated, Literal
@@ -150,15 +150,18 @@ class ImportPanel(FilesPanel):
     def __init__(self, context: Context) -> None:
         words = "Measured errors, or a controller's table"
         super().__init__(context, Entry(NAME, "measure", words, f"{__name__}:Import"))
-        context.offer_import = self.received
+        context.offer_import = lambda name, content: self.receive(lambda: (name, content))
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
+        return self._options(state, self._files)
+
+    def _options(self, state: AppState, files: Sequence[UploadedFile]) -> Sequence[Option]:
         """Leave out what the format has no choice of."""
-        if not self._files:
+        if not files:
             return ()
         found = {one.name: one for one in self.options()}
         names = {one.name: one.title for one in registry.formats()}
-        own = self._recognised()
+        own = _recognised(files)
         first = own.title if own is not None else "none, choose one"
         found["format"] = replace(
             found["format"], choices=tuple(names), words=names, unset=f"recognised: {first}"
@@ -173,15 +176,18 @@ class ImportPanel(FilesPanel):
             found["variant"] = replace(found["variant"], choices=kind.variants)
         return list(found.values())
 
-    def _recognised(self) -> registry.Format | None:
-        try:
-            return registry.recognise([one.content for one in self._files])
-        except WarpspaceError:  # none that is known, or several
-            return None
-
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked = read_form(Import, self.shown_options(state), values, scenes[0])
-        return replace(asked, sources=tuple(one.content for one in self._files))
+        return self._ask(state, self._files, values, scenes[0])
+
+    def _ask(
+        self,
+        state: AppState,
+        files: Sequence[UploadedFile],
+        values: Mapping[str, str],
+        scene: Scene,
+    ) -> Analysis:
+        asked = read_form(Import, self._options(state, files), values, scene)
+        return replace(asked, sources=tuple(one.content for one in files))
 
     def is_quick(self, state: AppState) -> bool:
         return True
@@ -201,8 +207,8 @@ class ImportPanel(FilesPanel):
     def actions(self, found: Result, *, stale: bool) -> Markup:
         return EMPTY
 
-    def received(self, name: str, content: bytes) -> None:
-        """Take a file, with those that are there where they belong together.
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse a file, with those that are there where they belong together.
 
         Alone it is kept also where it cannot be read yet: the section asks for what it does not
         say, or another file comes to it.
@@ -214,26 +220,34 @@ class ImportPanel(FilesPanel):
         )
         is_applied = self._applied[-1:] == (before,)
         held = () if is_applied else tuple(one for one in before if one.name != name)
-        state, keeps = self.context.state, False
+        state, keeps, files = self.context.state, False, before
         scene = state.active_scene()
         for keeps in (True, False) if 0 < len(held) < MOST_FILES else (False,):
-            self._files = (*held, own) if keeps else (own,)
+            files = (*held, own) if keeps else (own,)
             try:
-                self.ask(state, self.values(state) if keeps else {}, [scene]).run(
-                    scene, ignore_progress
-                )
+                values = self.values(state) if keeps else {}
+                self._ask(state, files, values, scene).run(scene, ignore_progress)
                 break
             except WarpspaceError as error:
                 problem = error
         else:
             if held and problem is not None:
-                self._files = before
                 raise problem
+        return partial(self._show, files, keeps=keeps)
+
+    def _show(self, files: tuple[UploadedFile, ...], *, keeps: bool) -> None:
+        self._hold(files)
         self.context.post(partial(_unfolded, keeps=keeps))
-        self.renew()
 
     def problem_html(self, state: AppState) -> Markup:
         return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before
+
+
+def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
+    try:
+        return registry.recognise([one.content for one in files])
+    except WarpspaceError:  # none that is known, or several
+        return None
 
 
 def _unfolded(state: AppState, *, keeps: bool) -> AppState:

@@ -34,7 +34,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
 from warpspace.app.panels.analysis_panel import AnalysisPanel, Question
 from warpspace.app.panels.block_html import block_html, details_html
-from warpspace.app.panels.panel import Context
+from warpspace.app.panels.panel import Context, Job, Jobs
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import TEST, read_form, with_form
@@ -44,7 +44,7 @@ from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.calibration_result import Calibration
 from warpspace.calibration.readings import bundled_data, find_data, parse_readings, parse_table
 from warpspace.calibration.registry import KINDS, RENAMED, test_kinds
-from warpspace.exceptions import OptionError, WarpspaceError
+from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
@@ -72,6 +72,7 @@ class FilesPanel(AnalysisPanel):
         super().__init__(context, entry)
         self._files: tuple[UploadedFile, ...] = ()
         self._trouble = ""
+        self._uploads = Jobs(self, self.renew, self._refuse)
 
     def question(self, state: AppState) -> Question:
         return (*super().question(state), self._files)
@@ -79,8 +80,12 @@ class FilesPanel(AnalysisPanel):
     def is_ready(self, state: AppState) -> bool:
         return bool(self._files)
 
-    def received(self, name: str, content: bytes) -> None:
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse a file beside the session; return what the session does with it."""
         raise NotImplementedError
+
+    def _hold(self, files: tuple[UploadedFile, ...]) -> None:
+        self._files = files
 
     def files_html(self) -> Markup:
         """List the files, and say why the last one is not among them."""
@@ -90,33 +95,42 @@ class FilesPanel(AnalysisPanel):
             for at, one in enumerate(self._files)
         ]  # fmt: skip
         problem = tag("p", self._trouble, class_="ws-problem", role="alert")
-        return join(((problem if self._trouble else EMPTY), rows(lines) if lines else EMPTY))
+        found = rows(lines) if lines else EMPTY
+        return join((problem if self._trouble else EMPTY, found, self._uploads.html()))
 
     def upload_html(self, words: str) -> Markup:
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
         upload = upload_button(words, self.name, MOST_BYTES, ".csv", hint=hint)
         return tag("div", upload, class_="ws-actions")
 
-    def attempt(self, action: Callable[[], None]) -> None:
-        """Do something in the session; what it raises is said above the files."""
+    def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
+        """Parse a file beside the session, one after the other; errors stand above the files."""
 
-        def attempted() -> None:
-            self._trouble = ""
-            try:
-                action()
-            except WarpspaceError as error:
-                self._trouble = error_words(error)
-            self.renew()
+        def work(job: Job) -> None:
+            take_in = self.parse(*read())
+            if not job.is_set():
+                self.context.act(partial(self._take_in, take_in))
 
-        self.context.act(attempted)
+        self._uploads.queue("Reading", work)
+
+    def _take_in(self, take_in: Callable[[], None]) -> None:
+        self._trouble = ""
+        take_in()
+        self.renew()
+
+    def _refuse(self, error: Exception) -> None:
+        self._trouble = error_words(error)
+        self.renew()
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "file":
-            self.attempt(lambda: self.received(*read_upload(value, self.most_bytes, self.what)))
+            self.receive(partial(read_upload, value, self.most_bytes, self.what))
         elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
             self.context.act(self.renew)
         else:
+            if word == "cancel":
+                self._uploads.cancel()
             return super().take(state, word, value)
         return state
 
@@ -197,8 +211,8 @@ class TestsPanel(FilesPanel):
             return with_form(state, "test.path", value)
         return super().take(state, word, value)
 
-    def received(self, name: str, content: bytes) -> None:
-        self._files = (UploadedFile(name, upload_text(content, name, WHAT)),)
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        return partial(self._hold, (UploadedFile(name, upload_text(content, name, WHAT)),))
 
 
 # --- Calibration ----------------------------------------------------------------------------------
@@ -313,7 +327,7 @@ class CalibratePanel(FilesPanel):
             name = self._kind_of_next.partition(":")[0]
             self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
         elif word == "bundled" and value in bundled_data():
-            self.attempt(partial(self.received, value, find_data(value).read_bytes()))
+            self.receive(lambda: (value, find_data(value).read_bytes()))
         elif word == "arrows":
             self._arrows = value if value in ARROWS else ""
             state = edits.with_sight(state, inside=bool(self._arrows))
@@ -322,10 +336,10 @@ class CalibratePanel(FilesPanel):
         self.context.act(self.renew)
         return state
 
-    def received(self, name: str, content: bytes) -> None:
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
         text = upload_text(content, name, WHAT)
-        scene, kind = self.context.state.active_scene(), self._kind_of_next or None
-        self._files = (*self._files, take_file(scene, text, name, kind, self._files))
+        scene, kind, files = self.context.state.active_scene(), self._kind_of_next, self._files
+        return partial(self._hold, (*files, take_file(scene, text, name, kind or None, files)))
 
     # --- arrows ----------------------------------------------------------------------------------
 

@@ -319,10 +319,16 @@ class Jobs:
         self._part, self._failed = part, failed
         self._again = partial(part.context.act, again)
         self._job: Job | None = None
+        self._waiting: deque[tuple[str, Callable[[Job], None]]] = deque()
 
     @property
     def busy(self) -> bool:
         return self._job is not None
+
+    def queue(self, name: str, work: Callable[[Job], None]) -> None:
+        """Start work once there is room. For the session."""
+        if not self.start(name, work):
+            self._waiting.append((name, work))
 
     def start(self, name: str, work: Callable[[Job], None]) -> bool:
         """Start work; give whether there was room. For the session, as all but the work itself."""
@@ -361,12 +367,14 @@ class Jobs:
         self._part.context.act(partial(self._end, job, error))
 
     def _end(self, job: Job, error: Exception | None) -> None:
-        self._part.context.jobs.discard(job)
         if self._job is not job:  # it has been cancelled, and there may be another
             return
         self._job = None
+        if self._waiting:
+            self.start(*self._waiting.popleft())
         self._again()
         if error is not None and not isinstance(error, CancelledError):
             if not isinstance(error, WarpspaceError):
                 logger.error("%s", job.name, exc_info=error)
             self._failed(error)
+        self._part.context.jobs.discard(job)

@@ -1,6 +1,6 @@
 """A part in the box, where it is clamped, what an inspector would measure; and a program."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -100,7 +100,7 @@ class PartPanel(InBoxPanel):
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         asked: Any = super().ask(state, values, scenes)
-        own, part = PartLook.of_scene(state.scene), state.part
+        (own, _), part = PartLook.of_scene(state.scene), state.part
         beside = state.scene.part.path("features") if part.mesh is own.mesh else None
         told = next(((one.name, one.content) for one in self._files), None)
         return replace(asked, place=part.place, mesh=part.mesh, features=beside, tolerances=told)
@@ -127,19 +127,20 @@ class PartPanel(InBoxPanel):
             return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
         found = super().take(state, word, value)
         if word == "set.unit" and state.part.mesh and self._sent:
-            self.attempt(partial(self.received, *self._sent))
+            sent = self._sent
+            self.receive(lambda: sent)
         return found
 
-    def received(self, name: str, content: bytes) -> None:
-        """Take in tolerances, or a mesh: of another name it is clamped in the middle."""
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        """Parse tolerances, or a mesh: of another name it is clamped in the middle."""
         if name.lower().endswith(".toml"):
-            self._files = (UploadedFile(name, upload_text(content, name, "file of tolerances")),)
-            return
+            text = upload_text(content, name, "file of tolerances")
+            return partial(self._hold, (UploadedFile(name, text),))
         self._sent, state = (name, content), self.context.state
         mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
         kept = state.part.place if name == state.part.name else None
         place = np.round(place_part(mesh, state.standing, kept).place, 3)
-        self.show(mesh, name, place=tuple(place.tolist()))
+        return partial(self.show, mesh, name, place=tuple(place.tolist()))
 
 
 class ProgramPanel(InBoxPanel):
@@ -169,5 +170,5 @@ class ProgramPanel(InBoxPanel):
         narrow = replace(worst, columns=(replace(line, form=link), *others))
         return block_html(narrow) + details_html((*rest, worst))
 
-    def received(self, name: str, content: bytes) -> None:
-        self.show(content.decode("utf-8-sig", "replace"), name)
+    def parse(self, name: str, content: bytes) -> Callable[[], None]:
+        return partial(self.show, content.decode("utf-8-sig", "replace"), name)

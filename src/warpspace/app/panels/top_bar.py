@@ -14,6 +14,7 @@ from warpspace.app.panels.file_dialogs import accepted_endings
 from warpspace.app.panels.panel import Context, Panel, Window
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
+from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 
 LONGEST_SENTENCE = 110
@@ -253,6 +254,10 @@ class PagePanel(Panel):
         return updates[word]() if word in updates else state
 
     def _travel(self, done: str, travel: Callable[[], str]) -> None:
-        what = travel()
+        try:
+            what = travel()
+        except OptionError as error:
+            self.context.notes.append(str(error))
+            return
         words = f"{done}: {what}" if what else f"Nothing to be {done.lower()}"
         self.context.notify(words)

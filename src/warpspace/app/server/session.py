@@ -19,8 +19,9 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,13 +38,16 @@ from warpspace.app.panels.overlay import PointerPanel, Tabs
 from warpspace.app.panels.page_panels import build_parts
 from warpspace.app.panels.panel import PAUSE_S, Context, Panel, Window
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
-from warpspace.app.state.app_state import AppState
-from warpspace.app.state.store import StateStore
+from warpspace.app.state.app_state import AppState, Comparison, PageLook, PartLook
+from warpspace.app.state.look import Look
+from warpspace.app.state.store import Mark, StateStore
 from warpspace.exceptions import WarpspaceError
 
 OFTEN_S = 0.4  # between two writings of what follows often
 LONGEST_PAUSE_S = 3.0  # what follows in a pause lags no longer than this while a slider is dragged
 REST_S = 0.5  # pause after which the slowest parts follow; a drag does not pay for them
+Guarded = Callable[[object, Callable[[], object]], None]
+"""Does something of a part or a layer, and takes in what that raises."""
 
 
 class Display:
@@ -144,7 +148,7 @@ class Display:
             return None
         return max(0.0, at - time.monotonic())
 
-    def settle(self, picture: LivePicture, guarded: Callable[[Callable[[], object]], None]) -> None:
+    def settle(self, picture: LivePicture, guarded: Guarded) -> None:
         """Bring the next part up to date; one at a time, so that a slider never waits for all."""
         if not self._waiting:
             follows = ("at rest",) if self._changed_at is None else ("often", "in a pause")
@@ -156,12 +160,12 @@ class Display:
                 self._late.clear()
                 for layer in self.layers:
                     if isinstance(layer, BoxLayer):
-                        guarded(partial(layer.rest, picture))
+                        guarded(layer, partial(layer.rest, picture))
             self._changed_at = None
         while self._waiting:
             part = self._waiting.popleft()
             if _key(part, picture) != self._shown.get(part):  # else it takes no turn
-                guarded(partial(self._write, [part], picture))
+                guarded(part, partial(self._write, [part], picture))
                 break
 
 
@@ -195,6 +199,17 @@ def turn() -> Generator[None]:
             _CHANGED.notify_all()
 
 
+class Good(NamedTuple):
+    mark: Mark
+    page: PageLook  # of this tab
+
+
+def _bare(state: AppState) -> AppState:
+    """Return a state without what stands in the box and what it is compared with."""
+    return replace(state, part=PartLook(), look=Look(), comparison=Comparison(), controller=None,
+                   picked=None, lever="", forms={})  # fmt: skip
+
+
 class Session:
     def __init__(
         self,
@@ -210,6 +225,9 @@ class Session:
         self._others = others
         self._keeper = TabKeeper(context, shared=others is not None)
         self.display = Display(context)
+        # what was evaluated last without an exception: of the map, and of all that follows it
+        self._shown = self._settled = self._good()
+        self._failing = set[object]()  # parts that fail whatever is shown
         self._is_known = False  # whether the page has said which tab it is
         self._around_at: float | None = None  # when what lies around the map is drawn at the latest
         self._stopped = threading.Event()
@@ -220,6 +238,11 @@ class Session:
     @property
     def state(self) -> AppState:
         return self.context.state
+
+    @property
+    def _tabs(self) -> Iterable[Context]:
+        """All that look at the state."""
+        return [self.context] if self._others is None else self._others()
 
     def start(self) -> None:
         self._worker.start()
@@ -277,12 +300,37 @@ class Session:
     def _guarded(self, step: Callable[[], object]) -> None:
         try:
             step()
-        except Exception as error:
-            if self._stopped.is_set() or not self.context.page.is_open:
-                return  # nobody is there to be told, and its widgets are gone
-            if not isinstance(error, WarpspaceError):
-                logger.exception("session %d", self._client.client_id)
-            self.context.page.report(error)
+        except Exception as error:  # noqa: BLE001 - logged and shown
+            self._report(error, [self.context])
+
+    def _report(self, error: Exception, tabs: Iterable[Context], **title: str) -> None:
+        if self._stopped.is_set() or not self.context.page.is_open:
+            return  # nobody is there to be told, and its widgets are gone
+        if not isinstance(error, WarpspaceError):
+            logger.error("session %d", self._client.client_id, exc_info=error)
+        for tab in tabs:
+            tab.page.report(error, **title)
+
+    def _good(self) -> Good:
+        return Good(self.context.store.mark(), self.context.unfolded)
+
+    def _go_back(self, error: Exception, failed: Good, good: Good) -> bool:
+        """Replace a state that cannot be evaluated, with a message; tell whether that helps."""
+        context, tabs = self.context, self._tabs
+        if context.telling is not None:
+            tabs = [context]
+            self._guarded(partial(self.display.parts[StoryPanel.name].take, self.state, "end", ""))
+        elif failed.mark.state is good.mark.state and failed.page is good.page:
+            return False
+        elif failed.mark.state is not context.store.state:
+            return True  # another tab has replaced it
+        else:
+            context.unfolded = good.page
+            if not context.store.back_to(good.mark, failed.mark.state):
+                return True
+        self._report(error, tabs, title="The change was reverted")
+        context.wake()
+        return True
 
     def _build(self) -> None:
         """Show map and all that is written; the rest follows when the page has drawn that.
@@ -295,7 +343,26 @@ class Session:
         if context.events and context.events[0].part == TAB:
             self._hear(context.events.popleft())
         context.wake()  # what else has come
-        picture = self._live.evaluate(self.state)
+        try:
+            self._open(self._live.evaluate(self.state))
+        except Exception as error:
+            if not self._strip(error):
+                raise
+            self.display = Display(context)
+            self._open(self._live.evaluate(self.state))
+
+    def _strip(self, error: Exception) -> bool:
+        """Leave out what may fail of a state that cannot be opened; tell whether it had any."""
+        now, bare = self.context.store.state, _bare(self.context.store.state)
+        if bare == now:
+            return False
+        self.context.store.back_to(Mark(bare, (), ()), now)
+        self._report(error, self._tabs, title="Not all of the scene can be shown")
+        return True
+
+    def _open(self, picture: LivePicture) -> None:
+        context = self.context
+        self._shown = self._settled = self._good()
         with context.page.as_one():
             self._darken(picture)
             context.page.call("title", picture.state.scene.title)
@@ -310,11 +377,17 @@ class Session:
     def _draw_around(self, picture: LivePicture) -> None:
         self._around_at = None
         context = self.context
-        with context.page.as_one():
-            context.stage = MovingLayer(self._client, context.page, picture)
-            context.stage.clamp = partial(context.send, "state:set.part.place")
-            self.display.add(picture, [context.stage])
-            context.page.call("stage", "open")
+        try:
+            with context.page.as_one():
+                context.stage = MovingLayer(self._client, context.page, picture)
+                context.stage.clamp = partial(context.send, "state:set.part.place")
+                self.display.add(picture, [context.stage])
+                context.page.call("stage", "open")
+        except Exception as error:
+            if not self._strip(error):
+                raise
+            self._around_at = time.monotonic()
+            return
 
         @self._client.scene.on_click()
         def _(event: Any) -> None:
@@ -355,14 +428,21 @@ class Session:
         while context.actions:
             self._guarded(context.actions.popleft())
         notes, context.notes = context.notes, []
-        state, shown = self.state, context.shown
+        now, state, shown = self._good(), self.state, context.shown
         if shown is None:  # it could not be built
             return
         if context.camera.wanted and focus(shown.state) == focus(state):
             context.camera.place(shown)
         if notes or state is not shown.state:
-            with turn():
-                self._show(self._live.evaluate(state), shown, anew=bool(notes))
+            try:
+                with turn():
+                    self._show(self._live.evaluate(state), shown, anew=bool(notes))
+            except Exception as error:
+                if not self._go_back(error, now, self._shown):
+                    raise
+                self._guarded(partial(self._show, shown, shown, anew=True))
+                return
+            self._shown = now
         if notes:
             context.notify("Please note", "\n".join(notes), "warning")
 
@@ -383,4 +463,15 @@ class Session:
 
     def _settle(self, picture: LivePicture) -> None:
         with turn(), self.context.page.as_one():
-            self.display.settle(picture, self._guarded)
+            self.display.settle(picture, self._follow_picture)
+        if self.display.due_in_s is None:
+            self._settled = self._shown
+
+    def _follow_picture(self, part: object, step: Callable[[], object]) -> None:
+        try:
+            step()
+            self._failing.discard(part)
+        except Exception as error:  # noqa: BLE001 - logged and shown
+            if part in self._failing or not self._go_back(error, self._shown, self._settled):
+                self._failing.add(part)
+                self._report(error, [self.context])

@@ -40,6 +40,7 @@ from warpspace.scene.model import Scene
 
 KEPT_SECONDS = 600.0
 KEPT_TABS = 64
+KEPT_BYTES = 256 * 2**20  # held by the histories of all of them
 _TOKEN = re.compile(r"[0-9a-f]{32}")
 
 
@@ -60,7 +61,7 @@ class TabRecord:
 
 
 class TabMemory:
-    """Keeps what tabs leave behind, bounded in time and number."""
+    """Keeps what tabs leave behind, bounded in time, number and memory."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -69,14 +70,22 @@ class TabMemory:
     def keep(self, token: str, left: TabRecord) -> None:
         self._left.pop(token, None)
         self._left[token] = (self._clock() + KEPT_SECONDS, left)
-        while len(self._left) > KEPT_TABS:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget what is too old, or too much; the oldest first."""
+        now = self._clock()
+        size = sum(left.store.size_bytes for _, left in self._left.values())
+        while self._left:
+            until, oldest = next(iter(self._left.values()))
+            if until >= now and len(self._left) <= KEPT_TABS and size <= KEPT_BYTES:
+                break
+            size -= oldest.store.size_bytes
             self._left.popitem(last=False)
 
     def take(self, token: str) -> TabRecord | None:
         """Give back what a tab has left behind, once; None where there is nothing."""
-        now = self._clock()
-        while self._left and next(iter(self._left.values()))[0] < now:
-            self._left.popitem(last=False)
+        self.forget()
         return self._left.pop(token, (0.0, None))[1]
 
 
@@ -196,7 +205,7 @@ class TabKeeper(Panel):
 
     def _restore(self, text: str) -> None:
         context, say = self.context, partial(self.context.page.call, "server.say")
-        if self._shared and context.store.past:
+        if self._shared and context.store.is_edited:
             say(JOINED_TITLE, [JOINED])
             return
         try:

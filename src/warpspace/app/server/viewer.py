@@ -1,5 +1,6 @@
 """The server of the app: finds where it can serve, gives each tab a session, ends cleanly."""
 
+import asyncio
 import contextlib
 import errno
 import io
@@ -30,7 +31,7 @@ from warpspace.app.panels.panel import Context
 from warpspace.app.server.connection_guard import Guard, TabConnection
 from warpspace.app.server.request_policy import Access, RequestPolicy, plain_address
 from warpspace.app.server.session import Session
-from warpspace.app.server.tab_keeper import TabMemory, TabRecord, is_token, new_token
+from warpspace.app.server.tab_keeper import KEPT_SECONDS, TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
@@ -242,7 +243,8 @@ class Viewer:
             allow_hosts=access.allow_hosts,
             token=self.token,
         )
-        self._start = start or start_state(scene)
+        start = start or start_state(scene)
+        self._start, self._notes = start.without_notes(), start.notes
         self._scenes = _with(scene, scenes or {})
         self._live = LiveModel()
         self._sessions: dict[int, Session] = {}
@@ -285,14 +287,17 @@ class Viewer:
             return tuple(self._sessions.values())
 
     def _warm(self) -> None:
-        surface(self._live.evaluate(self._start))
+        with contextlib.suppress(Exception):  # the first tab says what fails
+            surface(self._live.evaluate(self._start))
 
     async def _connect(self, client: viser.ClientHandle) -> None:
         connection = connection_of(self._server, client)
         if not isinstance(connection, TabConnection):
             return  # it has gone meanwhile
-        store, scenes = self._shared or StateStore(self._start), SceneList(self._scenes)
+        store = self._shared.joined() if self._shared else StateStore(self._start)
+        scenes = SceneList(self._scenes)
         context = Context(self._server, client, store, scenes, self._services)
+        context.notes += self._notes
         others = (lambda: [one.context for one in self.sessions]) if self._shared else None
         session = Session(context, self._live, self._claim, others=others)
         with self._lock:
@@ -312,10 +317,9 @@ class Viewer:
                 session.token = token
         if twins:
             # a duplicated tab, or one whose old connection is not yet known to be dead
-            left = TabRecord(twins[0].context.store.copy(), None)
+            twin = twins[0].context.store
+            left = TabRecord(twin.joined() if self._shared else twin.copy(), None)
             session.rename(new_token())
-        if left is not None and self._shared is not None:
-            return TabRecord(self._shared, left.camera)
         return left
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:
@@ -327,6 +331,11 @@ class Viewer:
                 self._memory.keep(session.token, session.record())
             finally:
                 session.stop()
+        asyncio.get_running_loop().call_later(KEPT_SECONDS + 1.0, self._forget)
+
+    def _forget(self) -> None:
+        with self._lock:
+            self._memory.forget()
 
     def stop(self) -> None:
         for session in self.sessions:

@@ -6,7 +6,6 @@ changed.
 """
 
 from collections.abc import Collection, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -198,15 +197,20 @@ class PartLook:
     )
 
     @classmethod
-    def of_scene(cls, scene: Scene) -> "PartLook":
-        """Give what a scene names; of files that cannot be read from here their names."""
-        own, mesh, text = scene.part, None, None
-        with suppress(WarpspaceError):
-            if path := own.path("file"):
-                mesh = _load_part(path, own.unit or None)
+    def of_scene(cls, scene: Scene) -> tuple["PartLook", tuple[str, ...]]:
+        """Return what a scene names, and why some files cannot be read: only their names."""
+        own, mesh, text, notes = scene.part, None, None, list[str]()
+        try:
             if path := own.path("program"):
                 text = "".join(program_lines(path))
-        return cls(mesh, Path(own.file).name, own.place, text, Path(own.program).name)
+            if path := own.path("file"):
+                mesh = _load_part(path, own.unit or None)
+        except WarpspaceError as error:
+            notes.append(str(error))
+        except Exception as error:  # noqa: BLE001 - whatever a file holds, the scene opens
+            notes.append(f"part of the scene: {error!r}")
+        look = cls(mesh, Path(own.file).name, own.place, text, Path(own.program).name)
+        return look, tuple(notes)
 
     @property
     def is_empty(self) -> bool:
@@ -500,7 +504,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
     start = {key: scene.errors.amplitude(key) for key in scene.parameter_keys}
     at = scene.workspace.positions
     positions = {axis: at.get(axis, 0.0) for axis in position_spans(scene)}
-    part = PartLook.of_scene(scene)
+    part, notes = PartLook.of_scene(scene)
     state = AppState(
         scene,
         start,
@@ -515,6 +519,7 @@ def start_state(scene: Scene, **changes: Any) -> AppState:
         part=part,
         look=Look() if part.is_empty else Look(surface="grid"),
         forms={"program.tcp": scene.part.tcp} if scene.part.tcp else {},
+        notes=notes,
     )
     return replace(state, **changes)
 

@@ -1,18 +1,27 @@
-"""The state that one tab, or all tabs of a shared review, look at and steer; with its history.
+"""The state that one tab, or all tabs of a shared review, look at and steer; a history per tab.
 
 Sessions read their widgets and apply what has changed to the present state, under a lock: nobody
 overwrites what somebody else has just done with an older state of the whole.
 """
 
+import gc
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
-from typing import TypeAlias
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, replace
+from types import FunctionType, ModuleType
+from typing import Any, NamedTuple, TypeAlias
 
-from warpspace.app.state.app_state import AppState
+import numpy as np
+
+from warpspace.app.state.app_state import AppState, Exclusions, PartLook, Shown, Specification
 from warpspace.app.state.leaf import description, lowered, name_of
+from warpspace.app.state.look import Look, MachineLook, RotaryLook
 from warpspace.app.state.tree import leaves, stored
+from warpspace.exceptions import OptionError
+from warpspace.machine.errors import ToleranceSet
 
 # --- What differs between two states --------------------------------------------------------------
 
@@ -66,18 +75,86 @@ def _equal(old: object, new: object) -> bool:
         return False
 
 
+# --- A change of one state applied to another -----------------------------------------------------
+
+_MERGED = (Exclusions, Look, MachineLook, PartLook, RotaryLook, Shown, Specification, ToleranceSet)
+"""What two users may change at once, field by field; a scene is changed as a whole."""
+_MISSING = object()
+
+
+def carried(old: AppState, new: AppState, present: AppState) -> AppState:
+    """Apply the change from an old state to a new one to the present state; its page stays.
+
+    Raises `OptionError` where somebody else has changed the same.
+    """
+    names = [entry.name for entry in _COMPARED if entry.name != "review"]
+    values = {name: _carried(*(getattr(s, name) for s in (old, new, present))) for name in names}
+    notes = _carried(*({note.id: note for note in s.review} for s in (old, new, present)))
+    return replace(present, **values, review=tuple(notes.values()))
+
+
+def _carried(old: Any, new: Any, present: Any) -> Any:
+    if _equal(old, new):
+        return present
+    if _equal(old, present):
+        return new
+    if _equal(new, present):
+        return present
+    states = old, new, present
+    if all(isinstance(one, frozenset) for one in states):
+        return (present - (old - new)) | (new - old)
+    if all(isinstance(one, Mapping) for one in states):
+        order = {**present, **new} if old.keys() == new.keys() else {**new, **present}
+        entries = {key: _carried(*(one.get(key, _MISSING) for one in states)) for key in order}
+        return {key: entry for key, entry in entries.items() if entry is not _MISSING}
+    if not isinstance(old, _MERGED) or not type(old) is type(new) is type(present):
+        raise OptionError("somebody else has changed the same since; it stays as it is")
+    names = [entry.name for entry in fields(old)]
+    values = {name: _carried(*(getattr(one, name) for one in states)) for name in names}
+    return replace(present, **values)
+
+
 # --- Undo and redo --------------------------------------------------------------------------------
-# What a slider drag sends in quick succession becomes one step. The number of steps kept is
-# bounded.
+# What a slider drag sends in quick succession becomes one step. The steps of a tab are bounded in
+# number and in the memory that only they hold.
 
 STEPS = 100  # steps that can be undone; the oldest are forgotten
+STEPS_BYTES = 128 * 2**20  # held by the steps of a tab; the latest step stays
 SAME_STEP_S = 0.8  # changes of one thing that follow each other faster than this are one step
+_LARGE = ("scene", "loaded", "part", "comparison", "controller")
+_COMMON = (type, ModuleType, FunctionType)
+
+
+def _held_bytes(thing: object, known: set[int]) -> int:
+    """Return the memory that an object holds beside those that are known."""
+    total, waiting = 0, [thing]
+    while waiting:
+        latest = waiting.pop()
+        if id(latest) not in known and not isinstance(latest, _COMMON):
+            known.add(id(latest))
+            total += latest.nbytes if isinstance(latest, np.ndarray) else sys.getsizeof(latest)
+            waiting += gc.get_referents(latest)
+    return total
+
+
+def _size_bytes(before: AppState, after: AppState) -> int:
+    """Return the memory that either of two states holds and the other does not."""
+    if all(getattr(before, name) is getattr(after, name) for name in _LARGE):
+        return 0
+    sizes: list[int] = []
+    for state, other in ((before, after), (after, before)):
+        known = set[int]()
+        _held_bytes(other, known)
+        sizes.append(_held_bytes(state, known))
+    return max(sizes)
 
 
 @dataclass(frozen=True, slots=True)
 class UndoStep:
-    state: AppState
+    before: AppState
+    after: AppState
     what: Mapping[str, str]
+    size_bytes: int
 
     @property
     def words(self) -> str:
@@ -91,6 +168,13 @@ class UndoStep:
 Steps: TypeAlias = tuple[UndoStep, ...]
 
 
+def _bounded(steps: Steps) -> Steps:
+    steps = steps[-STEPS:]
+    while len(steps) > 1 and sum(step.size_bytes for step in steps) > STEPS_BYTES:
+        steps = steps[1:]
+    return steps
+
+
 def _on_page(state: AppState, other: AppState) -> AppState:
     if (state.page, state.forms) == (other.page, other.forms):
         return state
@@ -101,16 +185,46 @@ Update: TypeAlias = Callable[[AppState], AppState]
 Listener: TypeAlias = Callable[[], None]
 
 
-class StateStore:
-    """A state with its past and its future, that any number of sessions share."""
+@dataclass(slots=True)
+class _Document:
+    """What all tabs of a shared review look at."""
 
-    def __init__(self, state: AppState) -> None:
-        self.state = state  # what is shown, or about to be
+    state: AppState  # what is shown, or about to be
+    listeners: tuple[Listener, ...] = ()
+    is_edited: bool = False
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+
+class Mark(NamedTuple):
+    """A state with the history of a tab, to go back to."""
+
+    state: AppState
+    past: Steps
+    future: Steps
+
+
+class StateStore:
+    """A state with the past and the future of one tab; tabs of a shared review share the state."""
+
+    def __init__(self, state: AppState, document: _Document | None = None) -> None:
+        self._document = document or _Document(state)
         self.past: Steps = ()  # latest last
         self.future: Steps = ()
         self._changed_at = float("-inf")
-        self._listeners: list[Listener] = []
-        self._lock = threading.Lock()
+
+    @property
+    def state(self) -> AppState:
+        return self._document.state
+
+    @property
+    def is_edited(self) -> bool:
+        """Whether anybody has changed the state."""
+        return self._document.is_edited
+
+    @property
+    def size_bytes(self) -> int:
+        """Memory that its history holds."""
+        return sum(step.size_bytes for step in (*self.past, *self.future))
 
     @property
     def undoes(self) -> str:
@@ -125,7 +239,7 @@ class StateStore:
         self, update: Update, by: Listener | None = None, at: float | None = None
     ) -> tuple[str, ...]:
         """Apply a pure update to the present state; give what it had to clamp."""
-        with self._lock:
+        with self._document.lock:
             before, found = self.state, update(self.state)
             self._push(found.without_notes(), time.monotonic() if at is None else at)
             changed = self.state is not before
@@ -134,41 +248,64 @@ class StateStore:
         return found.notes
 
     def _push(self, state: AppState, at: float) -> None:
-        what = changes(self.state, state)
+        document, before = self._document, self.state
+        what = changes(before, state)
         if not what:
-            self.state = _on_page(self.state, state)
+            document.state = _on_page(before, state)
             return
-        alone = {"scene", "review"} & what.keys()
-        same = self.past and not self.future and self.past[-1].what == what and not alone
-        if not same or at - self._changed_at >= SAME_STEP_S:
-            self.past = (*self.past, UndoStep(self.state, what))[-STEPS:]
-        self.state, self.future, self._changed_at = state, (), at
+        steps, alone = self.past, {"scene", "review"} & what.keys()
+        same = steps and not self.future and steps[-1].what == what and not alone
+        if same and at - self._changed_at < SAME_STEP_S:
+            with suppress(OptionError):  # with what others have changed meanwhile
+                before, steps = carried(steps[-1].after, steps[-1].before, before), steps[:-1]
+        step = UndoStep(before, state, what, _size_bytes(before, state))
+        self.past, self.future, self._changed_at = _bounded((*steps, step)), (), at
+        document.state, document.is_edited = state, True
 
     def undo(self) -> str:
-        """Take the latest change back; give what it was."""
-        with self._lock:
-            self.past, self.future, what = self._travel(self.past, self.future)
-        return self._told(what)
+        """Take the latest change of this tab back; give what it was.
+
+        Where somebody else has changed the same since, the step is forgotten with an `OptionError`.
+        """
+        return self._travel(back=True)
 
     def redo(self) -> str:
-        """Do again what was undone; give what it was."""
-        with self._lock:
-            self.future, self.past, what = self._travel(self.future, self.past)
-        return self._told(what)
+        """Do again what was undone; give what it was; raises as `undo`."""
+        return self._travel(back=False)
 
-    def _travel(self, steps: Steps, others: Steps) -> tuple[Steps, Steps, str]:
-        self._changed_at = float("-inf")
-        if not steps:
-            return steps, others, ""
-        *rest, step = steps
-        others = (*others, UndoStep(self.state, step.what))
-        self.state = _on_page(step.state, self.state)
-        return tuple(rest), others, step.words
+    def _travel(self, *, back: bool) -> str:
+        with self._document.lock:
+            self._changed_at = float("-inf")
+            steps = self.past if back else self.future
+            if not steps:
+                return ""
+            step, left = steps[-1], steps[:-1]
+            sides = (step.after, step.before) if back else (step.before, step.after)
+            self.past, self.future = (left, self.future) if back else (self.past, left)
+            try:
+                self._document.state = carried(*sides, self.state)
+            except OptionError as error:
+                raise OptionError(f"{step.words}: {error}") from None
+            if back:
+                self.future = (*self.future, step)
+            else:
+                self.past = (*self.past, step)
+        self._notify(None)
+        return step.words
 
-    def _told(self, what: str) -> str:
-        if what:
-            self._notify(None)
-        return what
+    def mark(self) -> Mark:
+        """Return what `back_to` goes back to."""
+        return Mark(self.state, self.past, self.future)
+
+    def back_to(self, mark: Mark, failed: AppState) -> bool:
+        """Replace a state that cannot be evaluated; False where it is not the present one."""
+        with self._document.lock:
+            if self.state is not failed or failed is mark.state:
+                return False
+            self._document.state, self.past, self.future = mark
+            self._changed_at = float("-inf")
+        self._notify(None)
+        return True
 
     def copy(self) -> "StateStore":
         """Give a store of its own with the same state and history."""
@@ -176,17 +313,21 @@ class StateStore:
         store.past, store.future = self.past, self.future
         return store
 
+    def joined(self) -> "StateStore":
+        """Return a store of the same state for another tab, with a history of its own."""
+        return StateStore(self.state, self._document)
+
     def subscribe(self, listener: Listener) -> None:
         """Have a callable called (from any thread; it must return at once) after every change."""
-        with self._lock:
-            self._listeners.append(listener)
+        with self._document.lock:
+            self._document.listeners += (listener,)
 
     def unsubscribe(self, listener: Listener) -> None:
-        with self._lock:
-            self._listeners = [known for known in self._listeners if known != listener]
+        with self._document.lock:
+            left = tuple(known for known in self._document.listeners if known != listener)
+            self._document.listeners = left
 
     def _notify(self, by: Listener | None) -> None:
-        with self._lock:
-            listeners = [listener for listener in self._listeners if listener != by]
-        for listener in listeners:
-            listener()
+        for listener in self._document.listeners:
+            if listener != by:
+                listener()

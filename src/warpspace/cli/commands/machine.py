@@ -267,12 +267,12 @@ def notes(
     from warpspace.scene.library import load_scene
     from warpspace.scene.text_files import spell_row
 
-    loaded = load_scene(scene)
     if text is not None:
-        at = {} if point is None else parse_point(point, loaded.machine.axes)
-        loaded = _add_note(loaded, scene, output or scene, force=force, text=text, at=at, **about)
+        loaded = _add_note(scene, output or scene, point, force=force, text=text, **about)
         output = None
-    elif point is not None or (output or "").endswith(".toml"):
+    else:
+        loaded = load_scene(scene)
+    if text is None and (point is not None or (output or "").endswith(".toml")):
         raise OptionError("--at and an .toml file belong to --add; there is no text to add")
     title = f"{loaded.name}: {loaded.title}"
     if output is not None:
@@ -286,24 +286,28 @@ def notes(
         print_blocks([notes_table(loaded, title)])
 
 
-def _add_note(scene: "Scene", name: str, path: str, *, force: bool, **about: Any) -> "Scene":
+def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: Any) -> "Scene":
     from warpspace.analysis.note_tables import note_numbers
     from warpspace.machine.limits import MAX_SCENE_BYTES
-    from warpspace.scene.library import parse_scene, scene_path
+    from warpspace.scene.library import load_scene, parse_scene, scene_path
     from warpspace.scene.notes import Note
     from warpspace.scene.scene_writer import spell_note
-    from warpspace.scene.text_files import read_text
+    from warpspace.scene.text_files import lock_file, read_bytes, read_text
 
     file = scene_path(name)
-    if not path.endswith(".toml"):
-        expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
-        raise OptionError(f"{path}: {expected}")
-    note = Note(**about)
-    warn_outside_travel(scene.machine, note.at)
-    note = replace(note, numbers=note_numbers(scene, [note])[0])
-    text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_note(note)}"
-    added = parse_scene(text, scene.name, path, Path(path).parent)
-    write_text(path, text, force=force or file == Path(path))
+    with lock_file(file):
+        original, scene = read_bytes(file, MAX_SCENE_BYTES), load_scene(file)
+        at = {} if point is None else parse_point(point, scene.machine.axes)
+        if not path.endswith(".toml"):
+            expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
+            raise OptionError(f"{path}: {expected}")
+        note = Note(at=at, **about)
+        warn_outside_travel(scene.machine, note.at)
+        note = replace(note, numbers=note_numbers(scene, [note])[0])
+        text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_note(note)}"
+        added = parse_scene(text, scene.name, path, Path(path).parent)
+        same = file == Path(path)
+        write_text(path, text, force=force or same, original=original if same else None)
     echo(f"{path}: {note.kind} {note.id} added", err=True)
     return added
 

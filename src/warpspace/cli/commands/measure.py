@@ -254,7 +254,7 @@ def _import_robot(
     force: bool,
 ) -> None:
     from warpspace.bodies.own_meshes import frame_meshes
-    from warpspace.outputs.file_output import mesh_files, write_meshes
+    from warpspace.outputs.file_output import mesh_files, write_with_meshes
     from warpspace.scene.library import parse_scene
     from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
 
@@ -270,8 +270,7 @@ def _import_robot(
     names = {frame: file.name for frame, file in written.items()}
     text = imported_text(found.machine, robot.name, notes, names)
     scene = parse_scene(text, target.stem, output)
-    write_meshes(written, meshes, overwrite=force)
-    write_text(target, text, force=force)
+    write_with_meshes(target, text.encode(), written, meshes, overwrite=force)
     axes = len(scene.machine.axes)
     print_text(f"{output}: {scene.machine.chain}, {axes} {'axis' if axes == 1 else 'axes'}")
     if written:

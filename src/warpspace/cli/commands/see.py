@@ -2,6 +2,7 @@
 
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,15 +97,22 @@ def view(
     from warpspace.app.server.request_policy import Access
     from warpspace.app.server.viewer import run_viewer
     from warpspace.bodies.own_meshes import check_meshes
-    from warpspace.scene.library import load_scene, scene_names
+    from warpspace.scene.library import load_scene, scene_names, scene_path
 
+    path = scene_path(scene)
+    original = path.read_bytes() if path.is_file() else b""
     shown = load_scene(scene)
     check_meshes(shown.machine)
     bundled = {name: shown if name == scene else load_scene(name) for name in scene_names()}
     run_viewer(
         shown,
         {loaded.title: loaded for loaded in bundled.values()},
-        services=build_services(),
+        services=replace(
+            build_services(),
+            is_current=lambda opened: (
+                opened is not shown or (path.is_file() and path.read_bytes() == original)
+            ),
+        ),
         access=Access(allow_hosts, token, no_token=no_token),
         code=sys.stdout.isatty(),
         browser=not no_browser,
@@ -379,7 +387,7 @@ def report(
     beside = [load_scene(scene) for scene in concepts]
     asked = {name: _asked(name) for name in others}
     say_first_order(settings.loop, *loaded)
-    with progress("writing the review"):
+    with progress("writing the review", total=1.0) as bar:
         written = write_report(
             loaded,
             output,
@@ -394,6 +402,7 @@ def report(
             },
             files=[scene_path(scene) for scene in (*scenes, *concepts)],
             overwrite=force,
+            watch=bar.reach,
         )
     titles = " and ".join(scene.title for scene in loaded)
     echo(f"{output}: design review of {titles}, {size_text(output)}")

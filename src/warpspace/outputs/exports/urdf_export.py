@@ -1,6 +1,7 @@
 """A machine as URDF: its links, joints, limits and the meshes of its bodies."""
 
 import re
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,10 @@ from warpspace.bodies.placed import load_bodies
 from warpspace.kinematics.transforms import placed
 from warpspace.machine.axes import direction_index
 from warpspace.machine.definition import Axis, Machine
-from warpspace.outputs.file_output import mesh_files, write_atomically, write_meshes
+from warpspace.outputs.file_output import (
+    mesh_files,
+    write_with_meshes,
+)
 from warpspace.picture.model import ScenePicture
 from warpspace.scene.urdf import not_installed
 from warpspace.units import Array
@@ -31,10 +35,10 @@ def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = Tru
     read = [Path(source.path) for source in machine.bodies.values() if source.path]
     files = mesh_files(target, meshes, overwrite=overwrite, inputs=read)
     robot = build_robot(machine, {frame: file.name for frame, file in files.items()})
-    write_meshes(files, meshes, overwrite=overwrite)
-    with write_atomically(target, overwrite=overwrite) as temporary:
-        model = URDF(robot, build_scene_graph=False, filename_handler=lambda name: name)
-        model.write_xml_file(str(temporary))
+    model = URDF(robot, build_scene_graph=False, filename_handler=lambda name: name)
+    text = BytesIO()
+    model.write_xml_file(text)
+    write_with_meshes(target, text.getvalue(), files, meshes, overwrite=overwrite)
 
 
 def _meshes(picture: ScenePicture) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.uncertainty.propagation import u95_lines
 from warpspace.exceptions import NoRendererError, OptionError, RenderError, WarpspaceError
 from warpspace.machine.axes import parameter
-from warpspace.machine.limits import MOST_CONCEPTS
+from warpspace.machine.limits import MAX_CSV_BYTES, MOST_CONCEPTS
 from warpspace.outputs.drawing.settings import PRINTED_PX, FigureSettings
 from warpspace.outputs.figures.registry import figure_kinds
 from warpspace.outputs.file_output import check_target, write_atomically
@@ -60,6 +60,7 @@ from warpspace.picture.traces import trace_lines
 from warpspace.resources import __version__
 from warpspace.scene.model import Scene
 from warpspace.scene.scene_writer import scene_to_toml
+from warpspace.scene.text_files import read_bytes
 from warpspace.units import spell, spell_short, spell_signed
 
 HEIGHT_PX = 400
@@ -85,8 +86,10 @@ class ReportFigures:
         loop: str,
         grid: int,
         form: str,
+        watch: ProgressCallback = ignore_progress,
     ) -> None:
-        self._worker, self._form = worker, form
+        self._worker, self._form, self._watch = worker, form, watch
+        self._begun = self._done = 0
         self._loop, self._grid, self._factor = loop, grid, pictures[0].exaggeration
         self.missing: list[str] = []
         scenes = [picture.scene for picture in pictures]
@@ -133,8 +136,11 @@ class ReportFigures:
         chosen = replace(chosen, size=size, printed=True)
         begin = partial(self._worker.begin, name, scenes, chosen, self._form)
         begun = begin()
+        self._begun += 1
 
         def drawn() -> Block:
+            self._watch(self._done / self._begun)
+            self._done += 1
             for first_or_second in (lambda: begun, begin):
                 try:
                     return ReportFigure(name, caption, first_or_second()(), self._form)
@@ -194,13 +200,15 @@ def build_report(
     concepts: Sequence[Scene] = (),
     results: Mapping[str, Result] | None = None,
     files: Sequence[Path] = (),
+    watch: ProgressCallback = ignore_progress,
 ) -> Report:
+    """Build a report; `watch` is called with the share of its figures that are drawn."""
     if form not in ("svg", "pdf"):
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
     settings = settings or ReportSettings()
     pictures = share_pictures(scenes, settings)
     with FigureWorker() as worker:
-        painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form)
+        painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
         review = build_review(scenes, settings, pictures)
         beside = {"Concepts side by side": concept_blocks(review, concepts, painter)}
         found = {
@@ -512,7 +520,7 @@ def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
     texts = [scene_to_toml(one.scene).encode() for one in review.scenes]
     inputs = [
         *zip((one.titled(f"scene {one.scene.name}") for one in review.scenes), texts, strict=True),
-        *((f"file {path.name}", path.read_bytes()) for path in files),
+        *((f"file {path.name}", read_bytes(path, MAX_CSV_BYTES)) for path in files),
     ]
     rows += [(name, f"SHA-256 {hashlib.sha256(data).hexdigest()}") for name, data in inputs]
     yield Table((Column("what"), Column("value")), rows, "Program, settings and input.")

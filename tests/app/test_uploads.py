@@ -1,0 +1,72 @@
+"""Files of a page are parsed beside its session, one after the other."""
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from app.hostile import upload
+from app.wire import opened
+from warpspace.app.panels import part
+from warpspace.exceptions import OptionError
+from warpspace.parts.workpiece import PartMesh
+from warpspace.resources import scenes_dir
+from warpspace.scene.library import load_scene
+
+STL = (scenes_dir() / "parts" / "contour.stl").read_bytes()
+
+
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Event, list[str]]]:
+    """Have a mesh parsed once an event is set; give that, and the names of the files so far."""
+    go_on, begun, original = threading.Event(), list[str](), part.load_part
+
+    def load(name: str, unit: str | None, content: bytes) -> PartMesh:
+        begun.append(name)
+        assert go_on.wait(60.0)
+        if name == "bad.stl":
+            raise OptionError("bad.stl: expected triangles")
+        return original(name, unit, content)
+
+    monkeypatch.setattr(part, "load_part", load)
+    yield go_on, begun
+    go_on.set()
+
+
+def test_a_tab_goes_on_while_its_files_are_parsed_in_order(held) -> None:
+    go_on, begun = held
+    with opened(load_scene("dvf5000_first")) as (wire, session):
+        for name in ("bad.stl", "good.stl"):
+            event, value = upload(name, STL)
+            wire.say(event.replace("files:", "part:"), value)
+        assert wire.read_until(lambda: bool(begun))
+        wire.say("errors:set.EXX", "3")
+        assert wire.read_until(lambda: 'data-text="3"' in wire.pieces["error.EXX"])
+        assert (begun, session.state.part.mesh) == (["bad.stl"], None)
+        go_on.set()
+        assert wire.read_until(lambda: session.state.part.mesh is not None)
+        assert begun == ["bad.stl", "good.stl"]
+
+
+def test_the_error_of_a_file_stands_in_its_section(held) -> None:
+    go_on, _ = held
+    go_on.set()
+    with opened(load_scene("part_on_dvf5000")) as (wire, _):
+        wire.say("page:task", "measure")
+        wire.say("page:fold", "part")
+        event, value = upload("bad.stl", STL)
+        wire.say(event.replace("files:", "part:"), value)
+        assert wire.read_until(lambda: "bad.stl: expected triangles" in str(wire.pieces))
+
+
+def test_a_file_that_is_parsed_when_its_tab_closes_is_not_taken_in(held) -> None:
+    go_on, begun = held
+    with opened(load_scene("dvf5000_first")) as (wire, session):
+        event, value = upload("good.stl", STL)
+        wire.say(event.replace("files:", "part:"), value)
+        assert wire.read_until(lambda: bool(begun))
+        (job,) = session.context.jobs
+        session.stop()
+        assert job.is_set()
+        go_on.set()
+    assert session.state.part.mesh is None
