@@ -134,7 +134,7 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
 @pytest.mark.parametrize("is_current", [True, False])
 def test_a_scene_is_saved_with_a_warning_where_its_file_has_changed(is_current):
     services = Services(is_current=lambda _: is_current)
-    window = Alone(FilesWindow, STATE, services=services)
+    window = Alone(FilesDialog, STATE, services=services)
     window.do("save")
     assert len(window.saved) == 1
     assert ["has changed" in one[0] for one in window.said] == [True] * (not is_current)

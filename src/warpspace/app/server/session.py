@@ -34,6 +34,7 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick, pick_line, with_clicked
+from warpspace.app.panels.note_panels import StoryPanel
 from warpspace.app.panels.overlay import PointerPanel, Tabs
 from warpspace.app.panels.page_panels import build_parts
 from warpspace.app.panels.panel import PAUSE_S, Context, Panel, Window

@@ -14,7 +14,7 @@ import numpy as np
 from warpspace.analysis.blocks import Bars, Column, Histogram, Lines, Mark, Table, number_columns
 from warpspace.analysis.blocks import Block as AnyBlock
 from warpspace.analysis.commands.concepts import Concepts
-from warpspace.analysis.description import Result, ignore_progress
+from warpspace.analysis.description import ProgressCallback, Result, ignore_progress
 from warpspace.analysis.note_tables import notes_table
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.uncertainty.propagation import u95_lines
