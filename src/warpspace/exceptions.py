@@ -9,10 +9,24 @@ from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
 SHOWN_PROBLEMS = 40  # problems of a file that a message lists; it counts the others
+_LONG = re.compile(r"(\d[\d.,_]{40,})|(?<!\S)\S{200,}|(?m:(?<=^.{2000}).+)")
+
+
+def shorten(text: str) -> str:
+    """Shorten endless numbers, words and lines of a message; both ends of them stay."""
+
+    def cut(found: re.Match[str]) -> str:
+        shown = 10 if found[1] else 80
+        return f"{found[0][:shown]}…{found[0][-shown:]}"
+
+    return _LONG.sub(cut, text)
 
 
 class WarpspaceError(Exception):
     """Base of all errors with a message meant for the user."""
+
+    def __str__(self) -> str:
+        return shorten(super().__str__())
 
 
 class ChainError(WarpspaceError):

@@ -18,7 +18,7 @@ import click
 from warpspace.analysis.catalogue import TASKS, entries
 from warpspace.cli.guard import Commands
 from warpspace.cli.tables import echo, plain
-from warpspace.exceptions import WarpspaceError
+from warpspace.exceptions import WarpspaceError, shorten
 from warpspace.resources import __version__
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def main() -> None:
         except click.ClickException as error:
             page = io.StringIO()
             error.show(file=page)
-            click.echo(plain(page.getvalue()), err=True, nl=False)
+            click.echo(shorten(plain(page.getvalue())), err=True, nl=False)
             sys.exit(BAD_INPUT)
         except (click.exceptions.Abort, KeyboardInterrupt):
             _end(ending)
