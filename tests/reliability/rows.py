@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from reliability import doors, kills, messages, proxy, surroundings
+from reliability import comments, doors, kills, lines, messages, proxy, surroundings
 from reliability.outcome import Outcome
 from reliability.reading import read_many
 
@@ -44,6 +44,9 @@ class Row:
 ROWS = {
     "files": Row(100_000, "files", partial(read_many, "bytes", seed=SEED)),
     "scenes": Row(50_000, "scenes", partial(read_many, "hypothesis", seed=SEED)),
+    "programs": Row(20_000, "programs", partial(read_many, "programs", seed=SEED)),
+    "comments": Row(3_000, "titles", comments.run),
+    "lines": Row(10_000, "lines", lines.run),
     "messages": Row(100_000, "messages", messages.run),
     "kills": Row(1_000, "kills", kills.run),
     "surroundings": Row(160, "runs", surroundings.run),

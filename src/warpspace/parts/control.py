@@ -90,6 +90,10 @@ REFUSED = {"M96", "M97", "M98", "M99", "M198"} | {
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
 
 
+def _cut(word: str) -> str:
+    return word if len(word) < SHOWN else f"{word[: SHOWN - 1]}…"
+
+
 def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
     found = read_numbers(text, "G54X=position and H1=length", "G54X=10,H1=85.5")
     for name, value in found.items():
@@ -259,20 +263,20 @@ class Control:
         """Take in a word or comment; where one is refused only others that are count."""
         letter, number, other = ((group or "").upper() for group in found.groups())
         value, is_code = float(number or 0.0), letter in {"G", "M"}
-        word = f"{letter}{value:g}" if is_code else (letter + number + other)[:SHOWN]
+        word = f"{letter}{value:g}" if is_code else _cut(letter + number + other)
         self.tokens.append((word if is_code else letter, found[0]))
         most = MAX_LENGTH_MM if letter in _POSITIONS else MAX_WORD
-        if (len(number) > SHOWN or abs(value) > most) and not self.refused:
-            unit = " mm or degrees" * (letter in _POSITIONS)
-            expected = f"at most ±{most:.8g}{unit}, in up to {SHOWN} characters"
-            self.fail(f"{(letter + number)[:SHOWN]}; expected {expected}")
         if letter == "O" or word in REFUSED or (other and _CONTROL_FLOW.match(other)):
             self.refused.setdefault(self.line, word)
+        elif (len(number) > SHOWN or abs(value) > most) and not self.refused:
+            unit = " mm or degrees" * (letter in _POSITIONS)
+            expected = f"at most ±{most:.8g}{unit}, in up to {SHOWN} characters"
+            self.fail(f"{letter}{_cut(number)}; expected {expected}")
         elif is_code:
             self.codes.append(word)
             if (letter == "G" and word not in _UNDERSTOOD) or word in {"M128", "M129"}:
                 self.unknown.setdefault(word, self.line)
-        elif letter == "E" or (word[:2].isalpha() and len(word) > 1):
+        elif letter == "E" or (word[:2].isalpha() and 1 < len(word) < SHOWN):
             self.unknown.setdefault(word, self.line)
         elif other and not self.refused:  # behind one may be a language that is not read
             end = "the end of the comment" if word.startswith("(") else "a letter and a number"
