@@ -9,17 +9,13 @@ from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
 SHOWN_PROBLEMS = 40  # problems of a file that a message lists; it counts the others
-_LONG = re.compile(r"(\d[\d.,_]{40,})|(?<!\S)\S{200,}|(?m:(?<=^.{2000}).+)")
+_DIGITS = re.compile(r"(\d{10})[\d.,_]{20,}(\d{10})")
+_LONG = re.compile(r"(?<!\S)(\S{80})\S{40,}(\S{80})|^(.{2000}).+(.{80})$", re.MULTILINE)
 
 
 def shorten(text: str) -> str:
     """Shorten endless numbers, words and lines of a message; both ends of them stay."""
-
-    def cut(found: re.Match[str]) -> str:
-        shown = 10 if found[1] else 80
-        return f"{found[0][:shown]}…{found[0][-shown:]}"
-
-    return _LONG.sub(cut, text)
+    return _LONG.sub(r"\1\3…\2\4", _DIGITS.sub(r"\1…\2", text))
 
 
 class WarpspaceError(Exception):

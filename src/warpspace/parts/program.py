@@ -154,13 +154,13 @@ def count_samples(read: control.ReadProgram, chord_mm: float) -> Integers:
 
 def _checked(read: control.ReadProgram, count: Array) -> Integers:
     """Refuse more samples of moves than a line, or a program, may come to."""
-    if count.sum() > MAX_PATH_POINTS:
-        raise OptionError(f"{count.sum():,.0f} points; expected at most {MAX_PATH_POINTS:,}")
     of_line = np.bincount(read.line, count)
     line = int(of_line.argmax())
     if of_line[line] > MAX_LINE_POINTS:
         most = f"expected at most {MAX_LINE_POINTS:,} of a line: fewer turns, or shorter moves"
         raise OptionError(f"line {line}: its moves come to {of_line[line]:,.0f} points; {most}")
+    if count.sum() > MAX_PATH_POINTS:
+        raise OptionError(f"{count.sum():,.0f} points; expected at most {MAX_PATH_POINTS:,}")
     return count.astype(np.int64)
 
 
