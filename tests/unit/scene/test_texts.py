@@ -23,7 +23,7 @@ def test_no_title_or_author_has_a_line_break_or_control_character(written):
 
 def test_the_title_of_a_machine_is_one_line():
     text = starter_text("wFXYZt").replace('[machine]\ntitle = "', '[machine]\ntitle = "a\\n')
-    with pytest.raises(SceneError, match=r"machine\.title: expected one line"):
+    with pytest.raises(SceneError, match=r"machine\.title = .*: expected one line"):
         parse_scene(text, "s")
 
 
