@@ -22,7 +22,7 @@ from warpspace.kinematics.conversion import (
 from warpspace.kinematics.model import ComponentErrors, complete_coordinates
 from warpspace.machine.axes import parameter
 from warpspace.machine.limits import MAX_LENGTH_MM
-from warpspace.scene.files import parse_number
+from warpspace.scene.files import one_line, parse_number
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene, evaluate
 from warpspace.scene.save import Notation, covered_spans, over_ranges, scene_to_toml, write_errors
@@ -112,8 +112,8 @@ class ConvertResult(Result):
 
     def texts(self, _ending: str = "", /) -> Mapping[str, str]:
         wishes = "; ".join(self.wishes)
-        head = f"# Converted from {self.before.name} by warpspace convert: {wishes}\n"
-        return {"": head + self.text}
+        head = one_line(f"# Converted from {self.before.name} by warpspace convert: {wishes}")
+        return {"": f"{head}\n{self.text}"}
 
     def as_plain(self) -> dict[str, Any]:
         return {

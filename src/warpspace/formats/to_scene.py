@@ -17,7 +17,7 @@ from warpspace.machine.curves.table import Table, TwoArguments
 from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run
 from warpspace.machine.limits import MAX_POINTS, MAX_SCENE_BYTES, MAX_TEXT, MIN_SPAN
 from warpspace.scene.curves import CurveReader
-from warpspace.scene.files import radian_notes
+from warpspace.scene.files import one_line, radian_notes
 from warpspace.scene.library import load_scene, parse_scene
 from warpspace.scene.machines import machine_names
 from warpspace.scene.model import Scene, coverage_notes
@@ -65,7 +65,7 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     notes: list[str] = []
     if base is None:
         base = plain_scene(found)
-        base = replace(base, title=title[:MAX_TEXT])
+        base = replace(base, title=one_line(title)[:MAX_TEXT])
         notes.append("no machine named: X, Y and Z carry the tool, travels are those of the data")
     _check_keys(found, base, name)
     _check_travel(found, base, name)

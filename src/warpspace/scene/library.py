@@ -24,7 +24,7 @@ from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run, Tol
 from warpspace.resources import scenes_dir
 from warpspace.scene import machines, schema
 from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
-from warpspace.scene.files import parse_toml, read_bytes, read_text
+from warpspace.scene.files import check_file, one_line, parse_toml, read_bytes, read_text
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.save import Notation, matrix_digest, read_errors, turn_covariance
@@ -110,7 +110,7 @@ def parse_scene(
     source = source or name
     raw, problems = parse_toml(text, source), Problems()
     machine = _machine(raw, name, folder, problems)
-    title = problems.read(schema.TEXT, "title", raw.get("title", ""))
+    title = problems.read(schema.TITLE, "title", raw.get("title", ""))
     description = problems.read(schema.TEXT, "description", raw.get("description", ""))
     convention = problems.read(schema.CONVENTION, "convention", raw.get("convention", {}))
     points = problems.read(schema.POINTS, "points_mm", raw.get("points_mm", {}))
@@ -142,7 +142,7 @@ def parse_scene(
     )
     return Scene(
         name=name,
-        title=title or name,
+        title=title or one_line(name),
         model=model,
         workspace=workspace,
         errors=errors,

@@ -190,6 +190,8 @@ LENGTH = _number(*LIMIT)
 POINT = _numbers("[x, y, z]", *[limits.MAX_LENGTH_MM] * 3)
 TURN = _numbers("[x, y, z]", *[limits.FULL_TURN_DEG] * 3)
 TEXT = _text(limits.MAX_TEXT)
+_LINE = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]*", "one line without control characters"
+TITLE = _text(limits.MAX_TEXT, 0, *_LINE)
 _HALF_WIDTH = 0.0, limits.MAX_ERROR, limits.MIN_HALF_WIDTH
 GANTRY = Section(
     {
@@ -199,7 +201,7 @@ GANTRY = Section(
 )
 MACHINE = Section(
     {
-        "title": (TEXT, ""),
+        "title": (TITLE, ""),
         "description": (TEXT, ""),
         "source": (TEXT, ""),
         "chain": (_text(100), MISSING),
@@ -305,11 +307,11 @@ ACTS = "each", "all", "scale"  # what a contribution acts on
 DIVISORS = {"normal": 1.0, "rectangular": 3**0.5, "triangular": 6**0.5, "u-shaped": 2**0.5}
 _CONTRIBUTION = Section(
     {
-        "name": (_text(100, 1), MISSING),
+        "name": (_text(100, 1, *_LINE), MISSING),
         "type": (_choice(lambda: ("A", "B")), MISSING),
         "distribution": (_one_of(DIVISORS), MISSING),
         "value": (_number(1e-9, limits.MAX_ERROR), MISSING),
-        "unit": (_text(20, 1), MISSING),
+        "unit": (_text(20, 1, *_LINE), MISSING),
         "acts": (_one_of(ACTS), MISSING),
         "sensitivity": (_number(1e-9, limits.MAX_ERROR), MISSING),
         "freedom": (_number(1.0, 1e9), math.inf),
@@ -318,7 +320,7 @@ _CONTRIBUTION = Section(
 )
 INSTRUMENT = Section(
     {
-        "title": (TEXT, ""),
+        "title": (TITLE, ""),
         "source": (TEXT, ""),
         "contributions": (_list(_CONTRIBUTION, limits.MAX_TERMS, 1), MISSING),
     }
@@ -336,7 +338,7 @@ _NOTE: dict[str, tuple[Kind, Any]] = {
     "at": (_by_name(LENGTH), {}),
     "on": (_MARK, None),
     "text": (_text(limits.MAX_NOTE_TEXT, 1, *_PLAIN), MISSING),
-    "author": (_text(100, 0, *_PLAIN), ""),
+    "author": (_text(100, 0, *_LINE), ""),
     "date": (_date, MISSING),
     "status": (_one_of(STATUSES), "open"),
     "loop": (_one_of(Loop), Loop.TOOL.value),
@@ -364,7 +366,7 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
 
 _FEATURE = Section(
     {
-        "name": (_text(100, 1, *_PLAIN), ""),
+        "name": (_text(100, 1, *_LINE), ""),
         "is": (_text(100, 1), MISSING),
         "near": (POINT, None),
         "measure": (_text(100), ""),

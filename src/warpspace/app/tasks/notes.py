@@ -27,6 +27,7 @@ from warpspace.app.tasks.forms import setting
 from warpspace.app.tasks.parts import Context, Part, actions
 from warpspace.exceptions import WarpspaceError
 from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_REPLIES
+from warpspace.scene.files import one_line
 from warpspace.scene.notes import TOLERANCES, Mark, Note, Pair, Reply, story, with_note
 from warpspace.units import spell_short
 
@@ -154,7 +155,7 @@ def _opened(
 
 
 def _author(state: AppState) -> str:
-    return clean(state.page.author)[:MOST_AUTHOR]
+    return one_line(clean(state.page.author))[:MOST_AUTHOR]
 
 
 def _about(state: AppState, note: Note, do: str, value: str) -> AppState:
