@@ -24,7 +24,7 @@ from warpspace.machine.errors import Covariance, ErrorSet, Measurement, Run, Tol
 from warpspace.resources import scenes_dir
 from warpspace.scene import machines, schema
 from warpspace.scene.curves import GUIDES, CurveReader, read_csv_runs
-from warpspace.scene.files import check_file, one_line, parse_toml, read_bytes, read_text
+from warpspace.scene.files import one_line, parse_toml, read_bytes, read_text
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.save import Notation, matrix_digest, read_errors, turn_covariance
