@@ -9,10 +9,20 @@ from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
 SHOWN_PROBLEMS = 40  # problems of a file that a message lists; it counts the others
+_DIGITS = re.compile(r"(\d{10})[\d.,_]{20,}(\d{10})")
+_LONG = re.compile(r"(?<!\S)(\S{80})\S{40,}(\S{80})|^(.{2000}).+(.{80})$", re.MULTILINE)
+
+
+def shorten(text: str) -> str:
+    """Shorten endless numbers, words and lines of a message; both ends of them stay."""
+    return _LONG.sub(r"\1\3…\2\4", _DIGITS.sub(r"\1…\2", text))
 
 
 class WarpspaceError(Exception):
     """Base of all errors with a message meant for the user."""
+
+    def __str__(self) -> str:
+        return shorten(super().__str__())
 
 
 class ChainError(WarpspaceError):

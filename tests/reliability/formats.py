@@ -14,6 +14,7 @@ from warpspace.calibration.readings import bundled_data, find_data
 from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import ReadOptions, find_format, formats, open_upload, read_errors
 from warpspace.formats.to_scene import base_scene, into_scene
+from warpspace.parts.program import Program
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 
@@ -25,6 +26,8 @@ class Format:
     read: Callable[[bytes, Path], object]
     share: float = 1.0
     text: bool = True
+    words: tuple[bytes, ...] = ()  # of its own, what mutations put into it
+    longest_s: float = 1.0
 
 
 CSV_SCENE = b"""
@@ -183,6 +186,47 @@ def _read_test(content: bytes, folder: Path) -> object:
     return run_test(load_scene("dvf5000_first"), find_test("positioning")(), path)
 
 
+CODES = "0 1 2 3 17 18 19 20 21 28 43 43.4 49 53 54 59 80 81 82 83 90 91 93 94 98 99 41 68.2 999"
+PROGRAM_WORDS = tuple(
+    word.encode()
+    for word in (
+        *(f"G{code} " for code in CODES.split()),
+        *("X", "Y-", "Z", "B", "C", "I", "J", "K", "R", "P", "L", "Q", "H1 ", "F", "S1 ", "N", "O"),
+        *("M30\n", "M98 P1 ", "%\n", "/", "(", ")", ";", "#1=", "[1]", "X" + "9" * 400, "1e400"),
+        *("P9999999 ", "L9999999 ", "K30000 ", "P900 ", "Q.0001 ", ".000000000001 ", "99999 "),
+        *("\u2028G91 G0 Z-300", "\x0bG0 Z-300", "\x85", "\x1b[2J", "X1" * 4000, "X" * 9000),
+    )
+)
+
+
+def _programs() -> list[bytes]:
+    part = (
+        b"%\nO1 (a part)\nN10 G90 G21 G54 G0 X10 Y0 Z-100\nG43 H1 Z-110 S900 M3 ; fast\n"
+        b"G1 X20 F500\nG2 X30 Y10 J10\nG3 X20 R8\nG2 I5 P2\nG91 G1 X5\nG28 Z0\nM30\n%\n"
+    )
+    return [
+        part,
+        b"G0 X0 Y0 Z-100\nG81 X10 Y10 Z-120 R-102 L2\nG83 X20 Z-120 Q3\nG82 G98 X30 P20\nG80\n",
+        b"G0 X10 Y0 Z-200 B0 C0\nG43.4 H1 Z-190\nG1 B20 C40 F100\nX50 Y30 B-30 C90\nG49 X0\n",
+    ]
+
+
+def _run_program(content: bytes, folder: Path) -> object:
+    """Run a program and write the corrected one, as the command does."""
+    program = Program(file=str(_put(content, folder, "p.ngc")), offset=(("G54X", 5.0),))
+    outcome = program.run(load_scene("dvf5000_first"), lambda _: None)
+    outcome.as_plain()
+    lines = "".join(outcome.texts().values()).split("\n")
+    last = (n for n, line in enumerate(lines) if n and re.search(r"^%|M(0?2|30)(?![0-9])", line))
+    lines = lines[: next(last, None)]  # what stands behind the end of a program is no program
+    if bad := [line for line in lines if line and not line.isprintable()]:
+        raise AssertionError(f"a corrected program holds {bad[0]!r}")
+    code = "\n".join(re.sub(r"\([^()]*\)|;.*", "", line) for line in lines)
+    if bad := re.search(r"[0-9]{41}|(?i:[A-Z]\s*-?(inf|nan)\b)", code):
+        raise AssertionError(f"a corrected program holds {bad[0]!r}")
+    return outcome
+
+
 # a scene with a part names files that are not beside the copy
 SCENES = [
     text
@@ -208,3 +252,5 @@ FORMATS: list[Format] = [
     Format("readings", _readings, _read_data),
     Format("test", _tests, _read_test),
 ]
+PROGRAM = Format("program", _programs, _run_program, words=PROGRAM_WORDS, longest_s=12.0)
+EVERY = [*FORMATS, PROGRAM]

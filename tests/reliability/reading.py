@@ -11,6 +11,7 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -132,9 +133,9 @@ def keep(name: str, content: bytes) -> Path:
 
 class Reader:
     def __init__(self, folder: Path) -> None:
-        from reliability.formats import FORMATS
+        from reliability.formats import EVERY
 
-        self._folder, self._formats = folder, {each.name: each for each in FORMATS}
+        self._folder, self._formats = folder, {each.name: each for each in EVERY}
         self.by_format: Counter[str] = Counter()
         self.good: Counter[str] = Counter()
         self.slowest_s, self.faults, self._said = 0.0, [], time.monotonic()
@@ -156,7 +157,7 @@ class Reader:
             self._fault(name, content, f"{type(error).__name__}: {error}"[:300])
         spent = time.process_time() - began
         self.slowest_s = max(self.slowest_s, spent)
-        if spent > LONGEST_S:
+        if spent > LONGEST_S * self._formats[name].longest_s:
             self._fault(name, content, f"{spent:.1f} s of CPU")
         self.by_format[name] += 1
         if time.monotonic() - self._said > 1.0:
@@ -183,15 +184,16 @@ class Reader:
         self.faults.append(f"{name}: {what} ({keep(name, content)})")
 
 
-def _read_bytes(reader: Reader, count: int, seed: int) -> None:
-    from reliability.formats import FORMATS, WORDS
+def _read_bytes(reader: Reader, count: int, seed: int, only: str = "") -> None:
+    from reliability.formats import EVERY, FORMATS, WORDS
 
     chance = random.Random(seed)
-    seeds = {each.name: each.seeds() for each in FORMATS}
-    shares = [each.share for each in FORMATS]
+    formats = [each for each in EVERY if each.name == only] or FORMATS
+    seeds = {each.name: each.seeds() for each in formats}
+    shares = [each.share for each in formats]
     for _ in range(count):
-        (each,) = chance.choices(FORMATS, shares)
-        words = WORDS if each.text else []
+        (each,) = chance.choices(formats, shares)
+        words = [*WORDS, *each.words * 3] if each.text else []
         reader.read(each.name, mutate(seeds[each.name], words, chance))
 
 
@@ -222,5 +224,6 @@ if __name__ == "__main__":  # way, count, seed, and the folder for files and for
     reader = Reader(Path(sys.argv[4]))
     reader.say()
     run = {"bytes": _read_bytes, "hypothesis": _read_hypothesis}
+    run["programs"] = partial(_read_bytes, only="program")
     run[sys.argv[1]](reader, int(sys.argv[2]), int(sys.argv[3]))
     reader.say(ended=True)

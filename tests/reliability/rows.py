@@ -8,7 +8,17 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from reliability import doors, failing, kills, messages, proxy, surroundings, together
+from reliability import (
+    comments,
+    doors,
+    failing,
+    kills,
+    lines,
+    messages,
+    proxy,
+    surroundings,
+    together,
+)
 from reliability.outcome import Outcome
 from reliability.reading import read_many
 
@@ -44,6 +54,9 @@ class Row:
 ROWS = {
     "files": Row(100_000, "files", partial(read_many, "bytes", seed=SEED)),
     "scenes": Row(50_000, "scenes", partial(read_many, "hypothesis", seed=SEED)),
+    "programs": Row(20_000, "programs", partial(read_many, "programs", seed=SEED)),
+    "comments": Row(3_000, "titles", comments.run),
+    "lines": Row(10_000, "lines", lines.run),
     "messages": Row(100_000, "messages", messages.run),
     "kills": Row(1_000, "kills", kills.run),
     "updates": Row(400, "notes", partial(together.run, "updates")),

@@ -261,7 +261,7 @@ def stated_and_true(instrument, draw):
     """Give the instrument as its owner knows it, and the standard deviation or value of each."""
     stated, true = [], []
     for one in instrument.contributions:
-        known = np.sqrt(draw.chisquare(one.freedom) / one.freedom) if one.type == "A" else 1.0
+        known = np.sqrt(draw.chisquare(one.dof) / one.dof) if one.type == "A" else 1.0
         stated.append(replace(one, value=one.value * known))
         each = one.acts == "each"
         true.append(one.sensitivity * one.value * (1.0 if each else DRAWS[one.distribution](draw)))
@@ -340,7 +340,7 @@ def test_readings_that_share_errors_with_those_fitted_lie_inside_their_intervals
     clean = vectors(scene, poses, np.zeros((12, 3)), session)
     away_m = 1e-3 * (clean.nominal_mm - clean.nominal_mm.mean(axis=0))
     stated = replace(
-        own, contributions=tuple(replace(one, freedom=np.inf) for one in own.contributions)
+        own, contributions=tuple(replace(one, dof=np.inf) for one in own.contributions)
     )
     for seed in range(120):
         draw = np.random.default_rng(seed)

@@ -23,7 +23,7 @@ _STL_HEAD = 84
 _STL_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _MIXERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9  # odd numbers of 64 bits
 _GROUPS = re.compile(r"^[ \t]*(?:usemtl|mtllib|[ogs])\b[^\n]*", re.MULTILINE)
-_NEXT_SOLID = re.compile(rb"endsolid[^\n]*\n\s*solid[^\n]*", re.IGNORECASE)
+_NEXT_SOLID = re.compile(rb"(?mi)^[ \t]*+endsolid[^\n]*+\n\s*+solid[^\n]*+")
 _FACE = re.compile("^f([^\n]*)", re.MULTILINE)
 _PLY_BYTES = {
     **dict.fromkeys(("char", "uchar", "int8", "uint8"), 1),

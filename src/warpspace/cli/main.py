@@ -20,7 +20,7 @@ import click
 from warpspace.analysis.registry import TASKS, entries
 from warpspace.cli.file_arguments import Commands
 from warpspace.cli.tables import echo, plain
-from warpspace.exceptions import WarpspaceError
+from warpspace.exceptions import WarpspaceError, shorten
 from warpspace.resources import __version__
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def main() -> None:
         except click.ClickException as error:
             page = io.StringIO()
             error.show(file=page)
-            _exit(page.getvalue().removesuffix("\n"))
+            _exit(shorten(page.getvalue().removesuffix("\n")))
         except (click.exceptions.Abort, KeyboardInterrupt):
             _end(ending)
         except WarpspaceError as error:

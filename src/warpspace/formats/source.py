@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_ERROR, MAX_LENGTH_MM
-from warpspace.scene.text_files import CsvRows, parse_number
+from warpspace.scene.text_files import CsvRows, one_line, parse_number
 
 UM_PER: Mapping[str, float] = {
     "um": 1.0,
@@ -55,6 +55,19 @@ def spell(value: float, digits: int) -> str:
     return "0.0" if text in {"-0.0", "-0"} else text
 
 
+_DELIMITERS = str.maketrans(dict.fromkeys("();#%*\\", " "))  # and what joins lines
+MAX_COMMENT = 200  # characters; LinuxCNC reads lines of 255
+
+
+def spell_comment(opens: str, text: str, closes: str = "") -> str:
+    """Spell a comment of a file that a control reads: one line of printable ASCII.
+
+    Some controls read other letters byte by byte, and take some bytes for the end of a line.
+    """
+    clean = one_line(text).translate(_DELIMITERS).encode("ascii", "replace").decode()
+    return f"{opens}{clean[:MAX_COMMENT]}{closes}"
+
+
 MAX_BYTES = 64 * 1024 * 1024
 MAX_LINES = 2_000_000
 MAX_LINE = 16_384  # characters of one line
@@ -76,7 +89,7 @@ class Source:
     @property
     def head(self) -> str:
         """The first lines, by which a format is recognised."""
-        return "\n".join(self.lines[:HEAD_LINES])
+        return "\n".join(line.strip() for line in self.lines[:HEAD_LINES])
 
     @property
     def text(self) -> str:
@@ -177,7 +190,7 @@ def _joined(found: str, expected: str) -> str:
 
 def shown(text: str) -> str:
     """Spell what a file says in at most a line, without control characters."""
-    clean = "".join(letter if letter.isprintable() else " " for letter in text.strip())
+    clean = one_line(text.strip())
     return repr(clean if len(clean) <= SHOWN else clean[: SHOWN - 1] + "…")
 
 

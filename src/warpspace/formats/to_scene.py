@@ -22,7 +22,7 @@ from warpspace.scene.machine_library import machine_names
 from warpspace.scene.model import Scene, coverage_notes
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.schema import Problems
-from warpspace.scene.text_files import radian_notes
+from warpspace.scene.text_files import one_line, radian_notes
 
 LEEWAY = 1e-6  # mm or degrees by which a position may lie beyond the travel
 LARGE = {False: 1000.0, True: 5000.0}
@@ -65,7 +65,7 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     notes: list[str] = []
     if base is None:
         base = plain_scene(found)
-        base = replace(base, title=title[:MAX_TEXT])
+        base = replace(base, title=one_line(title)[:MAX_TEXT])
         notes.append("no machine named: X, Y and Z carry the tool, travels are those of the data")
     _check_keys(found, base, name)
     _check_travel(found, base, name)

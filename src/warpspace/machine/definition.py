@@ -46,6 +46,9 @@ def parse_chain(text: str) -> Chain:
         raise ChainError(f"chain {text!r} cannot be read; {expected}")
     workpiece, tool = (tuple(re.findall(r"[A-Z][0-9]*", matched[side])) for side in (1, 3))
     axes = workpiece + tool
+    if not 1 <= len(axes) <= MAX_AXES:
+        found = f"{len(axes)} axes" if axes else "no axis"
+        raise ChainError(f"chain {text!r} has {found}; expected one to eight")
     unknown = sorted({name for name in axes if not is_axis_name(name)})
     if unknown:
         raise ChainError(f"chain {text!r} has unknown axis {', '.join(unknown)}; {expected}")
@@ -55,9 +58,6 @@ def parse_chain(text: str) -> Chain:
             f"chain {text!r} has axis {', '.join(twice)} twice; expected each name once"
             f" (a digit tells them apart: {twice[0][0]}1, {twice[0][0]}2)"
         )
-    if not 1 <= len(axes) <= MAX_AXES:
-        found = f"{len(axes)} axes" if axes else "no axis"
-        raise ChainError(f"chain {text!r} has {found}; expected one to eight")
     return Chain(tuple(reversed(workpiece)), tool)
 
 

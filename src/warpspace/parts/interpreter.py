@@ -33,7 +33,17 @@ from warpspace.exceptions import SceneError
 from warpspace.formats.source import MAX_LINE, MAX_LINES
 from warpspace.kinematics.model import Model, complete_coordinates
 from warpspace.machine.axes import is_linear
-from warpspace.machine.limits import MAX_CYCLE, MAX_LENGTH_MM, MAX_PATH_POINTS, MAX_PROGRAM_BYTES
+from warpspace.machine.limits import (
+    MAX_CYCLE,
+    MAX_CYCLE_MOVES,
+    MAX_LENGTH_MM,
+    MAX_PATH_POINTS,
+    MAX_PROGRAM_BYTES,
+    MAX_TURNS,
+    MAX_TYPED_NUMBER,
+    MAX_WORD,
+    MIN_SPAN,
+)
 from warpspace.scene.model import Scene
 from warpspace.scene.text_files import check_file
 from warpspace.units import Array, Integers
@@ -46,15 +56,15 @@ PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the dire
 CYCLES = "G81", "G82", "G83"
 _IDLE = {"G2": "L", "G3": "L", **dict.fromkeys(CYCLES, "IJ")}  # letters that count nothing there
 MOST_SAID = 1000  # words that are listed as not understood
-SHOWN = 40  # characters of a word that a message shows
+SHOWN = MAX_TYPED_NUMBER  # characters of a word that a message shows
 WORD = re.compile(
-    r"([A-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?![.\d#\[=]|E\d)"  # a letter and its number
-    r"|\([^()]*\)|;.*"  # comments
-    r"|(\S[^\s(;]*)",  # anything else
-    re.IGNORECASE,
+    r"([A-Z])\s*+([+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++))(?![.\d#\[=]|E\d)"  # a letter, its number
+    r"|\([^()]*+\)|;.*+"  # comments
+    r"|(\S[^\s(;]*+)",  # anything else
+    re.IGNORECASE | re.ASCII,
 )
-_SKIP = re.compile(r"(N\s*\d+\s*)?(/[/\d]*\s*)(.*)", re.IGNORECASE)
-_TITLE = re.compile(r"%?\s*<?[O:]\s*\d+>?\s*(\([^()]*\)\s*)*", re.IGNORECASE)  # number of a program
+_SKIP = re.compile(r"(N\s*+\d++\s*+)?+(/[/\d]*+\s*+)(.*+)", re.IGNORECASE)
+_TITLE = re.compile(r"%?\s*+<?[O:]\s*+\d++>?\s*+(\([^()]*+\)\s*+)*+", re.IGNORECASE)  # of a program
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
 _MODAL: Mapping[str, tuple[str, object]] = {
@@ -78,6 +88,10 @@ REFUSED = {"M96", "M97", "M98", "M99", "M198"} | {
     f"G{number}" for number in (*_BENDING.split(), *range(110, 130))
 }
 """Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
+
+
+def _cut(word: str) -> str:
+    return word if len(word) < SHOWN else f"{word[: SHOWN - 1]}…"
 
 
 def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
@@ -249,23 +263,26 @@ class Interpreter:
         """Take in a word or comment; where one is refused only others that are count."""
         letter, number, other = ((group or "").upper() for group in found.groups())
         value, is_code = float(number or 0.0), letter in {"G", "M"}
-        word = f"{letter}{value:g}" if is_code else (letter + number + other)[:SHOWN]
+        word = f"{letter}{value:g}" if is_code else _cut(letter + number + other)
         self.tokens.append((word if is_code else letter, found[0]))
+        most = MAX_LENGTH_MM if letter in _POSITIONS else MAX_WORD
         if letter == "O" or word in REFUSED or (other and _CONTROL_FLOW.match(other)):
             self.refused.setdefault(self.line, word)
+        elif (len(number) > SHOWN or abs(value) > most) and not self.refused:
+            unit = " mm or degrees" * (letter in _POSITIONS)
+            expected = f"at most ±{most:.8g}{unit}, in up to {SHOWN} characters"
+            self.fail(f"{letter}{_cut(number)}; expected {expected}")
         elif is_code:
             self.codes.append(word)
             if (letter == "G" and word not in _UNDERSTOOD) or word in {"M128", "M129"}:
                 self.unknown.setdefault(word, self.line)
-        elif letter == "E" or (word[:2].isalpha() and len(word) > 1):
+        elif letter == "E" or (word[:2].isalpha() and 1 < len(word) < SHOWN):
             self.unknown.setdefault(word, self.line)
         elif other and not self.refused:  # behind one may be a language that is not read
             end = "the end of the comment" if word.startswith("(") else "a letter and a number"
             self.fail(f"{word!r}; expected {end}")
         elif letter in self.words and not self.refused:
             self.fail(f"{word}; expected {letter} once in a line")
-        elif abs(value) > MAX_LENGTH_MM and letter in _POSITIONS:
-            self.fail(f"{word}; expected at most ±{MAX_LENGTH_MM:g} mm or degrees")
         elif letter:
             self.words[letter] = value
 
@@ -380,7 +397,7 @@ class Interpreter:
         sense = 1.0 if self.motion == "G3" else -1.0
         if "R" in words:  # of the longer arc where it is negative
             radius, half = self.value("R"), (end - start) / 2.0
-            if not half or abs(half) - abs(radius) > max(SLACK_MM, SLACK * abs(half)):
+            if abs(half) < MIN_SPAN or abs(half) - abs(radius) > max(SLACK_MM, SLACK * abs(half)):
                 chord = f"a chord of {2.0 * abs(half):.4f} mm, above 0"
                 self.fail(f"R{words['R']:g}; expected a radius for an arc of {chord}")
             height = sqrt(max(0.0, radius * radius - abs(half) ** 2))
@@ -390,10 +407,13 @@ class Interpreter:
         else:
             self.fail(f"{self.motion} without I, J, K or R")
         radius, other = abs(start - centre), abs(end - centre)
-        if not radius or abs(radius - other) > max(SLACK_MM, SLACK * radius):
+        if radius < MIN_SPAN or abs(radius - other) > max(SLACK_MM, SLACK * radius):
             self.fail(f"{self.motion}: radii {radius:.4f} and {other:.4f} mm; expected one radius")
+        turns = words.get("P", 1.0)
+        if turns > MAX_TURNS:
+            self.fail(f"P{turns:g}; expected at most {MAX_TURNS:,} turns of an arc")
         turn = sense * phase((end - centre) / (start - centre))
-        more = max(ceil(words.get("P", 1.0)), 1) - (turn > FULL_TURN_RAD)  # P: turns begun
+        more = max(ceil(turns), 1) - (turn > FULL_TURN_RAD)  # P: turns begun
         self.record(ARC, sense * (turn + more * tau), centre)
 
     def drill(self) -> None:
@@ -402,7 +422,8 @@ class Interpreter:
         self.cycle |= {x: self.value(x) for x in {deep, "R", "Q", "P"} & self.words.keys()}
         if deep not in self.index or not {deep, "R"} <= self.cycle.keys():
             self.fail(f"{self.motion} without {deep} and R")
-        index, repeats = self.index[deep], self.words.get("K", self.words.get("L", 1.0))
+        index, letter = self.index[deep], "K" if "K" in self.words else "L"
+        repeats = int(self.words.get(letter, 1.0))
         initial = self.cycle.setdefault("initial", self.at[index])
         clear = initial + self.cycle["R"]
         bottom = clear + self.cycle[deep]
@@ -412,10 +433,15 @@ class Interpreter:
         if bottom > clear or peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
             wanted = f"a depth below R, in up to {MAX_CYCLE:,} pecks of Q above 0"
             self.fail(f"{self.motion} from {clear:g} to {bottom:g} mm; expected {wanted}")
-        for _ in range(min(int(repeats), MAX_PATH_POINTS)):
+        pecks = ceil((clear - bottom) / peck)
+        moves = repeats * 3 * (pecks + 1)
+        if moves > MAX_CYCLE_MOVES:
+            wanted = f"at most {MAX_CYCLE_MOVES:,} moves in a line"
+            self.fail(f"{letter}{repeats} comes to {moves:,} moves; expected {wanted}")
+        for _ in range(repeats):
             self.line_to({index: max(clear, self.at[index])}, RAPID)
             self.line_to({**self.target(), index: self.at[index]}, RAPID)
-            for number in range(ceil((clear - bottom) / peck)):
+            for number in range(pecks):
                 self.line_to({index: clear}, RAPID)
                 self.line_to({index: clear - number * peck}, RAPID)
                 self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)

@@ -10,11 +10,11 @@ written from the line on that names it: where it stands before, nobody knows. Th
 G28 and G53, another work offset or mode, and for Z behind another tool or length.
 """
 
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from hashlib import sha256
+from io import StringIO
 from typing import Any
 
 import numpy as np
@@ -35,13 +35,14 @@ from warpspace.analysis.uncertainty.propagation import (
 from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.formats.source import MAX_LINES, spell
+from warpspace.formats.source import MAX_LINES, spell, spell_comment
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
-from warpspace.machine.limits import FULL_TURN_DEG, MAX_PATH_POINTS
+from warpspace.machine.limits import FULL_TURN_DEG, MAX_LINE_POINTS, MAX_PATH_POINTS
 from warpspace.parts import interpreter
 from warpspace.scene.model import Scene, check_magnitude, second_order
 from warpspace.scene.scene_writer import scene_to_toml
+from warpspace.scene.text_files import one_line
 from warpspace.units import Array, Integers
 
 TURN_DEG, STEP_MM = 2.0, 10.0  # most that axes, and arcs, move between samples
@@ -158,6 +159,16 @@ def count_samples(read: interpreter.ReadProgram, chord_mm: float) -> Integers:
         tip = along_moves(read, np.repeat(bent, 3), share.reshape(-1))[1].reshape(-1, 3, 3)
         away = np.linalg.norm(np.diff(tip, 2, axis=1)[:, 0] / 2.0, axis=1)
         count[bent] = np.ceil(count[bent] * np.maximum(1.0, np.sqrt(away / chord_mm)))
+    return _checked(read, count)
+
+
+def _checked(read: control.ReadProgram, count: Array) -> Integers:
+    """Refuse more samples of moves than a line, or a program, may come to."""
+    of_line = np.bincount(read.line, count)
+    line = int(of_line.argmax())
+    if of_line[line] > MAX_LINE_POINTS:
+        most = f"expected at most {MAX_LINE_POINTS:,} of a line: fewer turns, or shorter moves"
+        raise OptionError(f"line {line}: its moves come to {of_line[line]:,.0f} points; {most}")
     if count.sum() > MAX_PATH_POINTS:
         raise OptionError(f"{count.sum():,.0f} points; expected at most {MAX_PATH_POINTS:,}")
     return count.astype(np.int64)
@@ -232,7 +243,7 @@ class Program(interpreter.Setup, Analysis):
 
     def lines(self) -> Iterable[str]:
         file = self.file or ""
-        return interpreter.program_lines(file) if self.text is None else self.text.splitlines()
+        return interpreter.program_lines(file) if self.text is None else StringIO(self.text, None)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "ProgramResult":
         if self.file is None:
@@ -297,7 +308,7 @@ class ProgramResult(Result):
     asked: Program
 
     def texts(self, _ending: str = "", /) -> Mapping[str, str]:
-        return {"": "\n".join([*correct_program(self.asked, self.read), ""])}
+        return {"": "\n".join([*map(one_line, correct_program(self.asked, self.read)), ""])}
 
     def as_plain(self) -> dict[str, Any]:
         refused = [{"line": line, "word": word} for line, word in self.read.refused.items()]
@@ -351,7 +362,7 @@ def corrected_places(read: interpreter.ReadProgram, within_mm: float) -> tuple[I
     most = np.zeros(len(count))
     np.maximum.at(most, row[1:-1], np.where(row[2:] == row[:-2], bend, 0.0))
     # an arc leaves its chord by an eighth of its second difference, a kink by a quarter at most
-    count = np.ceil(count * np.maximum(np.sqrt(most / 8.0), most / 4.0)).astype(np.int64)
+    count = _checked(read, np.ceil(count * np.maximum(np.sqrt(most / 8.0), most / 4.0)))
     row, share, places = _corrected(read, np.maximum(count, 1))
     return row[share > 0.0], places[share > 0.0]
 
@@ -417,7 +428,7 @@ def correct_program(asked: Program, read: interpreter.ReadProgram) -> Iterator[s
 def _header(scene: Scene, asked: Program) -> Iterator[str]:
     digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
     said = f"for {scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
-    yield f"(corrected {re.sub('[()]', ' ', said).encode('ascii', 'replace').decode()})"
+    yield spell_comment("(", f"corrected {said}", ")")
     setup = "".join(f", {name}={value:g}" for name, value in asked.offset)
     yield f"(TCP {asked.tcp}, length {asked.length_mm:g} mm{setup})"
     yield f"(within {asked.within_um:g} um between points; geometry only)"
@@ -447,4 +458,5 @@ def _blocks(
         yield state.skip + " ".join([*number, *words, *(() if left else last), *rest])
         number, rest = [], []
         if state.motion == "G82" and not is_rapid:
-            yield f"{state.skip}G4 P{state.cycle.get('P', 0.0):g}"
+            dwell = spell(state.cycle.get("P", 0.0), DECIMALS).removesuffix(".0")
+            yield f"{state.skip}G4 P{dwell}"

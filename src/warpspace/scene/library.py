@@ -35,7 +35,7 @@ from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
 from warpspace.scene.scene_writer import Notation, matrix_digest, read_errors, turn_covariance
 from warpspace.scene.schema import Problems
-from warpspace.scene.text_files import parse_toml, read_bytes, read_text
+from warpspace.scene.text_files import one_line, parse_toml, read_bytes, read_text
 
 
 def scene_names() -> tuple[str, ...]:
@@ -117,7 +117,7 @@ def parse_scene(
     source = source or name
     raw, problems = parse_toml(text, source), Problems()
     machine = _machine(raw, name, folder, problems)
-    title = problems.read(schema.TEXT, "title", raw.get("title", ""))
+    title = problems.read(schema.TITLE, "title", raw.get("title", ""))
     description = problems.read(schema.TEXT, "description", raw.get("description", ""))
     convention = problems.read(schema.CONVENTION, "convention", raw.get("convention", {}))
     points = problems.read(schema.POINTS, "points_mm", raw.get("points_mm", {}))
@@ -149,7 +149,7 @@ def parse_scene(
     )
     return Scene(
         name=name,
-        title=title or name,
+        title=title or one_line(name),
         model=model,
         workspace=workspace,
         errors=errors,

@@ -13,7 +13,7 @@ from warpspace.machine.limits import MAX_SCENE_BYTES
 from warpspace.resources import assets_dir
 from warpspace.scene import schema
 from warpspace.scene.schema import Problems
-from warpspace.scene.text_files import parse_toml, read_text
+from warpspace.scene.text_files import one_line, parse_toml, read_text
 
 
 def read_bodies(
@@ -135,7 +135,7 @@ def machine_of(
         **tables,
         gantries=_gantries(section["gantry"], chain.axes, f"{prefix}gantry", problems),
         name=name,
-        title=section["title"] or name,
+        title=section["title"] or one_line(name),
         body_dir=body_dir,
         source=section["source"],
     )

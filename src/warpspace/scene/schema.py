@@ -196,6 +196,8 @@ LENGTH = _number(*LIMIT)
 POINT = _numbers("[x, y, z]", *[limits.MAX_LENGTH_MM] * 3)
 TURN = _numbers("[x, y, z]", *[limits.FULL_TURN_DEG] * 3)
 TEXT = _text(limits.MAX_TEXT)
+_LINE = r"[^\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]*", "one line without control characters"
+TITLE = _text(limits.MAX_TEXT, 0, *_LINE)
 _HALF_WIDTH = 0.0, limits.MAX_ERROR, limits.MIN_HALF_WIDTH
 GANTRY = TableSchema(
     {
@@ -205,7 +207,7 @@ GANTRY = TableSchema(
 )
 MACHINE = TableSchema(
     {
-        "title": (TEXT, ""),
+        "title": (TITLE, ""),
         "description": (TEXT, ""),
         "source": (TEXT, ""),
         "chain": (_text(100), MISSING),
@@ -311,11 +313,11 @@ ACTS = "each", "all", "scale"  # what a contribution acts on
 DIVISORS = {"normal": 1.0, "rectangular": 3**0.5, "triangular": 6**0.5, "u-shaped": 2**0.5}
 _CONTRIBUTION = TableSchema(
     {
-        "name": (_text(100, 1), MISSING),
+        "name": (_text(100, 1, *_LINE), MISSING),
         "type": (_choice(lambda: ("A", "B")), MISSING),
         "distribution": (_one_of(DIVISORS), MISSING),
         "value": (_number(1e-9, limits.MAX_ERROR), MISSING),
-        "unit": (_text(20, 1), MISSING),
+        "unit": (_text(20, 1, *_LINE), MISSING),
         "acts": (_one_of(ACTS), MISSING),
         "sensitivity": (_number(1e-9, limits.MAX_ERROR), MISSING),
         "dof": (_number(1.0, 1e9), math.inf),
@@ -324,7 +326,7 @@ _CONTRIBUTION = TableSchema(
 )
 INSTRUMENT = TableSchema(
     {
-        "title": (TEXT, ""),
+        "title": (TITLE, ""),
         "source": (TEXT, ""),
         "contributions": (_list(_CONTRIBUTION, limits.MAX_TERMS, 1), MISSING),
     }
@@ -342,7 +344,7 @@ _NOTE: dict[str, tuple[Kind, Any]] = {
     "at": (_by_name(LENGTH), {}),
     "on": (_MARK, None),
     "text": (_text(limits.MAX_NOTE_TEXT, 1, *_PLAIN), MISSING),
-    "author": (_text(100, 0, *_PLAIN), ""),
+    "author": (_text(100, 0, *_LINE), ""),
     "date": (_date, MISSING),
     "status": (_one_of(STATUSES), "open"),
     "loop": (_one_of(Loop), Loop.TOOL.value),
@@ -370,7 +372,7 @@ def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
 
 _FEATURE = TableSchema(
     {
-        "name": (_text(100, 1, *_PLAIN), ""),
+        "name": (_text(100, 1, *_LINE), ""),
         "is": (_text(100, 1), MISSING),
         "near": (POINT, None),
         "measure": (_text(100), ""),

@@ -168,6 +168,11 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
+def one_line(text: str) -> str:
+    """Replace what would end a line or steer whatever shows it: all that is not printable."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
 def spell_value(value: object) -> str:
     """Spell a value as TOML does, in at most a line."""
     return _cut(_spell(value, _DEPTH))
@@ -233,15 +238,14 @@ def _spell(value: object, depth: int) -> str:
 # semicolons or tabs part the columns the comma.
 
 MARKS = (";", "\t", ",")  # what may part columns, the most telling first
-FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""What a text must not begin with, or a spreadsheet would take it for a formula."""
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\uff1d", "\uff0b", "\uff0d", "\uff20")
+"""What a text must not begin with, or a spreadsheet would take it for a formula; wide, too."""
 _MOST_PROBLEMS = 10_000
 _TURN_RAD = 1.001 * math.tau
 _WHOLE_DEG = 0.02
 _MAX_LINES_OF_ROW = 20  # lines that one row may take, where its texts hold line breaks
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?", re.ASCII)
 _SEP = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
-_HEADING = re.compile(r"(.*?\S)\s*(?:\[\s*([^\[\]()]+?)\s*\]|\(\s*([^\[\]()]+?)\s*\))")
 _UNIT = str.maketrans({"µ": "u", "μ": "u", "°": "deg"})
 Row = tuple[int, list[str]]
 """Number of the line that a row ends on, and its cells without the blanks around them."""
@@ -266,8 +270,12 @@ def parse_whole(text: str) -> int:
 
 def plain_heading(text: str) -> str:
     """Spell a heading with its unit behind an underscore: ``angle (°)`` is ``angle_deg``."""
-    found = _HEADING.fullmatch(text.strip())
-    return f"{found[1]}_{(found[2] or found[3]).translate(_UNIT)}" if found else text.strip()
+    bare = text.strip()
+    for left, right in ("[]", "()"):
+        name, _, unit = bare[:-1].rpartition(left)
+        if bare.endswith(right) and name.strip() and unit.strip() and not {*"[]()"} & {*unit}:
+            return f"{name.rstrip()}_{unit.strip().translate(_UNIT)}"
+    return bare
 
 
 def radian_notes(columns: Mapping[str, Sequence[float]]) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.starter import error_lines
-from warpspace.scene.text_files import read_text
+from warpspace.scene.text_files import one_line, read_text
 from warpspace.units import Array
 
 MOVING = ("revolute", "continuous", "prismatic")
@@ -279,7 +279,7 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
         travel=travel,
         direction={axis: sign for axis, sign in direction.items() if sign < 0},
         name="machine",
-        title=str(robot.name or ""),
+        title=one_line(str(robot.name or "")),
     )
     notes += [f"joint {name!r} is axis {axis}" for name, axis in names.items() if name != axis]
     start = _pose_mm(paths[0][:shared])
@@ -423,7 +423,7 @@ def imported_text(
 ) -> str:
     scene = Scene(
         name="imported",
-        title=machine.title or source,
+        title=machine.title or one_line(source),
         model=Model(machine),
         workspace=Workspace(_ranges(machine)),
         tolerances=ToleranceSet(TOLERANCES),

@@ -104,7 +104,7 @@ EA0Z = -30
 [uncertainty.covariance]
 keys = ["EC0Y", "EA0Z"]
 matrix = [[4.0], [3.0, 9.0]]
-freedom = 12
+dof = 12
 """
 )
 
@@ -224,7 +224,9 @@ def test_what_is_not_stated_is_unknown_and_not_zero():
 def test_a_covariance_comes_back_from_its_text_and_from_a_file(tmp_path):
     scene = parse_scene(TWO, "s")
     assert parse_scene(scene_to_toml(scene), "s").covariance == scene.covariance
-    reach = replace(scene.covariance, reach={"X": (-10.0, 20.0)}, freedom=math.inf)
+    reach = replace(
+        scene.covariance, measured_range={"X": (-10.0, 20.0)}, dof=math.inf
+    )
     other = replace(scene, covariance=reach)
     assert parse_scene(scene_to_toml(other), "s").covariance == reach
     np.savez(tmp_path / "c.npz", keys=np.array(["EC0Y", "EA0Z"]), matrix=[[4.0, 3.0], [3.0, 9.0]])
@@ -257,8 +259,8 @@ def test_a_matrix_that_is_no_covariance_is_refused(matrix, said):
     [
         ('["EC0Y", "EA0Z"]', '["EC0Y", "EA0Q"]', "EA0Q"),
         ('["EC0Y", "EA0Z"]', '["EC0Y", "EC0Y"]', "expected each error once"),
-        ("freedom = 12", "freedom = 0", "freedom"),
-        ("freedom = 12", "reach = { Q = [0, 1] }", "reach.Q"),
+        ("dof = 12", "freedom = 0", "dof"),
+        ("dof = 12", "measured_range = { Q = [0, 1] }", "measured_range.Q"),
         ("[uncertainty.", "[uncertainty]\nEXX = 0\n[uncertainty.", "above 0"),
         ("[uncertainty.", "[uncertainty]\nEC0Y = 1\n[uncertainty.", "expected each error once"),
     ],

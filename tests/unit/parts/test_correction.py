@@ -163,3 +163,16 @@ def test_holes_and_turns_are_written_out(dvf: Scene):
     wanted, path = (trace(dvf, some) for some in (lines, found))
     length = [np.linalg.norm(one.step_mm, axis=1).sum() for one in (wanted, path)]
     assert length[1] == pytest.approx(length[0], abs=0.1)
+
+
+def test_a_corrected_program_has_no_control_characters_and_no_exponents(dvf: Scene):
+    text = (
+        "(a\x0bG0 Z-300)\nG0 X0 Y0 Z-100 ; b\u2028c\x85d\x1b[2J\n"
+        "G82 X5 Z-120 R-110 P2500000.5\nG80\nG93 G1 X9 F99999999\nM30\nrest\x0c\n"
+    )
+    outcome = Program(file="p", text=text).run(dvf, lambda _: None)
+    lines = outcome.texts()[""].removesuffix("\n").split("\n")
+    assert all(line.isprintable() for line in lines)
+    assert any(line.endswith("; b c d [2J") for line in lines)
+    assert "G4 P2500000.5" in lines
+    assert not re.search(r"[0-9]e[+-]?[0-9]|inf|nan", "".join(lines))

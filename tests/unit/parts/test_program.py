@@ -275,3 +275,39 @@ def test_offsets_are_bounded_as_lengths_are(dvf: Scene, offset: str):
     asked = next(one for one in Program.options() if one.name == "offset")
     with pytest.raises(ValueError, match="expected at most ±10000"):
         asked.grammar.read(offset, dvf)
+
+
+@pytest.mark.parametrize(
+    ("block", "message"),
+    [
+        *(
+            (f"{word}{'9' * 400}", f"line 2: {word[-1]}9{{37,39}}…; expected at most ±")
+            for word in ("G", "M", "N", "G1 X", "G1 X1 F", "G2 I5 P", "S", "G81 X1 Z-5 R1 L", "H")
+        ),
+        ("G1 X0." + "1" * 400, "line 2: X0.1+…; .* in up to 40 characters"),
+        ("G1 X1 AB" + "9" * 400, "line 2: 'AB9+…'; expected a letter and a number"),
+        ("G1 X1 F100000000", "line 2: F100000000; expected at most ±99999999"),
+        ("G1 X1\u2028G0 Z-300", r"line 2: '\\u2028G0'; expected a letter and a number"),
+        ("G2 I5 P1001", "line 2: P1001; expected at most 1,000 turns"),
+        ("G2 I5 P99999999", "line 2: P1e[+]08; expected at most 1,000 turns"),
+        ("G81 X1 Z-5 R1 L9999999", "line 2: L9999999 comes to 59,999,994 moves; .* 40,000"),
+        ("G83 X1 Z-500 R1 Q.1 K3", "line 2: K3 comes to 45,099 moves; .* 40,000"),
+        ("G2 X0 Y.004 I.00000001", "line 2: G2: radii 0.0000 and 0.0040 mm"),
+    ],
+)
+def test_numbers_of_a_program_are_bounded_before_anything_moves(dvf: Scene, block, message):
+    with pytest.raises(SceneError, match=message):
+        read_program(dvf, ["G0 X0 Y0 Z0", block])
+
+
+def test_a_line_comes_to_a_limited_number_of_samples(dvf: Scene):
+    read = read_program(dvf, ["G0 X0 Y0 Z0", "G2 I99999 P900"])
+    with pytest.raises(OptionError, match=r"line 2: its moves come to .* expected at most 100,000"):
+        trace_program(read)
+
+
+def test_a_program_has_the_lines_of_its_file_wherever_it_comes_from(tmp_path: Path):
+    text = "G0 X1 ; a\x0bb\x85c\u2028d\r\nG1 X2\rG1 X3\n"
+    path = tmp_path / "p.ngc"
+    path.write_text(text, "utf-8", newline="")
+    assert [*Program(text=text).lines()] == [*Program(file=str(path)).lines()]

@@ -14,7 +14,7 @@ from warpspace.calibration.readings import parse_table as parse_calibration
 from warpspace.exceptions import SceneError
 from warpspace.formats.registry import ReadOptions, open_upload, read_errors
 from warpspace.scene.curve_reader import read_csv_column
-from warpspace.scene.text_files import CsvRows, guard_cell, parse_number, unguard_cell
+from warpspace.scene.text_files import CsvRows, guard_cell, parse_number, spell_row, unguard_cell
 
 Points = list[tuple[float, float]]
 Reader = Callable[[str, Path], Points]
@@ -118,3 +118,10 @@ def test_guarded_texts_are_no_formulas_and_stay_apart(text):
     guarded = guard_cell(text)
     assert not guarded.startswith(("=", "+", "-", "@", "\t", "\r"))
     assert unguard_cell(guarded) == text
+
+
+@pytest.mark.parametrize("sign", "=+-@\uff1d\uff0b\uff0d\uff20")
+def test_a_text_that_a_spreadsheet_may_run_is_guarded(sign):
+    text = f"{sign}HYPERLINK(1)"
+    assert spell_row([text]) == f"'{text}\n"
+    assert unguard_cell(guard_cell(text)) == text

@@ -31,7 +31,7 @@ from warpspace.scene.scene_writer import (
     scene_to_toml,
     write_errors,
 )
-from warpspace.scene.text_files import parse_number
+from warpspace.scene.text_files import one_line, parse_number
 
 FORMS = {
     "component_errors": "after_motion or before_motion, or by axis: rotary:before_motion,X:…",
@@ -118,8 +118,8 @@ class ConvertResult(Result):
 
     def texts(self, _ending: str = "", /) -> Mapping[str, str]:
         wishes = "; ".join(self.wishes)
-        head = f"# Converted from {self.before.name} by warpspace convert: {wishes}\n"
-        return {"": head + self.text}
+        head = one_line(f"# Converted from {self.before.name} by warpspace convert: {wishes}")
+        return {"": f"{head}\n{self.text}"}
 
     def as_plain(self) -> dict[str, Any]:
         return {

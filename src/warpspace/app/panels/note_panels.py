@@ -28,6 +28,7 @@ from warpspace.app.state.tree import leaves, set_leaf, stored
 from warpspace.exceptions import WarpspaceError
 from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_REPLIES
 from warpspace.scene.notes import TOLERANCES, Note, NoteAnchor, Pair, Reply, story, with_note
+from warpspace.scene.text_files import one_line
 from warpspace.units import spell_short
 
 LIST, NEW = "list", "new"
@@ -154,7 +155,7 @@ def _opened(
 
 
 def _author(state: AppState) -> str:
-    return clean(state.page.author)[:MOST_AUTHOR]
+    return one_line(clean(state.page.author))[:MOST_AUTHOR]
 
 
 def _about(state: AppState, note: Note, do: str, value: str) -> AppState:

@@ -20,7 +20,7 @@ from warpspace.cli.shared_options import (
 from warpspace.cli.tables import echo, print_table, print_text, progress
 from warpspace.exceptions import OptionError
 from warpspace.machine.limits import MAX_LENGTH_MM
-from warpspace.scene.text_files import parse_number
+from warpspace.scene.text_files import one_line, parse_number
 
 
 def _test_names() -> tuple[str, ...]:
@@ -213,7 +213,7 @@ def import_(
         reading = read_errors(open_files(files), options, format_name or "")
         what = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
         if base is not None and (title or not scenes):
-            base = replace(base, title=title or files[0].stem, name=Path(output).stem)
+            base = replace(base, title=one_line(title or files[0].stem), name=Path(output).stem)
         made = into_scene(reading, base, title or files[0].stem, what)
     kind = reading.format
     how = "recognised" if reading.recognised else "as told"

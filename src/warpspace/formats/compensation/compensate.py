@@ -145,6 +145,8 @@ class Compensate(Analysis):
             raise OptionError(
                 "{sweep} writes no table: expected it without {output}, {points}, {orientation}"
             )
+        if stem and not stem.isprintable():  # files name each other
+            raise OptionError(f"{stem!r}: expected a name of printable characters")
         return self if stem is None else replace(self, stem=stem)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "Compensation | Sweep":

@@ -221,10 +221,6 @@ class RequiredCorrections:
     stem: str = "compensation"  # name of the files to write, without an ending
 
     @property
-    def title(self) -> str:
-        return self.scene.title.replace("\n", " ")
-
-    @property
     def axes(self) -> tuple[str, ...]:
         """Axes that span the volume, in the order of the machine."""
         spanning = self.scene.workspace.volume_axes

@@ -176,9 +176,13 @@ def recognise(head: str, name: str) -> bool:
         header = source_of_text(head, name).rows(1).header
     except SceneError:
         return False
-    found = [matched for part in header if (matched := _HEADING.fullmatch(part))]
+    found = [matched for part in header if (matched := _heading(part))]
     has_unit = any(one[3] or one[4] or one[5] for one in found)
     return has_unit and any(one[2] in PARAMETERS for one in found)
+
+
+def _heading(part: str) -> re.Match[str] | None:
+    return _HEADING.fullmatch(" ".join(part.split()))  # runs of blanks would be tried by all parts
 
 
 def _columns(at: SourceLine, parts: Sequence[str]) -> tuple[_CsvColumn, ...]:
@@ -193,7 +197,7 @@ def _column(at: SourceLine, part: str) -> _CsvColumn:
     lower = part.strip().lower()
     if lower in (RUN, DIRECTION):
         return _CsvColumn(lower, lower)
-    matched = _HEADING.fullmatch(part.strip())
+    matched = _heading(part)
     if matched is None:
         expected = "headings such as X [mm], EXX [um], u(EXX) [um], run, direction"
         at.refuse(f"column {shown(part)}", expected)

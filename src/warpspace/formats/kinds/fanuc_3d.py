@@ -13,7 +13,7 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import CORRECTION, Files, Format, ReadOptions, described, has
-from warpspace.formats.source import MM_PER, Source
+from warpspace.formats.source import MM_PER, Source, spell_comment
 from warpspace.formats.terms import Grid3, Tables
 
 MARK = "# three-dimensional error compensation"
@@ -110,7 +110,7 @@ def write(wanted: RequiredCorrections) -> Files:
     counts = np.rint(values / (unit * magnification)).astype(int)
     counts = np.clip(counts, -MOST_COUNT - 1, MOST_COUNT)
     lines = [
-        f"{MARK}, {wanted.title}",
+        spell_comment(f"{MARK}, ", wanted.scene.title),
         f"# detection unit = {unit:.9f}".rstrip("0") + " mm",
         f"# magnification = {magnification}",
         f"# {'values are ' + wanted.sign + 's' if wanted.sign else 'values are added'}",

@@ -18,7 +18,7 @@ import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, shown, spell
+from warpspace.formats.source import Source, shown, spell, spell_comment
 from warpspace.formats.terms import HELD, Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
 
@@ -30,10 +30,10 @@ INCH_MM = 25.4
 POSITIONS, OFFSETS = "type-0", "type-1"
 NEAR = 0.1
 """Share of its range by which an actual position may be off, for a file that names no type."""
-_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_NUMBER = r"([-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?)"
 _ROW = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s+{_NUMBER}(.*)", re.ASCII)
-_KINEMATICS = re.compile(r"(?mi)^\s*KINEMATICS\s*=.*\bcoordinates\s*=\s*([A-Z]+)")
-_INCH = re.compile(r"(?mi)^\s*LINEAR_UNITS\s*=\s*(?:in|inch|imperial)\b")
+_KINEMATICS = re.compile(r"(?mi)^[ \t]*+KINEMATICS\s*=.*\bcoordinates\s*=\s*([A-Z]+)")
+_INCH = re.compile(r"(?mi)^[ \t]*+LINEAR_UNITS\s*=\s*(?:in|inch|imperial)\b")
 _SECTION = re.compile(r"\[JOINT_([0-9])\]")
 
 
@@ -52,7 +52,7 @@ def _assignment(
     known: dict[str, tuple[str, str, float]] = {}
     tables: list[Source] = []
     for source in sources:
-        if not re.search(r"^\s*COMP_FILE", source.text, re.MULTILINE):
+        if not re.search(r"^[ \t]*+COMP_FILE", source.text, re.MULTILINE):
             tables.append(source)
             continue
         named = _KINEMATICS.search(source.text)
@@ -146,7 +146,8 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def _write_comp(wanted: RequiredCorrections) -> Files:
     files: dict[str, str] = {}
-    lines = [f"# {wanted.title}", f"# joints counted as {JOINTS}: trivkins without coordinates="]
+    lines = [spell_comment("# ", wanted.scene.title)]
+    lines += [f"# joints counted as {JOINTS}: trivkins without coordinates="]
     for axis in wanted.axes:
         if axis not in wanted.corrector.moved or axis not in JOINTS:
             continue
@@ -204,7 +205,7 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
 def _write_matrix(wanted: RequiredCorrections) -> Files:
     allowed = [(row, column) for row in AXES for column in AXES]
     found = wanted.linear_fit(allowed)
-    lines = [f"# {wanted.title}"]
+    lines = [spell_comment("# ", wanted.scene.title)]
     for row, column in allowed:
         value = float(row == column) + found.get((row, column), 0.0)
         text = spell(float(wanted.round(value)), MATRIX_DIGITS)

@@ -25,7 +25,7 @@ INFERRED = (
 ONE_WAY = "the flags say one direction: runs with even numbers hold nothing, left out"
 KNOWN = "Filetype, Target-count, Targets and Flags"
 _SECTION = re.compile(r"([A-Z][A-Z -]*)::")
-_KEY = re.compile(r"([A-Za-z][A-Za-z0-9 _-]*?)\s*:\s*(.*)")
+_KEY = re.compile(r"[A-Za-z][A-Za-z0-9 _-]*")
 Lines = list[tuple[SourceLine, str]]
 
 
@@ -51,8 +51,9 @@ def _sections(source: Source) -> dict[str, Lines]:
 
 
 def _pair(text: str) -> tuple[str, str] | None:
-    matched = _KEY.fullmatch(text)
-    return (matched[1].strip().lower(), matched[2].strip()) if matched else None
+    key, colon, value = text.partition(":")
+    matched = _KEY.fullmatch(key.rstrip()) if colon else None
+    return (matched[0].lower(), value.strip()) if matched else None
 
 
 def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:

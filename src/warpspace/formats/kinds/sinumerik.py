@@ -23,7 +23,7 @@ from warpspace.exceptions import OptionError
 from warpspace.field.grid import shares
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, SourceLine, shown, spell
+from warpspace.formats.source import Source, SourceLine, shown, spell, spell_comment
 from warpspace.formats.terms import HELD, MODULO, AxisTable, Product, Tables, Term
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
@@ -148,7 +148,8 @@ def _range_lines(prefix: str, index: str, places: Array) -> list[str]:
 
 
 def _archive(name: str, wanted: RequiredCorrections, sign: str, body: Sequence[str]) -> Files:
-    head = [f"%_N_{name}_INI", "CHANDATA(1)", f"; written by warpspace for {wanted.title}"]
+    remark = spell_comment("; ", f"written by warpspace for {wanted.scene.title}")
+    head = [f"%_N_{name}_INI", "CHANDATA(1)", remark]
     head.append(f"; {'sign: ' + wanted.sign if wanted.sign else sign}")
     return {"": "\n".join([*head, *body, "M17"]) + "\n"}
 

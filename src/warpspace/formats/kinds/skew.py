@@ -21,7 +21,7 @@ import numpy as np
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.measured import BOTH, ErrorSeries, Imported, MeasuredRun, merge
 from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, SourceLine, spell
+from warpspace.formats.source import Source, SourceLine, spell, spell_comment
 from warpspace.formats.terms import Affine, Tables, errors_of
 from warpspace.units import URAD_PER_RAD
 
@@ -89,10 +89,10 @@ def fitted_factors(wanted: RequiredCorrections) -> dict[str, float]:
 LEAST_OFFSET_MM = 1.0  # between probe and nozzle: below it a twist cannot be told from the height
 PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
-_PROFILE = re.compile(r"\[skew_correction\s+([^\]]+?)\s*\]")
+_PROFILE = re.compile(r"\[skew_correction\s++([^\]]+)\]")
 _LOAD = re.compile(r"\bSKEW_PROFILE\s+LOAD=\"?([^\s\"]+)")
 _SAVED = re.compile(r"(xy|xz|yz)_skew\s*[=:]\s*(\S+)")
-_SECTION = re.compile(r"\[([a-z_]+)(?:\s+[^\]]*)?\]")
+_SECTION = re.compile(r"\[([a-z_]+)(?:\s[^\]]*)?\]")
 Section = dict[str, tuple[SourceLine, str]]
 
 
@@ -116,7 +116,7 @@ def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str
         at, bare = source.at(number), text.removeprefix("#*#").strip()
         commented = bare.startswith((";", "#"))
         if matched := _PROFILE.fullmatch(bare):
-            name = matched[1]
+            name = matched[1].rstrip()
         elif not commented and (matched := _LOAD.search(bare)):
             loaded = options.variant or matched[1]
         elif "SET_SKEW" in bare and not commented:
@@ -215,7 +215,8 @@ def _write_klipper(wanted: RequiredCorrections) -> Files:
         f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
         for plane, factor in fitted_factors(wanted).items()
     ]
-    head = f"# {wanted.title}\n# [skew_correction] must stand in printer.cfg\n"
+    head = spell_comment("# ", wanted.scene.title)
+    head += "\n# [skew_correction] must stand in printer.cfg\n"
     return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
 
 
@@ -289,10 +290,12 @@ def _write_marlin(wanted: RequiredCorrections) -> Files:
         f"{letter}{spell(float(wanted.round(factors[plane])), DIGITS)}"
         for letter, plane in zip("IJK", PLANES, strict=True)
     ]
-    return {
-        "": f"; {wanted.title}\n; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled\n"
-        f"M852 {' '.join(words)}\n"
-    }
+    lines = [
+        spell_comment("; ", wanted.scene.title),
+        "; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled",
+        f"M852 {' '.join(words)}\n",
+    ]
+    return {"": "\n".join(lines)}
 
 
 KLIPPER = Format(

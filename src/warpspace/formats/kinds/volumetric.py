@@ -23,7 +23,7 @@ from warpspace.exceptions import OptionError
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
 from warpspace.formats.registry import Files, Format, ReadOptions, described
-from warpspace.formats.source import Source, SourceLine, spell
+from warpspace.formats.source import Source, SourceLine, spell, spell_comment
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.units import UM_PER_MM, URAD_PER_RAD
@@ -283,7 +283,11 @@ def _write_isg(wanted: RequiredCorrections) -> Files:
         key = measured.zero_key(wanted.scene)
         blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
-    return {"": f"// {wanted.title}\n// mm, rad, degrees\n" + "\n#\n".join(texts) + "\n"}
+    return {
+        "": f"{spell_comment('// ', wanted.scene.title)}\n// mm, rad, degrees\n"
+        + "\n#\n".join(texts)
+        + "\n"
+    }
 
 
 ISO = "iso-text"
@@ -368,7 +372,7 @@ def _iso_row(
 def _write_iso(wanted: RequiredCorrections) -> Files:
     held = measured.in_one_direction(measured.sampled(wanted), wanted)
     check_axes(held, ISO)
-    lines = [f"// {wanted.title}", "// mm, rad, degrees; variant Vendor"]
+    lines = [spell_comment("// ", wanted.scene.title), "// mm, rad, degrees; variant Vendor"]
     for plane in held.planes:
         axes = " and ".join(plane.axes)
         lines.append(f"// {plane.key} over {axes}: has no place here, left out")
