@@ -40,7 +40,7 @@ EA0Z = 20
 [uncertainty.covariance]
 keys = ["EXX", "EA0Z"]
 matrix = [[4.0], [3.0, 9.0]]
-reach = { X = [-100, 100], Z = [-50, 100] }
+measured_range = { X = [-100, 100], Z = [-50, 100] }
 """
 LIVE = LiveModel()
 

@@ -162,7 +162,7 @@ def count_samples(read: interpreter.ReadProgram, chord_mm: float) -> Integers:
     return _checked(read, count)
 
 
-def _checked(read: control.ReadProgram, count: Array) -> Integers:
+def _checked(read: interpreter.ReadProgram, count: Array) -> Integers:
     """Refuse more samples of moves than a line, or a program, may come to."""
     of_line = np.bincount(read.line, count)
     line = int(of_line.argmax())

@@ -224,9 +224,7 @@ def test_what_is_not_stated_is_unknown_and_not_zero():
 def test_a_covariance_comes_back_from_its_text_and_from_a_file(tmp_path):
     scene = parse_scene(TWO, "s")
     assert parse_scene(scene_to_toml(scene), "s").covariance == scene.covariance
-    reach = replace(
-        scene.covariance, measured_range={"X": (-10.0, 20.0)}, dof=math.inf
-    )
+    reach = replace(scene.covariance, measured_range={"X": (-10.0, 20.0)}, dof=math.inf)
     other = replace(scene, covariance=reach)
     assert parse_scene(scene_to_toml(other), "s").covariance == reach
     np.savez(tmp_path / "c.npz", keys=np.array(["EC0Y", "EA0Z"]), matrix=[[4.0, 3.0], [3.0, 9.0]])

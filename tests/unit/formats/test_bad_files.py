@@ -197,7 +197,7 @@ EC0Y = 20
 [uncertainty.covariance]
 keys = ["EXX", "EC0Y"]
 matrix = [[4.0], [3.0, 9.0]]
-reach = { X = [-10, 20], Y = 7 }
+measured_range = { X = [-10, 20], Y = 7 }
 """,
         "base",
     )
