@@ -45,11 +45,11 @@ def page_one(*scenes, **changes):
     return plain(" | ".join(words)).replace("\\xa0", " "), [one.within for one in review.scenes]
 
 
-def test_verdict_on_a_limit_that_is_missed():
+def test_verdict_on_a_limit_that_is_exceeded():
     scene = load_scene("dvf5000_first")
     text, (within,) = page_one(scene, grid=11, spec_um=40.0, author="me", questions=("Why?",))
-    assert "The limit of 40 µm is missed: 90.6 % of the working volume of 550 × 450 × 400" in text
-    assert "the worst is 51.7 µm at X 275 Y −225 Z −480." in text
+    assert "Limit of 40 µm: fail. 90.6 % of the working volume of 550 × 450 × 400" in text
+    assert "the largest error is 51.7 µm at X 275 Y −225 Z −480." in text
     assert within == share_below(evaluate(scene, grid=11), 40.0)
     for number in ("30.9 µm", "41.3 µm", "'within the limit', '90.6 %'"):
         assert number in text
@@ -61,18 +61,18 @@ def test_verdict_on_a_limit_that_is_missed():
 def test_the_limit_is_that_of_the_scene_unless_another_is_given():
     scene = replace(load_scene("dvf5000_first"), limit_um=60.0)
     text, shares = page_one(scene, spec_um=None)
-    assert "The limit of 60 µm is kept in the working volume" in text
-    assert "Nothing to adjust: the limit is kept." in text
+    assert "Limit of 60 µm: pass. The largest error in the working volume" in text
+    assert "Nothing to adjust: all errors are within the limit." in text
     assert shares == [1.0]
-    assert "The limit of 50 µm is missed" in page_one(scene)[0]
+    assert "Limit of 50 µm: fail." in page_one(scene)[0]
 
 
 @pytest.mark.parametrize(
     ("limit", "said"),
     [
-        (4.0, "The limit of 4 µm is missed"),
-        (4.9, "It cannot be told whether the limit of 4.9 µm is kept"),
-        (6.0, "The limit of 6 µm is kept"),
+        (4.0, "Limit of 4 µm: fail."),
+        (4.9, "Limit of 4.9 µm: undecided."),
+        (6.0, "Limit of 6 µm: pass."),
     ],
 )
 def test_a_verdict_is_given_where_it_holds_with_95_percent(limit, said):
@@ -98,7 +98,7 @@ def test_verdict_without_a_limit_and_on_a_perfect_machine():
 
 def test_verdicts_on_two_stand_in_one_table():
     text, shares = page_one(load_scene("dvf5000_first"), load_scene("dvf5000_second"), grid=11)
-    assert "A misses the limit of 50 µm; B keeps the limit of 50 µm." in text
+    assert "A, limit of 50 µm: fail; B, limit of 50 µm: pass." in text
     assert "mean error of B is 14.6 µm: 53 % less than A's 30.9 µm" in text
     assert "B: Nothing to adjust" in text
     assert shares[0] < shares[1] == 1.0

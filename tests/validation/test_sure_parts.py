@@ -69,10 +69,10 @@ def test_the_deviation_of_a_part_is_as_unsure_as_its_errors():
 
 
 @pytest.mark.parametrize(
-    ("limit", "verdict"), [(25.0, "kept"), (22.0, "cannot be told"), (17.0, "missed")]
+    ("limit", "verdict"), [(25.0, "pass"), (22.0, "undecided"), (17.0, "fail")]
 )
 @pytest.mark.parametrize(("text", "law"), [(STATED, norm), (FEW, t(5))])
-def test_a_tolerance_is_kept_or_missed_with_95_percent(text, law, limit, verdict):
+def test_a_verdict_is_pass_or_fail_with_95_percent(text, law, limit, verdict):
     found, told = cube(text, tolerances=("f.toml", TOLERANCE.format(limit=limit)))
     (one,) = [
         measure
@@ -88,7 +88,7 @@ def test_a_tolerance_is_kept_or_missed_with_95_percent(text, law, limit, verdict
     if text is FEW and limit == 25.0:
         assert expected > 0.95
     if text is FEW and limit == 17.0:  # 5 degrees of freedom: 5.1 %
-        verdict = "cannot be told"
+        verdict = "undecided"
     assert one["verdict"] == verdict
     assert any(verdict in " ".join(row) for row in list(found.blocks())[-1].cells())
 
@@ -98,14 +98,14 @@ def test_where_an_error_acts_of_which_nothing_is_stated_no_verdict_is_given():
     found, told = cube(text, tolerances=("f.toml", TOLERANCE.format(limit=500)))
     assert told["deviation"]["u95_mean_um"] is None
     said = [one for feature in told["features"] for one in feature["measures"].values()]
-    assert {one.get("verdict", "cannot be told") for one in said} == {"cannot be told"}
+    assert {one.get("verdict", "undecided") for one in said} == {"undecided"}
     assert any("EA0Z" in words for words in found.blocks() if isinstance(words, str))
 
 
 def test_without_a_statement_verdicts_are_those_of_the_model():
     _, told = cube(MACHINE, tolerances=("f.toml", TOLERANCE.format(limit=20.5)))
     said = [one for feature in told["features"] for one in feature["measures"].values()]
-    assert {one["verdict"] for one in said if "verdict" in one} == {"kept"}
+    assert {one["verdict"] for one in said if "verdict" in one} == {"pass"}
     assert not [key for one in (*said, told["deviation"]) for key in one if "u95" in key]
 
 

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.commands.contributions import budget_words
 from warpspace.analysis.uncertainty.propagation import (
-    SURE,
     ErrorUncertainty,
     FieldUncertainty,
     plus_minus,
 )
+from warpspace.analysis.uncertainty.verdict import Verdict
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
@@ -374,8 +374,8 @@ def _numbers(
 ) -> dict[str, Any]:
     """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad.
 
-    Where a scene states how sure its errors are, a tolerance is kept, or missed, with at least 95 %
-    probability (ISO 14253-1); else that cannot be told.
+    Where a scene states the uncertainty of its errors, a verdict holds with a probability of at least
+    95 % (ISO 14253-1).
     """
     large, small = ("deg", "urad") if kind.is_angle else ("mm", "um")
     per = np.rad2deg(RAD_PER_URAD) if kind.is_angle else MM_PER_UM
@@ -392,10 +392,9 @@ def _numbers(
         if doubt is not None:
             share = None if u95 is None else float(doubt.probability_within(placed, u95, *band))
             found["probability"] = share
-        verdict = "kept" if (share or 0.0) >= SURE else "missed"
-        if share is None or 1.0 - SURE < share < SURE:
-            verdict = "cannot be told"
-        verdict = "in doubt" if abs(beyond) < left_out else verdict
+        verdict = Verdict.from_probability(share)
+        if abs(beyond) < left_out:
+            verdict = Verdict.UNDECIDED
         found |= {f"tolerance_{small}": band, f"doubt_{small}": left_out, "verdict": verdict}
     return found | {"budget": dict(sorted(budget.items(), key=lambda pair: -abs(pair[1])))}
 

@@ -27,7 +27,6 @@ from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
 NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
-SURE = 0.95  # least probability of what is said of a limit (ISO 14253-1)
 COVERED = 0.9545  # of a normal distribution, within two standard deviations
 NEAR = 0.01  # part of the points that tells how their 95th percentile moves
 MOST_DRAWN = 2_000_000  # |E| of machines that are held at a time

@@ -230,7 +230,7 @@ def faded_words(picture: LivePicture) -> tuple[str, ...]:
         return ()
     percent = 100.0 * float(picture.grid.weights[picture.faded].sum())
     of = "|E|" if picture.component == "norm" else f"|E_{picture.component}|"
-    what = f"{of} ≤ U95" if picture.limit_um is None else "cannot be told with 95 %"
+    what = f"{of} ≤ U95" if picture.limit_um is None else "pass or fail undecided (95 %)"
     return (f"grey: {what}, {number(percent, 0)} % of the volume",)
 
 

@@ -149,7 +149,7 @@ class TolerancesPanel(AnalysisPanel):
         told = fill(
             '<p class="ws-told"><span class="{kind}">{share} %</span> of the machines stay within'
             " {limit} µm {where}</p>",
-            kind="ws-kept" if kept.low >= wanted.percent / 100.0 else "ws-missed",
+            kind="ws-pass" if kept.low >= wanted.percent / 100.0 else "ws-fail",
             share=percent(kept.probability), limit=f"{wanted.limit_um:g}", where=WHERE[wanted.over],
         )  # fmt: skip
         numbers = (

@@ -188,7 +188,7 @@ class CompensatePanel(AnalysisPanel):
         drawn = [result_html([table])]
         if _is_rounding(found):
             drawn.append(tag("p", "What is left is the resolution of the numbers in the file, not"
-                             " an error of the machine.", class_="ws-kept"))  # fmt: skip
+                             " an error of the machine.", class_="ws-pass"))  # fmt: skip
         if self._picture is not None and self._picture[0] is found:
             drawn.append(tag("img", src=self._picture[1], alt="Maps of |E| before and after",
                              width="100%"))  # fmt: skip

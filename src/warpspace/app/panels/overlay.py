@@ -72,7 +72,7 @@ class LegendPanel(Panel):
                            label="Limit", id="ws-limit")  # fmt: skip
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
             kept = menu(words, body, key="limit", hint="Change the limit",
-                        kind="ws-kept" if is_kept else "ws-missed")  # fmt: skip
+                        kind="ws-pass" if is_kept else "ws-fail")  # fmt: skip
             kept = Markup(" · ") + kept if place_words(picture) else kept
         return {"head.kept": kept, "legend": legend_html(picture)}
 

@@ -370,7 +370,7 @@ def report(
 ) -> None:
     """Write the design review of one SCENE or two.
 
-    The first page is the verdict: whether the limit is kept, four numbers, a map and what to do.
+    The first page has the verdict on the limit, four numbers, a map and the advice.
     Appendices hold the evidence: maps, contributions at the worst point, errors and tolerances,
     gains, Monte Carlo, conventions and provenance. With --concepts also a table and pictures of
     machines side by side, as `warpspace concepts` has them; --with adds an appendix of any other

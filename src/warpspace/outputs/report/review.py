@@ -15,7 +15,8 @@ from warpspace.analysis.description import Analysis, Result, ignore_progress
 from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, SamplingPlan
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.statistics import Statistics, share_below
-from warpspace.analysis.uncertainty.propagation import SURE, FieldUncertainty, volume_uncertainty
+from warpspace.analysis.uncertainty.propagation import FieldUncertainty, volume_uncertainty
+from warpspace.analysis.uncertainty.verdict import Verdict
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -101,14 +102,15 @@ class Reviewed:
         return f"{spell(found.max_um)}{_behind(found, 'max_um')}{UM} at {self.worst_axes}"
 
     @property
-    def is_told(self) -> bool:
-        """Whether the limit is kept, or missed, with enough probability (ISO 14253-1)."""
-        found, limit = self.statistics, self.scene.limit_um
-        u95 = found.expanded_uncertainty.get("u95_max_um")
+    def verdict(self) -> Verdict:
+        """Verdict on the limit; of the model alone where the uncertainty is unknown."""
+        statistics, limit = self.statistics, self.scene.limit_um
+        u95 = statistics.expanded_uncertainty.get("u95_max_um")
         if self.uncertainty is None or u95 is None or limit is None:
-            return True
-        kept = float(self.uncertainty.errors.probability_within(found.max_um, u95, -np.inf, limit))
-        return not 1.0 - SURE < kept < SURE
+            return Verdict.PASS if self.keeps else Verdict.FAIL
+        errors, largest = self.uncertainty.errors, statistics.max_um
+        probability = float(errors.probability_within(largest, u95, -np.inf, limit))
+        return Verdict.from_probability(probability)
 
     @property
     def worst_axes(self) -> str:
@@ -225,7 +227,7 @@ def verdict(review: Review) -> str:
     if len(review.scenes) == 1:
         return _verdict_on(review.scenes[0])
     kept = [
-        f"{one.letter} {'keeps' if one.keeps else 'misses'} the limit of {spell_short(limit)}{UM}"
+        f"{one.letter}, limit of {spell_short(limit)}{UM}: {one.verdict}"
         for one in review.scenes
         if (limit := one.scene.limit_um) is not None
     ]
@@ -245,14 +247,11 @@ def _verdict_on(one: Reviewed) -> str:
         return f"The error is zero in {volume}."
     if limit is None:
         return f"No limit is set. The largest error in {volume} is {worst}."
-    if not one.is_told:
-        words = f"It cannot be told whether the limit of {spell_short(limit)}{UM} is kept"
-        return f"{words} in {volume}: the largest error is {worst}."
-    words = f"The limit of {spell_short(limit)}{UM} is"
-    if one.keeps:
-        return f"{words} kept in {volume}: the largest error is {worst}."
-    share = volume_share(one.within)
-    return f"{words} missed: {share} of {volume} is within it, and the worst is {worst}."
+    verdict = f"Limit of {spell_short(limit)}{UM}: {one.verdict}."
+    if one.verdict is Verdict.FAIL:
+        volume = f"{volume_share(one.within)} of {volume} is within the limit; the"
+        return f"{verdict} {volume} largest error is {worst}."
+    return f"{verdict} The largest error in {volume} is {worst}."
 
 
 def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings) -> str:
@@ -260,7 +259,7 @@ def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings
     if before == 0.0:
         return "Nothing to adjust: the error is zero."
     if limit is not None and before <= limit:
-        return "Nothing to adjust: the limit is kept."
+        return "Nothing to adjust: all errors are within the limit."
     if not isinstance(found, AdjustResult) or not found.adjustments:
         return "Nothing to adjust: no squareness or alignment acts in this loop."
     after = evaluate_picture(found.changes()[0].scene, grid=settings.grid, loop=settings.loop)
@@ -273,7 +272,7 @@ def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings
     if limit is not None:
         share = volume_share(_within(after))
         then = (
-            ", and the limit is kept"
+            ", within the limit"
             if largest <= limit
             else f", and {share} of the volume is within the limit"
         )

@@ -400,26 +400,26 @@ def parameters(reviewed: Reviewed) -> Block:
     for key in scene.parameter_keys:
         row, tolerance = parameter(key), scene.tolerances.get(key)
         value = scene.errors.amplitude(key)
-        limits, kept = "", ""
+        limits, is_within = "", ""
         if tolerance is not None:
             centre = "" if tolerance.centre == 0.0 else f"{given(tolerance.centre)} "
             limits = f"{centre}± {spell_short(tolerance.half_width)}"
-            kept = "yes" if abs(value - tolerance.centre) <= tolerance.half_width else "no"
-        if value == 0.0 and kept != "no":
+            is_within = "yes" if abs(value - tolerance.centre) <= tolerance.half_width else "no"
+        if value == 0.0 and is_within != "no":
             zero += 1
             continue
         function = scene.errors.functions.get(key) if value else None
         curve = "" if function is None else function.describe(row.unit, spell, spell_short)
         number = given(value) if value else "0"
-        rows.append((key, row.symbol, row.name, number, limits, row.unit, kept, curve))
-        marks.append("worse" if kept == "no" else "key" if value else "")
+        rows.append((key, row.symbol, row.name, number, limits, row.unit, is_within, curve))
+        marks.append("worse" if is_within == "no" else "key" if value else "")
     title = reviewed.titled(f"Errors and tolerances of {scene.title}.")
     if not rows:
         return Text(f"{title} All errors are zero; none is out of its tolerance.", "note")
     title += f" Errors that are zero left out: {zero}." if zero else ""
     columns = (
         *(Column("key"), Column("symbol"), Column("error"), Column("value", "s")),
-        *(Column("tolerance", "s"), Column("unit"), Column("kept"), Column("along the axis")),
+        *(Column("tolerance", "s"), Column("unit"), Column("within"), Column("along the axis")),
     )
     return Table(columns, rows, title, marks=marks)
 
