@@ -12,7 +12,7 @@ from timing import best
 from warpspace import load_scene
 from warpspace.analysis.description import ignore_progress
 from warpspace.parts.part import Part
-from warpspace.parts.workpiece import load_part, make_points, point_basis
+from warpspace.parts.workpiece import evaluate_points, load_workpiece, point_basis
 
 AROUND = 1000  # vertices of a million
 GROWING = (400, 566, 800, 1000)  # above what features are looked for in
@@ -59,15 +59,15 @@ def measure() -> Section:
             of, beside = path.suffix[1:].upper(), "reading and copying it"
             copied = best(lambda: trimesh.load_mesh(path, process=False).copy(), 3)  # noqa: B023
             tracemalloc.start()
-            made = Part(file=str(path)).run(scene, ignore_progress).part
+            made = Part(file=str(path)).run(scene, ignore_progress).workpiece
             most = tracemalloc.get_traced_memory()[1] / MEGABYTE
             tracemalloc.stop()
             own = (made.vertices_mm.nbytes + made.triangles.nbytes) / MEGABYTE
             about = f"memory for it, {of}", most, "its vertices and triangles", own, "MB"
             rows.append(Row(f"part of 10⁶ vertices, {of}", cost, beside, copied, most=2.0))
             rows.append(Row(*about, most_ratio=8.0))
-    small = load_part("ball.ply", data=ball(316).export(file_type="ply"))
-    basis = point_basis(scene, make_points(scene, small.vertices_mm))
+    small = load_workpiece("ball.ply", data=ball(316).export(file_type="ply"))
+    basis = point_basis(scene, evaluate_points(scene, small.vertices_mm))
     values = np.array([scene.errors.amplitude(key) for key in basis.keys])
     moved = best(lambda: basis.evaluate(values))
     copied_small = best(basis.position.copy)

@@ -6,7 +6,7 @@ from timing import best
 
 from warpspace import load_scene
 from warpspace.analysis.description import ignore_progress
-from warpspace.parts.interpreter import Setup, read_program
+from warpspace.parts.interpreter import ControlSettings, read_program
 from warpspace.parts.program import Program, trace_program
 
 BLOCKS = 5600
@@ -33,7 +33,7 @@ def measure() -> Section:
     scene = load_scene("dvf5000_first")
 
     def trace(text: str, tcp: str = "program") -> None:
-        read = read_program(scene, text.splitlines(), Setup(tcp=tcp, length_mm=80.0))
+        read = read_program(scene, text.splitlines(), ControlSettings(tcp=tcp, length_mm=80.0))
         trace_program(read)
 
     text = program(BLOCKS)
@@ -53,7 +53,7 @@ def measure() -> Section:
     growth = [Growth("program, tool centre point", "blocks", [*map(float, GROWING)], costs)]
     asked = [Program(file="x", text=program(blocks)) for blocks in MENDED]
     ran = [one.run(scene, ignore_progress) for one in asked]
-    costs = [best(one.texts, 2) for one in ran]
+    costs = [best(one.output_files, 2) for one in ran]
     growth.append(Growth("program mended", "blocks", [*map(float, MENDED)], costs))
     words = (
         "A program in G-code whose short blocks move five axes: read, its modal words followed,"

@@ -34,7 +34,7 @@ from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.compensate import Compensate, compensate, read_points
 from warpspace.kinematics.model import Loop
 from warpspace.outputs.charts.result_charts import compensation_maps
-from warpspace.parts.workpiece import PartMesh
+from warpspace.parts.workpiece import Workpiece
 from warpspace.scene.library import load_scene
 
 SCENE = load_scene("dvf5000_first")
@@ -287,7 +287,7 @@ def test_nonsense_and_machines_with_nothing_to_correct_give_one_line(name, choic
 
 def test_a_part_is_cut_with_the_table(left):
     corners = np.array([[x, y, z] for x in (0, 200) for y in (0, 150) for z in (0, 80)], float)
-    mesh = PartMesh("box", corners, np.array([[0, 1, 2], [5, 6, 7]], "i4"))
+    mesh = Workpiece("box", corners, np.array([[0, 1, 2], [5, 6, 7]], "i4"))
     cut = [
         LIVE.evaluate(replace(state, part=PartLook(mesh, "box"))).part for state in (START, left)
     ]

@@ -31,7 +31,7 @@ from warpspace.app.server.viewer import free_port, is_local, page_url, resolve_h
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
-from warpspace.parts.workpiece import PartMesh
+from warpspace.parts.workpiece import Workpiece
 from warpspace.scene.library import load_scene
 
 
@@ -120,7 +120,7 @@ def test_what_is_kept_is_bounded_in_memory_and_released_once_it_is_too_old():
     memory = TabMemory(clock=lambda: now[0])
     for _ in range(KEPT_BYTES // 48_000_000 + 4):
         store = StateStore(STATE)
-        mesh = PartMesh("x", np.zeros((2_000_000, 3)), np.zeros((1, 3), "i4"))
+        mesh = Workpiece("x", np.zeros((2_000_000, 3)), np.zeros((1, 3), "i4"))
         look = replace(STATE.part, mesh=mesh)
         store.apply(lambda state, look=look: replace(state, part=look))
         memory.keep(new_token(), TabRecord(store, None))

@@ -21,7 +21,7 @@ from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.app.state.tree import put
 from warpspace.kinematics import transforms
-from warpspace.parts.workpiece import PartMesh, make_points, place_part
+from warpspace.parts.workpiece import Workpiece, evaluate_points, place_workpiece
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
 
@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 SCENE = load_scene("dvf5000_first")
 TRIANGLES = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
-MESH = PartMesh(
+MESH = Workpiece(
     "tip", np.array([[0.0, 0, 0], [100, 0, 0], [0, 80, 0], [0, 0, 60]]), np.array(TRIANGLES, "i4")
 )
 
 
-def holding(state: AppState, mesh: PartMesh = MESH, place: str = "") -> AppState:
+def holding(state: AppState, mesh: Workpiece = MESH, place: str = "") -> AppState:
     state = replace(state, part=replace(state.part, mesh=mesh, name=mesh.name))
     return put(state, "part.place", place)
 
@@ -51,7 +51,7 @@ def test_what_is_drawn_is_what_the_machine_makes(turned: dict[str, float]) -> No
     found = LIVE.evaluate(state).part
     assert found is not None
     scene = replace(state, scene=state.active_scene()).standing
-    made = make_points(scene, place_part(MESH, scene, state.part.place).vertices_mm)
+    made = evaluate_points(scene, place_workpiece(MESH, scene, state.part.place).vertices_mm)
     back = np.linalg.inv(found.pose)
     np.testing.assert_allclose(found.error_um @ back[:3, :3].T, made.error_um, atol=1e-4)
     np.testing.assert_allclose(transforms.apply(back, found.nominal_mm), made.point_mm, atol=1e-3)
@@ -137,7 +137,7 @@ def test_a_slider_moves_a_large_part_in_60_ms() -> None:
         1,
         2,
     ]
-    state = holding(start_state(SCENE), PartMesh("large", point, triangles.astype("i4")))
+    state = holding(start_state(SCENE), Workpiece("large", point, triangles.astype("i4")))
     part = LIVE.evaluate(state).part
     assert part is not None
     best = 1.0

@@ -19,7 +19,7 @@ from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.errors import Constant, Ramp, TableCurve
 from warpspace.machine.limits import MAX_ERROR
-from warpspace.parts.workpiece import PartMesh
+from warpspace.parts.workpiece import Workpiece
 from warpspace.scene.library import load_scene
 from warpspace.scene.notes import Note, with_note
 
@@ -353,7 +353,7 @@ def test_a_drag_beside_another_drag_is_one_step_without_the_other():
 
 
 def with_mesh(number):
-    mesh = PartMesh("x", np.full((1_000_000, 3), float(number)), np.zeros((1, 3), "i4"))
+    mesh = Workpiece("x", np.full((1_000_000, 3), float(number)), np.zeros((1, 3), "i4"))
     return lambda state: replace(state, part=replace(state.part, mesh=mesh, name=f"{number}"))
 
 

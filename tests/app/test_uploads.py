@@ -9,7 +9,7 @@ from app.hostile import upload
 from app.wire import opened
 from warpspace.app.panels import part
 from warpspace.exceptions import OptionError
-from warpspace.parts.workpiece import PartMesh
+from warpspace.parts.workpiece import Workpiece
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene
 
@@ -21,7 +21,7 @@ def held(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Event, lis
     """Have a mesh parsed once an event is set; give that, and the names of the files so far."""
     go_on, begun, original = threading.Event(), list[str](), part.load_part
 
-    def load(name: str, unit: str | None, content: bytes) -> PartMesh:
+    def load(name: str, unit: str | None, content: bytes) -> Workpiece:
         begun.append(name)
         assert go_on.wait(60.0)
         if name == "bad.stl":

@@ -9,7 +9,7 @@ from warpspace.calibration import Calibrate, read_readings
 from warpspace.calibration.next_best import u95_at
 from warpspace.calibration.solve import build_terms
 from warpspace.exceptions import OptionError
-from warpspace.parts.workpiece import load_part, place_part
+from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import PartSource
 
@@ -42,7 +42,7 @@ def test_a_part_is_as_unsure_as_its_vertices_and_its_verdict_as_its_width(tmp_pa
     scene = replace(SCENE, part=replace(SCENE.part, place=place))
     terms = build_terms(scene, ["EXX:ramp", "EZZ:ramp"])
     covariance = np.diag([9.0, 1e-18])
-    x = place_part(load_part(mesh), scene).vertices_mm[:, 0]
+    x = place_workpiece(load_workpiece(mesh), scene).vertices_mm[:, 0]
     wanted = 2.0 * 3.0 * x.std() / 550.0
     assert u95_at(scene, terms, "part")(covariance) == pytest.approx(wanted, rel=1e-3)
     own = PartSource(mesh, place, features="f.toml", folder=str(tmp_path))

@@ -16,7 +16,7 @@ from warpspace.analysis.description import ignore_progress
 from warpspace.formats.compensation.compensate import Compensate
 from warpspace.parts.part import Part
 from warpspace.parts.program import Program
-from warpspace.parts.workpiece import PartMesh
+from warpspace.parts.workpiece import Workpiece
 from warpspace.scene.library import parse_scene
 
 MACHINE = """[machine]
@@ -50,7 +50,7 @@ def scene(text):
 
 def cube(text, **more):
     mesh = trimesh.creation.box((100.0, 100.0, 100.0))
-    own = PartMesh("cube", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
+    own = Workpiece("cube", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
     found = Part(mesh=own, place=PLACE, **more).run(scene(text), ignore_progress)
     return found, found.as_json()
 

@@ -304,16 +304,24 @@ def u95_at(scene: Scene, terms: solve.FitParameters, target: Target) -> Callable
 
 def _u95_of_part(scene: Scene, terms: solve.FitParameters, target: str) -> Callable[[Array], float]:
     from warpspace.parts.inspection import measure_changes
-    from warpspace.parts.workpiece import fit_out, load_part, make_points, place_part, point_basis
+    from warpspace.parts.workpiece import (
+        evaluate_points,
+        load_workpiece,
+        place_workpiece,
+        point_basis,
+        subtract_best_fit,
+    )
 
     if (file := scene.part.path("file")) is None:
         raise OptionError(f"{{target}} {target}: expected a scene whose [part] has a file")
-    mesh = load_part(file, scene.part.unit or None)
-    made = make_points(scene, place_part(mesh, scene).vertices_mm)
+    mesh = load_workpiece(file, scene.part.unit or None)
+    made = evaluate_points(scene, place_workpiece(mesh, scene).vertices_mm)
     gains = point_basis(replace(scene, errors=terms.errors), made, terms.keys).position
     features, count = scene.part.path("features"), len(made.point_mm)
     if target == "part":
-        gains = fit_out(made.point_mm, gains).reshape(len(terms.keys), -1) / np.sqrt(count)
+        gains = subtract_best_fit(made.point_mm, gains).reshape(len(terms.keys), -1) / np.sqrt(
+            count
+        )
         return lambda found: FACTOR * float(np.sqrt(np.sum(gains * (found @ gains))))
     if features is not None:
         told = features, read_text(Path(features), MAX_SCENE_BYTES)

@@ -25,7 +25,14 @@ from warpspace.bench.placing import ball_point, following_axes
 from warpspace.exceptions import OptionError
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES
-from warpspace.parts.workpiece import OfPart, PartMesh, fit_out, made_doubt, make_points, place_part
+from warpspace.parts.workpiece import (
+    Workpiece,
+    WorkpieceAnalysis,
+    evaluate_points,
+    place_workpiece,
+    point_uncertainty,
+    subtract_best_fit,
+)
 from warpspace.scene.model import Scene, second_order
 
 SEARCHED = 800  # vertices that tell where a part deviates least; all do at the best places
@@ -53,7 +60,7 @@ U95 = "u95_max_um", "u95_placed_um"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clamp(OfPart):
+class Clamp(WorkpieceAnalysis):
     """Find where to clamp a part on the machine of SCENE.
 
     The part stands at places all over the travel, in the orientations that are allowed, and is
@@ -73,8 +80,8 @@ class Clamp(OfPart):
     placed: bool = option(False, "Judge what is left after the best rigid fit of the part")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "ClampResult":
-        mesh = self.find_mesh(scene)
-        part = place_part(mesh, scene, self.place)
+        mesh = self.load_mesh(scene)
+        part = place_workpiece(mesh, scene, self.place)
         a, b, c = part.place[3:]
         tilts = TILTS if self.turns == "all" else [(a, b)]
         quarters = range(1 if self.turns == "none" else 4)
@@ -85,7 +92,7 @@ class Clamp(OfPart):
         level, places = part.vertices_mm[:, 2].min(), list[tuple[float, ...]]()
         for tilt, quarter in product(tilts, quarters):
             turn = (*tilt, c + 90.0 * quarter)
-            turned = place_part(mesh, scene, (0.0, 0.0, 0.0, *turn)).vertices_mm
+            turned = place_workpiece(mesh, scene, (0.0, 0.0, 0.0, *turn)).vertices_mm
             low, high = (end(reach, axis=0) - end(turned, axis=0) for end in (np.min, np.max))
             z = float(np.clip(level - turned[:, 2].min(), low[2], high[2]))
             grid = np.linspace(low[:2], high[:2], self.grid).T.tolist()
@@ -95,14 +102,14 @@ class Clamp(OfPart):
         every = range(0, len(own), -(-len(own) // SEARCHED))
         some = replace(mesh, vertices_mm=own[[*np.argmax(own @ outermost, axis=0), *every]])
         for number, place in enumerate(places):
-            found.append(_judge(scene, place_part(some, scene, place)))
+            found.append(_judge(scene, place_workpiece(some, scene, place)))
             watch((number + 1) / len(places))
         judged = JUDGED[self.placed]
         found = sorted((one for one in found if not one.outside), key=judged)
         if not found:
             raise OptionError(f"{mesh.name} fits nowhere into the travel of {scene.machine.chain}")
         now, *best = (
-            _judge(scene, place_part(mesh, scene, at))
+            _judge(scene, place_workpiece(mesh, scene, at))
             for at in (part.place, *(one.place for one in found[:RIVALS]))
         )
         first = min(now, *best, key=lambda one: (one.outside > 0, judged(one)))
@@ -119,17 +126,17 @@ class Clamp(OfPart):
         )
 
 
-def _judge(scene: Scene, part: PartMesh) -> Clamping:
-    made = make_points(scene, part.vertices_mm)
-    both = made.error_um, fit_out(made.point_mm, made.error_um)
+def _judge(scene: Scene, part: Workpiece) -> Clamping:
+    made = evaluate_points(scene, part.vertices_mm)
+    both = made.error_um, subtract_best_fit(made.point_mm, made.error_um)
     most, placed = (float(np.linalg.norm(error, axis=1).max()) for error in both)
     return Clamping(part.place, most, placed, int(made.outside.sum()))
 
 
-def _doubts(scene: Scene, mesh: PartMesh, place: Sequence[float]) -> list[FieldUncertainty]:
-    made = make_points(scene, place_part(mesh, scene, place).vertices_mm)
-    found = made_doubt(scene, made)
-    return [found, found.transform(partial(fit_out, made.point_mm))] if found else []
+def _doubts(scene: Scene, mesh: Workpiece, place: Sequence[float]) -> list[FieldUncertainty]:
+    made = evaluate_points(scene, place_workpiece(mesh, scene, place).vertices_mm)
+    found = point_uncertainty(scene, made)
+    return [found, found.transform(partial(subtract_best_fit, made.point_mm))] if found else []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,7 +203,7 @@ class ClampResult(Result):
         note = f"{judged}. Geometry only: no forces, heat, wear or servo."
         yield Lines("plane", f"Where to clamp: {self.title}", "x [mm]", "y [mm]", dots, (), note)
 
-    def doubts(self) -> Iterator[str]:
+    def caveats(self) -> Iterator[str]:
         yield from (*self.warnings, *super().caveats())
         if self.present.outside:
             yield f"at present {self.present.outside:,} vertices are beyond the travel"

@@ -28,7 +28,7 @@ from warpspace.analysis.uncertainty.verdict import Verdict
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.kinematics.model import Loop
 from warpspace.kinematics.transforms import skew, vector_rotation
-from warpspace.parts.workpiece import Made, PartMesh, fit_out, point_basis
+from warpspace.parts.workpiece import ActualPoints, Workpiece, point_basis, subtract_best_fit
 from warpspace.scene import schema
 from warpspace.scene.model import Scene, evaluate
 from warpspace.scene.text_files import parse_toml
@@ -132,7 +132,7 @@ def fit_shape(start: FeatureShape, point_mm: Array) -> FeatureShape:
     return shape
 
 
-def find_features(mesh: PartMesh) -> dict[str, Feature]:
+def find_features(mesh: Workpiece) -> dict[str, Feature]:
     """Find the shapes that the surface of a part consists of: by kind, size, and place.
 
     First what lies between creases is looked at; then what is left of it, parted by the size of its
@@ -164,7 +164,7 @@ def find_features(mesh: PartMesh) -> dict[str, Feature]:
     }
 
 
-def _fitted(mesh: PartMesh, kind: str, part: NDArray[np.intp]) -> Feature | None:
+def _fitted(mesh: Workpiece, kind: str, part: NDArray[np.intp]) -> Feature | None:
     """Fit a shape to triangles; None where their normals or vertices are off it."""
     normal, area = mesh.surface.face_normals[part], mesh.surface.area_faces[part]
     place, weight = mesh.surface.triangles_center[part], area / area.sum()
@@ -234,9 +234,9 @@ def _position(own: ShapeMotion, *datums: ShapeMotion) -> Array:
 class MeasureKind(NamedTuple):
     """A kind of measure: how it is taken, of what, to how many others."""
 
-    take: Callable[..., Array]  # mm or rad, [F], of the motions of these
+    evaluate: Callable[..., Array]  # mm or rad, [F], of the motions of these
     features: Sequence[str]
-    others: tuple[int, int] = (0, 0)
+    reference_count: tuple[int, int] = (0, 0)
     is_angle: bool = False
 
 
@@ -254,8 +254,8 @@ KINDS: Mapping[str, MeasureKind] = {
     "parallelism": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
 }
 Band: TypeAlias = tuple[float, float] | None  # a tolerance, µm or µrad
-Measure: TypeAlias = tuple[str, tuple[int, ...]]  # its kind, and numbers of features
-Wanted = dict[Measure, Band]
+MeasureKey: TypeAlias = tuple[str, tuple[int, ...]]  # its kind, and numbers of features
+MeasureBands = dict[MeasureKey, Band]
 
 
 @dataclass(frozen=True)
@@ -271,8 +271,8 @@ class FeatureResult:
 
 def inspect(
     scene: Scene,
-    mesh: PartMesh,
-    made: Made,
+    mesh: Workpiece,
+    made: ActualPoints,
     tolerances: tuple[str, str] | None = None,
     sure: FieldUncertainty | None = None,
     between_um: float = 0.0,
@@ -285,11 +285,11 @@ def inspect(
     """
     known, points = find_features(mesh), mesh.vertices_mm
     names, features, shapes = [*known], known.values(), [one.shape for one in known.values()]
-    wanted: Wanted = {
+    wanted: MeasureBands = {
         (kind, (at,)): None
         for at, shape in enumerate(shapes)
         for kind, row in KINDS.items()
-        if shape.kind in row.features and not row.others[0]
+        if shape.kind in row.features and not row.reference_count[0]
     }
     if tolerances:
         wanted |= _read(*tolerances, shapes, names)
@@ -301,17 +301,19 @@ def inspect(
         at = made.coordinates
         exact = evaluate(scene, at=at, loop=Loop.RELATIVE, frame="workpiece", exact=True)
         errors.append(exact.error_um)
-    placed = fit_out(points, np.array(errors) @ turn)
+    placed = subtract_best_fit(points, np.array(errors) @ turn)
     values = take(np.stack([0.0 * placed[0], made.error_um @ turn, *placed]))
     budget: dict[str, Array] = {}
     for key in scene.parameter_keys:
         if amplitude := scene.errors.amplitude(key):
-            alone = fit_out(points, amplitude * point_basis(scene, made, [key]).position @ turn)
+            alone = subtract_best_fit(
+                points, amplitude * point_basis(scene, made, [key]).position @ turn
+            )
             low, high = take(placed[0] / 2.0 + NUDGE * np.concatenate([-alone, alone]))
             budget[key] = (high - low) / (2.0 * NUDGE)
     u95: list[float | None] = [None] * len(wanted)
     if sure is not None:
-        changes = fit_out(points, sure.response @ turn)
+        changes = subtract_best_fit(points, sure.response @ turn)
         u95 = sure.errors.propagate(
             lambda change: take(placed[:1] + np.tensordot(change, changes, 1))[0]
         )
@@ -330,7 +332,7 @@ def inspect(
 
 
 def measure_changes(
-    mesh: PartMesh, made: Made, moves_um: Array, tolerances: tuple[str, str]
+    mesh: Workpiece, made: ActualPoints, moves_um: Array, tolerances: tuple[str, str]
 ) -> Array:
     """Give what moves of vertices, [K, n, 3], µm, change of measures with a tolerance, [K, m].
 
@@ -340,13 +342,13 @@ def measure_changes(
     every = _read(*tolerances, [one.shape for one in known.values()], [*known])
     wanted = [measure for measure, band in every.items() if band]
     moved = np.array([made.error_um, *moves_um]) @ _turn(mesh, made)
-    here, *steps = fit_out(mesh.vertices_mm, moved)
+    here, *steps = subtract_best_fit(mesh.vertices_mm, moved)
     both = (here + sign * NUDGE * np.array(steps) for sign in (-1.0, 1.0))
     low, high = (_take(known.values(), wanted, move) for move in both)
     return (high - low) / (2.0 * NUDGE)
 
 
-def _turn(mesh: PartMesh, made: Made) -> Array:
+def _turn(mesh: Workpiece, made: ActualPoints) -> Array:
     """Give the rotation from the frame of a part to the workpiece, [3, 3]."""
     from scipy.spatial.transform import Rotation
 
@@ -354,12 +356,12 @@ def _turn(mesh: PartMesh, made: Made) -> Array:
     return Rotation.align_vectors(*arms)[0].as_matrix()
 
 
-def _take(features: Collection[Feature], wanted: Collection[Measure], move_um: Array) -> Array:
+def _take(features: Collection[Feature], wanted: Collection[MeasureKey], move_um: Array) -> Array:
     """Take measures, (m,), of features that follow moves, [F, V, 3]; [F, m], µm or µrad."""
     motions = [one.follow(move_um) for one in features]
     found = np.empty((len(move_um), len(wanted)))
     for index, (kind, of) in enumerate(wanted):
-        taken = KINDS[kind].take(*(motions[at] for at in of))
+        taken = KINDS[kind].evaluate(*(motions[at] for at in of))
         found[:, index] = taken * (URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM)
     return found
 
@@ -399,10 +401,10 @@ def _numbers(
     return found | {"budget": dict(sorted(budget.items(), key=lambda pair: -abs(pair[1])))}
 
 
-def _read(source: str, text: str, shapes: Sequence[FeatureShape], names: list[str]) -> Wanted:
+def _read(source: str, text: str, shapes: Sequence[FeatureShape], names: list[str]) -> MeasureBands:
     problems, raw = schema.Problems(), parse_toml(text, source)
     entries: Sequence[Any] = (problems.read(schema.FEATURES, "", raw) or {}).get("features", ())
-    known, wanted = {name: at for at, name in enumerate(names)}, Wanted()
+    known, wanted = {name: at for at, name in enumerate(names)}, MeasureBands()
     for index, entry in enumerate(entries):
         where, chosen = f"features[{index}]", [entry["is"], *entry["to"]]
         if entry["near"] is not None:
@@ -440,8 +442,8 @@ def _wrong(entry: Mapping[str, Any], shapes: Sequence[FeatureShape]) -> str:
     unit, other = ("urad", "um") if kind.is_angle else ("um", "urad")
     if bands[not kind.is_angle]:
         return f"tolerance_{other} of {name}; expected tolerance_{unit}"
-    if not kind.others[0] <= count <= kind.others[1]:
-        return f"{name} to {count} features; expected {kind.others[1]}"
+    if not kind.reference_count[0] <= count <= kind.reference_count[1]:
+        return f"{name} to {count} features; expected {kind.reference_count[1]}"
     for one in shapes:
         if one.kind not in kind.features:
             return f"{name} of a {one.kind}; expected a {' or a '.join(kind.features)}"

@@ -105,7 +105,7 @@ def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setup:
+class ControlSettings:
     """What is set on a control before a program runs."""
 
     tcp: Literal["program", "always", "never"] = option(
@@ -124,7 +124,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class ReadProgram:
+class ParsedProgram:
     """Moves of a program, one a row; each begins where the one before it ends."""
 
     scene: Scene
@@ -175,7 +175,7 @@ def axes_at(model: Model, length_mm: float, words: Mapping[str, Array]) -> dict[
     return follow(with_length(model, length_mm), words, ball_point(model, upright(words)))
 
 
-def words_at(model: Model, tip_mm: Array, axes: Mapping[str, Array]) -> dict[str, Array]:
+def programmed_words(model: Model, tip_mm: Array, axes: Mapping[str, Array]) -> dict[str, Array]:
     """Give the words of a program with TCP that lead the tip to a place, rotary axes to theirs."""
     words = follow(model, upright(axes), tip_mm)
     return {name: words[name] if is_linear(name) else at for name, at in axes.items()}
@@ -192,16 +192,16 @@ def program_lines(path: str | Path) -> Iterator[str]:
 
 
 def read_program(
-    scene: Scene, lines: Iterable[str], setup: Setup | None = None, name: str = "program"
-) -> ReadProgram:
+    scene: Scene, lines: Iterable[str], setup: ControlSettings | None = None, name: str = "program"
+) -> ParsedProgram:
     """Run the lines of a program on the control of a machine; a `SceneError` names its line."""
-    control = Interpreter(scene, setup or Setup(), name)
+    control = Interpreter(scene, setup or ControlSettings(), name)
     for _ in control.run(lines):
         pass
     rows = np.frombuffer(control.rows).reshape(-1, control.width)
     line, kind, tcp, across = rows[:, :4].T.astype(np.int64)
     kind[: control.first] = STAND
-    return ReadProgram(
+    return ParsedProgram(
         scene, control.names, line, kind, tcp > 0, across, rows[:, 4], rows[:, 5],
         rows[:, 6] + 1j * rows[:, 7], rows[:, 8:], control.refused, control.unknown,
         len(np.unique(line[kind != STAND])),
@@ -211,7 +211,7 @@ def read_program(
 class Interpreter:
     """Modal words of a control, where its axes stand, and the words of the line that it is at."""
 
-    def __init__(self, scene: Scene, setup: Setup, name: str) -> None:
+    def __init__(self, scene: Scene, setup: ControlSettings, name: str) -> None:
         self.scene, self.setup, self.name = scene, setup, name
         self.line, self.codes, self.words = 0, list[str](), dict[str, float]()
         # spelled words and comments of a line by code or letter, and what skips it: "/"
@@ -224,12 +224,12 @@ class Interpreter:
         self.motion, self.system, self.across, self.unit_mm = "G0", "G54", 2, 1.0
         self.absolute, self.to_initial, self.inverse_time = True, True, False
         self.is_compensated, self.has_blocks = False, False
-        self.unnamed = {i for i, axis in enumerate(self.names) if is_linear(axis)}
+        self.unnamed_axes = {i for i, axis in enumerate(self.names) if is_linear(axis)}
         self.first = 0  # row that the path begins with
         self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
         self.rows, self.width = array("d"), 8 + len(self.names)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
-        self.at = [float(stand[axis]) for axis in self.names]
+        self.position = [float(stand[axis]) for axis in self.names]
         self.tcp, self.length_mm = False, setup.length_mm
         self.record(STAND)
         self.switch(tcp=setup.tcp == "always", length_mm=setup.length_mm)
@@ -308,7 +308,7 @@ class Interpreter:
         for letter in idle:
             self.unknown.setdefault(f"{letter} with {once or self.motion}", self.line)
         if once == "G28":
-            if letters and any(self.at[index] != at for index, at in self.target().items()):
+            if letters and any(self.position[index] != at for index, at in self.target().items()):
                 self.line_to(self.target(), RAPID)
             axes, indices = self.scene.machine.axes, [self.index[x] for x in letters or self.index]
             home = {i: float(np.clip(0.0, *axes[self.names[i]].travel)) for i in indices}
@@ -335,13 +335,13 @@ class Interpreter:
     def switch(self, *, tcp: bool, length_mm: float) -> None:
         """Say where the axes stand in the words of another mode; nothing moves."""
         if (tcp or self.tcp) and (tcp, length_mm) != (self.tcp, self.length_mm):
-            at = {axis: np.asarray(q) for axis, q in zip(self.names, self.at, strict=True)}
+            at = {axis: np.asarray(q) for axis, q in zip(self.names, self.position, strict=True)}
             model = self.scene.model
             if self.tcp:
                 at = axes_at(model, self.length_mm, at)
             if tcp:
-                at = words_at(model, ball_point(with_length(model, length_mm), at), at)
-            self.at, self.tcp, self.length_mm = [*map(float, at.values())], tcp, length_mm
+                at = programmed_words(model, ball_point(with_length(model, length_mm), at), at)
+            self.position, self.tcp, self.length_mm = [*map(float, at.values())], tcp, length_mm
             self.record(STAND)
         self.length_mm = length_mm
 
@@ -349,7 +349,7 @@ class Interpreter:
         if len(self.rows) > MAX_PATH_POINTS * self.width:
             self.fail(f"more than {MAX_PATH_POINTS:,} moves; expected fewer or larger pecks")
         mode = self.line, kind, self.tcp, self.across, self.length_mm
-        self.rows.extend((*mode, turn, centre.real, centre.imag, *self.at))
+        self.rows.extend((*mode, turn, centre.real, centre.imag, *self.position))
 
     def value(self, letter: str) -> float:
         """Give the number of a word in mm, degrees or seconds."""
@@ -366,23 +366,26 @@ class Interpreter:
         to: dict[int, float] = {}
         for letter in self.words.keys() & self.index.keys():
             value, index = self.value(letter), self.index[letter]
-            to[index] = self.place(letter, value) if self.absolute else self.at[index] + value
+            to[index] = self.place(letter, value) if self.absolute else self.position[index] + value
         return to
 
     def line_to(self, to: Mapping[int, float], kind: int = STAND, *, bare: bool = False) -> None:
         """Go to positions of some axes: bare ones, or places of the tip with TCP."""
         tcp = self.tcp
         self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
-        before, self.at = self.at, [to.get(index, at) for index, at in enumerate(self.at)]
+        before, self.position = (
+            self.position,
+            [to.get(index, at) for index, at in enumerate(self.position)],
+        )
         kind = kind or (RAPID if self.motion == "G0" else FEED)
-        if not self.first or self.unnamed & to.keys():
-            self.unnamed -= to.keys()
+        if not self.first or self.unnamed_axes & to.keys():
+            self.unnamed_axes -= to.keys()
             self.record(STAND)
             self.first = len(self.rows) // self.width
-        elif before == self.at:
+        elif before == self.position:
             kind = STAND
         elif kind == FEED:  # from here on it is cut
-            self.unnamed.clear()
+            self.unnamed_axes.clear()
         self.record(kind)
         self.switch(tcp=tcp, length_mm=self.length_mm)
 
@@ -390,10 +393,10 @@ class Interpreter:
         names, centres, words = PLANES[self.across], CENTRES[self.across], self.words
         if not set(names) <= self.index.keys():
             self.fail(f"an arc in {names}; expected axes of {self.scene.machine.chain}")
-        start = complex(*(self.at[self.index[x]] for x in names))
-        self.at = [to.get(index, at) for index, at in enumerate(self.at)]
-        self.unnamed.clear()
-        end = complex(*(self.at[self.index[x]] for x in names))
+        start = complex(*(self.position[self.index[x]] for x in names))
+        self.position = [to.get(index, at) for index, at in enumerate(self.position)]
+        self.unnamed_axes.clear()
+        end = complex(*(self.position[self.index[x]] for x in names))
         sense = 1.0 if self.motion == "G3" else -1.0
         if "R" in words:  # of the longer arc where it is negative
             radius, half = self.value("R"), (end - start) / 2.0
@@ -424,7 +427,7 @@ class Interpreter:
             self.fail(f"{self.motion} without {deep} and R")
         index, letter = self.index[deep], "K" if "K" in self.words else "L"
         repeats = int(self.words.get(letter, 1.0))
-        initial = self.cycle.setdefault("initial", self.at[index])
+        initial = self.cycle.setdefault("initial", self.position[index])
         clear = initial + self.cycle["R"]
         bottom = clear + self.cycle[deep]
         if self.absolute:
@@ -439,8 +442,8 @@ class Interpreter:
             wanted = f"at most {MAX_CYCLE_MOVES:,} moves in a line"
             self.fail(f"{letter}{repeats} comes to {moves:,} moves; expected {wanted}")
         for _ in range(repeats):
-            self.line_to({index: max(clear, self.at[index])}, RAPID)
-            self.line_to({**self.target(), index: self.at[index]}, RAPID)
+            self.line_to({index: max(clear, self.position[index])}, RAPID)
+            self.line_to({**self.target(), index: self.position[index]}, RAPID)
             for number in range(pecks):
                 self.line_to({index: clear}, RAPID)
                 self.line_to({index: clear - number * peck}, RAPID)

@@ -24,13 +24,13 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_SCENE_BYTES
 from warpspace.parts.inspection import FeatureResult, features_table, inspect
 from warpspace.parts.workpiece import (
-    Made,
-    OfPart,
-    PartMesh,
-    fit_out,
-    made_doubt,
-    make_points,
-    place_part,
+    ActualPoints,
+    Workpiece,
+    WorkpieceAnalysis,
+    evaluate_points,
+    place_workpiece,
+    point_uncertainty,
+    subtract_best_fit,
 )
 from warpspace.scene.model import Scene, second_order
 from warpspace.scene.text_files import read_text
@@ -41,7 +41,7 @@ TRIANGLES_AT_ONCE = 200_000  # what lies between needs memory, too
 
 
 @dataclass(frozen=True, kw_only=True)
-class Off:
+class PartDeviation:
     """How far the vertices of a part are from where they should be."""
 
     deviation: Statistics
@@ -49,7 +49,7 @@ class Off:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part(OfPart):
+class Part(WorkpieceAnalysis):
     """Show a part, a mesh, as the machine of SCENE cuts it.
 
     The part stands where it is clamped; rotary axes stand as they do in the scene, linear axes
@@ -73,21 +73,21 @@ class Part(OfPart):
     tolerances: tuple[str, str] | None = None  # name and text of features that are read already
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult":
-        mesh = self.find_mesh(scene)
+        mesh = self.load_mesh(scene)
         is_own = not (self.mesh or self.file)
         features = self.features or (scene.part.path("features") if is_own else None)
         tolerances = self.tolerances
         if features and not tolerances:
             tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
         watch(0.2)
-        part = place_part(mesh, scene, self.place)
-        made = make_points(scene, part.vertices_mm)
+        part = place_workpiece(mesh, scene, self.place)
+        made = evaluate_points(scene, part.vertices_mm)
         watch(0.5)
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
         between = 0.0 if is_large else _between(scene, part, made)
         unseen = between if between > SEEN_UM else 0.0
-        fit = partial(fit_out, made.point_mm)
-        sure = None if is_large else made_doubt(scene, made)
+        fit = partial(subtract_best_fit, made.point_mm)
+        sure = None if is_large else point_uncertainty(scene, made)
         both = (made.error_um, sure), (fit(made.error_um), sure and sure.transform(fit))
         cut, placed = _off(part, made, *both)
         return PartResult(
@@ -97,16 +97,16 @@ class Part(OfPart):
             placed=placed,
             features=() if is_large else inspect(scene, mesh, made, tolerances, sure, unseen),
             uncertainty=sure and sure.errors,
-            unseen_um=unseen,
-            part=part,
-            made=made,
+            interpolation_um=unseen,
+            workpiece=part,
+            actual=made,
             scene=scene,
-            asked=self,
+            analysis=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
 
 
-def _between(scene: Scene, part: PartMesh, made: Made) -> float:
+def _between(scene: Scene, part: Workpiece, made: ActualPoints) -> float:
     """Give how far the errors amid the longest edges are from those of their ends, at most, µm."""
     corner = np.take(part.vertices_mm, part.triangles, axis=0)
     length = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).reshape(-1)
@@ -114,14 +114,14 @@ def _between(scene: Scene, part: PartMesh, made: Made) -> float:
     ends = np.stack([part.triangles, np.roll(part.triangles, -1, axis=1)], -1).reshape(-1, 2)[
         longest
     ]
-    amid = make_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
+    amid = evaluate_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
     off = amid - made.error_um[ends].mean(axis=1)
     return float(np.linalg.norm(off, axis=1).max())
 
 
 def _off(
-    part: PartMesh, made: Made, *found: tuple[Array, FieldUncertainty | None]
-) -> Iterator[Off]:
+    part: Workpiece, made: ActualPoints, *found: tuple[Array, FieldUncertainty | None]
+) -> Iterator[PartDeviation]:
     from trimesh import triangles
 
     # lowest and highest so far: how far, at which vertex, along which normal
@@ -145,43 +145,45 @@ def _off(
             normal[name] = value
             if sure is not None:
                 normal[f"u95_{name}"] = sure.u95_along(vertex, way)
-        yield Off(
+        yield PartDeviation(
             deviation=sure.with_expanded_uncertainty(deviation) if sure else deviation,
             normal=normal,
         )
 
 
 @dataclass(frozen=True, kw_only=True)
-class PartResult(Off, Result):
+class PartResult(PartDeviation, Result):
     """A part as it is cut."""
 
     keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
     vertices: int
     outside: int  # vertices beyond the travel
-    placed: Off
+    placed: PartDeviation
     features: Sequence[FeatureResult]
-    part: PartMesh  # nominal, in the workpiece frame
-    made: Made  # its vertices
+    workpiece: Workpiece  # nominal, in the workpiece frame
+    actual: ActualPoints  # its vertices
     scene: Scene
-    asked: Part
-    unseen_um: float  # how far errors between vertices are off, at most; 0 where that is little
+    analysis: Part
+    interpolation_um: (
+        float  # how far errors between vertices are off, at most; 0 where that is little
+    )
 
-    def doubts(self) -> Iterator[str]:
-        yield from self.part.warnings
+    def caveats(self) -> Iterator[str]:
+        yield from self.workpiece.warnings
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
             yield f"{far} are beyond the travel; their errors are continued"
-        if self.unseen_um:
-            off = f"errors are off by up to {self.unseen_um:.1f} µm more"
+        if self.interpolation_um:
+            off = f"errors are off by up to {self.interpolation_um:.1f} µm more"
             yield f"between its vertices {off}: expected a finer mesh"
-        if (count := len(self.part.triangles)) > MAX_FEATURE_TRIANGLES:
+        if (count := len(self.workpiece.triangles)) > MAX_FEATURE_TRIANGLES:
             most = f"up to {MAX_FEATURE_TRIANGLES:,}"
             yield f"{count:,} triangles: features, U95 and errors amid edges: in {most}"
 
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.deviation.max_at_mm
-        at = ", ".join(f"{value:.6g}" for value in self.part.place)
-        yield f"{self.scene.title} · {self.part.name}, {self.vertices:,} vertices"
+        at = ", ".join(f"{value:.6g}" for value in self.workpiece.place)
+        yield f"{self.scene.title} · {self.workpiece.name}, {self.vertices:,} vertices"
         yield f"  clamped at {at} mm and degrees"
         yield f"  largest |E| {self.deviation.max_um:.2f} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
         yield "  Geometry only: no forces, heat, wear or servo"
@@ -198,15 +200,15 @@ class PartResult(Off, Result):
             yield f"  U95 along the normal, {word}: min {low}, max {high} µm"
         yield features_table(self.features)
 
-    def texts(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
+    def output_files(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
         """Spell the part in its own frame and unit: as it is cut, or so that it is cut nominal."""
-        nominal, moved = self.made.point_mm, self.made.error_um * MM_PER_UM
-        for _ in range(2 * self.asked.predistorted):
-            moved = -make_points(self.scene, nominal + moved).error_um * MM_PER_UM
-        place, (unit, up) = self.part.place, FORMATS[ending]
+        nominal, moved = self.actual.point_mm, self.actual.error_um * MM_PER_UM
+        for _ in range(2 * self.analysis.predistorted):
+            moved = -evaluate_points(self.scene, nominal + moved).error_um * MM_PER_UM
+        place, (unit, up) = self.workpiece.place, FORMATS[ending]
         own = transforms.inverse(transforms.placed(place[:3], place[3:]))
         point = transforms.apply(own, nominal + moved)
         if up == "y":
             point = to_gltf(point) * MM_PER_M
-        cut = replace(self.part, vertices_mm=point / UNITS_MM[self.part.unit or unit])
+        cut = replace(self.workpiece, vertices_mm=point / UNITS_MM[self.workpiece.unit or unit])
         return {"": cut.surface.export(file_type=ending[1:])}

@@ -116,7 +116,7 @@ def _along(error_um: Array, tangent: Array) -> Array:
     return np.sum(error_um * tangent, axis=-1, keepdims=True) * tangent
 
 
-def trace_program(read: interpreter.ReadProgram, chord_mm: float = CHORD_MM) -> ToolPath:
+def trace_program(read: interpreter.ParsedProgram, chord_mm: float = CHORD_MM) -> ToolPath:
     """Follow the tip of the tool over the workpiece."""
     count = count_samples(read, chord_mm)
     move = np.repeat(np.arange(len(count)), count)
@@ -129,7 +129,7 @@ def trace_program(read: interpreter.ReadProgram, chord_mm: float = CHORD_MM) -> 
     return replace(found, uncertainty=_path_doubt(read, found))
 
 
-def _path_doubt(read: interpreter.ReadProgram, path: ToolPath) -> FieldUncertainty | None:
+def _path_doubt(read: interpreter.ParsedProgram, path: ToolPath) -> FieldUncertainty | None:
     """Say how sure the errors along a path are; None where a scene does not say, or it is long."""
     doubt, scene = scene_uncertainty(read.scene, Loop.RELATIVE), read.scene
     if doubt is None or len(path.line) > MOST_SURE:
@@ -143,7 +143,7 @@ def _path_doubt(read: interpreter.ReadProgram, path: ToolPath) -> FieldUncertain
     return combine(doubt, response, path.error_um, path.shares)
 
 
-def count_samples(read: interpreter.ReadProgram, chord_mm: float) -> Integers:
+def count_samples(read: interpreter.ParsedProgram, chord_mm: float) -> Integers:
     """Count the samples of each move, [m]; 0 where nothing moves."""
     is_rotary = np.array([not is_linear(name) for name in read.axes])
     moves = read.kind != interpreter.STAND
@@ -162,7 +162,7 @@ def count_samples(read: interpreter.ReadProgram, chord_mm: float) -> Integers:
     return _checked(read, count)
 
 
-def _checked(read: interpreter.ReadProgram, count: Array) -> Integers:
+def _checked(read: interpreter.ParsedProgram, count: Array) -> Integers:
     """Refuse more samples of moves than a line, or a program, may come to."""
     of_line = np.bincount(read.line, count)
     line = int(of_line.argmax())
@@ -175,7 +175,7 @@ def _checked(read: interpreter.ReadProgram, count: Array) -> Integers:
 
 
 def along_moves(
-    read: interpreter.ReadProgram, move: Integers, share: Array, shift_mm: Array | None = None
+    read: interpreter.ParsedProgram, move: Integers, share: Array, shift_mm: Array | None = None
 ) -> tuple[dict[str, Array], Array, Array]:
     """Give positions of axes, tip and error at shares of moves, [n].
 
@@ -219,7 +219,7 @@ class PathPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Program(interpreter.Setup, Analysis):
+class Program(interpreter.ControlSettings, Analysis):
     """Run a program on SCENE: the errors along its path.
 
     G-code: G0 to G3 in three planes, G17 to G21, G28, G43, G43.4, G49, G53 to G59, G80 to G83, G90,
@@ -284,9 +284,9 @@ class Program(interpreter.Setup, Analysis):
             across=across,
             worst=[explained(sample) for sample in worst],
             line=explained(ends[-1]) if len(ends) else None,
-            read=read,
+            program=read,
             path=path,
-            asked=self,
+            analysis=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
 
@@ -303,28 +303,28 @@ class ProgramResult(Result):
     across: Statistics
     worst: Sequence[PathPoint]
     line: PathPoint | None  # the end of the line asked for
-    read: interpreter.ReadProgram
+    program: interpreter.ParsedProgram
     path: ToolPath
-    asked: Program
+    analysis: Program
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
-        return {"": "\n".join([*map(one_line, correct_program(self.asked, self.read)), ""])}
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
+        return {"": "\n".join([*map(one_line, correct_program(self.analysis, self.program)), ""])}
 
     def as_plain(self) -> dict[str, Any]:
-        refused = [{"line": line, "word": word} for line, word in self.read.refused.items()]
-        said = {"blocks": self.read.blocks, "refused": refused, **to_json(self)}
+        refused = [{"line": line, "word": word} for line, word in self.program.refused.items()]
+        said = {"blocks": self.program.blocks, "refused": refused, **to_json(self)}
         return said | ({"line": to_json(self.line)} if self.line else {})
 
-    def doubts(self) -> Iterator[str]:
-        if refused := [f"line {line} {word}" for line, word in self.read.refused.items()]:
+    def caveats(self) -> Iterator[str]:
+        if refused := [f"line {line} {word}" for line, word in self.program.refused.items()]:
             yield f"refused: {', '.join(refused[:SAID])}; the path ends before the first of them"
-        if unknown := [f"{word} (line {line})" for word, line in self.read.unknown.items()]:
+        if unknown := [f"{word} (line {line})" for word, line in self.program.unknown.items()]:
             yield f"not followed: {', '.join(unknown[:SAID])}"
         if self.outside:
             yield f"{self.outside} of {len(self.path.line)} points are beyond the travel"
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.read.scene.title} · {self.read.blocks} blocks, {self.length_mm:.1f} mm"
+        yield f"{self.program.scene.title} · {self.program.blocks} blocks, {self.length_mm:.1f} mm"
         yield "  Geometry only: no forces, heat, wear or servo; errors in the workpiece frame"
         heads = number_columns(("mean", "RMS", "P95", "max"), ".2f", "µm")
         names = {"error": self.deviation, "along the path": self.along, "across it": self.across}
@@ -348,7 +348,7 @@ class ProgramResult(Result):
         yield Table(columns, rows, title)
 
 
-def corrected_places(read: interpreter.ReadProgram, within_mm: float) -> tuple[Integers, Array]:
+def corrected_places(read: interpreter.ParsedProgram, within_mm: float) -> tuple[Integers, Array]:
     """Give rows of a program, [n], and corrected places, [n, a], that its lines lead to in turn.
 
     A row comes as often as its move has pieces, all of one length. Between two places the linear
@@ -367,7 +367,7 @@ def corrected_places(read: interpreter.ReadProgram, within_mm: float) -> tuple[I
     return row[share > 0.0], places[share > 0.0]
 
 
-def _corrected(read: interpreter.ReadProgram, count: Integers) -> tuple[Integers, Array, Array]:
+def _corrected(read: interpreter.ParsedProgram, count: Integers) -> tuple[Integers, Array, Array]:
     """Give row and share of the ends of equal pieces of moves, and corrected places, [n, a]."""
     row = np.repeat(np.arange(len(count)), count + 1)
     share = (np.arange(len(row)) - np.searchsorted(row, row)) / count[row]
@@ -379,13 +379,16 @@ def _corrected(read: interpreter.ReadProgram, count: Integers) -> tuple[Integers
         shift = -error_um / 1e3
     else:
         raise OptionError("the errors change too much from place to place to be corrected")
-    places, words = read.positions(row, share), interpreter.words_at(read.scene.model, tip, found)
+    places, words = (
+        read.positions(row, share),
+        interpreter.programmed_words(read.scene.model, tip, found),
+    )
     for name in following_axes(read.scene.model):
         places[:, read.axes.index(name)] = np.where(read.tcp[row], words[name], found[name])
     return row, share, places
 
 
-def correct_program(asked: Program, read: interpreter.ReadProgram) -> Iterator[str]:
+def correct_program(asked: Program, read: interpreter.ParsedProgram) -> Iterator[str]:
     """Give the lines of a program that leaves the nominal path of another one on this machine."""
     idle = {line: word for word, line in read.unknown.items() if " with G" in word}
     for line, word in {**read.refused, **idle}.items():

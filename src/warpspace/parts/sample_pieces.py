@@ -49,7 +49,7 @@ class Outline:
         return [f"({self.name})", f"G0 {start}", f"G1 Z{self.level_mm:.4f} F600", *cuts]
 
 
-Built: TypeAlias = tuple[list[list[Outline]], list[dict[str, Any]]]
+PieceGeometry: TypeAlias = tuple[list[list[Outline]], list[dict[str, Any]]]
 """Solids, each by the outlines that its surface passes on its way, and features."""
 
 
@@ -86,7 +86,7 @@ def _feature(name: str, kind: str, near: list[float], measure: str, **more: Any)
     return {"name": name, "is": kind, "near": near, "measure": measure, **more}
 
 
-def _cube(half: float) -> Built:
+def _cube(half: float) -> PieceGeometry:
     high = 2.0 * half
     low = Outline(half, 0.0, name="square")
     return [[Outline(0.0, 0.0), low, Outline(half, high), Outline(0.0, high)]], [
@@ -96,7 +96,7 @@ def _cube(half: float) -> Built:
     ]
 
 
-def _cone(half: float) -> Built:
+def _cone(half: float) -> PieceGeometry:
     slope = np.tan(np.deg2rad(HALF_APEX_DEG))
     rings = [
         Outline(half - slope * level, level, CIRCLE, f"circle at {level:g} mm")
@@ -108,7 +108,7 @@ def _cone(half: float) -> Built:
     ]
 
 
-def _contour(half: float) -> Built:
+def _contour(half: float) -> PieceGeometry:
     base, middle, top, reach = 0.5 * half, 0.625 * half, 0.75 * half, 0.7 * half * np.sqrt(2.0)
     square = Outline(half, 0.0, name="square")
     solid = [
@@ -127,7 +127,7 @@ def _contour(half: float) -> Built:
     ]
 
 
-def _plate(half: float) -> Built:
+def _plate(half: float) -> PieceGeometry:
     pitch, high = 2.0 * half / 3.0, half / 6.0
     solids, features = list[list[Outline]](), list[dict[str, Any]]()
     for at in range(9):

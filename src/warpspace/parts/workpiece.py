@@ -45,7 +45,7 @@ class Corners(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class PartMesh:
+class Workpiece:
     """A closed surface, vertices merged, its triangles counter-clockwise seen from outside."""
 
     name: str
@@ -88,11 +88,13 @@ class PartMesh:
         return Corners(corner_of, triangles, split.vertex_normals, creases)
 
 
-def load_part(path: str | Path, unit: str | None = None, data: bytes | None = None) -> PartMesh:
+def load_workpiece(
+    path: str | Path, unit: str | None = None, data: bytes | None = None
+) -> Workpiece:
     """Read a mesh from a file, or from its bytes: in mm, .glb in m, unless a unit is given."""
     path = Path(path)
     mesh, said = read_mesh(path, unit, most=MAX_PART_TRIANGLES, data=data)
-    part = PartMesh(path.stem, np.asarray(mesh.vertices), mesh.faces.astype(np.int32), unit)
+    part = Workpiece(path.stem, np.asarray(mesh.vertices), mesh.faces.astype(np.int32), unit)
     surface = "its surface passes through itself"
     if (count := count_crossings(part)) is None:
         said += (f"{path}: too many triangles, or too many in one place, to tell if {surface}",)
@@ -101,7 +103,7 @@ def load_part(path: str | Path, unit: str | None = None, data: bytes | None = No
     return replace(part, warnings=said)
 
 
-def count_crossings(part: PartMesh) -> int | None:
+def count_crossings(part: Workpiece) -> int | None:
     """Count pairs of triangles that pass through each other along a line.
 
     Those with a common vertex do not count. None where there are too many to look at.
@@ -172,7 +174,7 @@ def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OfPart(Analysis):
+class WorkpieceAnalysis(Analysis):
     """A question about a part where it is clamped."""
 
     file: File = option(
@@ -187,18 +189,20 @@ class OfPart(Analysis):
     unit: Literal["mm", "cm", "m", "in"] | None = option(
         None, "Unit of its numbers", unset="mm, of .glb m"
     )
-    mesh: PartMesh | None = None  # one that is read already
+    mesh: Workpiece | None = None  # one that is read already
 
-    def find_mesh(self, scene: Scene) -> PartMesh:
+    def load_mesh(self, scene: Scene) -> Workpiece:
         """Read the mesh, or that of the scene where none is named."""
         if self.mesh is not None:
             return self.mesh
         if (path := self.file or scene.part.path("file")) is None:
             raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
-        return load_part(path, self.unit or (None if self.file else scene.part.unit or None))
+        return load_workpiece(path, self.unit or (None if self.file else scene.part.unit or None))
 
 
-def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = None) -> PartMesh:
+def place_workpiece(
+    mesh: Workpiece, scene: Scene, place: Sequence[float] | None = None
+) -> Workpiece:
     """Put a part into the workpiece frame: where told, else as the scene says, or in its middle."""
     at = scene.part.place if place is None else (*place, 0.0, 0.0, 0.0)[:6]
     if at is None:
@@ -209,7 +213,7 @@ def place_part(mesh: PartMesh, scene: Scene, place: Sequence[float] | None = Non
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class ActualPoints:
     """Points of the workpiece frame as the machine makes them."""
 
     point_mm: Array  # [n, 3], nominal, w
@@ -218,7 +222,7 @@ class Made:
     outside: NDArray[np.bool_]  # [n], beyond the travel of a linear axis; errors are continued
 
 
-def make_points(scene: Scene, point_mm: Array) -> Made:
+def evaluate_points(scene: Scene, point_mm: Array) -> ActualPoints:
     """Find where the axes stand at points of w, [n, 3], mm, and what error they have there."""
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
     at, error = follow(scene.model, stand, point_mm), np.empty(point_mm.shape)
@@ -227,11 +231,11 @@ def make_points(scene: Scene, point_mm: Array) -> Made:
         here = {name: of[rows] if np.ndim(of) else of for name, of in at.items()}
         error[rows] = evaluate(scene, at=here, loop=Loop.RELATIVE, frame="workpiece").error_um
     outside = ~np.broadcast_to(within_travel(scene.machine, at), len(point_mm))
-    return Made(point_mm, at, error, outside)
+    return ActualPoints(point_mm, at, error, outside)
 
 
 def point_basis(
-    scene: Scene, made: Made, keys: Sequence[str] | None = None, rows: Any = slice(None)
+    scene: Scene, made: ActualPoints, keys: Sequence[str] | None = None, rows: Any = slice(None)
 ) -> ErrorBasis:
     """Give the response of points to each parameter, [K, n, 3], in w: what a slider moves."""
     keys = scene.parameter_keys if keys is None else keys
@@ -241,7 +245,7 @@ def point_basis(
     return build_basis(scene.model, scene.errors, keys, at, view, point)
 
 
-def made_doubt(scene: Scene, made: Made) -> FieldUncertainty | None:
+def point_uncertainty(scene: Scene, made: ActualPoints) -> FieldUncertainty | None:
     """Say how sure errors of points are; None where a scene does not say."""
     if (doubt := scene_uncertainty(scene, Loop.RELATIVE)) is None:
         return None
@@ -251,7 +255,7 @@ def made_doubt(scene: Scene, made: Made) -> FieldUncertainty | None:
     return combine(doubt, basis.position, made.error_um)
 
 
-def fit_out(point_mm: Array, error_um: Array) -> Array:
+def subtract_best_fit(point_mm: Array, error_um: Array) -> Array:
     """Give errors, [..., n, 3], µm, less the rigid motion of the points, [n, 3], that fits best."""
     arm = point_mm - point_mm.mean(axis=0)
     shift = error_um.mean(axis=-2, keepdims=True)

@@ -25,7 +25,7 @@ from warpspace.kinematics.model import complete_coordinates
 from warpspace.machine.errors import Covariance
 from warpspace.parts.clamp import Clamp
 from warpspace.parts.part import Part
-from warpspace.parts.workpiece import OfPart
+from warpspace.parts.workpiece import WorkpieceAnalysis
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
 from warpspace.scene.scene_writer import scene_to_toml
@@ -169,7 +169,7 @@ def pairs(found):
 
 @pytest.mark.parametrize("asked", QUESTIONS, ids=lambda one: one.name)
 def test_one_error_makes_every_number_as_unsure_as_itself(asked, tmp_path):
-    if isinstance(asked, OfPart):
+    if isinstance(asked, WorkpieceAnalysis):
         trimesh.creation.box((40, 30, 20)).export(file := tmp_path / "box.stl")
         asked = replace(asked, file=str(file))
     found = asked.run(parse_scene(ALONE, "s"), lambda _: None).as_json()

@@ -9,7 +9,7 @@ from warpspace.analysis.description import ignore_progress
 from warpspace.exceptions import OptionError
 from warpspace.parts.clamp import Clamp, ClampResult
 from warpspace.parts.sample_pieces import build_piece
-from warpspace.parts.workpiece import load_part, make_points, place_part
+from warpspace.parts.workpiece import evaluate_points, load_workpiece, place_workpiece
 from warpspace.scene.library import parse_scene
 
 AXES = "X = [-200, 200]\nY = [-150, 150]\nZ = [-100, 100]"
@@ -52,9 +52,9 @@ def test_all_places_are_within_the_travel_in_all_orientations(tmp_path):
     scene = warpspace.load_scene("dvf5000_first")
     found = warpspace.clamp(scene, file=str(path), turns="all", grid=2)
     assert len({one.place[3:] for one in found.places}) == 24
-    mesh = load_part(path)
+    mesh = load_workpiece(path)
     for one in found.places[::17]:
-        made = make_points(scene, place_part(mesh, scene, one.place).vertices_mm)
+        made = evaluate_points(scene, place_workpiece(mesh, scene, one.place).vertices_mm)
         assert not made.outside.any()
         length = np.linalg.norm(made.error_um, axis=1)
         assert one.max_um == pytest.approx(length.max(), rel=0.02)

@@ -20,7 +20,7 @@ from warpspace.parts.inspection import (
     fit_shape,
     inspect,
 )
-from warpspace.parts.workpiece import PartMesh, fit_out, make_points, place_part
+from warpspace.parts.workpiece import Workpiece, evaluate_points, place_workpiece, subtract_best_fit
 
 make = trimesh.creation
 CUBE = make.box((100.0, 100.0, 100.0))
@@ -28,7 +28,7 @@ CUBE = make.box((100.0, 100.0, 100.0))
 
 def part_of(mesh):
     mesh.merge_vertices()
-    return PartMesh("x", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
+    return Workpiece("x", np.array(mesh.vertices), np.array(mesh.faces, dtype=np.int32))
 
 
 def plate_of_holes():
@@ -157,7 +157,7 @@ def test_a_published_cylinder():
 
 def inspected(scene, mesh, tolerances="", place=None):
     part = part_of(mesh.copy())
-    made = make_points(scene, place_part(part, scene, place).vertices_mm)
+    made = evaluate_points(scene, place_workpiece(part, scene, place).vertices_mm)
     found = inspect(scene, part, made, ("tolerances.toml", tolerances) if tolerances else None)
     return {one.name: one for one in found}
 
@@ -262,9 +262,9 @@ def test_a_plate_of_holes_is_the_ball_plate_of_the_bench():
     test = BallPlate(balls=3, pitch_mm=60.0, positions=1)
     plan = test.plan(scene)
     sites = {name: np.broadcast_to(at, 9) for name, at in plan.coordinates.items()}
-    made = make_points(scene, ball_point(scene.model, sites))
+    made = evaluate_points(scene, ball_point(scene.model, sites))
     balls = left_over(plan, simulate(scene, plan, exact=False))
-    assert np.abs(fit_out(made.point_mm, made.error_um) - balls).max() < 1e-6
+    assert np.abs(subtract_best_fit(made.point_mm, made.error_um) - balls).max() < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -14,13 +14,13 @@ from warpspace.kinematics.model import Loop
 from warpspace.parts.part import Part
 from warpspace.parts.program import Program
 from warpspace.parts.workpiece import (
-    PartMesh,
+    Workpiece,
     count_crossings,
-    fit_out,
-    load_part,
-    make_points,
-    place_part,
+    evaluate_points,
+    load_workpiece,
+    place_workpiece,
     point_basis,
+    subtract_best_fit,
 )
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import evaluate
@@ -28,7 +28,7 @@ from warpspace.scene.scene_writer import scene_to_toml
 
 
 def mesh_of(mesh, ending="ply"):
-    return load_part(f"x.{ending}", "mm", mesh.export(file_type=ending))
+    return load_workpiece(f"x.{ending}", "mm", mesh.export(file_type=ending))
 
 
 BOX = trimesh.creation.box([100.0, 60.0, 40.0])
@@ -63,11 +63,11 @@ def test_what_is_wrong_with_a_surface_is_said(tmp_path):
     lid = trimesh.Trimesh(BOX.vertices, BOX.faces[2:], process=False)
     assert "not closed" in mesh_of(lid).warnings[0]
     with pytest.raises(OptionError, match="probably in m"):
-        load_part("x.stl", data=trimesh.creation.box([0.1] * 3).export(file_type="stl"))
+        load_workpiece("x.stl", data=trimesh.creation.box([0.1] * 3).export(file_type="stl"))
     with pytest.raises(OptionError, match="in another unit; give"):  # 160 mm in inches
-        load_part("x.stl", data=trimesh.creation.box([6.299] * 3).export(file_type="stl"))
+        load_workpiece("x.stl", data=trimesh.creation.box([6.299] * 3).export(file_type="stl"))
     with pytest.raises(OptionError, match="no such file"):
-        load_part(tmp_path / "none.stl")
+        load_workpiece(tmp_path / "none.stl")
 
 
 def prism(*corners):
@@ -115,36 +115,36 @@ def test_triangles_of_a_heap_are_not_all_looked_at():
 
 def test_a_part_stands_in_the_middle_or_where_it_is_put():
     scene = scene_with()
-    part = place_part(mesh_of(BOX), scene, None)
-    middle = make_points(scene, np.array([part.vertices_mm.mean(axis=0)])).coordinates
+    part = place_workpiece(mesh_of(BOX), scene, None)
+    middle = evaluate_points(scene, np.array([part.vertices_mm.mean(axis=0)])).coordinates
     for name, (low, high) in scene.workspace.ranges.items():
         assert float(np.mean(middle[name])) == pytest.approx((low + high) / 2.0)
-    turned = place_part(mesh_of(BOX), scene, (10.0, 20.0, 30.0, 0.0, 0.0, 90.0))
+    turned = place_workpiece(mesh_of(BOX), scene, (10.0, 20.0, 30.0, 0.0, 0.0, 90.0))
     assert np.ptp(turned.vertices_mm, axis=0) == pytest.approx([60.0, 100.0, 40.0])
     assert turned.vertices_mm.mean(axis=0) == pytest.approx([10.0, 20.0, 30.0])
 
 
 def test_a_part_is_what_the_field_says():
     scene = load_scene("dvf5000_first")
-    part = place_part(mesh_of(BALL), scene, None)
-    made = make_points(scene, part.vertices_mm)
+    part = place_workpiece(mesh_of(BALL), scene, None)
+    made = evaluate_points(scene, part.vertices_mm)
     field = evaluate(scene, at=made.coordinates, loop=Loop.RELATIVE, frame="workpiece")
     assert np.array_equal(field.error_um, made.error_um)
     basis = point_basis(scene, made)
     amplitudes = np.array([scene.errors.amplitude(key) for key in basis.keys])
     assert np.abs(basis.evaluate(amplitudes).error_um - made.error_um).max() < 1e-9
     assert not made.outside.any()
-    far = make_points(scene, part.vertices_mm + np.array([400.0, 0.0, 0.0]))
+    far = evaluate_points(scene, part.vertices_mm + np.array([400.0, 0.0, 0.0]))
     assert 0 < far.outside.sum() <= len(far.outside)
 
 
 def test_a_location_error_is_fitted_out_and_a_squareness_is_not():
-    part = place_part(mesh_of(BALL), scene_with(), None)
-    located = make_points(scene_with(EX0C=20.0, EY0C=-7.0, EA0C=30.0), part.vertices_mm)
+    part = place_workpiece(mesh_of(BALL), scene_with(), None)
+    located = evaluate_points(scene_with(EX0C=20.0, EY0C=-7.0, EA0C=30.0), part.vertices_mm)
     assert np.linalg.norm(located.error_um, axis=1).max() > 20.0
-    assert np.abs(fit_out(located.point_mm, located.error_um)).max() < 1e-9
-    square = make_points(scene_with(EC0Y=100.0), part.vertices_mm)
-    left = fit_out(square.point_mm, square.error_um)
+    assert np.abs(subtract_best_fit(located.point_mm, located.error_um)).max() < 1e-9
+    square = evaluate_points(scene_with(EC0Y=100.0), part.vertices_mm)
+    left = subtract_best_fit(square.point_mm, square.error_um)
     # 100 µrad over ±50 mm: half of it is a rotation, the other half a shear of ±2.5 µm
     assert np.linalg.norm(left, axis=1).max() == pytest.approx(2.5, rel=0.01)
 
@@ -168,7 +168,7 @@ def test_what_is_off_is_told_by_closed_forms():
 
 
 def test_a_pitch_over_the_travel_shears_what_is_high():
-    made = cut(BOX, None, EBX=(0.0, 550.0)).made  # 1 µrad for each mm
+    made = cut(BOX, None, EBX=(0.0, 550.0)).actual  # 1 µrad for each mm
     sides = np.sign(made.point_mm - made.point_mm.mean(axis=0))
     assert np.sum(sides[:, 0] * sides[:, 2] * made.error_um[:, 0]) / 2 == pytest.approx(4.0)
 
@@ -195,14 +195,14 @@ def test_what_waves_between_vertices_is_said_and_leaves_verdicts_undecided(limit
     # 0.004 x² µm: 10 µm at the corners of a box from x −50 to 50, none amid its edges
     asked = Part(mesh=mesh_of(BOX), place=(0.0, 0.0, 0.0), tolerances=("f", KEEPS % limit))
     found = asked.run(parse_scene(WAVE, "s"), ignore_progress)
-    assert [*found.doubts()] == [
+    assert [*found.caveats()] == [
         "between its vertices errors are off by up to 10.0 µm more: expected a finer mesh"
     ]
     (one,) = [m for f in found.features for m in f.measures.values() if "verdict" in m]
     assert one["verdict"] == verdict
     fine = BOX.subdivide().subdivide().subdivide().subdivide()
     finer = replace(asked, mesh=mesh_of(fine)).run(parse_scene(WAVE, "s"), ignore_progress)
-    assert [*finer.doubts()] == []
+    assert [*finer.caveats()] == []
     (one,) = [m for f in finer.features for m in f.measures.values() if "verdict" in m]
     assert one["verdict"] == "pass"
 
@@ -210,7 +210,7 @@ def test_what_waves_between_vertices_is_said_and_leaves_verdicts_undecided(limit
 def test_a_part_beyond_the_travel_is_counted_and_said():
     far = cut(BOX, (270.0, 0.0, 120.0))
     assert 0 < far.outside < far.vertices
-    assert any("beyond the travel" in said for said in far.doubts())
+    assert any("beyond the travel" in said for said in far.caveats())
     with pytest.raises(OptionError, match="expected a mesh"):
         Part().run(scene_with(), ignore_progress)
 
@@ -224,9 +224,9 @@ def test_a_scene_names_its_part(tmp_path):
     scene_file.write_text(f'machine = "dvf5000"\n{text}')
     scene = load_scene(scene_file)
     found = Part().run(scene, ignore_progress)
-    assert found.part.place == scene.part.place
-    assert np.ptp(found.part.vertices_mm, axis=0) == pytest.approx([600.0, 1000.0, 400.0])
-    assert Program().run(scene, ignore_progress).read.blocks == 1
+    assert found.workpiece.place == scene.part.place
+    assert np.ptp(found.workpiece.vertices_mm, axis=0) == pytest.approx([600.0, 1000.0, 400.0])
+    assert Program().run(scene, ignore_progress).program.blocks == 1
     saved = scene_to_toml(scene)
     assert text in saved
     assert parse_scene(saved, "scene", folder=tmp_path) == scene
@@ -247,18 +247,18 @@ def test_a_bent_file_is_as_cut_and_a_predistorted_one_is_cut_nominal(ending, tmp
     file.write_bytes(data.encode() if isinstance(data, str) else data)
     ways = [Part(file=str(file), place=place, unit="mm", predistorted=way) for way in (False, True)]
     found, other = (way.run(scene, ignore_progress) for way in ways)
-    texts = [one.texts(ending)[""] for one in (found, other)]
+    texts = [one.output_files(ending)[""] for one in (found, other)]
     bent, asked = (
-        load_part(f"bent{ending}", "mm", text.encode() if isinstance(text, str) else text)
+        load_workpiece(f"bent{ending}", "mm", text.encode() if isinstance(text, str) else text)
         for text in texts
     )
     assert bent.warnings == asked.warnings == ()  # as closed as it was
-    moved = place_part(bent, scene, place)
-    nearest = np.linalg.norm(moved.vertices_mm[:, None] - found.made.point_mm, axis=-1).argmin(1)
-    error = 1e3 * (moved.vertices_mm - found.made.point_mm[nearest])
-    assert np.abs(error - found.made.error_um[nearest]).max() < 0.02  # of numbers in 4 bytes
-    made = make_points(scene, place_part(asked, scene, place).vertices_mm)
-    off = made.point_mm[:, None] + 1e-3 * made.error_um[:, None] - found.made.point_mm
+    moved = place_workpiece(bent, scene, place)
+    nearest = np.linalg.norm(moved.vertices_mm[:, None] - found.actual.point_mm, axis=-1).argmin(1)
+    error = 1e3 * (moved.vertices_mm - found.actual.point_mm[nearest])
+    assert np.abs(error - found.actual.error_um[nearest]).max() < 0.02  # of numbers in 4 bytes
+    made = evaluate_points(scene, place_workpiece(asked, scene, place).vertices_mm)
+    off = made.point_mm[:, None] + 1e-3 * made.error_um[:, None] - found.actual.point_mm
     assert np.linalg.norm(off, axis=-1).min(axis=1).max() < 2e-5
 
 
@@ -267,4 +267,4 @@ def test_triangles_that_lie_close_without_meeting_are_counted_as_looked_at():
     stack = np.tile([[0.0, 0.0, 0.0], [100.0, 0.0, 100.0], [0.0, 100.0, 0.0]], (100_000, 1, 1))
     stack[:, :, 2] += np.arange(len(stack))[:, None] / 3.0
     triangles = np.arange(3 * len(stack), dtype=np.int32).reshape(-1, 3)
-    assert count_crossings(PartMesh("stack", stack.reshape(-1, 3), triangles)) is None
+    assert count_crossings(Workpiece("stack", stack.reshape(-1, 3), triangles)) is None

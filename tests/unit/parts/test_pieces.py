@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import warpspace
-from warpspace.parts.interpreter import Setup, read_program
+from warpspace.parts.interpreter import ControlSettings, read_program
 from warpspace.parts.program import trace_program
 from warpspace.parts.sample_pieces import ON_RING, PIECES, build_piece
-from warpspace.parts.workpiece import load_part
+from warpspace.parts.workpiece import load_workpiece
 from warpspace.scene.library import parse_scene
 
 PLAIN = (
@@ -31,7 +31,7 @@ VOLUMES = {
 def test_pieces_hold_together(name: str, tmp_path: Path):
     for ending, text in build_piece(name).items():
         (tmp_path / f"a{ending}").write_text(text)
-    mesh = load_part(tmp_path / "a.stl")
+    mesh = load_workpiece(tmp_path / "a.stl")
     assert not mesh.warnings
     assert mesh.surface.volume == pytest.approx(VOLUMES[name], rel=1e-7)
     scene = warpspace.load_scene("dvf5000_first")
@@ -40,7 +40,7 @@ def test_pieces_hold_together(name: str, tmp_path: Path):
     verdicts = [one for row in found for one in row.measures.values() if "verdict" in one]
     assert len(verdicts) == Path(features).read_text().count("measure")
     scene = parse_scene(f"title = 'plain'\n{PLAIN}", "plain")
-    read = read_program(scene, (tmp_path / "a.ngc").read_text().splitlines(), Setup())
+    read = read_program(scene, (tmp_path / "a.ngc").read_text().splitlines(), ControlSettings())
     assert not read.refused
     assert not read.unknown
     path = trace_program(read)

@@ -12,7 +12,13 @@ import warpspace
 from warpspace.analysis.registry import verb
 from warpspace.bench.kinds.circular import Circular
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.parts.interpreter import STAND, ReadProgram, Setup, read_program, with_length
+from warpspace.parts.interpreter import (
+    STAND,
+    ControlSettings,
+    ParsedProgram,
+    read_program,
+    with_length,
+)
 from warpspace.parts.program import Program, ToolPath, trace_program
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene, evaluate
@@ -47,8 +53,8 @@ def dvf() -> Scene:
     return warpspace.load_scene("dvf5000_first")
 
 
-def run(scene: Scene, text: str, **setup: Any) -> tuple[ReadProgram, ToolPath]:
-    read = read_program(scene, text.splitlines(), Setup(**setup))
+def run(scene: Scene, text: str, **setup: Any) -> tuple[ParsedProgram, ToolPath]:
+    read = read_program(scene, text.splitlines(), ControlSettings(**setup))
     return read, trace_program(read)
 
 
@@ -229,7 +235,7 @@ def test_the_way_from_an_unknown_place_does_not_count(dvf: Scene):
     text = "G90 G0 Z-100\nG1 X250\nG0 Y200\nG1 X240\nY230"  # of 10 and 30 mm
     found = Program(file="x", text=text).run(dvf, lambda _: None)
     assert found.length_mm == pytest.approx(40.0, abs=1e-9)
-    assert found.read.blocks == 3
+    assert found.program.blocks == 3
     assert found.path.line[0] == 3
     _, late = run(dvf, "G0 X250 Y200\nG1 X240\nG0 Z-270")  # Z is named once all is cut
     assert np.linalg.norm(late.step_mm, axis=1).sum() == pytest.approx(20.0, abs=1e-9)

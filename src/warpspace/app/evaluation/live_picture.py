@@ -19,7 +19,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
 from warpspace.geometry.colour import ColourScale, component_values
 from warpspace.parts.program import ToolPath
-from warpspace.parts.workpiece import PartMesh
+from warpspace.parts.workpiece import Workpiece
 from warpspace.picture.model import Picture, choose_scale, picture_size_mm
 from warpspace.picture.traces import TraceLine, TraceLines, is_moved, name_trace
 from warpspace.units import Array
@@ -69,7 +69,7 @@ class LivePicture(Picture):
         return None if self.is_difference else bench_in_box(self.drawn_state)
 
     @cached_property
-    def part(self) -> SceneOverlay[PartMesh] | None:
+    def part(self) -> SceneOverlay[Workpiece] | None:
         return self._in_box(part_in_box)
 
     @cached_property
@@ -87,7 +87,7 @@ class LivePicture(Picture):
 
     def coloured(self, found: SceneOverlay[Any]) -> tuple[Array, ColourScale]:
         """Give what is coloured of it, in the colours of the map; along normals in its own."""
-        if self.state.part.normal and isinstance(found.of, PartMesh):
+        if self.state.part.normal and isinstance(found.of, Workpiece):
             normals = found.of.corners.normals @ found.pose[:3, :3].T
             values = np.einsum("ij,ij->i", found.error_um[found.at], normals)
             return values, choose_scale([values], "x")

@@ -23,7 +23,13 @@ from warpspace.kinematics.chain import branch_pose
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.parts.interpreter import read_program
 from warpspace.parts.program import Program, ToolPath, trace_program
-from warpspace.parts.workpiece import Made, PartMesh, make_points, place_part, point_basis
+from warpspace.parts.workpiece import (
+    ActualPoints,
+    Workpiece,
+    evaluate_points,
+    place_workpiece,
+    point_basis,
+)
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
@@ -83,7 +89,7 @@ def _in_box(
         return None
 
 
-def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> SceneOverlay[T]:
+def _respond(scene: Scene, of: T, made: ActualPoints, at: NDArray[Any]) -> SceneOverlay[T]:
     count, keys = len(made.point_mm), scene.parameter_keys
     if count > MOST_POINTS:
         raise OptionError(f"{count:,} points; expected at most {MOST_POINTS:,} in the app")
@@ -104,20 +110,22 @@ def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> SceneOverlay[
 # --- A part ---------------------------------------------------------------------------------------
 
 
-def part_in_box(state: AppState) -> SceneOverlay[PartMesh] | None:
+def part_in_box(state: AppState) -> SceneOverlay[Workpiece] | None:
     """Give the part as it is cut; None where there is none, or it cannot be clamped."""
     mesh, wanted = state.part.mesh, state.part.place
     if mesh is None or not state.part.shown:
         return None
 
-    def clamp(scene: Scene) -> SceneOverlay[PartMesh]:
-        part = place_part(mesh, scene, wanted)
-        return _respond(scene, part, make_points(scene, part.vertices_mm), part.corners.corner_of)
+    def clamp(scene: Scene) -> SceneOverlay[Workpiece]:
+        part = place_workpiece(mesh, scene, wanted)
+        return _respond(
+            scene, part, evaluate_points(scene, part.vertices_mm), part.corners.corner_of
+        )
 
     return _in_box(state, (Identity(mesh), wanted), clamp)
 
 
-def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
+def moved_place(part: Workpiece, stand: Array) -> tuple[float, ...]:
     """Give the place of a part whose middle is to stand so, [4, 4], in the workpiece frame."""
     own = transforms.placed(part.place[:3], part.place[3:])
     pose = stand @ transforms.translation(-part.middle_mm) @ own
@@ -138,7 +146,7 @@ def path_in_box(state: AppState) -> SceneOverlay[ToolPath] | None:
         asked = read_form(Program, Program.options(), told, scene)
         read = read_program(scene, text.splitlines(), asked, state.part.program_name)
         path = trace_program(read)
-        made = Made(path.tip_mm, path.coordinates, path.error_um, path.outside)
+        made = ActualPoints(path.tip_mm, path.coordinates, path.error_um, path.outside)
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return _respond(scene, path, made, np.stack([ends - 1, ends], axis=1))
 

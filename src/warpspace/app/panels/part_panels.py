@@ -27,7 +27,7 @@ from warpspace.app.state.app_state import AppState, PartLook
 from warpspace.app.state.form_values import option_values
 from warpspace.kinematics import transforms
 from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
-from warpspace.parts.workpiece import load_part, place_part
+from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.model import Scene
 
 MOST_LETTERS = 200  # of a line that is shown
@@ -137,9 +137,9 @@ class PartPanel(InBoxPanel):
             text = upload_text(content, name, "file of tolerances")
             return partial(self._hold, (UploadedFile(name, text),))
         self._sent, state = (name, content), self.context.state
-        mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
+        mesh = load_workpiece(name, option_values(state, self.name).get("unit") or None, content)
         kept = state.part.place if name == state.part.name else None
-        place = np.round(place_part(mesh, state.standing, kept).place, 3)
+        place = np.round(place_workpiece(mesh, state.standing, kept).place, 3)
         return partial(self.show, mesh, name, place=tuple(place.tolist()))
 
 

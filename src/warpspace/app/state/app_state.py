@@ -30,7 +30,7 @@ from warpspace.machine.errors import Constant, ErrorFunction, ErrorSet, Toleranc
 from warpspace.machine.limits import EXAGGERATION as FACTORS
 from warpspace.machine.limits import LIVE_NODES, MAX_ERROR, MAX_LENGTH_MM, PROBABILITY
 from warpspace.parts.interpreter import program_lines
-from warpspace.parts.workpiece import PartMesh, load_part
+from warpspace.parts.workpiece import Workpiece, load_workpiece
 from warpspace.scene.model import Scene
 from warpspace.scene.notes import KINDS, Note, NoteAnchor
 
@@ -67,7 +67,7 @@ SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
 """What can be drawn of a comparison; the difference is the change from A to B."""
 PRESENT, NOBODY = "present errors", "nothing"
 """Names of what is steered, and of no other side."""
-_load_part = lru_cache(maxsize=4)(load_part)
+_load_part = lru_cache(maxsize=4)(load_workpiece)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ class PartLook:
     """The part that stands in the box, in place of the scene's own."""
 
     # mesh and text of the program are never saved or linked
-    mesh: PartMesh | None = field(default=None, metadata=said("Mesh of the part"))
+    mesh: Workpiece | None = field(default=None, metadata=said("Mesh of the part"))
     name: str = described("", "Part", linked="part")
     place: tuple[float, ...] | None = described(
         None,
