@@ -20,7 +20,7 @@ from warpspace.app.state.app_state import Picked, start_state
 from warpspace.app.state.tree import put
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene
-from warpspace.scene.notes import Note, NoteAnchor, story, told
+from warpspace.scene.notes import Note, NoteAnchor, changed_number, story
 
 START = start_state(SCENES[0])
 EVIL = "<img src=x onerror='window.taken=1'>"
@@ -65,7 +65,7 @@ def test_numbers_of_a_note_are_those_of_check_and_grow_stale():
     assert note.numbers == note_numbers(scene, [note])[0]
     assert note.numbers["here_um"] == note.numbers["max_um"]  # nothing was asked: the worst point
     moved = part.store.state.with_amplitude("EA0Z", 0.0).resulting_scene()
-    assert told(note.numbers, note_numbers(moved, [note])[0])
+    assert changed_number(note.numbers, note_numbers(moved, [note])[0])
 
 
 def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_holds():

@@ -15,7 +15,16 @@ from warpspace.analysis.note_tables import note_numbers, said_stale
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_NOTES, MAX_REPLACED, MAX_REPLIES
 from warpspace.scene.library import parse_scene
-from warpspace.scene.notes import KINDS, STATUSES, Note, Reply, merge_notes, story, told, with_note
+from warpspace.scene.notes import (
+    KINDS,
+    STATUSES,
+    Note,
+    Reply,
+    changed_number,
+    merge_notes,
+    story,
+    with_note,
+)
 from warpspace.scene.scene_writer import scene_to_toml
 
 BEGAN = datetime(2026, 11, 22, 10, tzinfo=UTC)
@@ -164,13 +173,13 @@ def test_the_longest_text_is_kept_and_one_character_more_is_refused():
 
 def test_numbers_hold_until_they_are_off_by_more_than_the_printed_digit():
     then = {"max_um": 51.72, "here_um": 46.0}
-    assert not told(then, {"max_um": 51.73, "here_um": 45.99, "mean_um": 1.0})
-    assert not told({}, {})
-    assert told(then, {"max_um": 51.74, "here_um": 46.0})
-    assert told(then, {"max_um": 51.72})
-    assert told(then, {"max_um": 46.11, "here_um": 46.0}) == "51.7 → 46.1 µm"
-    assert told(then, {"max_um": 51.74, "here_um": 46.0}) == "51.72 → 51.74 µm"
-    assert told(then, {"max_um": 51.72}) == "46.0 → nothing µm"
+    assert not changed_number(then, {"max_um": 51.73, "here_um": 45.99, "mean_um": 1.0})
+    assert not changed_number({}, {})
+    assert changed_number(then, {"max_um": 51.74, "here_um": 46.0})
+    assert changed_number(then, {"max_um": 51.72})
+    assert changed_number(then, {"max_um": 46.11, "here_um": 46.0}) == "51.7 → 46.1 µm"
+    assert changed_number(then, {"max_um": 51.74, "here_um": 46.0}) == "51.72 → 51.74 µm"
+    assert changed_number(then, {"max_um": 51.72}) == "46.0 → nothing µm"
 
 
 @settings(max_examples=40)

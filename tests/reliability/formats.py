@@ -94,13 +94,13 @@ URDF = """<?xml version="1.0"?>
 
 def _read_urdf(content: bytes, folder: Path) -> object:
     from warpspace.bodies.own_meshes import frame_meshes
-    from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
+    from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
 
     path = _put(content, folder, "r.urdf")
     loaded, others = read_robot(path)
     found = place_robot(loaded, str(path), "", "")
     _, unread, _ = frame_meshes(loaded, found.frame_of, folder)
-    notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
+    notes = [*found.notes, *unread, *omitted_notes(loaded, others, found.frame_of)]
     return parse_scene(imported_text(found.machine, path.name, notes, {}), "fuzz")
 
 

@@ -11,7 +11,7 @@ from warpspace.field.grid import DEFAULT_NODES, build_grid
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import PARAMETERS, parameter
 from warpspace.scene.model import Scene, evaluate, evaluate_grid
-from warpspace.scene.notes import TOLERANCES, Note, told
+from warpspace.scene.notes import TOLERANCES, Note, changed_number
 from warpspace.units import spell_short
 
 Numbers = Mapping[str, float]
@@ -64,7 +64,7 @@ def _here(scene: Scene, note: Note) -> Numbers:
 
 def said_stale(note: Note, found: Numbers) -> str:
     """Say that the numbers of a note no longer hold: "changed: 51.7 → 46.1 µm"."""
-    said = told(note.numbers, found)
+    said = changed_number(note.numbers, found)
     return f"changed: {said}" if said else ""
 
 

@@ -78,7 +78,7 @@ def read_table(path: str | Path, columns: Sequence[DataColumn]) -> ReadingsFile:
 
 
 def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> ReadingsFile:
-    rows = text_files.CsvRows(io.StringIO(text, newline=""), source, MAX_POINTS, once=True)
+    rows = text_files.CsvRows(io.StringIO(text, newline=""), source, MAX_POINTS, unique=True)
     if not rows.header:
         raise SceneError(source, ["is empty; expected a header " + _header(columns)])
     header = [text_files.plain_heading(name) for name in rows.header]

@@ -6,15 +6,15 @@ from itertools import takewhile
 import numpy as np
 
 from warpspace.bodies.schematic import (
+    HomeAxis,
     Parts,
     Range,
     Shape,
-    Way,
     about,
-    beside,
     block,
     cone,
     cylinder,
+    mirrored_walls,
     pair,
     rod,
 )
@@ -40,7 +40,7 @@ class Mount:
 
     point_mm: Array  # [3]; middle of its upper face, in R at home
     half_mm: float  # half width of what should carry it there, mm
-    inner: tuple[Way, ...]  # axes that carry it, the bed's first
+    inner: tuple[HomeAxis, ...]  # axes that carry it, the bed's first
 
     @property
     def carrier(self) -> str:
@@ -64,7 +64,7 @@ class Head:
             shape.apply_transform(self.place)
         self.parts.add(frame, what, *shapes)
 
-    def _line(self, axis: Way) -> tuple[Array, Array]:
+    def _line(self, axis: HomeAxis) -> tuple[Array, Array]:
         direction = self.turn.T @ axis.direction
         origin = self.turn.T @ (axis.origin_mm - self.layout.tip_mm)
         across = direction[:2]
@@ -104,7 +104,7 @@ class Head:
             nose = None
         return self._mount(top, 1.3 * u, inner)
 
-    def _mount(self, top: float, width: float, inner: tuple[Way, ...]) -> Mount:
+    def _mount(self, top: float, width: float, inner: tuple[HomeAxis, ...]) -> Mount:
         over = max(top, self.volume_top)
         mount = Mount(self.turn @ np.array([*self.centre, over]) + self.place[:3, 3], width, inner)
         if top < over:
@@ -140,7 +140,7 @@ class Head:
         nose_cone.apply_translation([*self.centre, 0.0])
         self._add("S", "spindle", nose_cone, cylinder(wide, (cut, top), self.centre))
 
-    def _add_swivel(self, axis: Way, top: float) -> float:
+    def _add_swivel(self, axis: HomeAxis, top: float) -> float:
         u, point = self.u, self._line(axis)[1][:2]
         self._add(axis.name, "swivel", cylinder(1.45 * u, (top, top + 0.9 * u), point))
         if not np.allclose(point, self.centre, atol=0.2 * u):
@@ -150,7 +150,7 @@ class Head:
             self.centre = point.copy()
         return top + 0.9 * u
 
-    def _add_fork(self, axis: Way, parent: str, nose: float) -> float:
+    def _add_fork(self, axis: HomeAxis, parent: str, nose: float) -> float:
         u, (direction, point) = self.u, self._line(axis)
         k = int(np.argmax(np.abs(direction[:2])))
         out = np.eye(3)[k]
@@ -179,7 +179,7 @@ class Head:
         self._add(parent, "fork", body)
         return roof + 0.6 * u
 
-    def _add_nutator(self, axis: Way, parent: str, nose: float) -> float:
+    def _add_nutator(self, axis: HomeAxis, parent: str, nose: float) -> float:
         u, (direction, point) = self.u, self._line(axis)
         line = direction * np.sign(direction[2])
         pivot = np.array([*self.centre, max(float(point[2]), nose + 1.8 * u)])
@@ -273,7 +273,7 @@ class WorkpieceSide:
         for rail in pair(self.centre_mm[1 - k], apart, half_width * self.u):
             self.parts.box(frame, what, self.range(k), rail, z, along=k)
 
-    def _add_slide(self, axis: Way, *, outermost: bool) -> None:
+    def _add_slide(self, axis: HomeAxis, *, outermost: bool) -> None:
         u, k, reach = self.u, axis.k, axis.reach_mm
         if outermost:
             self._add_plate(axis.name, 0.55)
@@ -294,7 +294,7 @@ class WorkpieceSide:
         self._add_rails(axis.name, what, k, half_width=0.22, height=0.25)
         self.half_mm[k] += 0.6 * reach
 
-    def _add_turntable(self, axis: Way, *, outermost: bool) -> None:
+    def _add_turntable(self, axis: HomeAxis, *, outermost: bool) -> None:
         u, z, at = self.u, self.bed_mm, axis.origin_mm
         if not outermost:
             radius = 0.85 * float(self.half_mm.max())
@@ -315,7 +315,7 @@ class WorkpieceSide:
         self.parts.add(axis.name, "table", lines_mm=slots)
         self.half_mm, self.swept_mm = np.full(2, radius), np.full(2, radius)
 
-    def _add_oblique_table(self, axis: Way) -> None:
+    def _add_oblique_table(self, axis: HomeAxis) -> None:
         line = axis.direction * np.sign(axis.direction[2] or 1.0)
         radius = float(self.half_mm.min())
         middle = np.append(self.centre_mm, self.bed_mm - 0.75 * radius)
@@ -327,7 +327,7 @@ class WorkpieceSide:
         )
         self.bed_mm = float(middle[2]) - 0.8 * radius - 0.4 * self.u
 
-    def _add_headstock(self, axis: Way, parent: str) -> None:
+    def _add_headstock(self, axis: HomeAxis, parent: str) -> None:
         layout, parts, u, k = self.layout, self.parts, self.u, axis.k
         m, line, tip, half = 1 - k, axis.origin_mm, layout.tip_mm[k], layout.half_mm[k]
         side = 1.0 if line[k] > tip + 0.5 * half else -1.0
@@ -355,7 +355,7 @@ class WorkpieceSide:
         self.half_mm[k], self.half_mm[m] = abs(near - far) / 2.0, 1.9 * u
         self.swept_mm, self.bed_mm = self.half_mm.copy(), low
 
-    def _add_cradle(self, axis: Way, parent: str) -> None:
+    def _add_cradle(self, axis: HomeAxis, parent: str) -> None:
         layout, u, k = self.layout, self.u, axis.k
         m, z, line = 1 - k, self.bed_mm, axis.origin_mm
         middle, pivot, plate = float(self.centre_mm[k]), float(line[2]), z - 0.65 * u
@@ -370,7 +370,7 @@ class WorkpieceSide:
             (axis.name, "cradle", inner, 0.6 * u, 1.0 * u, (min(plate, pivot), max(pivot, z))),
             (parent, "towers", inner + 0.7 * u, 0.9 * u, 1.2 * u, (bed, pivot)),
         ):
-            for wall in beside(middle, near, thick):
+            for wall in mirrored_walls(middle, near, thick):
                 self.parts.box(frame, what, wall, about(line[m], half), ends, along=k)
                 start, end = line.copy(), line.copy()
                 start[k], end[k] = wall

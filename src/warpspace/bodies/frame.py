@@ -13,14 +13,14 @@ from warpspace.bodies.ends import Head, Mount, WorkpieceSide
 from warpspace.bodies.mesh import LIGHT, MIDDLE, Body
 from warpspace.bodies.schematic import (
     Colour,
+    HomeAxis,
     Parts,
     Range,
-    Way,
     about,
     bar,
-    beside,
     build_layout,
     cylinder,
+    mirrored_walls,
     pair,
     rod,
 )
@@ -55,7 +55,7 @@ class _ToolSide:
     def middle(self) -> float:
         return float(self.spine[self.i])
 
-    def around(self, half: float) -> Range:
+    def centred(self, half: float) -> Range:
         return about(self.middle, half)
 
     def depth(self, point_mm: Array) -> float:
@@ -79,9 +79,9 @@ class _ToolSide:
 
     def posts(self, frame: str, what: str, inner: float, j: Range, z: Range, roof: float) -> None:
         thick = 1.1 * self.u
-        for post in beside(self.middle, inner, thick):
+        for post in mirrored_walls(self.middle, inner, thick):
             self.box(frame, what, post, j, z)
-        self.box(frame, what, self.around(inner + thick), j, (z[1], z[1] + roof * self.u))
+        self.box(frame, what, self.centred(inner + thick), j, (z[1], z[1] + roof * self.u))
 
 
 class _Behind(_ToolSide):
@@ -102,14 +102,14 @@ class _Behind(_ToolSide):
             axis, reach = axes[0], axes[0].reach_mm
             if axis.k == 2:
                 z, flange = about(middle, 1.3 * w), about(middle, 1.9 * w)
-                i, deep = self.around(half), (start + 0.5 * u, start + 0.8 * u)
+                i, deep = self.centred(half), (start + 0.5 * u, start + 0.8 * u)
                 self.box(axis.name, "headstock", i, (start, start + 3.6 * u), z, MIDDLE)
-                self.box(axis.name, "headstock", self.around(half + 0.35 * u), deep, flange)
+                self.box(axis.name, "headstock", self.centred(half + 0.35 * u), deep, flange)
                 half, high, column_at = half + 0.1 * u, middle + reach + 2.6 * w, start + 0.8 * u
                 hangs = False
             elif axis.k == self.j and hangs:
                 j = (start, start + 2.0 * reach + 3.0 * u)
-                self.box(axis.name, "ram", self.around(w), j, about(middle, w), LIGHT)
+                self.box(axis.name, "ram", self.centred(w), j, about(middle, w), LIGHT)
                 start += 0.8 * u
             else:
                 break
@@ -117,28 +117,28 @@ class _Behind(_ToolSide):
         column_at = max(column_at or start + 0.8 * u, self.swept())
         if hangs and not axes:
             j, wide = (start, max(column_at, start) + 1.5 * u), 1.2 * w
-            self.box(BASE, "headstock", self.around(wide), j, about(middle, wide), MIDDLE)
+            self.box(BASE, "headstock", self.centred(wide), j, about(middle, wide), MIDDLE)
         self._add_column(axes, half, column_at, high)
 
-    def _add_column(self, axes: list[Way], half: float, at: float, high: float) -> None:
+    def _add_column(self, axes: list[HomeAxis], half: float, at: float, high: float) -> None:
         u, frames = self.u, [*(axis.name for axis in axes), BASE]
         top = self.stack.bed_mm + 0.75 * u * len(axes)
         self.posts(frames[0], "column", half, (at, at + 2.4 * u), (top, high), 0.9)
         span, near, far = half + 1.5 * u, at - 0.2 * u, at + 2.9 * u
         for number, axis in enumerate(axes):
             what, below = "base" if number else "column", frames[number + 1]
-            self.box(axis.name, what, self.around(span), (near, far), (top - 0.55 * u, top))
+            self.box(axis.name, what, self.centred(span), (near, far), (top - 0.55 * u, top))
             rails = (top - 0.75 * u, top - 0.55 * u)
             if axis.is_linear and axis.k == self.i:
                 span += axis.reach_mm
                 for line in ((at + 0.1 * u, at + 0.5 * u), (far - 0.7 * u, far - 0.3 * u)):
-                    self.box(below, "rails", self.around(span), line, rails)
+                    self.box(below, "rails", self.centred(span), line, rails)
             else:
                 far += axis.reach_mm
                 for line in pair(self.middle, 0.7 * span, 0.2 * u):
                     self.box(below, "rails", line, (near, far), rails)
             top -= 0.75 * u
-        self.stand(self.around(span), (near, far))
+        self.stand(self.centred(span), (near, far))
 
 
 @dataclass
@@ -164,7 +164,7 @@ class _Overhead(_ToolSide):
         self.arm_step = _ARM * self.u
         self.front = self.depth(self.spine)
 
-    def _across(self, level: list[Way]) -> int:
+    def _across(self, level: list[HomeAxis]) -> int:
         ways = [axis.k for axis in level]
         if len(level) < 2 or ways[0] == ways[1]:
             return 0
@@ -201,7 +201,7 @@ class _Overhead(_ToolSide):
         return max(float(own), swept) + self.layout.gap_mm
 
     def _add_vertical(
-        self, axis: Way, rear: _Rear | None, rest: list[Way], at: Array, top: float
+        self, axis: HomeAxis, rear: _Rear | None, rest: list[HomeAxis], at: Array, top: float
     ) -> tuple[_Rear | None, float]:
         u, w, reach = self.u, self.mount.half_mm, axis.reach_mm
         if rear is None and rest and not rest[0].is_linear:
@@ -214,7 +214,7 @@ class _Overhead(_ToolSide):
         if rear is None and any(axis.slides_level for axis in rest):
             high = top + 1.7 * reach + 1.5 * u
             z = (top, high + 0.5 * reach + 0.6 * u)
-            self.box(axis.name, "ram", self.around(w), about(self.front, w), z)
+            self.box(axis.name, "ram", self.centred(w), about(self.front, w), z)
             return _Rear(self.front + w, top + 0.5 * u, high, w + 0.5 * u), top
         if rear is None:
             return self._add_headstock(axis.name, top, reach), top
@@ -229,17 +229,17 @@ class _Overhead(_ToolSide):
         u, w = self.u, 1.25 * self.mount.half_mm
         column, high = self._behind(self.front + w + 1.2 * u), top + 3.2 * u
         low, plate = top - 0.2 * u, (column - 0.35 * u, column - 0.12 * u)
-        self.box(name, "headstock", self.around(w), (self.front - w, plate[0]), (top, high))
-        self.box(name, "headstock", self.around(1.25 * w), plate, (low, high + 0.8 * u))
+        self.box(name, "headstock", self.centred(w), (self.front - w, plate[0]), (top, high))
+        self.box(name, "headstock", self.centred(1.25 * w), plate, (low, high + 0.8 * u))
         self.parts.add(name, "headstock", cylinder(0.62 * w, (high, high + 1.3 * u), self.spine))
         return _Rear(column, low - reach, high + 0.8 * u + reach, 1.45 * w, "column")
 
-    def _add_level(self, axis: Way, rear: _Rear | None, top: float) -> _Rear:
+    def _add_level(self, axis: HomeAxis, rear: _Rear | None, top: float) -> _Rear:
         u, reach, name = self.u, axis.reach_mm, axis.name
         across = axis.k == self.i
         if rear is None:
             w, z = 1.2 * self.mount.half_mm, (top, top + 1.6 * u)
-            self.box(name, "carriage", self.around(w), about(self.front, w), z)
+            self.box(name, "carriage", self.centred(w), about(self.front, w), z)
             rear = _Rear(self.front + w, *z, w)
         elif rear.need == "ledge" and across:
             return self._add_ledge_saddle(name, rear, reach)
@@ -258,22 +258,22 @@ class _Overhead(_ToolSide):
     def _add_carriage(self, name: str, rear: _Rear) -> _Rear:
         plane = rear.plane + 0.6 * self.u
         z = (rear.low, rear.high)
-        self.box(name, "carriage", self.around(rear.half), (rear.plane, plane), z)
+        self.box(name, "carriage", self.centred(rear.half), (rear.plane, plane), z)
         return _Rear(plane, *z, rear.half)
 
     def _add_sliding_ram(self, name: str, rear: _Rear, reach: float) -> _Rear:
         u, middle, front = self.u, (rear.low + rear.high) / 2.0, rear.plane + 0.55 * self.u
         under, over = max(rear.low, middle - 1.9 * u), middle + 1.5 * u
         back = 2.0 * reach + max(rear.plane + 2.4 * u, self._behind(0.0) + 1.6 * u)
-        i, z = self.around(rear.half), (rear.low, rear.high)
+        i, z = self.centred(rear.half), (rear.low, rear.high)
         self.box(name, "saddle", i, (rear.plane, front), z, LIGHT)
-        self.box(name, "saddle", self.around(0.92 * rear.half), (front, back), (under, over))
+        self.box(name, "saddle", self.centred(0.92 * rear.half), (front, back), (under, over))
         return _Rear(back, under, over, rear.half, "ledge", reach)
 
     def _add_ledge_saddle(self, name: str, rear: _Rear, reach: float) -> _Rear:
         u, half, low = self.u, 1.35 * rear.half, rear.low - 1.3 * self.u
         j, rails = (self._behind(0.0), rear.plane - 0.1 * u), rear.low - 0.25 * u
-        self.box(name, "saddle", self.around(half), j, (low, rails))
+        self.box(name, "saddle", self.centred(half), j, (low, rails))
         for line in pair(self.middle, 0.6 * rear.half, 0.2 * u):
             self.box(name, "saddle", line, j, (rails, rear.low))
         return _Rear(rear.plane, low, rear.high, half + reach, "ledge", reach)
@@ -283,7 +283,7 @@ class _Overhead(_ToolSide):
         rear.low = max(rear.low, float(self.layout.high_mm[2]) + self.layout.gap_mm)
         rear.high = max(rear.low + 2.6 * u, min(rear.high, rear.low + 3.6 * u))
         half = max(rear.half + rear.reach + 0.3 * u, self._clear_half() + 0.2 * u)
-        i, front = self.around(half), rear.plane + 0.18 * u
+        i, front = self.centred(half), rear.plane + 0.18 * u
         self.box(name, what, i, (front, front + 1.5 * u), (rear.low + 0.15 * u, rear.high))
         for z in (rear.low + 0.5 * u, rear.high - 0.5 * u):
             self.box(name, what, i, (rear.plane, front), about(z, 0.16 * u))
@@ -294,7 +294,7 @@ class _Overhead(_ToolSide):
         wall = max(bed + 0.1 * u, float(self.layout.low_mm[2]) - 0.9 * u)
         half, middle = self._add_beam(name, rear, "bridge"), rear.plane + 0.9 * u
         foot, ends = wall + 0.55 * u, about(middle, 1.9 * u + reach)
-        for low, high in beside(self.middle, half, 1.0 * u):
+        for low, high in mirrored_walls(self.middle, half, 1.0 * u):
             self.box(name, "bridge", (low, high), about(middle, 1.1 * u), (foot, rear.high))
             deep = about(middle, 1.9 * u)
             self.box(name, "bridge", (low, high), deep, (wall + 0.12 * u, foot))
@@ -307,7 +307,7 @@ class _Overhead(_ToolSide):
     def _add_cantilever(self, top: float) -> _Rear:
         u, w = self.u, 1.25 * self.mount.half_mm
         column, z = self._behind(self.front + w + 0.5 * u), (top, top + 2.2 * u)
-        self.box(BASE, "column", self.around(w), (self.front - w, column), z)
+        self.box(BASE, "column", self.centred(w), (self.front - w, column), z)
         return _Rear(column, *z, 1.2 * w, "column")
 
     def _add_base(self, rear: _Rear) -> None:
@@ -316,14 +316,14 @@ class _Overhead(_ToolSide):
             return
         if rear.need == "beam":
             half, j = self._add_beam(BASE, rear, "portal"), about(rear.plane + 1.1 * u, 1.4 * u)
-            for leg in beside(self.middle, half, 1.3 * u):
+            for leg in mirrored_walls(self.middle, half, 1.3 * u):
                 self.box(BASE, "portal", leg, j, (bed, rear.high + 0.25 * u))
                 self.stand(leg, j)
         elif rear.need == "posts":
             inner, middle = rear.half - 0.3 * u, rear.plane + 1.0 * u
             z = (bed, rear.high + rear.reach + 0.6 * u)
             self.posts(BASE, "portal", inner, about(middle, 0.6 * u), z, 0.7)
-            self.stand(self.around(inner + 1.1 * u), about(middle, 1.2 * u))
+            self.stand(self.centred(inner + 1.1 * u), about(middle, 1.2 * u))
         elif rear.need == "ledge":
             self._add_ledge(rear)
         else:
@@ -332,7 +332,7 @@ class _Overhead(_ToolSide):
     def _add_ledge(self, rear: _Rear) -> None:
         u, bed, rails = self.u, self.stack.bed_mm, rear.low - 0.25 * self.u
         half = max(rear.half + 0.3 * u, 0.6 * float(self.stack.half_mm[self.i]))
-        i, (front, back) = self.around(half), (self._behind(0.0), rear.plane)
+        i, (front, back) = self.centred(half), (self._behind(0.0), rear.plane)
         self.box(BASE, "column", i, (front, back), (bed, rails))
         if rear.reach and half > rear.half:
             for j in (front + 0.6 * u, back - 0.9 * u):
@@ -344,7 +344,7 @@ class _Overhead(_ToolSide):
         low = bed + (0.9 * u if foot else 0.0)
         rear.plane = max(rear.plane, self._behind(0.0))
         i, j = (
-            self.around(1.15 * rear.half),
+            self.centred(1.15 * rear.half),
             (rear.plane, rear.plane + max(2.0 * u, 1.3 * rear.half)),
         )
         self.box(name, "column", i, j, (low, rear.high + 0.3 * u))
@@ -354,13 +354,13 @@ class _Overhead(_ToolSide):
                 self.box(name, "column", line, (rear.plane - 0.12 * u, rear.plane), guides)
         if foot:
             j = (j[0] - 0.2 * u, j[1] + 0.4 * u)
-            self.box(name, "column", self.around(1.4 * rear.half), j, (bed + 0.2 * u, low))
-            i = self.around(1.5 * rear.half + float(self.layout.half_mm[self.i]))
+            self.box(name, "column", self.centred(1.4 * rear.half), j, (bed + 0.2 * u, low))
+            i = self.centred(1.5 * rear.half + float(self.layout.half_mm[self.i]))
             for at in (j[0] + 0.5 * u, j[1] - 0.5 * u):
                 self.box(BASE, "rails", i, about(at, 0.18 * u), (bed, bed + 0.2 * u))
         self.stand(i, j)
 
-    def _add_turning(self, axis: Way, at: Array, top: float) -> tuple[Array, float]:
+    def _add_turning(self, axis: HomeAxis, at: Array, top: float) -> tuple[Array, float]:
         u, line = self.u, axis.origin_mm
         if axis.k != 2:
             out, hub = axis.direction, np.array([*at[:2], top + 1.2 * u])

@@ -34,18 +34,18 @@ _GLB_BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _GLB_COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 _DAE_REFERENCES = 20
 """Nodes of a DAE file by reference: each may hold others, so that they multiply."""
-LISTED, WORDS, BYTES = 12, 40, 200
+NUMBERS_PER_TRIANGLE, WORDS_PER_TRIANGLE, BYTES_PER_TRIANGLE = 12, 40, 200
 """Of a triangle in a file: numbers in lists or lines; words of a text, 21 in STL; bytes."""
 
 
-def count_mesh(data: bytes, ending: str, most: int = limits.MAX_TRIANGLES) -> bytes:
+def count_mesh(data: bytes, ending: str, max_triangles: int = limits.MAX_TRIANGLES) -> bytes:
     """Refuse a mesh file that holds more than can be built in a moment."""
     if ending == ".obj":
         text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", "")
         data = _GROUPS.sub("", text).encode()
     elif ending == ".stl" and not _is_binary(data):
         data = _NEXT_SOLID.sub(b"", data)
-    _COUNTERS[ending](data, most)
+    _COUNTERS[ending](data, max_triangles)
     return data
 
 
@@ -95,10 +95,10 @@ def _merge_stl(data: bytes) -> Any:
 
 
 def _count_text(data: bytes, most: int) -> int:
-    _limit(data.count(b"\n"), LISTED * most, "lines")
+    _limit(data.count(b"\n"), NUMBERS_PER_TRIANGLE * most, "lines")
     blank = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
     words = int(np.count_nonzero(blank[:-1] & ~blank[1:]))
-    _limit(words, WORDS * most, "words")
+    _limit(words, WORDS_PER_TRIANGLE * most, "words")
     return words
 
 
@@ -131,7 +131,7 @@ def _count_ply(data: bytes, most: int) -> None:
         _limit(data.count(b"\n", at), total + 100, "lines")
     held = _count_text(data[at:], most) if is_text else (len(data) - at) // smallest
     scalars //= 1 if is_text else smallest
-    _limit(held - scalars, LISTED * most, "numbers in lists")
+    _limit(held - scalars, NUMBERS_PER_TRIANGLE * most, "numbers in lists")
 
 
 def _count_glb(data: bytes, most: int) -> None:
@@ -151,16 +151,16 @@ def _count_glb(data: bytes, most: int) -> None:
     primitives = [mesh["primitives"] for mesh in held.get("meshes", [])]
     _limit(sum(map(len, primitives)), limits.MAX_MESH_PARTS, "primitives")
     accessors = [max(int(accessor["count"]), 0) for accessor in held.get("accessors", [])]
-    _limit(sum(accessors), LISTED * most, "points and indices")
+    _limit(sum(accessors), NUMBERS_PER_TRIANGLE * most, "points and indices")
     stored = sum(max(int(view["byteLength"]), 0) for view in held.get("bufferViews", []))
-    _limit(stored, BYTES * most, "bytes in views of its data")
+    _limit(stored, BYTES_PER_TRIANGLE * most, "bytes in views of its data")
     arrays = sum(
         max(int(accessor["count"]), 0)
         * _GLB_COLUMNS[accessor["type"]]
         * _GLB_BYTES[accessor["componentType"]]
         for accessor in held.get("accessors", [])
     )
-    _limit(arrays, BYTES * most, "bytes of points and indices")
+    _limit(arrays, BYTES_PER_TRIANGLE * most, "bytes of points and indices")
     placed = [primitive for mesh in _placed(held) for primitive in primitives[mesh]]
     _limit(len(placed), limits.MAX_MESH_PARTS, "primitives, each placing counted")
     corners = sum(
@@ -252,14 +252,14 @@ def _check_geometry(scene: Any, most: int) -> None:
 def open_meshes(
     path: Path,
     what: str,
-    most: int = limits.MAX_TRIANGLES,
+    max_triangles: int = limits.MAX_TRIANGLES,
     data: bytes | None = None,
     *,
     has_materials: bool = False,
 ) -> Any:
     """Open a mesh file; without its materials, whose pictures may need any amount of memory."""
     try:
-        data = read_bytes(path, BYTES * most) if data is None else data
+        data = read_bytes(path, BYTES_PER_TRIANGLE * max_triangles) if data is None else data
     except SceneError as error:
         raise OptionError(str(error)) from None
     if not data:
@@ -271,13 +271,13 @@ def open_meshes(
     try:
         with np.errstate(all="ignore"):
             ending = path.suffix.lower()
-            data = count_mesh(data, ending, most)
+            data = count_mesh(data, ending, max_triangles)
             merged = _merge_stl(data) if ending == ".stl" and _is_binary(data) else None
             file = io.BytesIO(data)
             found = merged or trimesh.load_scene(
                 file, file_type=ending[1:], process=False, skip_materials=not has_materials
             )
-            _check_geometry(found, most)
+            _check_geometry(found, max_triangles)
             return found
     except OptionError as error:
         raise OptionError(f"{path}: {error}. Reduce it before") from None

@@ -35,7 +35,7 @@ def load_mesh(path: str | Path, frame: str, unit: str | None = None) -> Body:
 
 
 def read_mesh(
-    path: Path, unit: str | None, most: int = MAX_TRIANGLES, data: bytes | None = None
+    path: Path, unit: str | None, max_triangles: int = MAX_TRIANGLES, data: bytes | None = None
 ) -> tuple[Any, tuple[str, ...]]:
     """Give a file as one mesh of trimesh, in mm with z upwards, and what is wrong with it.
 
@@ -48,7 +48,7 @@ def read_mesh(
     is_told, (standard, up) = unit is not None, FORMATS[path.suffix.lower()]
     if (unit := unit or standard) not in UNITS_MM:
         raise OptionError(f"{path}: {unit!r}; expected one of {', '.join(UNITS_MM)}")
-    found = open_meshes(path, f"{path.suffix[1:].upper()} file", most, data)
+    found = open_meshes(path, f"{path.suffix[1:].upper()} file", max_triangles, data)
     nodes = found.graph.nodes_geometry
     pose, name = found.graph[nodes[0]] if len(nodes) == 1 else (None, None)
     is_one = hasattr(found.geometry.get(name), "faces")  # a large one is not copied
@@ -116,7 +116,7 @@ def _is_closed(faces: NDArray[np.int64]) -> bool:
     return sum(sums) % 2**64 == 0
 
 
-def own_meshes(machine: Machine) -> dict[str, Body]:
+def machine_meshes(machine: Machine) -> dict[str, Body]:
     return {
         frame: _read(frame, source)
         for frame, source in machine.bodies.items()
@@ -142,7 +142,7 @@ def _read(frame: str, source: BodySource) -> Body:
 
 
 def check_meshes(machine: Machine) -> tuple[str, ...]:
-    return tuple(text for body in own_meshes(machine).values() for text in body.warnings)
+    return tuple(text for body in machine_meshes(machine).values() for text in body.warnings)
 
 
 MM_PER_M = 1000.0

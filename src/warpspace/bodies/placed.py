@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
-from warpspace.bodies.own_meshes import own_meshes
+from warpspace.bodies.own_meshes import machine_meshes
 from warpspace.bodies.schematic import BODY_FILE, read_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms
@@ -25,7 +25,7 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
     frames = {BASE, "S", "t", "w", *machine.axes}
     kept = read_bodies(Path(machine.body_dir) / BODY_FILE) if machine.body_dir else ()
-    own = own_meshes(machine)
+    own = machine_meshes(machine)
     bodies = [body for body in kept or generate_bodies(machine) if body.frame not in own]
     return tuple(body for body in (*bodies, *own.values()) if body.frame in frames)
 

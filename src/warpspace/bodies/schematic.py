@@ -108,7 +108,7 @@ def pair(middle: float, apart: float, half: float) -> tuple[Range, Range]:
     return about(middle - apart, half), about(middle + apart, half)
 
 
-def beside(middle: float, inner: float, thick: float) -> tuple[Range, Range]:
+def mirrored_walls(middle: float, inner: float, thick: float) -> tuple[Range, Range]:
     """Give two mirrored ranges, such as two walls, by the inner faces."""
     return pair(middle, inner + thick / 2.0, thick / 2.0)
 
@@ -161,7 +161,7 @@ _ALIGNED, _SQUARE = 0.9994, 0.02
 
 
 @dataclass(frozen=True)
-class Way:
+class HomeAxis:
     """How an axis moves at home, in R."""
 
     name: str
@@ -182,8 +182,8 @@ class MachineLayout:
     """A machine at home."""
 
     poses: dict[str, Array]  # [4, 4]; every frame in R
-    tool: tuple[Way, ...]  # axes of each branch, from the frame outwards
-    workpiece: tuple[Way, ...]
+    tool: tuple[HomeAxis, ...]  # axes of each branch, from the frame outwards
+    workpiece: tuple[HomeAxis, ...]
     tip_mm: Array  # [3]; tool point: the middle of the working volume
     # [3]; half edges of the working volume along the axes of R, its lower and its upper corner
     half_mm: Array
@@ -239,11 +239,11 @@ def build_layout(machine: Machine) -> MachineLayout:
     )
 
 
-def _way(axis: Axis, pose: Array) -> Way:
+def _way(axis: Axis, pose: Array) -> HomeAxis:
     direction = pose[:3, axis.index]
     k = 2 if abs(direction[2]) > _STEEP else int(np.argmax(np.abs(direction[:2])))
     reach = (axis.travel[1] - axis.travel[0]) / 2.0 if axis.is_linear else 0.0
-    return Way(axis.name, axis.is_linear, direction, pose[:3, 3], k, reach)
+    return HomeAxis(axis.name, axis.is_linear, direction, pose[:3, 3], k, reach)
 
 
 def _find_slant(machine: Machine, poses: Mapping[str, Array]) -> Array:

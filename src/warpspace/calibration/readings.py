@@ -66,7 +66,7 @@ def parse_table(text: str, source: str) -> ReadingTable:
     """Read the text of a CSV file with a header, or what ``field --json`` printed."""
     if text.lstrip().startswith("{"):
         return _parse_field(text, source)
-    rows = CsvRows(io.StringIO(text, newline=""), source, MAX_READINGS, once=True)
+    rows = CsvRows(io.StringIO(text, newline=""), source, MAX_READINGS, unique=True)
     header = [plain_heading(name).lower() for name in rows.header]
     if not header:
         raise SceneError(source, ["is empty; expected a header and rows of readings"])

@@ -150,9 +150,9 @@ def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
 def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = False) -> "Scene":
     """Load a scene as it is looked at: for a direction of travel, the workpiece placed or not."""
     from warpspace.scene.library import load_scene
-    from warpspace.scene.model import in_direction, placed_in
+    from warpspace.scene.model import with_direction, with_placement
 
-    return placed_in(in_direction(load_scene(name), direction), loop, placed=placed)
+    return with_placement(with_direction(load_scene(name), direction), loop, placed=placed)
 
 
 def say_first_order(loop: str, *scenes: "Scene") -> None:

@@ -108,7 +108,7 @@ class Source:
 
     def rows(self, most: int) -> CsvRows:
         """Read it as a table with a header and at most so many rows."""
-        return CsvRows(io.StringIO(self.text), self.name, most, once=True)
+        return CsvRows(io.StringIO(self.text), self.name, most, unique=True)
 
     def at(self, line: int) -> "SourceLine":
         """Give one of its lines, counted from 1."""

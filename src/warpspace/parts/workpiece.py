@@ -93,7 +93,7 @@ def load_workpiece(
 ) -> Workpiece:
     """Read a mesh from a file, or from its bytes: in mm, .glb in m, unless a unit is given."""
     path = Path(path)
-    mesh, said = read_mesh(path, unit, most=MAX_PART_TRIANGLES, data=data)
+    mesh, said = read_mesh(path, unit, max_triangles=MAX_PART_TRIANGLES, data=data)
     part = Workpiece(path.stem, np.asarray(mesh.vertices), mesh.faces.astype(np.int32), unit)
     surface = "its surface passes through itself"
     if (count := count_crossings(part)) is None:

@@ -249,7 +249,7 @@ class CurveReader:
         else:
             self.problems.add(where, f"expected {spell_forms()}", raw)
             return None
-        self.problems.take(where, reader)
+        self.problems.add_findings(where, reader)
         self.problems.only(where, table, form, "key")
         return curve
 
@@ -262,7 +262,7 @@ class CurveReader:
         raw: dict[str, object],
         where: str,
         gantry: Gantry | None,
-        given: Collection[str],
+        keys: Collection[str],
     ) -> dict[str, ErrorFunction]:
         """Read ``{ guides = [CURVE, CURVE] }`` of a gantry: a mean, and a rotation."""
         axis, problems = self.axis, self.problems
@@ -275,7 +275,7 @@ class CurveReader:
             expected = f"expected guides in {gantry.positioning_key}, the positioning of {axis}"
             problems.add(where, expected, raw)
             return {}
-        if gantry.rotation_key in given:
+        if gantry.rotation_key in keys:
             found = f"follows from the guides of {key}; expected one of the two"
             problems.add(f"errors.{gantry.rotation_key}", found)
         problems.only(where, raw, (GUIDES,), "key")

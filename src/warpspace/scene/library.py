@@ -33,7 +33,7 @@ from warpspace.scene import machine_library, schema
 from warpspace.scene.curve_reader import GUIDES, CurveReader, read_csv_runs
 from warpspace.scene.model import PartSource, Scene, scene_notes
 from warpspace.scene.notes import TOLERANCES, Note
-from warpspace.scene.scene_writer import Notation, matrix_digest, read_errors, turn_covariance
+from warpspace.scene.scene_writer import Notation, convert_covariance, matrix_digest, read_errors
 from warpspace.scene.schema import Problems
 from warpspace.scene.text_files import one_line, parse_toml, read_bytes, read_text
 
@@ -162,7 +162,7 @@ def parse_scene(
         description=description,
         notes=(*scene_notes(machine, workspace, errors), *machine_library.body_notes(machine)),
         uncertainty=uncertainty,
-        covariance=turn_covariance(machine, covariance, convention["squareness"]),
+        covariance=convert_covariance(machine, covariance, convention["squareness"]),
         measured=measured,
         review=review,
         part=PartSource(**part, folder=str(folder or "")),
@@ -174,7 +174,7 @@ def _machine(
 ) -> Machine:
     given, machine = raw.get("machine"), None
     if not isinstance(given, str):
-        machine = machine_library.machine_of(given, "machine", name, problems, folder=folder)
+        machine = machine_library.read_machine(given, "machine", name, problems, folder=folder)
     elif given in machine_library.machine_names():
         machine = machine_library.load_machine(given)
     else:
@@ -326,7 +326,7 @@ class _Document:
     folder: Path | None
     problems: Problems
 
-    def known(self, section: str) -> dict[str, object]:
+    def parameter_entries(self, section: str) -> dict[str, object]:
         known: dict[str, object] = {}
         machine, problems = self.machine, self.problems
         for key, value in problems.table(section, self.raw.get(section)).items():
@@ -363,7 +363,7 @@ class _Document:
 
     def errors(self) -> ErrorSet:
         found: dict[str, ErrorFunction] = {}
-        problems, known = self.problems, self.known("errors")
+        problems, known = self.problems, self.parameter_entries("errors")
         given = cast("dict[str, object]", self.raw.get("errors") or {})
         for key, value in known.items():
             where, row, reader = f"errors.{key}", PARAMETERS[key], self.curves(key)
@@ -390,14 +390,14 @@ class _Document:
         if isinstance(table, dict) and "default" in table:
             default = problems.read(schema.DEFAULTS, "tolerances.default", table["default"])
         own: dict[str, Tolerance] = {}
-        for key, value in self.known("tolerances").items():
+        for key, value in self.parameter_entries("tolerances").items():
             if valid := problems.read(schema.tolerance, f"tolerances.{key}", value):
                 own[key] = valid
         return ToleranceSet(default or {}, own)
 
     def uncertainties(self) -> dict[str, ErrorFunction]:
         found: dict[str, ErrorFunction] = {}
-        for key, raw in self.known("uncertainty").items():
+        for key, raw in self.parameter_entries("uncertainty").items():
             where, constant = f"uncertainty.{key}", PARAMETERS[key].is_constant
             curve = self.curves(key).read(raw, where, constant=constant)
             if curve is None:
@@ -413,7 +413,7 @@ class _Document:
             found[key] = curve
         return found
 
-    def covariance(self, alone: Collection[str]) -> Covariance | None:
+    def covariance(self, independent_keys: Collection[str]) -> Covariance | None:
         """Read how sure errors are together, of others than those that stand alone."""
         where, problems = "uncertainty.covariance", self.problems
         given = self.raw.get("uncertainty")
@@ -440,7 +440,7 @@ class _Document:
         )
         for at, key in enumerate(every):
             self.check_free(f"{where}.keys", key, key)
-            if key in every[:at] or key in alone:
+            if key in every[:at] or key in independent_keys:
                 expected = "expected each error once, here or as uncertainty.KEY"
                 problems.add(f"{where}.keys", expected, key)
         lengths, where = [*map(len, rows)], f"{where}.matrix"
@@ -475,7 +475,7 @@ class _Document:
 
     def measurements(self) -> dict[str, Measurement]:
         found: dict[str, Measurement] = {}
-        for key, raw in self.known("measured").items():
+        for key, raw in self.parameter_entries("measured").items():
             where = f"measured.{key}"
             if isinstance(raw, dict) and "csv" in raw:
                 named = self.problems.read(schema.CSV_RUNS, where, raw)

@@ -93,13 +93,13 @@ def load_machine(name: str) -> definition.Machine:
     path = folder / "machine.toml"
     raw = parse_toml(read_text(path, MAX_SCENE_BYTES), str(path))
     problems = Problems()
-    machine = machine_of(raw, "", name, problems, body_dir=str(folder), folder=folder)
+    machine = read_machine(raw, "", name, problems, body_dir=str(folder), folder=folder)
     if machine is None or problems.lines:
         raise SceneError(str(path), problems.lines)
     return machine
 
 
-def machine_of(
+def read_machine(
     raw: object,
     key: str,
     name: str,

@@ -192,7 +192,7 @@ def evaluate(
     """
     if at is not None and grid is not None:
         raise OptionError("give either points (at) or a grid, not both")
-    scene = placed_in(scene, loop, placed=placed)
+    scene = with_placement(scene, loop, placed=placed)
     view = choose_view(scene, loop, frame)
     if at is not None:
         given = complete_coordinates(scene.machine, at, scene.workspace.positions)
@@ -219,7 +219,7 @@ def check_magnitude(scene: Scene, coordinates: Coordinates) -> None:
             )
 
 
-def in_direction(scene: Scene, direction: str | None) -> Scene:
+def with_direction(scene: Scene, direction: str | None) -> Scene:
     if direction is None:
         return scene
     if direction not in [*axes.TravelDirection]:
@@ -228,7 +228,7 @@ def in_direction(scene: Scene, direction: str | None) -> Scene:
     return replace(scene, model=replace(scene.model, direction=axes.TravelDirection(direction)))
 
 
-def placed_in(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
+def with_placement(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
     """Give a scene whose relative errors leave out where the workpiece lies, if that is wanted."""
     if placed and loop != Loop.RELATIVE:
         raise OptionError(

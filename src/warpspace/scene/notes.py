@@ -94,7 +94,7 @@ class Note:
         return replace(self, replies=(*self.replies, reply))
 
 
-def told(then: Mapping[str, float], found: Mapping[str, float]) -> str:
+def changed_number(then: Mapping[str, float], found: Mapping[str, float]) -> str:
     """Say which number of a note no longer holds, if any: "51.7 → 46.1 µm"."""
     for name in reversed(MEASURES):
         was, now = then.get(name), found.get(name)

@@ -55,7 +55,7 @@ def covered_spans(model: Model, workspace: Workspace) -> dict[str, Span]:
     return found
 
 
-def over_ranges(errors: ErrorSet, model: Model, workspace: Workspace) -> ErrorSet:
+def extend_to_ranges(errors: ErrorSet, model: Model, workspace: Workspace) -> ErrorSet:
     """Give every curve the range that it has in a scene; its values stay."""
     chosen = dict(errors.functions)
     for key, function in errors.functions.items():
@@ -77,7 +77,7 @@ def read_errors(
     spans = covered_spans(model, workspace)
     try:
         moved = move_measuring_line(model, errors, spans, lines, to_origin=True)
-        return over_ranges(moved, model, workspace)
+        return extend_to_ranges(moved, model, workspace)
     except OptionError as error:
         raise SceneError(source, [f"convention.measuring_line_mm: {error}"]) from None
 
@@ -87,11 +87,11 @@ def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
     lines, errors = notation.measuring_line_mm, scene.errors
     if lines:
         moved = move_measuring_line(scene.model, errors, spans, lines, to_origin=False)
-        errors = over_ranges(moved, scene.model, scene.workspace)
+        errors = extend_to_ranges(moved, scene.model, scene.workspace)
     return convert_squareness(scene.machine, errors, notation.squareness)
 
 
-def turn_covariance(
+def convert_covariance(
     machine: Machine, found: Covariance | None, sign: SquarenessSign | str
 ) -> Covariance | None:
     """Write a covariance with another sign of squareness, or read it; both are the same step."""
@@ -109,7 +109,7 @@ _WRAP = 8  # entries of a list that stand on one line
 
 def scene_files(scene: Scene, stem: str) -> dict[str, str | bytes]:
     """Spell a scene by the ends of its files: a large covariance stands beside it, as numbers."""
-    joint = turn_covariance(scene.machine, scene.covariance, Notation().squareness)
+    joint = convert_covariance(scene.machine, scene.covariance, Notation().squareness)
     if joint is None or len(joint.keys) <= MOST_SPELLED:
         return {"": scene_to_toml(scene)}
     packed = BytesIO()
@@ -165,7 +165,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = 
         for key, function in scene.errors.functions.items()
     }
     parts += [spell_section("errors", functions, PARAMETERS), _tolerances_section(scene)]
-    joint = turn_covariance(scene.machine, scene.covariance, notation.squareness)
+    joint = convert_covariance(scene.machine, scene.covariance, notation.squareness)
     uncertain = {key: function.to_toml() for key, function in scene.uncertainty.items()}
     parts.append(spell_section("uncertainty", uncertain | _covariance(joint, matrix), PARAMETERS))
     for key, measurement in scene.measured.items():

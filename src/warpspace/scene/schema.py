@@ -46,7 +46,7 @@ class Problems:
                 hint = near_miss(name, known) if len(self.lines) < SHOWN_PROBLEMS else ""
                 self.lines.append(f"{location(section, [name])}: unknown {what}{hint}")
 
-    def take(self, key: str, reader: ValueReader) -> bool:
+    def add_findings(self, key: str, reader: ValueReader) -> bool:
         """Note what a reader has found below a key; tell whether that is nothing."""
         for finding in reader.findings:
             self.add(location(key, finding.path), finding.text, finding.value)
@@ -56,7 +56,7 @@ class Problems:
         """Read one value; None where anything is wrong with it."""
         reader = ValueReader()
         found = kind(reader, value, ())
-        return found if self.take(key, reader) else None
+        return found if self.add_findings(key, reader) else None
 
     def table(self, key: str, value: object) -> dict[str, object]:
         """Give a table as a dictionary; note a problem and give an empty one for anything else."""

@@ -47,7 +47,7 @@ class StarterDimensions:
     traces_mm: tuple[Vector, Vector]
 
 
-def layout(chain: Chain) -> StarterDimensions:
+def compute_dimensions(chain: Chain) -> StarterDimensions:
     spanning = _spanning(chain)
     lying = _is_lying(chain)
     up = 1 if lying else 2
@@ -170,7 +170,7 @@ def starter_text(chain: str | Chain, title: str = "") -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     parsed = parse_chain(chain) if isinstance(chain, str) else chain
-    sizes = layout(parsed)
+    sizes = compute_dimensions(parsed)
     count = len(parsed.axes)
     name = title or f"{parsed}, {count} {'axis' if count == 1 else 'axes'}"
     templates = Environment(

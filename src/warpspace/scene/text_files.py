@@ -321,9 +321,9 @@ def _spell_cell(value: object) -> str:
 class CsvRows:
     """The rows of a table: memory does not grow with what is refused."""
 
-    def __init__(self, file: TextIO, source: str, most: int, *, once: bool = False) -> None:
+    def __init__(self, file: TextIO, source: str, max_rows: int, *, unique: bool = False) -> None:
         self.source, self.problems = source, list[str]()
-        self._file, self._most, self._once = file, most, once
+        self._file, self._most, self._once = file, max_rows, unique
         self._number = self._since_row = 0
         self._signs: dict[str, str] = {}
         self._repeated: list[str] = []

@@ -484,7 +484,7 @@ _NO_PLACE: tuple[tuple[str, str, Callable[[Any], object]], ...] = (
 )
 
 
-def left_out(robot: Any, others: Sequence[str], kept: Collection[str]) -> list[str]:
+def omitted_notes(robot: Any, others: Sequence[str], kept: Collection[str]) -> list[str]:
     gone = [link.name for link in robot.links if link.name not in kept]
     mimics = [one.name for one in robot.joints if one.child in gone and one.mimic is not None]
     found = [

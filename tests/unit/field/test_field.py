@@ -24,7 +24,7 @@ from warpspace.kinematics.model import Loop, Model, complete_coordinates
 from warpspace.machine.definition import build_machine
 from warpspace.machine.errors import Constant, ErrorSet, Ramp, TableCurve
 from warpspace.scene.library import parse_scene
-from warpspace.scene.model import choose_view, evaluate_grid, grid_basis, placed_in
+from warpspace.scene.model import choose_view, evaluate_grid, grid_basis, with_placement
 
 MACHINE = build_machine(
     "wCBFXYZt",
@@ -237,7 +237,7 @@ def test_what_is_left_is_the_least_and_the_same_by_every_way(machine):
         ),
     }[machine]()
     grid = build_grid(scene.model, scene.workspace)
-    scene = placed_in(scene, "relative")
+    scene = with_placement(scene, "relative")
     view = choose_view(scene, "relative")
     field = evaluate_grid(scene, grid, view)
     response = placement_effect(scene.model, np.eye(6), grid.coordinates, grid.point_mm)[0]
@@ -260,7 +260,7 @@ def test_a_reference_point_is_held_still_after_the_fit():
     at = {"X": [10, 150], "Y": [20, -40], "Z": [-150, -250]}
     loose, still = (evaluate(scene, at=at, loop="relative", placed=True) for scene in (free, bound))
     assert np.allclose(still.error_um, loose.error_um - loose.error_um[0])
-    view = choose_view(placed_in(bound, "relative"), "relative")
+    view = choose_view(with_placement(bound, "relative"), "relative")
     placement = find_placement(bound.model, bound.errors, view)
     assert placement is not None
     assert np.abs(placement).max() > 1.0

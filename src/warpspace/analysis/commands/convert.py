@@ -27,7 +27,7 @@ from warpspace.scene.model import Scene, evaluate
 from warpspace.scene.scene_writer import (
     Notation,
     covered_spans,
-    over_ranges,
+    extend_to_ranges,
     scene_to_toml,
     write_errors,
 )
@@ -158,7 +158,7 @@ def convert_scene(scene: Scene, target: Target, wishes: tuple[str, ...] = ()) ->
     model, errors = convert_order(scene.model, scene.errors, spans, target.component_errors)
     errors = convert_reference_line(model, errors, spans, target.straightness)
     errors = zero_at(model, errors, spans, target.zero_at)
-    other = replace(scene, model=model, errors=over_ranges(errors, model, scene.workspace))
+    other = replace(scene, model=model, errors=extend_to_ranges(errors, model, scene.workspace))
     if target.reference is not None:
         other = _with_reference(other, target.reference)
     left = tuple(
@@ -204,7 +204,9 @@ def _with_reference(scene: Scene, reference: Mapping[str, float] | str) -> Scene
         raise OptionError("the scene holds no point still; expected a reference in its [view]")
     place = complete_coordinates(scene.machine, {**scene.workspace.positions, **scene.reference})
     held = held_by_constants(scene.model, scene.errors, place)
-    return replace(scene, errors=over_ranges(held, scene.model, scene.workspace), reference=None)
+    return replace(
+        scene, errors=extend_to_ranges(held, scene.model, scene.workspace), reference=None
+    )
 
 
 def field_difference(one: Scene, other: Scene) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from warpspace.field.evaluate import ErrorField, evaluate_exact, evaluate_first_
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, nominal_point
 from warpspace.kinematics.model import Coordinates, Loop
-from warpspace.scene.model import Scene, placed_in
+from warpspace.scene.model import Scene, with_placement
 from warpspace.units import MINUS, UM_PER_MM, URAD_PER_RAD, Array
 
 RIGHT_RAD = 1e-6  # a nominal angle this close to 90° is a right one: its deviation is a squareness
@@ -42,7 +42,7 @@ class Distance(Between):
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "DistanceResult":
-        scene = placed_in(scene, self.loop, placed=self.placed)
+        scene = with_placement(scene, self.loop, placed=self.placed)
         at = self.places(scene, self.corner)
         point = nominal_point(scene.model, Loop.TOOL, at)  # in any loop, as over the grid
         solve = evaluate_exact if self.exact else evaluate_first_order

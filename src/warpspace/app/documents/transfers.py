@@ -91,14 +91,14 @@ MOST_NOTES = 12  # remarks on a robot description that are shown
 
 def robot_text(name: str, content: bytes) -> tuple[str, list[str]]:
     """Read a robot description (URDF) as a scene file, without meshes; with remarks on it."""
-    from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
+    from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / safe_file_name(name)
         path.write_bytes(content)
         robot, others = read_robot(path)
     found = place_robot(robot, name)
-    notes = [*found.notes, *left_out(robot, others, found.frame_of)]
+    notes = [*found.notes, *omitted_notes(robot, others, found.frame_of)]
     return imported_text(found.machine, safe_file_name(name), notes, {}), notes[:MOST_NOTES]
 
 

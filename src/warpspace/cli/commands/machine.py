@@ -208,12 +208,12 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 def notes_json(scene: "Scene") -> list[dict[str, Any]]:
     """List the notes of a scene as its file has them, and what their numbers are now."""
     from warpspace.analysis.note_tables import note_numbers
-    from warpspace.scene.notes import note_to_toml, told
+    from warpspace.scene.notes import changed_number, note_to_toml
 
     return [
         {
             **note_to_toml(note),
-            "stale": told(note.numbers, now) != "",
+            "stale": changed_number(note.numbers, now) != "",
             "numbers": note.numbers,
             "now": {name: now[name] for name in note.numbers if name in now},
         }

@@ -256,7 +256,7 @@ def _import_robot(
     from warpspace.bodies.own_meshes import frame_meshes
     from warpspace.outputs.file_output import mesh_files, write_with_meshes
     from warpspace.scene.library import parse_scene
-    from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
+    from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
 
     target, robot = Path(output), files[0]
     if len(files) > 1:
@@ -266,7 +266,7 @@ def _import_robot(
     meshes, unread, read = frame_meshes(loaded, found.frame_of, robot.parent, mesh_root)
     written = mesh_files(target, meshes, overwrite=force, inputs=read)
     check_files(click.get_current_context(), written.values())
-    notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
+    notes = [*found.notes, *unread, *omitted_notes(loaded, others, found.frame_of)]
     names = {frame: file.name for frame, file in written.items()}
     text = imported_text(found.machine, robot.name, notes, names)
     scene = parse_scene(text, target.stem, output)

@@ -29,7 +29,7 @@ from warpspace.formats.compensation.corrections import (
 from warpspace.formats.registry import SIGNS, Files, Format, find_format
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import TravelDirection
-from warpspace.scene.model import Scene, in_direction, placed_in
+from warpspace.scene.model import Scene, with_direction, with_placement
 from warpspace.scene.text_files import parse_whole
 from warpspace.units import Array
 
@@ -151,7 +151,7 @@ class Compensate(Analysis):
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "Compensation | Sweep":
         asked = replace(self, loop="relative") if self.placed and self.loop is None else self
-        scene = placed_in(scene, asked.loop or "", placed=self.placed)
+        scene = with_placement(scene, asked.loop or "", placed=self.placed)
         if self.sweep:
             return sweep(scene, asked)
         return compensate(scene, asked, watch=lambda: watch(0.0))
@@ -327,7 +327,7 @@ def compensate(
     if sign and (sign not in SIGNS or kind.tables is None):
         raise OptionError(f"{{sign}} {sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
-        scene = in_direction(scene, TravelDirection.MEAN)
+        scene = with_direction(scene, TravelDirection.MEAN)
     scene = placed_for([kind], scene, loop)
     corrector = build_corrector(scene, loop, orientation=asked.orientation)
     points = table_points(kind, scene, asked.points)

@@ -16,7 +16,7 @@ from warpspace.formats.terms import Tables
 from warpspace.kinematics.model import Coordinates, Loop
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection
 from warpspace.machine.errors import ErrorSet
-from warpspace.scene.model import Scene, in_direction
+from warpspace.scene.model import Scene, with_direction
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
@@ -94,7 +94,7 @@ class Controller:
         way = TravelDirection(scene.model.direction)
         if way is TravelDirection.DIFFERENCE:
             there, back = (
-                self.at(coordinates, nominal_mm, in_direction(scene, one), loop, point_mm)
+                self.at(coordinates, nominal_mm, with_direction(scene, one), loop, point_mm)
                 for one in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
             )
             return replace(there, less=back)
@@ -234,7 +234,7 @@ class BeforeAfter:
 
 def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
     at, nominal, scene = grid.coordinates, grid.nominal_mm, controller.scene
-    scene = in_direction(scene, direction)
+    scene = with_direction(scene, direction)
     before = controller.without().field(at, nominal, scene)
     view = scene.view(controller.loop)
     sure = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
