@@ -105,11 +105,11 @@ class Head:
         return self._mount(top, 1.3 * u, inner)
 
     def _mount(self, top: float, width: float, inner: tuple[HomeAxis, ...]) -> Mount:
-        over = max(top, self.volume_top)
-        mount = Mount(self.turn @ np.array([*self.centre, over]) + self.place[:3, 3], width, inner)
-        if top < over:
-            half = [0.8 * width, 0.8 * width, (over - top) / 2.0 + 1.0]
-            self._add(mount.carrier, "neck", block([*self.centre, (top + over) / 2.0], half))
+        height = max(top, self.volume_top)
+        mount = Mount(self.turn @ np.array([*self.centre, height]) + self.place[:3, 3], width, inner)
+        if top < height:
+            half = [0.8 * width, 0.8 * width, (height - top) / 2.0 + 1.0]
+            self._add(mount.carrier, "neck", block([*self.centre, (top + height) / 2.0], half))
         return mount
 
     def _add_tool(self, length: float) -> None:

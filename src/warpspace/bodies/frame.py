@@ -62,8 +62,8 @@ class _ToolSide:
         return self.sign * (float(point_mm[self.j]) - self.zero_mm)
 
     def swept(self) -> float:
-        back = self.depth(self.stack.centre_mm) + float(self.stack.swept_mm[self.j])
-        return back + self.layout.gap_mm
+        depth = self.depth(self.stack.centre_mm) + float(self.stack.swept_mm[self.j])
+        return depth + self.layout.gap_mm
 
     def _in_r(self, j: Range) -> Range:
         low, high = sorted(self.zero_mm + self.sign * depth for depth in j)
@@ -165,13 +165,13 @@ class _Overhead(_ToolSide):
         self.front = self.depth(self.spine)
 
     def _across(self, level: list[HomeAxis]) -> int:
-        ways = [axis.k for axis in level]
-        if len(level) < 2 or ways[0] == ways[1]:
+        directions = [axis.k for axis in level]
+        if len(level) < 2 or directions[0] == directions[1]:
             return 0
         lengths = [axis.reach_mm for axis in level[:2]]
-        if ways[0] == 0:
+        if directions[0] == 0:
             return 1 if lengths[0] >= _LONG * lengths[1] else 0
-        return ways[1]
+        return directions[1]
 
     def build(self) -> None:
         top = float(self.spine[2])
@@ -197,21 +197,21 @@ class _Overhead(_ToolSide):
     def _clear_half(self) -> float:
         i, stack = self.i, self.stack
         swept = float(stack.swept_mm[i] + abs(stack.centre_mm[i] - self.middle))
-        own = max(self.layout.high_mm[i] - self.middle, self.middle - self.layout.low_mm[i])
-        return max(float(own), swept) + self.layout.gap_mm
+        volume = max(self.layout.high_mm[i] - self.middle, self.middle - self.layout.low_mm[i])
+        return max(float(volume), swept) + self.layout.gap_mm
 
     def _add_vertical(
-        self, axis: HomeAxis, rear: _Rear | None, rest: list[HomeAxis], at: Array, top: float
+        self, axis: HomeAxis, rear: _Rear | None, outer_axes: list[HomeAxis], at: Array, top: float
     ) -> tuple[_Rear | None, float]:
         u, w, reach = self.u, self.mount.half_mm, axis.reach_mm
-        if rear is None and rest and not rest[0].is_linear:
-            arms = sum(not turning.is_linear for turning in rest)
+        if rear is None and outer_axes and not outer_axes[0].is_linear:
+            arms = sum(not turning.is_linear for turning in outer_axes)
             first = top + reach + 0.2 * u + (arms - 1) * _ARM * u
             self.arm_step = -_ARM * u
             quill = cylinder(0.4 * u, (top, first + reach + 1.6 * u), at)
             self.parts.add(axis.name, "quill", quill)
             return None, first
-        if rear is None and any(axis.slides_level for axis in rest):
+        if rear is None and any(axis.slides_level for axis in outer_axes):
             high = top + 1.7 * reach + 1.5 * u
             z = (top, high + 0.5 * reach + 0.6 * u)
             self.box(axis.name, "ram", self.centred(w), about(self.front, w), z)
@@ -263,12 +263,12 @@ class _Overhead(_ToolSide):
 
     def _add_sliding_ram(self, name: str, rear: _Rear, reach: float) -> _Rear:
         u, middle, front = self.u, (rear.low + rear.high) / 2.0, rear.plane + 0.55 * self.u
-        under, over = max(rear.low, middle - 1.9 * u), middle + 1.5 * u
-        back = 2.0 * reach + max(rear.plane + 2.4 * u, self._behind(0.0) + 1.6 * u)
+        lower, upper = max(rear.low, middle - 1.9 * u), middle + 1.5 * u
+        rear_end = 2.0 * reach + max(rear.plane + 2.4 * u, self._behind(0.0) + 1.6 * u)
         i, z = self.centred(rear.half), (rear.low, rear.high)
         self.box(name, "saddle", i, (rear.plane, front), z, LIGHT)
-        self.box(name, "saddle", self.centred(0.92 * rear.half), (front, back), (under, over))
-        return _Rear(back, under, over, rear.half, "ledge", reach)
+        self.box(name, "saddle", self.centred(0.92 * rear.half), (front, rear_end), (lower, upper))
+        return _Rear(rear_end, lower, upper, rear.half, "ledge", reach)
 
     def _add_ledge_saddle(self, name: str, rear: _Rear, reach: float) -> _Rear:
         u, half, low = self.u, 1.35 * rear.half, rear.low - 1.3 * self.u
@@ -332,12 +332,12 @@ class _Overhead(_ToolSide):
     def _add_ledge(self, rear: _Rear) -> None:
         u, bed, rails = self.u, self.stack.bed_mm, rear.low - 0.25 * self.u
         half = max(rear.half + 0.3 * u, 0.6 * float(self.stack.half_mm[self.i]))
-        i, (front, back) = self.centred(half), (self._behind(0.0), rear.plane)
-        self.box(BASE, "column", i, (front, back), (bed, rails))
+        i, (front, rear_end) = self.centred(half), (self._behind(0.0), rear.plane)
+        self.box(BASE, "column", i, (front, rear_end), (bed, rails))
         if rear.reach and half > rear.half:
-            for j in (front + 0.6 * u, back - 0.9 * u):
+            for j in (front + 0.6 * u, rear_end - 0.9 * u):
                 self.box(BASE, "column", i, about(j, 0.2 * u), (rails, rear.low))
-        self.stand(i, (front, back))
+        self.stand(i, (front, rear_end))
 
     def _add_column(self, name: str, rear: _Rear, *, foot: bool) -> None:
         u, bed = self.u, self.stack.bed_mm
@@ -385,11 +385,11 @@ class _Overhead(_ToolSide):
             at[self.j] = self._behind(0.0) + 1.8 * u
             # a shoulder below would cut the volume
             lift = 0.4 * u if below else (0.4 + _ARM) * u
-            over = under + lift + 0.35 * u
+            shoulder = under + lift + 0.35 * u
             raised = np.array([0.0, 0.0, lift])
             self.parts.add(BASE, "pedestal", bar(front + raised, at + raised, 1.0 * u, 0.35 * u))
-            self.parts.add(BASE, "pedestal", cylinder(1.0 * u, (under, over), front))
-            under = over
+            self.parts.add(BASE, "pedestal", cylinder(1.0 * u, (under, shoulder), front))
+            under = shoulder
         foot = bed + 0.4 * u
         self.parts.add(BASE, "pedestal", cylinder(1.15 * u, (foot, max(under, foot + 1.0)), at))
         x, y = (about(place, 1.7 * u) for place in at[:2])

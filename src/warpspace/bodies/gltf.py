@@ -156,7 +156,7 @@ def _mesh(part: GltfNode, material: int, arrays: _Arrays) -> Json:
 
 def _material(material: Material) -> Json:
     linear = srgb_to_linear(np.array(material.srgb) / 255.0)
-    spelled: Json = {
+    entries: Json = {
         "name": material.name,
         "doubleSided": True,
         "extensions": {UNLIT: {}},
@@ -167,5 +167,5 @@ def _material(material: Material) -> Json:
         },
     }
     if material.opacity < 1.0:
-        spelled["alphaMode"] = "BLEND"
-    return spelled
+        entries["alphaMode"] = "BLEND"
+    return entries

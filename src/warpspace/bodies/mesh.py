@@ -49,23 +49,23 @@ def count_mesh(data: bytes, ending: str, max_triangles: int = limits.MAX_TRIANGL
     return data
 
 
-def _limit(count: int, limit: int, what: str) -> None:
+def _check_count(count: int, limit: int, what: str) -> None:
     if count > limit:
         raise OptionError(f"it holds {count:,} {what}; expected at most {limit:,}")
 
 
-def _count_stl(data: bytes, most: int) -> None:
+def _count_stl(data: bytes, max_triangles: int) -> None:
     stated = int.from_bytes(data[_STL_HEAD - 4 : _STL_HEAD], "little")
     if _is_binary(data):
-        _limit(stated, most, "triangles")
+        _check_count(stated, max_triangles, "triangles")
         return
-    _count_text(data, most)
+    _count_text(data, max_triangles)
     text = data.lower()
-    _limit(text.count(b"endsolid"), limits.MAX_SOLIDS, "solids")
-    _limit(text.count(b"vertex") // 3, most, "triangles")
+    _check_count(text.count(b"endsolid"), limits.MAX_SOLIDS, "solids")
+    _check_count(text.count(b"vertex") // 3, max_triangles, "triangles")
     if b"vertex" not in text:
-        held = max(len(data) - _STL_HEAD, 0) // _STL_ROW.itemsize
-        raise ValueError(f"its head says {stated:,} triangles, {held:,} follow")
+        n_stored = max(len(data) - _STL_HEAD, 0) // _STL_ROW.itemsize
+        raise ValueError(f"its head says {stated:,} triangles, {n_stored:,} follow")
 
 
 def _is_binary(data: bytes) -> bool:
@@ -94,104 +94,104 @@ def _merge_stl(data: bytes) -> Any:
     return trimesh.Scene(trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False))
 
 
-def _count_text(data: bytes, most: int) -> int:
-    _limit(data.count(b"\n"), NUMBERS_PER_TRIANGLE * most, "lines")
+def _count_text(data: bytes, max_triangles: int) -> int:
+    _check_count(data.count(b"\n"), NUMBERS_PER_TRIANGLE * max_triangles, "lines")
     blank = np.frombuffer(b" " + data, dtype=np.uint8) <= ord(" ")
-    words = int(np.count_nonzero(blank[:-1] & ~blank[1:]))
-    _limit(words, WORDS_PER_TRIANGLE * most, "words")
-    return words
+    n_words = int(np.count_nonzero(blank[:-1] & ~blank[1:]))
+    _check_count(n_words, WORDS_PER_TRIANGLE * max_triangles, "words")
+    return n_words
 
 
-def _count_obj(data: bytes, most: int) -> None:
-    _count_text(data, most)
+def _count_obj(data: bytes, max_triangles: int) -> None:
+    _count_text(data, max_triangles)
     faces = _FACE.finditer(data.decode())
     triangles = sum(max(len(face[1].split()) - 2, 0) for face in faces)
-    _limit(triangles, most, "triangles")
+    _check_count(triangles, max_triangles, "triangles")
 
 
-def _count_ply(data: bytes, most: int) -> None:
+def _count_ply(data: bytes, max_triangles: int) -> None:
     rows, total, scalars, smallest, at = 0, 0, 0, 4, 0
     is_text = b"ascii" in data[:100].lower()
     while at < len(data):
         end = data.find(b"\n", at) + 1 or len(data)
-        _limit(end, limits.MAX_MESH_HEADER[".ply"], "bytes of header")
-        words = data[at:end].decode("utf-8", "replace").split()
+        _check_count(end, limits.MAX_MESH_HEADER[".ply"], "bytes of header")
+        fields = data[at:end].decode("utf-8", "replace").split()
         at = end
-        if "end_header" in words:
+        if "end_header" in fields:
             break
-        if len(words) == 3 and "element" in words[0]:
-            rows = max(int(words[2]), 0)
+        if len(fields) == 3 and "element" in fields[0]:
+            rows = max(int(fields[2]), 0)
             total += rows
-            _limit(rows, 3 * most, f"rows of {words[1][:40]!r}")
-        elif len(words) == 3 and "property" in words[0]:
-            scalars += rows * (1 if is_text else _PLY_BYTES.get(words[1], 4))
-        elif len(words) == 5 and "property" in words[0]:
-            smallest = min(smallest, _PLY_BYTES.get(words[3], 4))
+            _check_count(rows, 3 * max_triangles, f"rows of {fields[1][:40]!r}")
+        elif len(fields) == 3 and "property" in fields[0]:
+            scalars += rows * (1 if is_text else _PLY_BYTES.get(fields[1], 4))
+        elif len(fields) == 5 and "property" in fields[0]:
+            smallest = min(smallest, _PLY_BYTES.get(fields[3], 4))
     if is_text:
-        _limit(data.count(b"\n", at), total + 100, "lines")
-    held = _count_text(data[at:], most) if is_text else (len(data) - at) // smallest
+        _check_count(data.count(b"\n", at), total + 100, "lines")
+    n_numbers = _count_text(data[at:], max_triangles) if is_text else (len(data) - at) // smallest
     scalars //= 1 if is_text else smallest
-    _limit(held - scalars, NUMBERS_PER_TRIANGLE * most, "numbers in lists")
+    _check_count(n_numbers - scalars, NUMBERS_PER_TRIANGLE * max_triangles, "numbers in lists")
 
 
-def _count_glb(data: bytes, most: int) -> None:
+def _count_glb(data: bytes, max_triangles: int) -> None:
     size = int.from_bytes(data[12:16], "little")
     if data[:4] != b"glTF" or size > len(data):
         return  # whoever reads it says what it is not
-    _limit(size, limits.MAX_MESH_HEADER[".glb"], "bytes of description")
-    rest, chunks = 20 + size, 0
-    while rest + 8 <= len(data) and chunks <= limits.MAX_MESH_PARTS:
-        rest += 8 + int.from_bytes(data[rest : rest + 4], "little")
+    _check_count(size, limits.MAX_MESH_HEADER[".glb"], "bytes of description")
+    offset, chunks = 20 + size, 0
+    while offset + 8 <= len(data) and chunks <= limits.MAX_MESH_PARTS:
+        offset += 8 + int.from_bytes(data[offset : offset + 4], "little")
         chunks += 1
-    _limit(chunks, limits.MAX_MESH_PARTS, "chunks")
-    held = json.loads(data[20 : 20 + size])
-    for name, entries in held.items():
+    _check_count(chunks, limits.MAX_MESH_PARTS, "chunks")
+    document = json.loads(data[20 : 20 + size])
+    for name, entries in document.items():
         if isinstance(entries, list):
-            _limit(len(entries), limits.MAX_MESH_PARTS, name)  # pyright: ignore[reportUnknownArgumentType]
-    primitives = [mesh["primitives"] for mesh in held.get("meshes", [])]
-    _limit(sum(map(len, primitives)), limits.MAX_MESH_PARTS, "primitives")
-    accessors = [max(int(accessor["count"]), 0) for accessor in held.get("accessors", [])]
-    _limit(sum(accessors), NUMBERS_PER_TRIANGLE * most, "points and indices")
-    stored = sum(max(int(view["byteLength"]), 0) for view in held.get("bufferViews", []))
-    _limit(stored, BYTES_PER_TRIANGLE * most, "bytes in views of its data")
+            _check_count(len(entries), limits.MAX_MESH_PARTS, name)  # pyright: ignore[reportUnknownArgumentType]
+    primitives = [mesh["primitives"] for mesh in document.get("meshes", [])]
+    _check_count(sum(map(len, primitives)), limits.MAX_MESH_PARTS, "primitives")
+    accessors = [max(int(accessor["count"]), 0) for accessor in document.get("accessors", [])]
+    _check_count(sum(accessors), NUMBERS_PER_TRIANGLE * max_triangles, "points and indices")
+    stored = sum(max(int(view["byteLength"]), 0) for view in document.get("bufferViews", []))
+    _check_count(stored, BYTES_PER_TRIANGLE * max_triangles, "bytes in views of its data")
     arrays = sum(
         max(int(accessor["count"]), 0)
         * _GLB_COLUMNS[accessor["type"]]
         * _GLB_BYTES[accessor["componentType"]]
-        for accessor in held.get("accessors", [])
+        for accessor in document.get("accessors", [])
     )
-    _limit(arrays, BYTES_PER_TRIANGLE * most, "bytes of points and indices")
-    placed = [primitive for mesh in _placed(held) for primitive in primitives[mesh]]
-    _limit(len(placed), limits.MAX_MESH_PARTS, "primitives, each placing counted")
+    _check_count(arrays, BYTES_PER_TRIANGLE * max_triangles, "bytes of points and indices")
+    placed = [primitive for mesh in _placed(document) for primitive in primitives[mesh]]
+    _check_count(len(placed), limits.MAX_MESH_PARTS, "primitives, each placing counted")
     corners = sum(
         accessors[part["indices"] if "indices" in part else part["attributes"]["POSITION"]]
         for part in placed
     )
-    _limit(corners // 3, most, "triangles, each placing counted")
+    _check_count(corners // 3, max_triangles, "triangles, each placing counted")
 
 
-def _placed(held: Any) -> Iterator[int]:
-    nodes = held.get("nodes", [])
-    scenes = held.get("scenes", [])
+def _placed(document: Any) -> Iterator[int]:
+    nodes = document.get("nodes", [])
+    scenes = document.get("scenes", [])
     waiting = (
-        [(root, 1) for root in scenes[held.get("scene", 0)].get("nodes", [])] if scenes else []
+        [(root, 1) for root in scenes[document.get("scene", 0)].get("nodes", [])] if scenes else []
     )
-    seen: set[int] = set()
+    visited: set[int] = set()
     while waiting:
         node, depth = waiting.pop()
-        if node in seen:
+        if node in visited:
             raise OptionError(f"it holds node {node} twice in its scene; expected a tree of nodes")
-        seen.add(node)
-        _limit(depth, limits.MAX_MESH_DEPTH, "nodes below each other")
+        visited.add(node)
+        _check_count(depth, limits.MAX_MESH_DEPTH, "nodes below each other")
         waiting += [(child, depth + 1) for child in nodes[node].get("children", [])]
         if "mesh" in nodes[node]:
             yield nodes[node]["mesh"]
 
 
-def _count_dae(data: bytes, most: int) -> None:
-    _limit(data.count(b"<"), 2 * limits.MAX_MESH_PARTS, "XML tags")
-    _limit(data.count(b"<instance_node"), _DAE_REFERENCES, "nodes by reference")
-    _count_text(data, most)
+def _count_dae(data: bytes, max_triangles: int) -> None:
+    _check_count(data.count(b"<"), 2 * limits.MAX_MESH_PARTS, "XML tags")
+    _check_count(data.count(b"<instance_node"), _DAE_REFERENCES, "nodes by reference")
+    _count_text(data, max_triangles)
 
 
 _COUNTERS: dict[str, Callable[[bytes, int], object]] = {
@@ -236,7 +236,7 @@ def build_body(
     )
 
 
-def _check_geometry(scene: Any, most: int) -> None:
+def _check_geometry(scene: Any, max_triangles: int) -> None:
     """Refuse what trimesh takes as it comes: points in a plane, vertices that are not there."""
     for mesh in scene.geometry.values():
         mesh.metadata.clear()  # of a PLY file it holds all again
@@ -245,8 +245,8 @@ def _check_geometry(scene: Any, most: int) -> None:
         faces = np.asarray(getattr(mesh, "faces", ()))
         if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(mesh.vertices)):
             raise ValueError("a triangle names a vertex that is not there")
-        if len(faces) > most:
-            raise ValueError(f"{len(faces):,} triangles; expected at most {most:,}")
+        if len(faces) > max_triangles:
+            raise ValueError(f"{len(faces):,} triangles; expected at most {max_triangles:,}")
 
 
 def open_meshes(
@@ -274,11 +274,11 @@ def open_meshes(
             data = count_mesh(data, ending, max_triangles)
             merged = _merge_stl(data) if ending == ".stl" and _is_binary(data) else None
             file = io.BytesIO(data)
-            found = merged or trimesh.load_scene(
+            scene = merged or trimesh.load_scene(
                 file, file_type=ending[1:], process=False, skip_materials=not has_materials
             )
-            _check_geometry(found, max_triangles)
-            return found
+            _check_geometry(scene, max_triangles)
+            return scene
     except OptionError as error:
         raise OptionError(f"{path}: {error}. Reduce it before") from None
     except Exception as error:  # noqa: BLE001  # trimesh raises whatever a damaged file leads to

@@ -27,11 +27,11 @@ MOST_SHELL_PAIRS = 20_000_000  # of a shell and a cavity in a mesh that are look
 def load_mesh(path: str | Path, frame: str, unit: str | None = None) -> Body:
     """Read a body from a file of a user; it can be drawn whatever its warnings say."""
     path = Path(path)
-    mesh, said = read_mesh(path, unit)
+    mesh, warnings = read_mesh(path, unit)
     mesh.update_faces(mesh.nondegenerate_faces())
     if not len(mesh.faces):
         raise OptionError(f"{path}: all of its triangles are points or lines")
-    return replace(build_body(mesh, path.stem, frame, MIDDLE), warnings=said)
+    return replace(build_body(mesh, path.stem, frame, MIDDLE), warnings=warnings)
 
 
 def read_mesh(
@@ -45,14 +45,14 @@ def read_mesh(
 
     if path.suffix.lower() not in FORMATS:
         raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
-    is_told, (standard, up) = unit is not None, FORMATS[path.suffix.lower()]
+    has_unit, (standard, up) = unit is not None, FORMATS[path.suffix.lower()]
     if (unit := unit or standard) not in UNITS_MM:
         raise OptionError(f"{path}: {unit!r}; expected one of {', '.join(UNITS_MM)}")
-    found = open_meshes(path, f"{path.suffix[1:].upper()} file", max_triangles, data)
-    nodes = found.graph.nodes_geometry
-    pose, name = found.graph[nodes[0]] if len(nodes) == 1 else (None, None)
-    is_one = hasattr(found.geometry.get(name), "faces")  # a large one is not copied
-    mesh = found.geometry[name].apply_transform(pose) if is_one else found.to_mesh()
+    scene = open_meshes(path, f"{path.suffix[1:].upper()} file", max_triangles, data)
+    nodes = scene.graph.nodes_geometry
+    pose, name = scene.graph[nodes[0]] if len(nodes) == 1 else (None, None)
+    is_one = hasattr(scene.geometry.get(name), "faces")  # a large one is not copied
+    mesh = scene.geometry[name].apply_transform(pose) if is_one else scene.to_mesh()
     if not np.isfinite(mesh.vertices).all():
         raise OptionError(f"{path}: a vertex is not finite")
     is_closed = len(mesh.vertices) <= len(mesh.faces) and _is_closed(mesh.faces)
@@ -65,7 +65,7 @@ def read_mesh(
     if up == "y":
         mesh.apply_transform([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
     longest = float(np.ptp(mesh.vertices, axis=0).max())
-    if not (is_told or SMALL_MM <= longest <= LARGE_MM):
+    if not (has_unit or SMALL_MM <= longest <= LARGE_MM):
         is_usual = longest < 1.0 if unit == "mm" else longest > LARGE_MM
         other = {"mm": "m", "m": "mm"}[unit] if is_usual else "another unit"
         raise OptionError(
@@ -73,31 +73,31 @@ def read_mesh(
             f" {other}; give its unit ({', '.join(UNITS_MM)})"
         )
     if not (is_closed or _is_closed(mesh.faces)):
-        said = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
+        warning = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
         count = len(grouping.group_rows(mesh.edges_sorted, require_count=1))
-        return mesh, (f"{said} ({count:,} open edges); it is taken as it is",)
+        return mesh, (f"{warning} ({count:,} open edges); it is taken as it is",)
     x, y, z = np.ascontiguousarray((mesh.vertices - mesh.vertices[0]).T)
-    one, two, three = mesh.faces.T
-    across = (y[two] - y[one]) * (z[three] - z[one]) - (z[two] - z[one]) * (y[three] - y[one])
-    across *= x[one] + x[two] + x[three]  # six times the volume
+    first, second, third = mesh.faces.T
+    across = (y[second] - y[first]) * (z[third] - z[first]) - (z[second] - z[first]) * (y[third] - y[first])
+    across *= x[first] + x[second] + x[third]  # six times the volume
     if across.sum() < 0.0:
         mesh.invert()
         return mesh, (f"{path}: its triangles face inwards; they are turned outwards",)
     if len(mesh.faces) > MAX_FEATURE_TRIANGLES:
         return mesh, ()
     shell = graph.connected_component_labels(mesh.edges, node_count=len(x))
-    volume, low, high = np.bincount(shell[one], across), *np.full((2, shell.max() + 1, 3), np.inf)
+    volume, low, high = np.bincount(shell[first], across), *np.full((2, shell.max() + 1, 3), np.inf)
     np.minimum.at(low, shell, mesh.vertices)
     np.minimum.at(high, shell, -mesh.vertices)
-    cavities, looked_at = np.flatnonzero(volume < 0.0), 0
+    cavities, n_pairs = np.flatnonzero(volume < 0.0), 0
     for outer in np.argsort(-volume)[: int(np.sum(volume > 0.0))]:  # a cavity is within another one
         is_within = (low[outer] <= low[cavities]) & (high[outer] <= high[cavities])
         is_inside = is_within.all(axis=1) & (volume[outer] > -volume[cavities])
-        looked_at += len(cavities)
+        n_pairs += len(cavities)
         cavities = cavities[~is_inside]
-        if not len(cavities) or looked_at > MOST_SHELL_PAIRS:
+        if not len(cavities) or n_pairs > MOST_SHELL_PAIRS:
             break
-    if len(cavities) and looked_at > MOST_SHELL_PAIRS:
+    if len(cavities) and n_pairs > MOST_SHELL_PAIRS:
         return mesh, (f"{path}: too many shells to tell if some face inwards",)
     if len(cavities):
         return mesh, (f"{path}: some of its shells face inwards; they are taken as they are",)
@@ -107,10 +107,10 @@ def read_mesh(
 def _is_closed(faces: NDArray[np.int64]) -> bool:
     """Tell whether each edge is passed as often in one direction as in the other."""
     count = faces.max(initial=0) + 1
-    one, other = np.random.default_rng(0).integers(2**64, size=(2, count), dtype=np.uint64)
+    begin_weight, end_weight = np.random.default_rng(0).integers(2**64, size=(2, count), dtype=np.uint64)
     # each direction adds its own random number; only opposite ones cancel
     sums = [
-        int(np.sum(one[begin] * other[end] - other[begin] * one[end]))
+        int(np.sum(begin_weight[begin] * end_weight[end] - end_weight[begin] * begin_weight[end]))
         for begin, end in zip(faces.T, np.roll(faces, 1, axis=1).T, strict=True)
     ]
     return sum(sums) % 2**64 == 0
@@ -156,7 +156,7 @@ def frame_meshes(
 
     parts: dict[str, list[Any]] = {}
     notes: list[str] = []
-    read: dict[Path, Any] = {}
+    meshes: dict[Path, Any] = {}
     triangles = 0
     for link in robot.links:
         if link.name not in frame_of:
@@ -164,7 +164,7 @@ def frame_meshes(
         frame, pose = frame_of[link.name]
         for visual in link.visuals:
             try:
-                mesh = _shape(visual, pose, (folder, root or folder), read)
+                mesh = _shape(visual, pose, (folder, root or folder), meshes)
             except WarpspaceError as error:
                 notes.append(f"link {link.name!r}: {error}")
                 continue
@@ -177,10 +177,10 @@ def frame_meshes(
                     " triangles, the most expected"
                 )
             parts.setdefault(frame, []).append(mesh)
-    return {frame: util.concatenate(own) for frame, own in parts.items()}, notes, list(read)
+    return {frame: util.concatenate(own) for frame, own in parts.items()}, notes, list(meshes)
 
 
-def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
+def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], meshes: dict[Path, Any]) -> Any:
     from trimesh import creation
 
     placed = np.eye(4) if visual.origin is None else np.array(visual.origin, dtype=float)
@@ -192,14 +192,14 @@ def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], read: dict[Path
     if geometry.box is not None:
         mesh = creation.box(extents=_sizes(geometry.box.size, 3, "box"))
     elif geometry.cylinder is not None:
-        given = (geometry.cylinder.radius, geometry.cylinder.length)
-        radius, height = _sizes(given, 2, "cylinder")
+        dimensions = (geometry.cylinder.radius, geometry.cylinder.length)
+        radius, height = _sizes(dimensions, 2, "cylinder")
         mesh = creation.cylinder(radius=radius, height=height, sections=48)
     elif geometry.sphere is not None:
         (radius,) = _sizes([geometry.sphere.radius], 1, "sphere")
         mesh = creation.icosphere(subdivisions=2, radius=radius)
     elif geometry.mesh is not None:
-        mesh = _mesh(geometry.mesh, folders, read)
+        mesh = _mesh(geometry.mesh, folders, meshes)
     else:
         return None
     mesh.apply_transform(placed)
@@ -210,9 +210,9 @@ def _shape(visual: Any, pose: Array, folders: tuple[Path, Path], read: dict[Path
     return mesh
 
 
-def _sizes(given: Any, count: int, what: str) -> Array:
+def _sizes(dimensions: Any, count: int, what: str) -> Array:
     try:
-        sizes = np.abs(np.asarray(given, dtype=float))
+        sizes = np.abs(np.asarray(dimensions, dtype=float))
     except (TypeError, ValueError):
         sizes = np.empty(0)
     if sizes.shape != (count,) or not (sizes < LARGEST_M).all():
@@ -220,10 +220,10 @@ def _sizes(given: Any, count: int, what: str) -> Array:
     return sizes
 
 
-def _mesh(given: Any, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
+def _mesh(geometry: Any, folders: tuple[Path, Path], meshes: dict[Path, Any]) -> Any:
     import trimesh
 
-    name = str(given.filename or "")
+    name = str(geometry.filename or "")
     path = _find(name, *folders)
     if path is None:
         raise WarpspaceError(f"mesh {name!r} is missing; left out")
@@ -231,17 +231,17 @@ def _mesh(given: Any, folders: tuple[Path, Path], read: dict[Path, Any]) -> Any:
         raise WarpspaceError(
             f"mesh {name!r} leads out of {folders[1]}; left out (--mesh-root FOLDER)"
         )
-    if path not in read:
+    if path not in meshes:
         try:
-            found = open_meshes(path, "mesh").to_mesh()
-            read[path] = found if len(found.faces) else "it is empty"
+            loaded = open_meshes(path, "mesh").to_mesh()
+            meshes[path] = loaded if len(loaded.faces) else "it is empty"
         except OptionError as error:
-            read[path] = str(error)
-    if isinstance(mesh := read[path], str):
+            meshes[path] = str(error)
+    if isinstance(mesh := meshes[path], str):
         raise WarpspaceError(f"mesh {name!r}: {mesh}; left out")
     bare = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
-    if given.scale is not None:
-        scale = np.asarray(given.scale, dtype=float)
+    if geometry.scale is not None:
+        scale = np.asarray(geometry.scale, dtype=float)
         if scale.shape not in ((), (1,), (3,)) or not (np.abs(scale) < LARGEST_M).all():
             raise WarpspaceError(f"mesh {name!r} has no scale that can be read; left out")
         bare.apply_transform(np.diag([*np.broadcast_to(scale, 3), 1.0]))
@@ -252,9 +252,9 @@ def _find(name: str, folder: Path, root: Path) -> Path | None:
     places = [folder / name.removeprefix("file://")]
     if name.startswith("package://"):
         inside = name.removeprefix("package://")
-        rest = inside.partition("/")[2]
+        in_package = inside.partition("/")[2]
         above = [part for part in folder.resolve().parents if part.is_relative_to(root.resolve())]
-        places = [place / part for place in (folder, *above, root) for part in (inside, rest)]
+        places = [place / part for place in (folder, *above, root) for part in (inside, in_package)]
     for place in places:
         try:
             if place.is_file():

@@ -24,10 +24,10 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
 def load_bodies(machine: Machine) -> tuple[Body, ...]:
     frames = {BASE, "S", "t", "w", *machine.axes}
-    kept = read_bodies(Path(machine.body_dir) / BODY_FILE) if machine.body_dir else ()
-    own = machine_meshes(machine)
-    bodies = [body for body in kept or generate_bodies(machine) if body.frame not in own]
-    return tuple(body for body in (*bodies, *own.values()) if body.frame in frames)
+    schematic = read_bodies(Path(machine.body_dir) / BODY_FILE) if machine.body_dir else ()
+    meshes = machine_meshes(machine)
+    bodies = [body for body in schematic or generate_bodies(machine) if body.frame not in meshes]
+    return tuple(body for body in (*bodies, *meshes.values()) if body.frame in frames)
 
 
 def _error_values(
@@ -68,10 +68,10 @@ def scene_motions(
             turn = turn + pose[:3, :3] @ placement[3:] * RAD_PER_URAD
             shift = shift + at_zero * MM_PER_UM
     if view.reference is not None:
-        held = complete_coordinates(model.machine, {**positions, **view.reference})
-        values = _error_values(errors, amplitudes, held, model.direction)
-        there = body_motions(model, values, held)
-        shift = shift + _held_displacement(model, there, view.loop)
+        reference = complete_coordinates(model.machine, {**positions, **view.reference})
+        values = _error_values(errors, amplitudes, reference, model.direction)
+        reference_motions = body_motions(model, values, reference)
+        shift = shift + _held_displacement(model, reference_motions, view.loop)
     return {
         name: BodyMotion(m.nominal, m.rotation_rad - turn, m.displacement_mm - shift)
         for name, m in motions.items()

@@ -211,11 +211,11 @@ def build_layout(machine: Machine) -> MachineLayout:
     upright = np.eye(4)
     upright[:3, :3] = slant.T
     poses = {name: upright @ motion.nominal for name, motion in motions.items()}
-    ways = {axis.name: _way(axis, poses[axis.name]) for axis in axes}
+    home_axes = {axis.name: _home_axis(axis, poses[axis.name]) for axis in axes}
     half = np.zeros(3)
     first = {axis.index: axis for axis in reversed(axes) if axis.is_linear}
     for axis in first.values():
-        half += ways[axis.name].reach_mm * np.abs(ways[axis.name].direction)
+        half += home_axes[axis.name].reach_mm * np.abs(home_axes[axis.name].direction)
     lengths = [np.linalg.norm(offset) for offset in machine.fixed_mm.values()]
     lengths += [np.linalg.norm(axis.offset_mm) for axis in axes]
     arms = [np.hypot(*axis.offset_mm[:2]) for axis in axes if not axis.is_linear]
@@ -225,12 +225,12 @@ def build_layout(machine: Machine) -> MachineLayout:
     filled = np.maximum(half, _FLAT * reach)
     unit = max(_SHARE_OF_VOLUME * 2.0 * float(filled.mean()), _SMALLEST_MM)
     flat = [k for k in (0, 1) if half[k] < 1.0]
-    if flat and any(not way.is_linear and way.k == 2 for way in ways.values()):
-        around = _ARMS * sum(float(np.hypot(*axis.offset_mm[:2])) for axis in axes)
-        filled[flat] = half[:2].max() if len(flat) == 1 else max(around, filled[:2].max())
+    if flat and any(not way.is_linear and way.k == 2 for way in home_axes.values()):
+        radius = _ARMS * sum(float(np.hypot(*axis.offset_mm[:2])) for axis in axes)
+        filled[flat] = half[:2].max() if len(flat) == 1 else max(radius, filled[:2].max())
     tip = poses["t"][:3, 3]
     tool, workpiece = (
-        tuple(ways[axis.name] for axis in machine.branch(side)) for side in ("tool", "workpiece")
+        tuple(home_axes[axis.name] for axis in machine.branch(side)) for side in ("tool", "workpiece")
     )
     low, high = tip - filled, tip + filled
     length = -float(machine.fixed_mm.get("t", (0.0, 0.0, 0.0))[2])
@@ -239,7 +239,7 @@ def build_layout(machine: Machine) -> MachineLayout:
     )
 
 
-def _way(axis: Axis, pose: Array) -> HomeAxis:
+def _home_axis(axis: Axis, pose: Array) -> HomeAxis:
     direction = pose[:3, axis.index]
     k = 2 if abs(direction[2]) > _STEEP else int(np.argmax(np.abs(direction[:2])))
     reach = (axis.travel[1] - axis.travel[0]) / 2.0 if axis.is_linear else 0.0
@@ -251,12 +251,12 @@ def _find_slant(machine: Machine, poses: Mapping[str, Array]) -> Array:
     if all(np.abs(way).max() > _ALIGNED for way in linear):
         return np.eye(3)
     triad: list[Array] = []
-    for way in linear:
-        cosines = [abs(float(way @ known)) for known in triad]
+    for direction in linear:
+        cosines = [abs(float(direction @ known)) for known in triad]
         if any(_SQUARE < cosine < 1.0 - _SQUARE for cosine in cosines):
             return np.eye(3)
         if not any(cosine > 0.5 for cosine in cosines):
-            triad.append(way)
+            triad.append(direction)
     turned = _nearest(_completed(triad), np.array(linear))
     turning = [axis for axis in machine.branch("workpiece") if not axis.is_linear]
     about = [turned.T @ poses[axis.name][:3, axis.index] for axis in turning]
@@ -264,14 +264,14 @@ def _find_slant(machine: Machine, poses: Mapping[str, Array]) -> Array:
 
 
 def _completed(triad: list[Array]) -> Array:
-    found = list(triad)
+    vectors = list(triad)
     for axis in np.eye(3)[np.argsort(np.abs(np.sum(np.square(triad), axis=0)))]:
-        if len(found) < 3:
-            rest = axis - sum((float(axis @ known) * known for known in found), np.zeros(3))
-            if np.linalg.norm(rest) > 0.5:
-                found.append(rest / np.linalg.norm(rest))
-    left, _, right = np.linalg.svd(np.array(found).T)
-    return left @ right
+        if len(vectors) < 3:
+            remainder = axis - sum((float(axis @ known) * known for known in vectors), np.zeros(3))
+            if np.linalg.norm(remainder) > 0.5:
+                vectors.append(remainder / np.linalg.norm(remainder))
+    left_vectors, _, right_vectors = np.linalg.svd(np.array(vectors).T)
+    return left_vectors @ right_vectors
 
 
 def _nearest(triad: Array, linear: Array) -> Array:
@@ -279,12 +279,12 @@ def _nearest(triad: Array, linear: Array) -> Array:
         level = np.abs(linear @ turned[:, 2]) < 0.5
         return round(float(np.trace(turned)), 6), float(level.sum())
 
-    every = (
+    candidates = (
         triad[:, order] * signs
         for order in permutations(range(3))
         for signs in product((1.0, -1.0), repeat=3)
     )
-    return max((turned for turned in every if np.linalg.det(turned) > 0.0), key=rank)
+    return max((turned for turned in candidates if np.linalg.det(turned) > 0.0), key=rank)
 
 
 Colour = tuple[int, int, int]
@@ -358,8 +358,8 @@ class Parts:
             mesh = util.concatenate(part.shapes)
             inverse = np.linalg.inv(self.layout.poses[part.frame])
             mesh.apply_transform(inverse)
-            own = None
+            lines_mm = None
             if part.lines_mm:
-                own = np.array(part.lines_mm) @ inverse[:3, :3].T + inverse[:3, 3]
-            found.append(build_body(mesh, name, part.frame, part.colour, own))
+                lines_mm = np.array(part.lines_mm) @ inverse[:3, :3].T + inverse[:3, 3]
+            found.append(build_body(mesh, name, part.frame, part.colour, lines_mm))
         return tuple(found)

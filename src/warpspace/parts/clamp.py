@@ -1,6 +1,6 @@
-"""Where to clamp a part: its worst deviation over the travel, in the orientations allowed.
+"""Fixture position with the smallest deviation of a workpiece, over travel and orientations.
 
-Fixtures and collisions are not looked at. Geometry only: no forces, heat, wear or servo.
+Fixtures and collisions are not considered. Geometry only: no forces, heat, wear or servo.
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,15 +35,15 @@ from warpspace.parts.workpiece import (
 )
 from warpspace.scene.model import Scene, second_order
 
-SEARCHED = 800  # vertices that tell where a part deviates least; all do at the best places
-RIVALS = 3  # best places of the search that are judged by all vertices
+SEARCH_VERTICES = 800  # of the search; the best places are evaluated with all vertices
+FINALISTS = 3  # best places of the search, evaluated with all vertices
 TILTS = (0, 0), (90, 0), (180, 0), (270, 0), (0, 90), (0, 270)  # degrees about x and y
-SHOWN, CLASSES = 10, 5  # places of the table; colours of the map
+MAX_ROWS, CLASSES = 10, 5  # places of the table; colours of the map
 
 
 @dataclass(frozen=True)
 class Clamping:
-    """A part at one place, and its largest |E| there."""
+    """A fixture position and the largest |E| there."""
 
     place: tuple[float, ...]  # [6], mm and degrees, in the workpiece frame
     max_um: float
@@ -54,18 +54,17 @@ class Clamping:
     )  # U95, where that is stated
 
 
-JUDGED = attrgetter("max_um"), attrgetter("placed_um")
-"""What is judged: as the part lies, and placed."""
+CRITERIA = attrgetter("max_um"), attrgetter("placed_um")  # as clamped; after the best rigid fit
 U95 = "u95_max_um", "u95_placed_um"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Clamp(WorkpieceAnalysis):
-    """Find where to clamp a part on the machine of SCENE.
+    """Find the best fixture position of a part on the machine of SCENE.
 
-    The part stands at places all over the travel, in the orientations that are allowed, and is
-    compared with where it is clamped; where any of it would be beyond the travel it does not
-    stand. Fixtures and collisions are not looked at. Geometry only: no forces, heat, wear or servo.
+    Places over the travel in the allowed orientations are compared with the present place; those
+    where a vertex is beyond the travel are excluded. Fixtures and collisions are not considered.
+    Geometry only: no forces, heat, wear or servo.
     """
 
     name = "clamp"
@@ -74,10 +73,10 @@ class Clamp(WorkpieceAnalysis):
     chart_help = "map of the places"
     has_table = True
     turns: Literal["none", "C", "all"] = option(
-        "none", "Orientations allowed: this one, 90° steps about z, or all 24"
+        "none", "Allowed orientations: the present one, 90° steps about z, or all 24"
     )
     grid: int = option(7, "Places along x and along y", low=2, high=31)
-    placed: bool = option(False, "Judge what is left after the best rigid fit of the part")
+    placed: bool = option(False, "Compare deviations after the best rigid fit of the part")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "ClampResult":
         mesh = self.load_mesh(scene)
@@ -97,24 +96,27 @@ class Clamp(WorkpieceAnalysis):
             z = float(np.clip(level - turned[:, 2].min(), low[2], high[2]))
             grid = np.linspace(low[:2], high[:2], self.grid).T.tolist()
             places += [(x, y, z, *turn) for x, y in product(*grid)]
-        own, found = mesh.vertices_mm, list[Clamping]()
-        outermost = np.random.default_rng(0).standard_normal((3, SEARCHED // 4))
-        every = range(0, len(own), -(-len(own) // SEARCHED))
-        some = replace(mesh, vertices_mm=own[[*np.argmax(own @ outermost, axis=0), *every]])
+        vertices = mesh.vertices_mm
+        outermost = np.random.default_rng(0).standard_normal((3, SEARCH_VERTICES // 4))
+        regular = range(0, len(vertices), -(-len(vertices) // SEARCH_VERTICES))
+        rows = [*np.argmax(vertices @ outermost, axis=0), *regular]
+        sample, clampings = replace(mesh, vertices_mm=vertices[rows]), list[Clamping]()
         for number, place in enumerate(places):
-            found.append(_judge(scene, place_workpiece(some, scene, place)))
+            clamping = _evaluate(scene, place_workpiece(sample, scene, place))
+            if not clamping.outside:
+                clampings.append(clamping)
             watch((number + 1) / len(places))
-        judged = JUDGED[self.placed]
-        found = sorted((one for one in found if not one.outside), key=judged)
-        if not found:
+        criterion = CRITERIA[self.placed]
+        clampings.sort(key=criterion)
+        if not clampings:
             raise OptionError(f"{mesh.name} fits nowhere into the travel of {scene.machine.chain}")
         now, *best = (
-            _judge(scene, place_workpiece(mesh, scene, at))
-            for at in (part.place, *(one.place for one in found[:RIVALS]))
+            _evaluate(scene, place_workpiece(mesh, scene, place))
+            for place in (part.place, *(clamping.place for clamping in clampings[:FINALISTS]))
         )
-        first = min(now, *best, key=lambda one: (one.outside > 0, judged(one)))
+        first = min(now, *best, key=lambda clamping: (clamping.outside > 0, criterion(clamping)))
         result = ClampResult(
-            places=found, best=first, present=now, gain_um=judged(now) - judged(first),
+            places=clampings, best=first, present=now, gain_um=criterion(now) - criterion(first),
             title=f"{scene.title} · {mesh.name}", placed=self.placed, warnings=mesh.warnings,
             second_order=second_order(scene, Loop.RELATIVE),
         )  # fmt: skip
@@ -122,29 +124,32 @@ class Clamp(WorkpieceAnalysis):
         if is_large or not scene_uncertainty(scene, Loop.RELATIVE):
             return result
         return result.with_expanded_uncertainty(
-            *(_doubts(scene, mesh, one.place) for one in (now, first))
+            *(_uncertainties(scene, mesh, clamping.place) for clamping in (now, first))
         )
 
 
-def _judge(scene: Scene, part: Workpiece) -> Clamping:
-    made = evaluate_points(scene, part.vertices_mm)
-    both = made.error_um, subtract_best_fit(made.point_mm, made.error_um)
-    most, placed = (float(np.linalg.norm(error, axis=1).max()) for error in both)
-    return Clamping(part.place, most, placed, int(made.outside.sum()))
+def _evaluate(scene: Scene, part: Workpiece) -> Clamping:
+    actual = evaluate_points(scene, part.vertices_mm)
+    errors = actual.error_um, subtract_best_fit(actual.point_mm, actual.error_um)
+    clamped, placed = (float(np.linalg.norm(error, axis=1).max()) for error in errors)
+    return Clamping(part.place, clamped, placed, int(actual.outside.sum()))
 
 
-def _doubts(scene: Scene, mesh: Workpiece, place: Sequence[float]) -> list[FieldUncertainty]:
-    made = evaluate_points(scene, place_workpiece(mesh, scene, place).vertices_mm)
-    found = point_uncertainty(scene, made)
-    return [found, found.transform(partial(subtract_best_fit, made.point_mm))] if found else []
+def _uncertainties(scene: Scene, mesh: Workpiece, place: Sequence[float]) -> list[FieldUncertainty]:
+    """Return the uncertainty as clamped, and after the best rigid fit."""
+    actual = evaluate_points(scene, place_workpiece(mesh, scene, place).vertices_mm)
+    clamped = point_uncertainty(scene, actual)
+    if clamped is None:
+        return []
+    return [clamped, clamped.transform(partial(subtract_best_fit, actual.point_mm))]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClampResult(Result):
-    """Places of a part, the best one, and what it gains."""
+    """Fixture positions of a part, the best one, and its gain."""
 
     keys = ("places", "best", "present", "gain_um")
-    places: list[Clamping]  # by some of the vertices, best first
+    places: list[Clamping]  # from some of the vertices, best first
     best: Clamping
     present: Clamping
     gain_um: float
@@ -153,55 +158,56 @@ class ClampResult(Result):
     warnings: tuple[str, ...]  # of the mesh
     expanded_uncertainty: Numbers = field(
         default_factory=dict[str, float | None]
-    )  # U95 of what is gained
+    )  # U95 of the gain
 
     def with_expanded_uncertainty(self, *each: list[FieldUncertainty]) -> "ClampResult":
-        """Say U95 at present, at the best place and of the gain."""
-        before, after = (found[self.placed] for found in each)
+        """Return the result with U95 at present, at the best place and of the gain."""
+        before, after = (uncertainties[self.placed] for uncertainties in each)
         gain = before.u95(before.gradients[-1] - after.gradients[-1])
-        told = {"u95_gain_um": gain if before.errors.is_known else None}
-        now, best = (
-            replace(
-                at,
-                expanded_uncertainty=dict(
-                    zip(U95, [x.statistics()["max_um"] for x in found], strict=True)
-                ),
-            )
-            for at, found in zip((self.present, self.best), each, strict=True)
-        )
+        clampings: list[Clamping] = []
+        for clamping, uncertainties in zip((self.present, self.best), each, strict=True):
+            largest = [uncertainty.statistics()["max_um"] for uncertainty in uncertainties]
+            u95 = dict(zip(U95, largest, strict=True))
+            clampings.append(replace(clamping, expanded_uncertainty=u95))
         return replace(
-            self, present=now, best=best, expanded_uncertainty=told, uncertainty=before.errors
+            self,
+            present=clampings[0],
+            best=clampings[1],
+            expanded_uncertainty={"u95_gain_um": gain if before.errors.is_known else None},
+            uncertainty=before.errors,
         )
 
     def blocks(self) -> Iterator[Block]:
-        judged = "largest |E|" + " after the best rigid fit" * self.placed
+        quantity = "largest |E|" + " after the best rigid fit" * self.placed
         yield f"{self.title}: {len(self.places):,} places"
-        yield f"  the best one gains {self.gain_um:.2f} µm of the {judged}"
+        yield f"  the best one reduces the {quantity} by {self.gain_um:.2f} µm"
         if self.expanded_uncertainty:
             name, gain = U95[self.placed], plus_minus(self.expanded_uncertainty["u95_gain_um"])
             now, best = (
-                plus_minus(one.expanded_uncertainty[name]) for one in (self.present, self.best)
+                plus_minus(clamping.expanded_uncertainty[name])
+                for clamping in (self.present, self.best)
             )
-            yield f"  U95 of that: at present {now}, at the best {best}, of the gain {gain} µm"
+            yield f"  U95: at present {now}, at the best place {best}, of the gain {gain} µm"
         yield "  Geometry only: no forces, heat, wear or servo"
         columns = (
-            Column("where", leads=True),
+            Column("place", leads=True),
             *number_columns(("x", "y", "z"), ".1f", "mm", ("x_mm", "y_mm", "z_mm")),
             *number_columns(("A", "B", "C"), ".0f", "°", ("a_deg", "b_deg", "c_deg")),
             *number_columns(("|E|", "placed"), ".2f", "µm", ("max_um", "placed_um")),
         )
-        told = [("present", self.present), ("best", self.best), *(("", x) for x in self.places)]
-        rows = [(word, *one.place, one.max_um, one.placed_um) for word, one in told]
-        yield Table(columns, rows[:SHOWN], file_rows=rows)
-        here = [one for one in self.places if one.place[2:] == self.places[0].place[2:]]
-        um, (x, y, *_) = [*map(JUDGED[self.placed], here)], np.array([one.place for one in here]).T
-        ends = np.linspace(0, len(here), min(CLASSES, len(here)) + 1).astype(int)
+        labelled = [("present", self.present), ("best", self.best), *(("", x) for x in self.places)]
+        rows = [(label, *at.place, at.max_um, at.placed_um) for label, at in labelled]
+        yield Table(columns, rows[:MAX_ROWS], file_rows=rows)
+        level = [at for at in self.places if at.place[2:] == self.places[0].place[2:]]
+        um = [*map(CRITERIA[self.placed], level)]
+        x, y, *_ = np.array([at.place for at in level]).T
+        ends = np.linspace(0, len(level), min(CLASSES, len(level)) + 1).astype(int)
         dots = tuple(
             Curve(f"{um[at]:.2f} to {um[end - 1]:.2f} µm", x[at:end], y[at:end], number, "dots")
             for number, (at, end) in enumerate(pairwise(ends))
         )
-        note = f"{judged}. Geometry only: no forces, heat, wear or servo."
-        yield Lines("plane", f"Where to clamp: {self.title}", "x [mm]", "y [mm]", dots, (), note)
+        note = f"{quantity}. Geometry only: no forces, heat, wear or servo."
+        yield Lines("plane", f"Fixture positions: {self.title}", "x [mm]", "y [mm]", dots, (), note)
 
     def caveats(self) -> Iterator[str]:
         yield from (*self.warnings, *super().caveats())

@@ -1,12 +1,12 @@
-"""What an inspector measures on a part as cut: features, their measures, tolerances and causes.
+"""Inspection of the actual workpiece: features, their measures, tolerances and contributions.
 
-A shape is a surface of revolution about an axis: from a point at the height h along it and the
-distance ρ from it, (ρ − radius) · cos φ − h · sin φ is the way to the surface. φ is 0 for a
+A shape is a surface of revolution about an axis: a point at the height h along it and the distance
+ρ from it has the distance (ρ − radius) · cos φ − h · sin φ to the surface. φ is 0 for a
 cylinder and the half angle of a cone; −90° makes it a plane whose axis is its normal; without an
 axis it is a sphere. Shapes are fitted to vertices by least squares of these distances, and follow
-small moves of them in first order. A measure is taken on the part as it lies in the machine, and
-`placed`, after the best rigid fit of all vertices; each parameter adds to it what it does where all
-errors are half as large, so that the parts add up.
+their small displacements in first order. A measure is evaluated on the workpiece as clamped, and
+`placed`, after the best rigid fit of all vertices. The contribution of a parameter is evaluated
+where all errors are half as large, so that contributions add up.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -36,20 +36,25 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Ar
 
 SMOOTH_DEG = 30.5  # triangles meeting at less may belong to one curved surface: 12 around a hole
 FLAT_RAD = 1e-3  # triangles meeting at less lie in one facet
-FINE = 5e-6  # share of the largest coordinate that vertices are rounded by: files of six digits
-CLOSE = 2e-5  # share of its extent that a feature's vertices may be off its shape, beside rounding
+ROUNDING_SHARE = 5e-6  # share of the largest coordinate: files with six digits
+SHAPE_SHARE = 2e-5  # share of its extent by which vertices may deviate from a shape, and rounding
 NEAR_DEG = 12.0  # angle between triangles and the first guess of the shape, at most
 FACETS = 4  # of a curved surface, at least: fewer lie on many shapes
-ALIKE = 4.0  # facets within this ratio may belong to one surface that runs into others
-ODD = 0.01  # share of its area that may lean otherwise: slivers
-MIDST_MM = 1e-3  # from an axis; closer points, as the tip of a cone, are on no side of it
-WEAK = 3e-7  # share of the strongest response below which a freedom of a shape counts as none
+FACET_RATIO = 4.0  # facets within this ratio may belong to one surface that is tangent to others
+SLIVER_SHARE = 0.01  # share of the area whose normals may deviate
+AXIS_MM = 1e-3  # distance from an axis below which a point, as the tip of a cone, has no side
+RANK_TOLERANCE = 3e-7  # share of the strongest response below which a freedom is undetermined
 STEPS, STILL_MM, FAR_MM = 40, 1e-11, 1e6  # of a fit; changes of a distance that end it
-MAX_FEATURES = 500  # the largest surfaces of a mesh; what lies behind is left
-RIGHT_RAD = 1e-4  # nominal angles this close to 90° or 0 are right or none; datums fix no less
-NUDGE = 1e-4  # share of an error by which points are moved: too little for others to stand out
-LEVER_MM = 100.0  # at which turns count as much as shifts where datums leave both free
-SHAPES = ("plane", "cylinder", "cone", "sphere")  # as they are tried: two circles fit a sphere, too
+MAX_FEATURES = 500  # the largest surfaces of a mesh; smaller ones are ignored
+RIGHT_RAD = 1e-4  # tolerance of nominal angles of 90° or 0, and of what datums fix
+STEP_SHARE = 1e-4  # step of difference quotients, as a share of an error
+LEVER_MM = 100.0  # weight of rotations against translations that datums leave free
+SHAPES = (
+    "plane",
+    "cylinder",
+    "cone",
+    "sphere",
+)  # in the order of trials
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,21 +62,22 @@ class FeatureShape:
     """A plane, sphere, cylinder or cone."""
 
     kind: str
-    centre_mm: Array  # [3]; on the plane or axis, amid the triangles that it was found in
+    centre_mm: Array  # [3]; on the plane or axis, amid its triangles
     axis: Array  # [3], unit vector; outward normal of a plane, zero of a sphere
     radius_mm: float = 0.0  # at the centre
     angle_rad: float = 0.0  # half angle of a cone, along whose axis the radius grows
 
     @property
     def across(self) -> Array:
-        """Projection on the directions in which it has a place, [3, 3]."""
+        """Projection on the directions in which its position is determined, [3, 3]."""
         along = np.outer(self.axis, self.axis)
         return along if self.kind == "plane" else np.eye(3) - along
 
     def respond(self, point_mm: Array) -> tuple[Array, Array, Array]:
-        """Give distances of points, [n], outwards, and what they grow with.
+        """Compute distances of points, [n], outwards, and their derivatives.
 
-        That is unit vectors, [n, 3]; and shifts, turns, and radius or, of a cone, angle, [n, 8].
+        These are unit vectors, [n, 3], by the points, and a design matrix, [n, 8], by translation,
+        rotation, and radius or, of a cone, angle.
         """
         arm = point_mm - self.centre_mm
         sine, cosine = np.sin(self.angle_rad), np.cos(self.angle_rad)
@@ -79,7 +85,7 @@ class FeatureShape:
         radial = arm - np.outer(height, self.axis)
         length = np.linalg.norm(radial, axis=1)
         beyond = length - self.radius_mm
-        normal = radial * (cosine / np.maximum(length, MIDST_MM))[:, None] - sine * self.axis
+        normal = radial * (cosine / np.maximum(length, AXIS_MM))[:, None] - sine * self.axis
         opening, widening = beyond * sine + height * cosine, np.full_like(beyond, cosine)
         sizes = [0.0 * widening, opening] if self.kind == "cone" else [widening, 0.0 * opening]
         design: Any = -np.column_stack([normal, np.cross(arm, normal), *sizes])
@@ -87,7 +93,7 @@ class FeatureShape:
 
 
 class ShapeMotion(NamedTuple):
-    """How a shape follows F fields of small moves."""
+    """Motion of a shape that follows F fields of small displacements."""
 
     shape: FeatureShape
     shift_mm: Array  # [F, 3], of its centre
@@ -99,31 +105,31 @@ class ShapeMotion(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Feature:
-    """One surface of a part."""
+    """One surface of a workpiece."""
 
     shape: FeatureShape  # in the frame of the mesh
     vertices: NDArray[np.int32]  # [n], of the mesh
     area_mm2: float
-    normal: Array  # [n, 3]; see `Shape.respond`
+    normal: Array  # [n, 3]; see `FeatureShape.respond`
     design: Array  # [n, 8]
 
     def follow(self, move_um: Array) -> ShapeMotion:
-        """Fit how the shape follows moves of all vertices of the mesh, [F, V, 3]."""
+        """Fit the motion of the shape to displacements of all vertices of the mesh, [F, V, 3]."""
         move = move_um[:, self.vertices] * MM_PER_UM
-        mean = move.mean(axis=1)  # what no distance tells follows this
+        mean = move.mean(axis=1)  # directions without influence on distances follow it
         away = np.einsum("fnc,nc->fn", move - mean[:, None], self.normal)
-        step = -np.linalg.lstsq(self.design, away.T, WEAK)[0].T
+        step = -np.linalg.lstsq(self.design, away.T, RANK_TOLERANCE)[0].T
         radius, angle = self.shape.radius_mm + step[:, 6], self.shape.angle_rad + step[:, 7]
         form = np.ptp(away + step @ self.design.T, axis=1)
         return ShapeMotion(self.shape, mean + step[:, :3], step[:, 3:6], radius, angle, form)
 
 
 def fit_shape(start: FeatureShape, point_mm: Array) -> FeatureShape:
-    """Fit a shape to points, [n, 3], by least squares of their distances, from a near one."""
+    """Fit a shape to points, [n, 3], by least squares of distances, from an approximate one."""
     shape = start
     for _ in range(STEPS):
         distance, _, design = shape.respond(point_mm)
-        step = -np.linalg.lstsq(design, distance, WEAK)[0]
+        step = -np.linalg.lstsq(design, distance, RANK_TOLERANCE)[0]
         centre, axis = shape.centre_mm + step[:3], vector_rotation(step[3:6]) @ shape.axis
         radius, angle = shape.radius_mm + step[6], shape.angle_rad + step[7]
         shape = FeatureShape(shape.kind, centre, axis, radius, angle)
@@ -133,41 +139,44 @@ def fit_shape(start: FeatureShape, point_mm: Array) -> FeatureShape:
 
 
 def find_features(mesh: Workpiece) -> dict[str, Feature]:
-    """Find the shapes that the surface of a part consists of: by kind, size, and place.
+    """Find the shapes that the surface of a part consists of, sorted by kind, size and place.
 
-    First what lies between creases is looked at; then what is left of it, parted by the size of its
-    facets. A surface that is none of them, within `CLOSE` of its extent, is no feature.
+    Surfaces between creases are examined first, then the remaining ones, divided by the size of
+    their facets. A surface that deviates from all shapes by more than `SHAPE_SHARE` of its extent
+    is no feature.
     """
     from trimesh.graph import connected_component_labels, connected_components
 
     area, pairs = mesh.surface.area_faces, mesh.surface.face_adjacency
-    leaning = mesh.surface.face_adjacency_angles
-    facet_of = connected_component_labels(pairs[leaning < FLAT_RAD], len(area))
-    pairs = pairs[leaning < np.deg2rad(SMOOTH_DEG)]
+    angle = mesh.surface.face_adjacency_angles
+    facet_of = connected_component_labels(pairs[angle < FLAT_RAD], len(area))
+    pairs = pairs[angle < np.deg2rad(SMOOTH_DEG)]
     facet = np.bincount(facet_of, area)[facet_of][pairs]
-    is_alike = facet.max(axis=1) < ALIKE * facet.min(axis=1)
-    is_left, found = np.ones(len(area), dtype=bool), list[Feature]()
+    is_alike = facet.max(axis=1) < FACET_RATIO * facet.min(axis=1)
+    is_free, features = np.ones(len(area), dtype=bool), list[Feature]()
     for chosen in (True, is_alike):
-        links = pairs[chosen & is_left[pairs].all(axis=1)]
+        links = pairs[chosen & is_free[pairs].all(axis=1)]
         # a single triangle is flat whatever the machine does
-        parts: Any = connected_components(links, min_len=2, engine="scipy")
-        for part in sorted(parts, key=lambda one: -area[one].sum())[:MAX_FEATURES]:
-            kinds = SHAPES if len(np.unique(facet_of[part])) >= FACETS else SHAPES[:1]
-            if feature := next(filter(None, (_fitted(mesh, kind, part) for kind in kinds)), None):
-                is_left[part] = False
-                found.append(feature)
-    found.sort(key=lambda one: (float(f"{-one.area_mm2:.5g}"), *one.shape.centre_mm.round(3)))
-    return {
-        f"{kind} {number}": feature
-        for kind in SHAPES
-        for number, feature in enumerate((one for one in found if one.shape.kind == kind), 1)
-    }
+        surfaces: Any = connected_components(links, min_len=2, engine="scipy")
+        for rows in sorted(surfaces, key=lambda rows: -area[rows].sum())[:MAX_FEATURES]:
+            kinds = SHAPES if len(np.unique(facet_of[rows])) >= FACETS else SHAPES[:1]
+            fits = (_fit_feature(mesh, kind, rows) for kind in kinds)
+            feature = next(filter(None, fits), None)
+            if feature is not None:
+                is_free[rows] = False
+                features.append(feature)
+    features.sort(key=lambda x: (float(f"{-x.area_mm2:.5g}"), *x.shape.centre_mm.round(3)))
+    names: dict[str, Feature] = {}
+    for kind in SHAPES:
+        same_kind = (feature for feature in features if feature.shape.kind == kind)
+        names |= {f"{kind} {number}": feature for number, feature in enumerate(same_kind, 1)}
+    return names
 
 
-def _fitted(mesh: Workpiece, kind: str, part: NDArray[np.intp]) -> Feature | None:
-    """Fit a shape to triangles; None where their normals or vertices are off it."""
-    normal, area = mesh.surface.face_normals[part], mesh.surface.area_faces[part]
-    place, weight = mesh.surface.triangles_center[part], area / area.sum()
+def _fit_feature(mesh: Workpiece, kind: str, rows: NDArray[np.intp]) -> Feature | None:
+    """Fit a shape to triangles; None where their normals or vertices deviate from it."""
+    normal, area = mesh.surface.face_normals[rows], mesh.surface.area_faces[rows]
+    place, weight = mesh.surface.triangles_center[rows], area / area.sum()
     centre, mean = weight @ place, weight @ normal
     bent, is_flat = normal - mean, kind == "plane"
     same, spread = np.outer(mean, mean), (weight * bent.T) @ bent
@@ -176,77 +185,86 @@ def _fitted(mesh: Workpiece, kind: str, part: NDArray[np.intp]) -> Feature | Non
     axis = np.linalg.eigh(apart)[1][:, 2] * (kind != "sphere")
     lean = mean @ axis
     angle = {"plane": -np.pi / 2.0, "cone": np.arcsin(min(abs(lean), 1.0))}.get(kind, 0.0)
-    # what places go apart by with their normals; a hole has less than none
+    # radius: distance of places per change of their normals; negative for a hole
     reach = 0.0 if is_flat else weight @ np.sum((place - centre) * bent, 1) / np.trace(spread)
     axis = axis * np.copysign(1.0, lean if is_flat else -lean * reach)
     centre = centre - reach * (mean - (mean @ axis) * axis)
     start = FeatureShape(kind, centre, axis, abs(reach) * np.cos(angle), angle)
     turned = np.sum(start.respond(place)[1] * normal, axis=1)
-    if area @ (turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG))) > ODD * area.sum():
+    if (
+        area @ (turned * np.sign(area @ turned) < np.cos(np.deg2rad(NEAR_DEG)))
+        > SLIVER_SHARE * area.sum()
+    ):
         return None
-    vertices = np.unique(mesh.triangles[part])
+    vertices = np.unique(mesh.triangles[rows])
     points = mesh.vertices_mm[vertices]
     shape = fit_shape(start, points)
     distance, *response = shape.respond(points)
-    most = CLOSE * np.linalg.norm(np.ptp(points, axis=0)) + FINE * np.abs(mesh.vertices_mm).max()
-    is_close = np.abs(distance).max() <= most
+    tolerance = (
+        SHAPE_SHARE * np.linalg.norm(np.ptp(points, axis=0))
+        + ROUNDING_SHARE * np.abs(mesh.vertices_mm).max()
+    )
+    is_close = np.abs(distance).max() <= tolerance
     return Feature(shape, vertices, float(area.sum()), *response) if is_close else None
 
 
-def _distance(one: ShapeMotion, other: ShapeMotion) -> Array:
-    """Distance square to a plane; else square to an axis; else between centres."""
-    fixing = min(other, one, key=lambda motion: SHAPES.index(motion.shape.kind))
-    away = one.shape.centre_mm - other.shape.centre_mm
-    moved = one.shift_mm - other.shift_mm - np.cross(fixing.turn_rad, away)
+def _distance(feature: ShapeMotion, datum: ShapeMotion) -> Array:
+    """Compute the distance normal to a plane, else to an axis, else between centres."""
+    fixing = min(datum, feature, key=lambda motion: SHAPES.index(motion.shape.kind))
+    away = feature.shape.centre_mm - datum.shape.centre_mm
+    moved = feature.shift_mm - datum.shift_mm - np.cross(fixing.turn_rad, away)
     return np.linalg.norm((away + moved) @ fixing.shape.across, axis=1)
 
 
-def _angle(one: ShapeMotion, other: ShapeMotion) -> Array:
-    """Angle through the material between planes, else up to 90° between axes, or to a plane."""
-    axis, planes = one.shape.axis, [one.shape.kind, other.shape.kind].count("plane")
-    same = -1.0 if axis @ other.shape.axis < -RIGHT_RAD else 1.0
-    sine = np.linalg.norm(about := np.cross(axis, same * other.shape.axis))
-    start = about * np.arctan2(sine, same * axis @ other.shape.axis) / (sine or 1.0)
-    turned = other.turn_rad - one.turn_rad
+def _angle(feature: ShapeMotion, datum: ShapeMotion) -> Array:
+    """Compute the angle through the material between planes, else up to 90°."""
+    axis, planes = feature.shape.axis, [feature.shape.kind, datum.shape.kind].count("plane")
+    same = -1.0 if axis @ datum.shape.axis < -RIGHT_RAD else 1.0
+    about = np.cross(axis, same * datum.shape.axis)
+    sine = np.linalg.norm(about)
+    start = about * np.arctan2(sine, same * axis @ datum.shape.axis) / (sine or 1.0)
+    turned = datum.turn_rad - feature.turn_rad
     offset = np.pi / 2.0 if planes == 1 else np.pi if planes and same > 0.0 else 0.0
     return np.abs(offset - np.linalg.norm(start + turned - np.outer(turned @ axis, axis), axis=1))
 
 
-def _position(own: ShapeMotion, *datums: ShapeMotion) -> Array:
-    """How far a feature is from where it should be against datums, along what it fixes.
+def _position(feature: ShapeMotion, *datums: ShapeMotion) -> Array:
+    """Compute the deviation of a feature from its nominal position against datums.
 
-    Each datum fixes what those before it have left; what none does stays as the best fit has it.
+    Each datum fixes degrees of freedom that the previous ones leave free; the best fit determines
+    those that none fixes.
     """
     from scipy.linalg import block_diag, pinv
 
-    found, left, rigid = np.zeros(6), np.eye(6), np.eye(6)
+    motion, free, rigid = np.zeros(6), np.eye(6), np.eye(6)
     for shape, shifted, turned, *_ in datums:
-        rigid[3:, :3] = skew((shape.centre_mm - own.shape.centre_mm) / LEVER_MM)
+        rigid[3:, :3] = skew((shape.centre_mm - feature.shape.centre_mm) / LEVER_MM)
         turns = np.eye(3) * (shape.axis @ shape.axis) - np.outer(shape.axis, shape.axis)
-        ways: Any = block_diag(shape.across, turns)
-        rest = np.hstack([shifted, turned * LEVER_MM]) @ ways - found @ rigid @ ways
-        fixing = left @ rigid @ ways
-        inverse = pinv(fixing, atol=RIGHT_RAD) @ left
-        found, left = found + rest @ inverse, left - fixing @ inverse
-    return np.linalg.norm((own.shift_mm - found[..., :3]) @ own.shape.across, axis=1)
+        fixed: Any = block_diag(shape.across, turns)
+        moved = np.hstack([shifted, turned * LEVER_MM])
+        difference = moved @ fixed - motion @ rigid @ fixed
+        fixing = free @ rigid @ fixed
+        inverse = pinv(fixing, atol=RIGHT_RAD) @ free
+        motion, free = motion + difference @ inverse, free - fixing @ inverse
+    return np.linalg.norm((feature.shift_mm - motion[..., :3]) @ feature.shape.across, axis=1)
 
 
 class MeasureKind(NamedTuple):
-    """A kind of measure: how it is taken, of what, to how many others."""
+    """A kind of measure, its features, and the number of its datums."""
 
-    evaluate: Callable[..., Array]  # mm or rad, [F], of the motions of these
+    evaluate: Callable[..., Array]  # mm or rad, [F], of the motions of features
     features: Sequence[str]
-    reference_count: tuple[int, int] = (0, 0)
+    datum_count: tuple[int, int] = (0, 0)
     is_angle: bool = False
 
 
 KINDS: Mapping[str, MeasureKind] = {
-    "flatness": MeasureKind(lambda one: one.form_mm, ["plane"]),
-    "cylindricity": MeasureKind(lambda one: one.form_mm, ["cylinder"]),
-    "conicity": MeasureKind(lambda one: one.form_mm, ["cone"]),
-    "sphericity": MeasureKind(lambda one: one.form_mm, ["sphere"]),
-    "diameter": MeasureKind(lambda one: 2.0 * one.radius_mm, ["cylinder", "sphere"]),
-    "half_angle": MeasureKind(lambda one: one.angle_rad, ["cone"], is_angle=True),
+    "flatness": MeasureKind(lambda shape: shape.form_mm, ["plane"]),
+    "cylindricity": MeasureKind(lambda shape: shape.form_mm, ["cylinder"]),
+    "conicity": MeasureKind(lambda shape: shape.form_mm, ["cone"]),
+    "sphericity": MeasureKind(lambda shape: shape.form_mm, ["sphere"]),
+    "diameter": MeasureKind(lambda shape: 2.0 * shape.radius_mm, ["cylinder", "sphere"]),
+    "half_angle": MeasureKind(lambda shape: shape.angle_rad, ["cone"], is_angle=True),
     "position": MeasureKind(_position, SHAPES, (0, 6)),
     "distance": MeasureKind(_distance, SHAPES, (1, 1)),
     "angle": MeasureKind(_angle, SHAPES[:3], (1, 1), is_angle=True),
@@ -260,151 +278,161 @@ MeasureBands = dict[MeasureKey, Band]
 
 @dataclass(frozen=True)
 class FeatureResult:
-    """A feature as it is measured."""
+    """Inspection result of a feature."""
 
     name: str
     kind: str
     measures: Mapping[str, Mapping[str, Any]]  # by name: numbers by names with units, and a budget
-    budget_of: str  # its measure that `budget` splits: with a tolerance in µm, or the position
-    budget: Mapping[str, float]  # what each parameter adds to it, placed, µm
+    budget_of: str  # measure of `budget`: one with a tolerance in µm, or the position
+    budget: Mapping[str, float]  # contribution of each parameter, placed, µm
 
 
 def inspect(
     scene: Scene,
     mesh: Workpiece,
-    made: ActualPoints,
+    actual: ActualPoints,
     tolerances: tuple[str, str] | None = None,
-    sure: FieldUncertainty | None = None,
-    between_um: float = 0.0,
+    uncertainty: FieldUncertainty | None = None,
+    interpolation_um: float = 0.0,
 ) -> tuple[FeatureResult, ...]:
-    """Measure the features of a part, in its own frame, and made at some place in a scene.
+    """Measure the features of a workpiece, in the frame of its mesh.
 
-    What errors are off between vertices leaves in doubt what is no further from a tolerance.
-    Tolerances are the name and the text of a TOML file that names features and says what they have
-    to keep; SceneError says all that is wrong with it.
+    A verdict is undecided where the distance to the tolerance is below `interpolation_um`, the
+    largest deviation of errors between vertices. `tolerances` are the name and the text of a TOML
+    file of features; a SceneError lists its problems.
     """
-    known, points = find_features(mesh), mesh.vertices_mm
-    names, features, shapes = [*known], known.values(), [one.shape for one in known.values()]
-    wanted: MeasureBands = {
+    by_name, points = find_features(mesh), mesh.vertices_mm
+    names, features = [*by_name], by_name.values()
+    shapes = [feature.shape for feature in features]
+    bands: MeasureBands = {
         (kind, (at,)): None
         for at, shape in enumerate(shapes)
         for kind, row in KINDS.items()
-        if shape.kind in row.features and not row.reference_count[0]
+        if shape.kind in row.features and not row.datum_count[0]
     }
     if tolerances:
-        wanted |= _read(*tolerances, shapes, names)
-    if not wanted:
+        bands |= _read_tolerances(*tolerances, shapes, names)
+    if not bands:
         return ()
-    turn, take = _turn(mesh, made), partial(_take, features, wanted)
-    errors = [made.error_um]
-    if any(wanted.values()):
-        at = made.coordinates
+    turn, evaluate_measures = _rotation(mesh, actual), partial(_evaluate_measures, features, bands)
+    errors = [actual.error_um]
+    if any(bands.values()):
+        at = actual.coordinates
         exact = evaluate(scene, at=at, loop=Loop.RELATIVE, frame="workpiece", exact=True)
         errors.append(exact.error_um)
     placed = subtract_best_fit(points, np.array(errors) @ turn)
-    values = take(np.stack([0.0 * placed[0], made.error_um @ turn, *placed]))
+    values = evaluate_measures(np.stack([0.0 * placed[0], actual.error_um @ turn, *placed]))
     budget: dict[str, Array] = {}
     for key in scene.parameter_keys:
-        if amplitude := scene.errors.amplitude(key):
-            alone = subtract_best_fit(
-                points, amplitude * point_basis(scene, made, [key]).position @ turn
-            )
-            low, high = take(placed[0] / 2.0 + NUDGE * np.concatenate([-alone, alone]))
-            budget[key] = (high - low) / (2.0 * NUDGE)
-    u95: list[float | None] = [None] * len(wanted)
-    if sure is not None:
-        changes = subtract_best_fit(points, sure.response @ turn)
-        u95 = sure.errors.propagate(
-            lambda change: take(placed[:1] + np.tensordot(change, changes, 1))[0]
+        amplitude = scene.errors.amplitude(key)
+        if amplitude:
+            effect = amplitude * point_basis(scene, actual, [key]).position @ turn
+            effect = STEP_SHARE * subtract_best_fit(points, effect)
+            low, high = evaluate_measures(placed[0] / 2.0 + np.concatenate([-effect, effect]))
+            budget[key] = (high - low) / (2.0 * STEP_SHARE)
+    u95: list[float | None] = [None] * len(bands)
+    if uncertainty is not None:
+        changes = subtract_best_fit(points, uncertainty.response @ turn)
+        u95 = uncertainty.errors.propagate(
+            lambda change: evaluate_measures(placed[:1] + np.tensordot(change, changes, 1))[0]
         )
     measures = [dict[str, Mapping[str, Any]]() for _ in features]
-    for index, ((kind, of), band) in enumerate(wanted.items()):
+    for index, ((kind, of), band) in enumerate(bands.items()):
         to = f" to {', '.join(names[at] for at in of[1:])}" if of[1:] else ""
         split = {key: float(part[index]) for key, part in budget.items()}
-        known = (sure.errors, u95[index]) if sure else None
-        told = KINDS[kind], values[:, index], band, split, known, between_um
-        measures[of[0]][kind + to] = _numbers(*told)
+        stated = (uncertainty.errors, u95[index]) if uncertainty else None
+        measures[of[0]][kind + to] = _measure_numbers(
+            KINDS[kind], values[:, index], band, split, stated, interpolation_um
+        )
     results: list[FeatureResult] = []
     for name, shape, row in zip(names, shapes, measures, strict=True):
-        of = next((key for key, one in row.items() if "tolerance_um" in one), "position")
+        of = next((key for key, numbers in row.items() if "tolerance_um" in numbers), "position")
         results.append(FeatureResult(name, shape.kind, row, of, row[of]["budget"]))
     return tuple(results)
 
 
 def measure_changes(
-    mesh: Workpiece, made: ActualPoints, moves_um: Array, tolerances: tuple[str, str]
+    mesh: Workpiece, actual: ActualPoints, moves_um: Array, tolerances: tuple[str, str]
 ) -> Array:
-    """Give what moves of vertices, [K, n, 3], µm, change of measures with a tolerance, [K, m].
+    """Compute the changes of toleranced measures, placed, [K, m], with vertices, [K, n, 3], µm.
 
-    Placed, µm or µrad; the moves are in the workpiece frame.
+    In µm or µrad; displacements of vertices are in the workpiece frame.
     """
-    known = find_features(mesh)
-    every = _read(*tolerances, [one.shape for one in known.values()], [*known])
-    wanted = [measure for measure, band in every.items() if band]
-    moved = np.array([made.error_um, *moves_um]) @ _turn(mesh, made)
-    here, *steps = subtract_best_fit(mesh.vertices_mm, moved)
-    both = (here + sign * NUDGE * np.array(steps) for sign in (-1.0, 1.0))
-    low, high = (_take(known.values(), wanted, move) for move in both)
-    return (high - low) / (2.0 * NUDGE)
+    features = find_features(mesh)
+    shapes = [feature.shape for feature in features.values()]
+    bands = _read_tolerances(*tolerances, shapes, [*features])
+    toleranced = [measure for measure, band in bands.items() if band]
+    moved = np.array([actual.error_um, *moves_um]) @ _rotation(mesh, actual)
+    present, *steps = subtract_best_fit(mesh.vertices_mm, moved)
+    moves = (present + sign * STEP_SHARE * np.array(steps) for sign in (-1.0, 1.0))
+    low, high = (_evaluate_measures(features.values(), toleranced, move) for move in moves)
+    return (high - low) / (2.0 * STEP_SHARE)
 
 
-def _turn(mesh: Workpiece, made: ActualPoints) -> Array:
-    """Give the rotation from the frame of a part to the workpiece, [3, 3]."""
+def _rotation(mesh: Workpiece, actual: ActualPoints) -> Array:
+    """Compute the rotation from the frame of a mesh to the workpiece frame, [3, 3]."""
     from scipy.spatial.transform import Rotation
 
-    arms = (at - at.mean(axis=0) for at in (made.point_mm, mesh.vertices_mm))
+    arms = (at - at.mean(axis=0) for at in (actual.point_mm, mesh.vertices_mm))
     return Rotation.align_vectors(*arms)[0].as_matrix()
 
 
-def _take(features: Collection[Feature], wanted: Collection[MeasureKey], move_um: Array) -> Array:
-    """Take measures, (m,), of features that follow moves, [F, V, 3]; [F, m], µm or µrad."""
-    motions = [one.follow(move_um) for one in features]
-    found = np.empty((len(move_um), len(wanted)))
-    for index, (kind, of) in enumerate(wanted):
-        taken = KINDS[kind].evaluate(*(motions[at] for at in of))
-        found[:, index] = taken * (URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM)
-    return found
+def _evaluate_measures(
+    features: Collection[Feature], measures: Collection[MeasureKey], move_um: Array
+) -> Array:
+    """Evaluate measures of features that follow displacements, [F, V, 3]; [F, m], µm or µrad."""
+    motions = [feature.follow(move_um) for feature in features]
+    numbers = np.empty((len(move_um), len(measures)))
+    for index, (kind, of) in enumerate(measures):
+        number = KINDS[kind].evaluate(*(motions[at] for at in of))
+        numbers[:, index] = number * (URAD_PER_RAD if KINDS[kind].is_angle else UM_PER_MM)
+    return numbers
 
 
-def _numbers(
+def _measure_numbers(
     kind: MeasureKind,
     values: Array,
     band: Band,
     budget: dict[str, float],
-    known: tuple[ErrorUncertainty, float | None] | None,
-    between_um: float,
+    uncertainty: tuple[ErrorUncertainty, float | None] | None,
+    interpolation_um: float,
 ) -> dict[str, Any]:
-    """Give a measure in numbers: nominal, actual, placed and, for a verdict, exact, µm or µrad.
+    """Build the numbers of a measure from its nominal, actual, placed and exact placed values.
 
-    Where a scene states the uncertainty of its errors, a verdict holds with a probability of at least
-    95 % (ISO 14253-1).
+    Where a scene states the uncertainty of its errors, a verdict holds with a probability of at
+    least 95 % (ISO 14253-1).
     """
     large, small = ("deg", "urad") if kind.is_angle else ("mm", "um")
     per = np.rad2deg(RAD_PER_URAD) if kind.is_angle else MM_PER_UM
     difference, placed, *exact = (values[1:] - values[0]).tolist()
     names = (f"{word}_{large}" for word in ("nominal", "actual", "placed"))
-    found: dict[str, Any] = dict(zip(names, (values * per).tolist(), strict=False))
-    found |= {f"difference_{small}": difference, f"placed_difference_{small}": placed}
-    doubt, u95 = known or (None, None)
-    found |= {f"u95_placed_difference_{small}": u95} if doubt else {}
+    numbers: dict[str, Any] = dict(zip(names, (values * per).tolist(), strict=False))
+    numbers |= {f"difference_{small}": difference, f"placed_difference_{small}": placed}
+    errors, u95 = uncertainty or (None, None)
+    if errors is not None:
+        numbers[f"u95_placed_difference_{small}"] = u95
     if band is not None:
-        left_out, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
-        left_out += 0.0 if kind.is_angle else between_um
-        share = float(beyond <= 0.0)
-        if doubt is not None:
-            share = None if u95 is None else float(doubt.probability_within(placed, u95, *band))
-            found["probability"] = share
-        verdict = Verdict.from_probability(share)
-        if abs(beyond) < left_out:
+        neglected, beyond = abs(exact[0] - placed), max(band[0] - placed, placed - band[1])
+        neglected += 0.0 if kind.is_angle else interpolation_um
+        probability: float | None = float(beyond <= 0.0)
+        if errors is not None:
+            probability = None
+            if u95 is not None:
+                probability = float(errors.probability_within(placed, u95, *band))
+            numbers["probability"] = probability
+        verdict = Verdict.from_probability(probability)
+        if abs(beyond) < neglected:
             verdict = Verdict.UNDECIDED
-        found |= {f"tolerance_{small}": band, f"doubt_{small}": left_out, "verdict": verdict}
-    return found | {"budget": dict(sorted(budget.items(), key=lambda pair: -abs(pair[1])))}
+        numbers |= {f"tolerance_{small}": band, f"doubt_{small}": neglected, "verdict": verdict}
+    return numbers | {"budget": dict(sorted(budget.items(), key=lambda pair: -abs(pair[1])))}
 
 
-def _read(source: str, text: str, shapes: Sequence[FeatureShape], names: list[str]) -> MeasureBands:
+def _read_tolerances(
+    source: str, text: str, shapes: Sequence[FeatureShape], names: list[str]
+) -> MeasureBands:
     problems, raw = schema.Problems(), parse_toml(text, source)
     entries: Sequence[Any] = (problems.read(schema.FEATURES, "", raw) or {}).get("features", ())
-    known, wanted = {name: at for at, name in enumerate(names)}, MeasureBands()
+    index_of, bands = {name: at for at, name in enumerate(names)}, MeasureBands()
     for index, entry in enumerate(entries):
         where, chosen = f"features[{index}]", [entry["is"], *entry["to"]]
         if entry["near"] is not None:
@@ -414,24 +442,25 @@ def _read(source: str, text: str, shapes: Sequence[FeatureShape], names: list[st
                 if shape.kind == entry["is"]
             }
             chosen[0] = away.get(min(away, default=0.0), entry["is"])
-        problems.only(where, chosen, known, "feature")
-        of = tuple(known[one] for one in chosen if one in known)
+        problems.only(where, chosen, index_of, "feature")
+        of = tuple(index_of[name] for name in chosen if name in index_of)
         if len(of) < len(chosen):
             continue
         names[of[0]] = name = entry["name"] or names[of[0]]
-        if known.setdefault(name, of[0]) != of[0]:
+        if index_of.setdefault(name, of[0]) != of[0]:
             problems.add(f"{where}.name", "another feature has it", name)
-        twice = "an entry before has the same measure" * ((entry["measure"], of) in wanted)
-        if wrong := twice or _wrong(entry, [shapes[at] for at in of]):
-            problems.add(where, wrong)
+        twice = "an entry before has the same measure" * ((entry["measure"], of) in bands)
+        problem = twice or _find_problem(entry, [shapes[at] for at in of])
+        if problem:
+            problems.add(where, problem)
         elif entry["measure"]:
-            wanted[entry["measure"], of] = entry["tolerance_um"] or entry["tolerance_urad"]
+            bands[entry["measure"], of] = entry["tolerance_um"] or entry["tolerance_urad"]
     if problems.lines:
         raise SceneError(source, problems.lines)
-    return wanted
+    return bands
 
 
-def _wrong(entry: Mapping[str, Any], shapes: Sequence[FeatureShape]) -> str:
+def _find_problem(entry: Mapping[str, Any], shapes: Sequence[FeatureShape]) -> str:
     name, count = entry["measure"], len(shapes) - 1
     bands = entry["tolerance_um"], entry["tolerance_urad"]
     if not name:
@@ -442,11 +471,11 @@ def _wrong(entry: Mapping[str, Any], shapes: Sequence[FeatureShape]) -> str:
     unit, other = ("urad", "um") if kind.is_angle else ("um", "urad")
     if bands[not kind.is_angle]:
         return f"tolerance_{other} of {name}; expected tolerance_{unit}"
-    if not kind.reference_count[0] <= count <= kind.reference_count[1]:
-        return f"{name} to {count} features; expected {kind.reference_count[1]}"
-    for one in shapes:
-        if one.kind not in kind.features:
-            return f"{name} of a {one.kind}; expected a {' or a '.join(kind.features)}"
+    if not kind.datum_count[0] <= count <= kind.datum_count[1]:
+        return f"{name} to {count} features; expected {kind.datum_count[1]}"
+    for shape in shapes:
+        if shape.kind not in kind.features:
+            return f"{name} of a {shape.kind}; expected a {' or a '.join(kind.features)}"
     if name in ("squareness", "parallelism"):
         (angle,) = _angle(*(ShapeMotion(shape, *np.zeros((5, 1, 3))) for shape in shapes))
         if abs((np.cos if name == "squareness" else np.sin)(angle)) > RIGHT_RAD:
@@ -455,18 +484,18 @@ def _wrong(entry: Mapping[str, Any], shapes: Sequence[FeatureShape]) -> str:
 
 
 def features_table(results: Sequence[FeatureResult]) -> Table:
-    """List features and their measures, with what adds most to each."""
+    """List features and their measures with the largest contributions."""
     rows: list[tuple[Any, ...]] = []
     for result in results:
-        for name, one in result.measures.items():
-            nominal, _, placed, *differences = [*one.values()][:5]
-            tolerance = one.get("tolerance_um") or one.get("tolerance_urad") or ()
-            u95 = [value for key, value in one.items() if key.startswith("u95_")]
-            sure = plus_minus(u95[0]) if u95 else None
+        for name, numbers in result.measures.items():
+            nominal, _, placed, *differences = [*numbers.values()][:5]
+            tolerance = numbers.get("tolerance_um") or numbers.get("tolerance_urad") or ()
+            u95 = [plus_minus(number) for key, number in numbers.items() if key.startswith("u95_")]
             rows.append((
-                f"{result.name} · {name.replace('_', ' ')}", nominal, placed, *differences, sure,
-                " … ".join(map(spell_signed, tolerance)), one.get("verdict", ""),
-                budget_words(one["budget"]),
+                f"{result.name} · {name.replace('_', ' ')}", nominal, placed, *differences,
+                u95[0] if u95 else None,
+                " … ".join(map(spell_signed, tolerance)), numbers.get("verdict", ""),
+                budget_words(numbers["budget"]),
             ))  # fmt: skip
     columns = (
         Column("measure", key="measure", leads=True, wraps=True),
@@ -475,6 +504,6 @@ def features_table(results: Sequence[FeatureResult]) -> Table:
         Column("U95", key="u95", shows=any(row[5] for row in rows)),
         Column("tolerance", key="tolerance"),
         Column("verdict", key="verdict"),
-        Column("most of it", key="most_of_it", wraps=True),
+        Column("largest contributions", key="most_of_it", wraps=True),
     )
     return Table(columns, rows, empty=f"no {', '.join(SHAPES)} was found")

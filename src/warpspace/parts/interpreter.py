@@ -1,28 +1,28 @@
-"""A program as a control runs it: words of G-code, and the moves that they come to.
+"""Interpreter of G-code programs: words, and the moves that they command.
 
 **Words** are axis positions plus the active offset; after G53 they are axis positions. A tool of
 length L reaches L beyond the scene's tool point, against the tool axis: tip = tool point − L · tool
 axis in the tool frame. G43 H moves Z by +L, so that the tip is at the programmed Z while rotary
 axes are at zero. A change of length or offset moves nothing by itself.
 
-**Without tool centre point** (TCP) all axes go in proportion, arcs are arcs of axis positions,
+**Without tool centre point** (TCP) all axes move in proportion, arcs are arcs of axis positions,
 and rotary axes swing the tip. **With it** (G43.4 to G49) X, Y, Z are the tip on the workpiece: the
 point of the workpiece frame where the tip is with these words at rotary axes zero. The tip then
 runs along lines and arcs of the workpiece, rotary axes turn in proportion, linear axes follow.
 
-The path begins where straight blocks have named all linear axes, or feed one that was named before:
-nobody knows where the others stood.
-G28 goes to axis positions zero, or to the end of the travel that is nearest.
+The path begins where straight blocks have named all linear axes, or feed one named before: the
+initial positions of the others are unknown.
+G28 moves to axis positions zero, or to the end of the travel that is nearest.
 """
 
 import re
 from array import array
 from cmath import phase
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from math import ceil, copysign, sqrt, tau
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Literal, NoReturn, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,12 +51,16 @@ from warpspace.units import Array, Integers
 MM_PER_INCH, MAX_TOOL_MM = 25.4, 1e4  # the latter of offsets, too
 SLACK_MM, SLACK = 0.005, 1e-3  # by which radii at both ends of an arc may differ, or its share
 FULL_TURN_RAD = 1e-9  # an arc below it is a full circle
-STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND is the same place in other words
+STAND, RAPID, FEED, ARC = range(4)  # kinds of moves; STAND: the same place in another mode
 PLANES, CENTRES = ("YZ", "ZX", "XY"), ("JK", "KI", "IJ")  # of arcs, by the direction across
 CYCLES = "G81", "G82", "G83"
-_IDLE = {"G2": "L", "G3": "L", **dict.fromkeys(CYCLES, "IJ")}  # letters that count nothing there
-MOST_SAID = 1000  # words that are listed as not understood
-SHOWN = MAX_TYPED_NUMBER  # characters of a word that a message shows
+_UNUSED_LETTERS = {
+    "G2": "L",
+    "G3": "L",
+    **dict.fromkeys(CYCLES, "IJ"),
+}  # letters without meaning there
+MAX_REMARKS = 1000  # words listed as not understood
+MAX_SHOWN = MAX_TYPED_NUMBER  # characters of a word that a message shows
 WORD = re.compile(
     r"([A-Z])\s*+([+-]?(?:[0-9]++\.?[0-9]*+|\.[0-9]++))(?![.\d#\[=]|E\d)"  # a letter, its number
     r"|\([^()]*+\)|;.*+"  # comments
@@ -67,46 +71,37 @@ _SKIP = re.compile(r"(N\s*+\d++\s*+)?+(/[/\d]*+\s*+)(.*+)", re.IGNORECASE)
 _TITLE = re.compile(r"%?\s*+<?[O:]\s*+\d++>?\s*+(\([^()]*+\)\s*+)*+", re.IGNORECASE)  # of a program
 _CONTROL_FLOW = re.compile(r".*[#\[<=]|GOTO|IF|WHILE|FOR|LOOP|REPEAT|CALL")
 _AXES, _POSITIONS = frozenset("XYZUVWABC"), frozenset("XYZUVWABCIJKRQ")
-_MODAL: Mapping[str, tuple[str, object]] = {
-    **{code: ("motion", code) for code in ("G0", "G1", "G2", "G3", *CYCLES)},
-    "G80": ("motion", "G0"),
-    "G17": ("across", 2), "G18": ("across", 1), "G19": ("across", 0),
-    "G20": ("unit_mm", MM_PER_INCH), "G21": ("unit_mm", 1.0),
-    "G90": ("absolute", True), "G91": ("absolute", False),
-    "G93": ("inverse_time", True), "G94": ("inverse_time", False), "G95": ("inverse_time", False),
-    "G98": ("to_initial", True), "G99": ("to_initial", False),
-    **{code: ("system", code) for code in ("G54", "G55", "G56", "G57", "G58", "G59")},
-}  # fmt: skip
-_OTHER = "4 9 15 28 40 43 43.4 49 50 53 61 61.1 64 67 69 91.1 96 97"
-_UNDERSTOOD = _MODAL.keys() | {f"G{number}" for number in _OTHER.split()}
 _BENDING = (
     "2.1 2.2 2.3 2.4 3.1 3.2 3.3 3.4 5.2 5.3 6.2 7 10 12 12.1 13 16 27 29 30 31 33 33.1 34 37 38.2"
     " 38.3 38.4 38.5 41 41.1 42 42.1 43.1 43.2 43.5 47 51 51.1 52 54.1 54.2 54.4 59.1 59.2 59.3 65"
     " 66 68 68.2 68.3 70 72 73 74 76 84 85 86 87 88 89 90.1 92 150 154"
 )
+_NO_EFFECT = (  # on the path
+    "G9", "G15", "G40", "G50", "G61", "G61.1", "G64", "G67", "G69", "G91.1", "G96", "G97",
+)  # fmt: skip
 REFUSED = {"M96", "M97", "M98", "M99", "M198"} | {
     f"G{number}" for number in (*_BENDING.split(), *range(110, 130))
 }
-"""Codes that move the path in ways that are not followed: corrections, turns, calls, cycles."""
+"""Codes whose effect on the path is not supported: corrections, rotations, calls, cycles."""
 
 
-def _cut(word: str) -> str:
-    return word if len(word) < SHOWN else f"{word[: SHOWN - 1]}…"
+def _shorten(word: str) -> str:
+    return word if len(word) < MAX_SHOWN else f"{word[: MAX_SHOWN - 1]}…"
 
 
 def _offsets(text: str, scene: Scene) -> tuple[tuple[str, float], ...]:
-    found = read_numbers(text, "G54X=position and H1=length", "G54X=10,H1=85.5")
-    for name, value in found.items():
+    offsets = read_numbers(text, "G54X=position and H1=length", "G54X=10,H1=85.5")
+    for name, value in offsets.items():
         if abs(value) > MAX_TOOL_MM:
             raise ValueError(f"{name}={value:g}; expected at most ±{MAX_TOOL_MM:g}")
         if not re.fullmatch(rf"G5[4-9]({'|'.join(scene.machine.axes)})|H\d+", name):
             raise ValueError(f"{name}; expected G54 to G59 with an axis of the machine, or H1")
-    return tuple(found.items())
+    return tuple(offsets.items())
 
 
 @dataclass(frozen=True, kw_only=True)
 class ControlSettings:
-    """What is set on a control before a program runs."""
+    """Settings of a control before a program runs."""
 
     tcp: Literal["program", "always", "never"] = option(
         "program", "Tool centre point: switched by G43.4 and G49, or on or off throughout"
@@ -125,11 +120,11 @@ class ControlSettings:
 
 @dataclass(frozen=True, eq=False)
 class ParsedProgram:
-    """Moves of a program, one a row; each begins where the one before it ends."""
+    """Moves of a program, one per row; each begins where the previous one ends."""
 
     scene: Scene
     axes: tuple[str, ...]  # of its machine, [a]
-    line: Integers  # [m], of the file, from 1; 0 for where the axes stand at first
+    line: Integers  # [m], of the file, from 1; 0 for the initial positions
     kind: Integers  # [m]; STAND, RAPID, FEED or ARC
     tcp: NDArray[np.bool_]  # [m]
     across: Integers  # [m]; direction 0 to 2 about which an arc turns
@@ -139,12 +134,12 @@ class ParsedProgram:
     # [m, a], mm and degrees; axis positions. With TCP those of the linear axes bring the scene's
     # tool point to where the tip is while rotary axes are at zero: see `upright`
     end: Array
-    refused: Mapping[int, str]  # words by their line; the path ends before the first of them
-    unknown: Mapping[str, int]  # words that are not understood, to their first line
+    refused: Mapping[int, str]  # words by line; the path ends before the first
+    unknown: Mapping[str, int]  # words not understood: first line of each
     blocks: int  # lines that move an axis
 
     def positions(self, move: Integers, share: Array) -> Array:
-        """Give the positions of axes, as `end` has them, at shares of moves, [n, a]."""
+        """Return the axis positions, in the mode of `end`, at shares of moves, [n, a]."""
         start, end = self.end[np.maximum(move - 1, 0)], self.end[move]
         at = start + share[:, None] * (end - start)
         (arc,) = np.nonzero(self.turn_rad[move])
@@ -160,29 +155,30 @@ class ParsedProgram:
 
 
 def with_length(model: Model, length_mm: float) -> Model:
-    """Give a model whose tool point is the tip of a tool of this length."""
+    """Return a model whose tool point is the tip of a tool of this length."""
     x, y, z = model.tool_point_mm
     return replace(model, tool_point_mm=(x, y, z - length_mm))
 
 
-def upright(words: Mapping[str, Array]) -> dict[str, Array]:
-    """Give where the axes stand at words of a program with TCP, were its rotary axes at zero."""
-    return {name: at if is_linear(name) else np.zeros(()) for name, at in words.items()}
+def upright(positions: Mapping[str, Array]) -> dict[str, Array]:
+    """Return axis positions with the rotary axes at zero."""
+    return {name: at if is_linear(name) else np.zeros(()) for name, at in positions.items()}
 
 
-def axes_at(model: Model, length_mm: float, words: Mapping[str, Array]) -> dict[str, Array]:
-    """Give where the axes stand at words of a program with TCP."""
-    return follow(with_length(model, length_mm), words, ball_point(model, upright(words)))
+def axes_at(model: Model, length_mm: float, programmed: Mapping[str, Array]) -> dict[str, Array]:
+    """Compute axis positions from the words of a program with TCP."""
+    tip_mm = ball_point(model, upright(programmed))
+    return follow(with_length(model, length_mm), programmed, tip_mm)
 
 
 def programmed_words(model: Model, tip_mm: Array, axes: Mapping[str, Array]) -> dict[str, Array]:
-    """Give the words of a program with TCP that lead the tip to a place, rotary axes to theirs."""
-    words = follow(model, upright(axes), tip_mm)
-    return {name: words[name] if is_linear(name) else at for name, at in axes.items()}
+    """Compute the words of a program with TCP from the tip and the rotary axis positions."""
+    linear = follow(model, upright(axes), tip_mm)
+    return {name: linear[name] if is_linear(name) else at for name, at in axes.items()}
 
 
 def program_lines(path: str | Path) -> Iterator[str]:
-    """Read the lines of a program one by one; bytes that are no UTF-8 stand in comments."""
+    """Read the lines of a program; bytes that are not UTF-8 are taken for comment text."""
     check_file(Path(path), MAX_PROGRAM_BYTES, str(path))
     try:
         with Path(path).open(encoding="utf-8-sig", errors="replace") as file:
@@ -192,10 +188,13 @@ def program_lines(path: str | Path) -> Iterator[str]:
 
 
 def read_program(
-    scene: Scene, lines: Iterable[str], setup: ControlSettings | None = None, name: str = "program"
+    scene: Scene,
+    lines: Iterable[str],
+    settings: ControlSettings | None = None,
+    name: str = "program",
 ) -> ParsedProgram:
-    """Run the lines of a program on the control of a machine; a `SceneError` names its line."""
-    control = Interpreter(scene, setup or ControlSettings(), name)
+    """Run a program on the control of a machine; a `SceneError` names the line."""
+    control = Interpreter(scene, settings or ControlSettings(), name)
     for _ in control.run(lines):
         pass
     rows = np.frombuffer(control.rows).reshape(-1, control.width)
@@ -209,15 +208,15 @@ def read_program(
 
 
 class Interpreter:
-    """Modal words of a control, where its axes stand, and the words of the line that it is at."""
+    """State of a control: modal codes, axis positions, and the words of the current block."""
 
-    def __init__(self, scene: Scene, setup: ControlSettings, name: str) -> None:
-        self.scene, self.setup, self.name = scene, setup, name
+    def __init__(self, scene: Scene, settings: ControlSettings, name: str) -> None:
+        self.scene, self.settings, self.name = scene, settings, name
         self.line, self.codes, self.words = 0, list[str](), dict[str, float]()
-        # spelled words and comments of a line by code or letter, and what skips it: "/"
+        # words and comments of the block as written, by code or letter, and its skip mark "/"
         self.tokens, self.skip = list[tuple[str, str]](), ""
         self.refused, self.unknown = dict[int, str](), dict[str, int]()
-        self.offset = dict(setup.offset)
+        self.offset = dict(settings.offset)
         self.names = tuple(scene.machine.axes)
         first = [axis[0] for axis in self.names]
         self.index = {x: first.index(x) for x in first if first.count(x) == 1}
@@ -225,115 +224,140 @@ class Interpreter:
         self.absolute, self.to_initial, self.inverse_time = True, True, False
         self.is_compensated, self.has_blocks = False, False
         self.unnamed_axes = {i for i, axis in enumerate(self.names) if is_linear(axis)}
-        self.first = 0  # row that the path begins with
+        self.first = 0  # first row of the path
+        self.once = ""  # non-modal code of the block: G4, G28 or G53
         self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
         self.rows, self.width = array("d"), 8 + len(self.names)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
         self.position = [float(stand[axis]) for axis in self.names]
-        self.tcp, self.length_mm = False, setup.length_mm
+        self.tcp, self.length_mm = False, settings.length_mm
         self.record(STAND)
-        self.switch(tcp=setup.tcp == "always", length_mm=setup.length_mm)
+        self.switch(tcp=settings.tcp == "always", length_mm=settings.length_mm)
 
     def run(self, lines: Iterable[str]) -> Iterator[str]:
-        """Do what lines say, and give them one by one, up to the first word that is refused."""
+        """Execute lines and return them one by one, up to the first refused word."""
         for line, raw in enumerate(lines, start=1):
             self.line, self.codes, self.words, self.tokens = line, [], {}, []
             self.skip, text = "", raw.strip()
-            if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MOST_SAID:
-                most = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MOST_SAID:,} other words"
-                self.fail(f"is no program in G-code; expected at most {most}")
+            if line > MAX_LINES or len(raw) > MAX_LINE or len(self.unknown) > MAX_REMARKS:
+                size = f"{MAX_LINES:,} lines of {MAX_LINE:,} characters, {MAX_REMARKS:,}"
+                self.fail(f"is no program in G-code; expected at most {size} other words")
             if text.startswith("%") and self.has_blocks:
                 return
-            if skipped := _SKIP.fullmatch(text):
+            skipped = _SKIP.fullmatch(text)
+            if skipped:
                 self.unknown.setdefault("/", line)
                 self.skip, text = skipped[2], (skipped[1] or "") + skipped[3]
             if self.has_blocks or not _TITLE.fullmatch(text):
-                for found in WORD.finditer(text.lstrip("%")):
-                    self.take(found)
+                for match in WORD.finditer(text.lstrip("%")):
+                    self.read_word(match)
             if {"G5", "G5.1"} & {*self.codes} and {"X", "Y", "Z"} & self.words.keys():
                 self.refused[line] = "G5"  # a spline; without a place a look-ahead
             self.has_blocks = self.has_blocks or bool(self.codes or self.words)
             if not self.refused:
-                self.move()
+                self.execute_block()
                 yield raw
-            if {"M2", "M30"} & {*self.codes} or len(self.refused) > MOST_SAID:
+            if {"M2", "M30"} & {*self.codes} or len(self.refused) > MAX_REMARKS:
                 return
 
-    def take(self, found: re.Match[str]) -> None:
-        """Take in a word or comment; where one is refused only others that are count."""
-        letter, number, other = ((group or "").upper() for group in found.groups())
+    def read_word(self, match: re.Match[str]) -> None:
+        """Read a word or comment; after a refused word only further refused words matter."""
+        letter, number, other = ((group or "").upper() for group in match.groups())
         value, is_code = float(number or 0.0), letter in {"G", "M"}
-        word = f"{letter}{value:g}" if is_code else _cut(letter + number + other)
-        self.tokens.append((word if is_code else letter, found[0]))
-        most = MAX_LENGTH_MM if letter in _POSITIONS else MAX_WORD
+        word = f"{letter}{value:g}" if is_code else _shorten(letter + number + other)
+        self.tokens.append((word if is_code else letter, match[0]))
         if letter == "O" or word in REFUSED or (other and _CONTROL_FLOW.match(other)):
             self.refused.setdefault(self.line, word)
-        elif (len(number) > SHOWN or abs(value) > most) and not self.refused:
+            return
+        limit = MAX_LENGTH_MM if letter in _POSITIONS else MAX_WORD
+        if len(number) > MAX_SHOWN or abs(value) > limit:
             unit = " mm or degrees" * (letter in _POSITIONS)
-            expected = f"at most ±{most:.8g}{unit}, in up to {SHOWN} characters"
-            self.fail(f"{letter}{_cut(number)}; expected {expected}")
-        elif is_code:
+            expected = f"at most ±{limit:.8g}{unit}, in up to {MAX_SHOWN} characters"
+            self.reject(f"{letter}{_shorten(number)}; expected {expected}")
+        if is_code:
             self.codes.append(word)
-            if (letter == "G" and word not in _UNDERSTOOD) or word in {"M128", "M129"}:
+            if (letter == "G" and word not in CODES) or word in {"M128", "M129"}:
                 self.unknown.setdefault(word, self.line)
-        elif letter == "E" or (word[:2].isalpha() and 1 < len(word) < SHOWN):
+        elif letter == "E" or (word[:2].isalpha() and 1 < len(word) < MAX_SHOWN):
             self.unknown.setdefault(word, self.line)
-        elif other and not self.refused:  # behind one may be a language that is not read
+        elif other:  # possibly a language that is not supported
             end = "the end of the comment" if word.startswith("(") else "a letter and a number"
-            self.fail(f"{word!r}; expected {end}")
-        elif letter in self.words and not self.refused:
-            self.fail(f"{word}; expected {letter} once in a line")
+            self.reject(f"{word!r}; expected {end}")
         elif letter:
+            if letter in self.words:
+                self.reject(f"{word}; expected {letter} once in a line")
             self.words[letter] = value
 
     def fail(self, problem: str) -> NoReturn:
         raise SceneError(self.name, [f"line {self.line}: {problem}"])
 
-    def move(self) -> None:
-        """Do what the words of a line say."""
-        words, once = self.words, ""
+    def reject(self, problem: str) -> None:
+        """Fail, unless the path has ended at a refused word."""
+        if not self.refused:
+            self.fail(problem)
+
+    def execute_block(self) -> None:
+        """Execute the codes of the current block, then its motion."""
+        self.set_once("")
         for code in self.codes:
-            if code in _MODAL:
-                setattr(self, *_MODAL[code])
-            elif code in {"G43", "G43.4", "G49"}:
-                self.compensate(code)
-            elif code in {"G4", "G28", "G53"}:
-                once = code
+            handler = CODES.get(code)
+            if handler is not None:
+                handler(self, code)
         self.cycle = self.cycle if self.motion in CYCLES else {}
-        letters = set[str]() if once == "G4" else words.keys() & _AXES  # X is a time there
+        # X of G4 is a time
+        letters = set[str]() if self.once == "G4" else self.words.keys() & _AXES
         for letter in letters - self.index.keys():
-            known = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
-            self.fail(f"{letter}{words[letter]:g}; expected {known}")
-        idle = self.words.keys() & set(_IDLE.get(self.motion, "IJKLR") if letters else "L")
-        for letter in idle:
-            self.unknown.setdefault(f"{letter} with {once or self.motion}", self.line)
-        if once == "G28":
-            if letters and any(self.position[index] != at for index, at in self.target().items()):
-                self.line_to(self.target(), RAPID)
-            axes, indices = self.scene.machine.axes, [self.index[x] for x in letters or self.index]
-            home = {i: float(np.clip(0.0, *axes[self.names[i]].travel)) for i in indices}
-            self.line_to(home, RAPID, bare=True)
-        elif once == "G53" and letters:
-            self.line_to({self.index[letter]: self.value(letter) for letter in letters}, bare=True)
-        elif self.motion in {"G2", "G3"}:
-            if letters or words.keys() & set("IJKR"):
-                self.arc_to(self.target())
-        elif letters and self.motion in CYCLES:
-            self.drill()
-        elif letters:
+            axes = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
+            self.fail(f"{letter}{self.words[letter]:g}; expected {axes}")
+        unused = _UNUSED_LETTERS.get(self.motion, "IJKLR") if letters else "L"
+        for letter in self.words.keys() & {*unused}:
+            self.unknown.setdefault(f"{letter} with {self.once or self.motion}", self.line)
+        replaces_motion = self.once == "G28" or (self.once == "G53" and letters)
+        MOTIONS[self.once if replaces_motion else self.motion](self, letters)
+
+    def set_once(self, code: str) -> None:
+        self.once = code
+
+    def move_home(self, letters: Set[str]) -> None:
+        """Move over the programmed point to axis positions zero, or the nearest end of travel."""
+        target = self.target()
+        if letters and any(self.position[index] != at for index, at in target.items()):
+            self.line_to(target, RAPID)
+        axes, home = self.scene.machine.axes, dict[int, float]()
+        for letter in letters or self.index:
+            index = self.index[letter]
+            home[index] = float(np.clip(0.0, *axes[self.names[index]].travel))
+        self.line_to(home, RAPID, bare=True)
+
+    def move_bare(self, letters: Set[str]) -> None:
+        """Move to axis positions (G53)."""
+        self.line_to({self.index[letter]: self.value(letter) for letter in letters}, bare=True)
+
+    def move_straight(self, letters: Set[str]) -> None:
+        if letters:
             self.line_to(self.target())
 
+    def move_along_arc(self, letters: Set[str]) -> None:
+        if letters or self.words.keys() & {*"IJKR"}:
+            self.arc_to(self.target())
+
+    def run_cycle(self, letters: Set[str]) -> None:
+        if letters:
+            self.drill()
+
     def compensate(self, code: str) -> None:
+        """Set the length compensation of the tool, and TCP."""
         length, self.is_compensated = self.length_mm, code != "G49"
         if self.is_compensated:
             number = f"H{self.words.get('H', 0.0):g}"
-            if not (length := self.offset.get(number, self.setup.length_mm)):
+            length = self.offset.get(number, self.settings.length_mm)
+            if not length:
                 self.unknown.setdefault(f"{number} without a length", self.line)
-        by_word = code == "G43.4" and self.setup.tcp == "program"
-        self.switch(tcp=by_word or self.setup.tcp == "always", length_mm=length)
+        by_word = code == "G43.4" and self.settings.tcp == "program"
+        self.switch(tcp=by_word or self.settings.tcp == "always", length_mm=length)
 
     def switch(self, *, tcp: bool, length_mm: float) -> None:
-        """Say where the axes stand in the words of another mode; nothing moves."""
+        """Express the position in another mode; nothing moves."""
         if (tcp or self.tcp) and (tcp, length_mm) != (self.tcp, self.length_mm):
             at = {axis: np.asarray(q) for axis, q in zip(self.names, self.position, strict=True)}
             model = self.scene.model
@@ -352,17 +376,17 @@ class Interpreter:
         self.rows.extend((*mode, turn, centre.real, centre.imag, *self.position))
 
     def value(self, letter: str) -> float:
-        """Give the number of a word in mm, degrees or seconds."""
+        """Return the number of a word in mm, degrees or seconds."""
         return self.words[letter] * (1.0 if letter in "ABCP" else self.unit_mm)
 
     def place(self, letter: str, value: float) -> float:
-        """Give the position of an axis of an absolute word, mm or degrees."""
+        """Return the axis position of an absolute word, mm or degrees."""
         is_longer = letter == "Z" and self.is_compensated and not self.tcp
         shift = self.offset.get(self.system + letter, 0.0)
         return value + shift + (self.length_mm if is_longer else 0.0)
 
     def target(self) -> dict[int, float]:
-        """Give where the words of the line lead, by number of the axis."""
+        """Return the target of the block by number of the axis."""
         to: dict[int, float] = {}
         for letter in self.words.keys() & self.index.keys():
             value, index = self.value(letter), self.index[letter]
@@ -370,7 +394,7 @@ class Interpreter:
         return to
 
     def line_to(self, to: Mapping[int, float], kind: int = STAND, *, bare: bool = False) -> None:
-        """Go to positions of some axes: bare ones, or places of the tip with TCP."""
+        """Move to positions of some axes: bare ones, or places of the tip with TCP."""
         tcp = self.tcp
         self.switch(tcp=tcp and not bare, length_mm=self.length_mm)
         before, self.position = (
@@ -390,7 +414,7 @@ class Interpreter:
         self.switch(tcp=tcp, length_mm=self.length_mm)
 
     def arc_to(self, to: Mapping[int, float]) -> None:
-        names, centres, words = PLANES[self.across], CENTRES[self.across], self.words
+        names, centres = PLANES[self.across], CENTRES[self.across]
         if not set(names) <= self.index.keys():
             self.fail(f"an arc in {names}; expected axes of {self.scene.machine.chain}")
         start = complex(*(self.position[self.index[x]] for x in names))
@@ -398,26 +422,27 @@ class Interpreter:
         self.unnamed_axes.clear()
         end = complex(*(self.position[self.index[x]] for x in names))
         sense = 1.0 if self.motion == "G3" else -1.0
-        if "R" in words:  # of the longer arc where it is negative
+        if "R" in self.words:  # of the longer arc where it is negative
             radius, half = self.value("R"), (end - start) / 2.0
             if abs(half) < MIN_SPAN or abs(half) - abs(radius) > max(SLACK_MM, SLACK * abs(half)):
                 chord = f"a chord of {2.0 * abs(half):.4f} mm, above 0"
-                self.fail(f"R{words['R']:g}; expected a radius for an arc of {chord}")
+                self.fail(f"R{self.words['R']:g}; expected a radius for an arc of {chord}")
             height = sqrt(max(0.0, radius * radius - abs(half) ** 2))
             centre = start + half + copysign(sense, sense * radius) * height * 1j * half / abs(half)
-        elif words.keys() & {*centres}:
-            centre = start + self.unit_mm * complex(*(words.get(x, 0.0) for x in centres))
+        elif self.words.keys() & {*centres}:
+            offsets = (self.words.get(letter, 0.0) for letter in centres)
+            centre = start + self.unit_mm * complex(*offsets)
         else:
             self.fail(f"{self.motion} without I, J, K or R")
         radius, other = abs(start - centre), abs(end - centre)
         if radius < MIN_SPAN or abs(radius - other) > max(SLACK_MM, SLACK * radius):
             self.fail(f"{self.motion}: radii {radius:.4f} and {other:.4f} mm; expected one radius")
-        turns = words.get("P", 1.0)
+        turns = self.words.get("P", 1.0)
         if turns > MAX_TURNS:
             self.fail(f"P{turns:g}; expected at most {MAX_TURNS:,} turns of an arc")
         turn = sense * phase((end - centre) / (start - centre))
-        more = max(ceil(turns), 1) - (turn > FULL_TURN_RAD)  # P: turns begun
-        self.record(ARC, sense * (turn + more * tau), centre)
+        extra_turns = max(ceil(turns), 1) - (turn > FULL_TURN_RAD)  # P: turns begun
+        self.record(ARC, sense * (turn + extra_turns * tau), centre)
 
     def drill(self) -> None:
         """Drill at the place of the line, K or L times: R plane, depth, in pecks of Q with G83."""
@@ -434,13 +459,13 @@ class Interpreter:
             clear, bottom = (self.place(deep, self.cycle[letter]) for letter in ("R", deep))
         peck = abs(self.cycle.get("Q", 0.0)) if self.motion == "G83" else clear - bottom or 1.0
         if bottom > clear or peck <= 0.0 or (clear - bottom) / peck > MAX_CYCLE:
-            wanted = f"a depth below R, in up to {MAX_CYCLE:,} pecks of Q above 0"
-            self.fail(f"{self.motion} from {clear:g} to {bottom:g} mm; expected {wanted}")
+            expected = f"a depth below R, in up to {MAX_CYCLE:,} pecks of Q above 0"
+            self.fail(f"{self.motion} from {clear:g} to {bottom:g} mm; expected {expected}")
         pecks = ceil((clear - bottom) / peck)
         moves = repeats * 3 * (pecks + 1)
         if moves > MAX_CYCLE_MOVES:
-            wanted = f"at most {MAX_CYCLE_MOVES:,} moves in a line"
-            self.fail(f"{letter}{repeats} comes to {moves:,} moves; expected {wanted}")
+            expected = f"at most {MAX_CYCLE_MOVES:,} moves in a line"
+            self.fail(f"{letter}{repeats} comes to {moves:,} moves; expected {expected}")
         for _ in range(repeats):
             self.line_to({index: max(clear, self.position[index])}, RAPID)
             self.line_to({**self.target(), index: self.position[index]}, RAPID)
@@ -449,3 +474,34 @@ class Interpreter:
                 self.line_to({index: clear - number * peck}, RAPID)
                 self.line_to({index: max(bottom, clear - (number + 1) * peck)}, FEED)
             self.line_to({index: max(initial, clear) if self.to_initial else clear}, RAPID)
+
+
+CodeHandler: TypeAlias = Callable[[Interpreter, str], None]
+
+
+def _modal(name: str, value: object) -> CodeHandler:
+    return lambda control, _code: setattr(control, name, value)
+
+
+CODES: Mapping[str, CodeHandler] = {
+    **{code: _modal("motion", code) for code in ("G0", "G1", "G2", "G3", *CYCLES)},
+    "G80": _modal("motion", "G0"),
+    "G17": _modal("across", 2), "G18": _modal("across", 1), "G19": _modal("across", 0),
+    "G20": _modal("unit_mm", MM_PER_INCH), "G21": _modal("unit_mm", 1.0),
+    "G90": _modal("absolute", value=True), "G91": _modal("absolute", value=False),
+    "G93": _modal("inverse_time", value=True),
+    **dict.fromkeys(("G94", "G95"), _modal("inverse_time", value=False)),
+    "G98": _modal("to_initial", value=True), "G99": _modal("to_initial", value=False),
+    **{code: _modal("system", code) for code in ("G54", "G55", "G56", "G57", "G58", "G59")},
+    **dict.fromkeys(("G43", "G43.4", "G49"), Interpreter.compensate),
+    **dict.fromkeys(("G4", "G28", "G53"), Interpreter.set_once),
+    **dict.fromkeys(_NO_EFFECT, lambda _control, _code: None),
+}  # fmt: skip
+"""Effects of the supported codes."""
+MOTIONS: Mapping[str, Callable[[Interpreter, Set[str]], None]] = {
+    **dict.fromkeys(("G0", "G1"), Interpreter.move_straight),
+    **dict.fromkeys(("G2", "G3"), Interpreter.move_along_arc),
+    **dict.fromkeys(CYCLES, Interpreter.run_cycle),
+    "G28": Interpreter.move_home, "G53": Interpreter.move_bare,
+}  # fmt: skip
+"""Motions of a block by its modal or non-modal code, with the letters of the axes it names."""

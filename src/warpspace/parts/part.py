@@ -1,4 +1,4 @@
-"""A part as this machine cuts it: how far it deviates, its features, and its mesh as a file.
+"""The actual workpiece: its deviation, its features, and its mesh as a file.
 
 Geometry only: no forces, heat, wear or servo.
 """
@@ -36,13 +36,13 @@ from warpspace.scene.model import Scene, second_order
 from warpspace.scene.text_files import read_text
 from warpspace.units import MM_PER_UM, Array
 
-LOOKED_AT, SEEN_UM = 500, 0.5  # longest edges; errors amid them that are said
-TRIANGLES_AT_ONCE = 200_000  # what lies between needs memory, too
+CHECKED_EDGES, REPORTED_UM = 500, 0.5  # longest edges; interpolation errors that are reported
+TRIANGLES_AT_ONCE = 200_000  # limits the memory of intermediate arrays
 
 
 @dataclass(frozen=True, kw_only=True)
 class PartDeviation:
-    """How far the vertices of a part are from where they should be."""
+    """Deviation of the vertices of a workpiece from nominal."""
 
     deviation: Statistics
     normal: Numbers  # min_um and max_um along normals of triangles, at their corners, and U95
@@ -50,12 +50,12 @@ class PartDeviation:
 
 @dataclass(frozen=True, kw_only=True)
 class Part(WorkpieceAnalysis):
-    """Show a part, a mesh, as the machine of SCENE cuts it.
+    """Evaluate a part, a mesh, as the machine of SCENE cuts it.
 
-    The part stands where it is clamped; rotary axes stand as they do in the scene, linear axes
-    bring the tool to each vertex. Errors are those of the tool against the workpiece, in the
-    workpiece frame, actual − nominal: as they are, and placed, after the best rigid fit of all
-    vertices, as an inspector makes it. Planes, cylinders, cones and spheres are found and measured.
+    Rotary axes are at their positions of the scene; linear axes bring the tool to each vertex of
+    the clamped part. Errors are those of the tool against the workpiece, in the workpiece frame,
+    actual − nominal: as cut, and placed, after the best rigid fit of all vertices, as in an
+    inspection. Planes, cylinders, cones and spheres are recognised and measured.
     Geometry only: no forces, heat, wear or servo.
     """
 
@@ -65,95 +65,97 @@ class Part(WorkpieceAnalysis):
     file_help = "Part as cut: .stl, .obj, .ply or .glb."
     file_endings = tuple(FORMATS)
     features: File = option(
-        None, "Names and tolerances of its features, .toml", unset="all that are found"
+        None, "Names and tolerances of its features, .toml", unset="all recognised features"
     )
     predistorted: bool = option(
-        False, "Write with -o the part to be asked for, so that the nominal one is cut"
+        False, "Write with -o the predistorted part, from which the nominal one is cut"
     )
-    tolerances: tuple[str, str] | None = None  # name and text of features that are read already
+    tolerances: tuple[str, str] | None = None  # name and text, instead of `features`
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "PartResult":
         mesh = self.load_mesh(scene)
-        is_own = not (self.mesh or self.file)
-        features = self.features or (scene.part.path("features") if is_own else None)
+        of_scene = not (self.mesh or self.file)
+        features = self.features or (scene.part.path("features") if of_scene else None)
         tolerances = self.tolerances
         if features and not tolerances:
             tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
         watch(0.2)
-        part = place_workpiece(mesh, scene, self.place)
-        made = evaluate_points(scene, part.vertices_mm)
+        workpiece = place_workpiece(mesh, scene, self.place)
+        actual = evaluate_points(scene, workpiece.vertices_mm)
         watch(0.5)
         is_large = len(mesh.triangles) > MAX_FEATURE_TRIANGLES
-        between = 0.0 if is_large else _between(scene, part, made)
-        unseen = between if between > SEEN_UM else 0.0
-        fit = partial(subtract_best_fit, made.point_mm)
-        sure = None if is_large else point_uncertainty(scene, made)
-        both = (made.error_um, sure), (fit(made.error_um), sure and sure.transform(fit))
-        cut, placed = _off(part, made, *both)
+        interpolation = 0.0 if is_large else _interpolation_error(scene, workpiece, actual)
+        if interpolation <= REPORTED_UM:
+            interpolation = 0.0
+        uncertainty = None if is_large else point_uncertainty(scene, actual)
+        fit = partial(subtract_best_fit, actual.point_mm)
+        placed_uncertainty = uncertainty.transform(fit) if uncertainty else None
+        as_cut = _deviation(workpiece, actual, actual.error_um, uncertainty)
+        placed = _deviation(workpiece, actual, fit(actual.error_um), placed_uncertainty)
+        features_of: Sequence[FeatureResult] = ()
+        if not is_large:
+            features_of = inspect(scene, mesh, actual, tolerances, uncertainty, interpolation)
         return PartResult(
             vertices=len(mesh.vertices_mm),
-            outside=int(made.outside.sum()),
-            **vars(cut),
+            outside=int(actual.outside.sum()),
+            **vars(as_cut),
             placed=placed,
-            features=() if is_large else inspect(scene, mesh, made, tolerances, sure, unseen),
-            uncertainty=sure and sure.errors,
-            interpolation_um=unseen,
-            workpiece=part,
-            actual=made,
+            features=features_of,
+            uncertainty=uncertainty and uncertainty.errors,
+            interpolation_um=interpolation,
+            workpiece=workpiece,
+            actual=actual,
             scene=scene,
             analysis=self,
             second_order=second_order(scene, Loop.RELATIVE),
         )
 
 
-def _between(scene: Scene, part: Workpiece, made: ActualPoints) -> float:
-    """Give how far the errors amid the longest edges are from those of their ends, at most, µm."""
+def _interpolation_error(scene: Scene, part: Workpiece, actual: ActualPoints) -> float:
+    """Compute the largest deviation of errors amid the longest edges from the mean of ends, µm."""
     corner = np.take(part.vertices_mm, part.triangles, axis=0)
     length = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).reshape(-1)
-    longest = np.argsort(-length)[:LOOKED_AT]
-    ends = np.stack([part.triangles, np.roll(part.triangles, -1, axis=1)], -1).reshape(-1, 2)[
-        longest
-    ]
-    amid = evaluate_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
-    off = amid - made.error_um[ends].mean(axis=1)
-    return float(np.linalg.norm(off, axis=1).max())
+    longest = np.argsort(-length)[:CHECKED_EDGES]
+    edges = np.stack([part.triangles, np.roll(part.triangles, -1, axis=1)], -1).reshape(-1, 2)
+    ends = edges[longest]
+    middle_um = evaluate_points(scene, part.vertices_mm[ends].mean(axis=1)).error_um
+    deviation_um = middle_um - actual.error_um[ends].mean(axis=1)
+    return float(np.linalg.norm(deviation_um, axis=1).max())
 
 
-def _off(
-    part: Workpiece, made: ActualPoints, *found: tuple[Array, FieldUncertainty | None]
-) -> Iterator[PartDeviation]:
+def _deviation(
+    part: Workpiece, actual: ActualPoints, error_um: Array, uncertainty: FieldUncertainty | None
+) -> PartDeviation:
     from trimesh import triangles
 
-    # lowest and highest so far: how far, at which vertex, along which normal
-    spans = [[(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)] for _ in found]
+    # lowest and highest so far: deviation, vertex, normal
+    span = [(end, 0, np.zeros(3)) for end in (np.inf, -np.inf)]
     for first in range(0, len(part.triangles), TRIANGLES_AT_ONCE):
-        some = part.triangles[first : first + TRIANGLES_AT_ONCE]
-        normals, is_valid = triangles.normals(np.take(part.vertices_mm, some, axis=0))
-        corners = some[is_valid]
-        for span, (error, _) in zip(spans, found, strict=True):
-            away = np.einsum("tcx,tx->tc", np.take(error, corners, axis=0), normals)
-            for index, (choose, better) in enumerate(((np.argmin, min), (np.argmax, max))):
-                if away.size:
-                    at = int(choose(away))
-                    new = away.item(at), corners.item(at), normals[at // 3]
-                    span[index] = better(span[index], new, key=itemgetter(0))
-    for span, (error, sure) in zip(spans, found, strict=True):
-        field = ErrorField(made.point_mm, error, np.broadcast_to(np.nan, error.shape))
-        deviation = statistics(field, made.coordinates)
-        normal: dict[str, float | None] = {}
-        for name, (value, vertex, way) in zip(("min_um", "max_um"), span, strict=True):
-            normal[name] = value
-            if sure is not None:
-                normal[f"u95_{name}"] = sure.u95_along(vertex, way)
-        yield PartDeviation(
-            deviation=sure.with_expanded_uncertainty(deviation) if sure else deviation,
-            normal=normal,
-        )
+        rows = part.triangles[first : first + TRIANGLES_AT_ONCE]
+        normals, is_valid = triangles.normals(np.take(part.vertices_mm, rows, axis=0))
+        corners = rows[is_valid]
+        along = np.einsum("tcx,tx->tc", np.take(error_um, corners, axis=0), normals)
+        if not along.size:
+            continue
+        for index, (choose, better) in enumerate(((np.argmin, min), (np.argmax, max))):
+            at = int(choose(along))
+            candidate = along.item(at), corners.item(at), normals[at // 3]
+            span[index] = better(span[index], candidate, key=itemgetter(0))
+    field = ErrorField(actual.point_mm, error_um, np.broadcast_to(np.nan, error_um.shape))
+    deviation = statistics(field, actual.coordinates)
+    if uncertainty is not None:
+        deviation = uncertainty.with_expanded_uncertainty(deviation)
+    normal: dict[str, float | None] = {}
+    for name, (extreme, vertex, direction) in zip(("min_um", "max_um"), span, strict=True):
+        normal[name] = extreme
+        if uncertainty is not None:
+            normal[f"u95_{name}"] = uncertainty.u95_along(vertex, direction)
+    return PartDeviation(deviation=deviation, normal=normal)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PartResult(PartDeviation, Result):
-    """A part as it is cut."""
+    """The actual workpiece."""
 
     keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
     vertices: int
@@ -164,21 +166,22 @@ class PartResult(PartDeviation, Result):
     actual: ActualPoints  # its vertices
     scene: Scene
     analysis: Part
-    interpolation_um: (
-        float  # how far errors between vertices are off, at most; 0 where that is little
-    )
+    interpolation_um: float  # largest interpolation error; 0 below REPORTED_UM
 
     def caveats(self) -> Iterator[str]:
         yield from self.workpiece.warnings
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
-            yield f"{far} are beyond the travel; their errors are continued"
+            yield f"{far} are beyond the travel; their errors are extrapolated"
         if self.interpolation_um:
-            off = f"errors are off by up to {self.interpolation_um:.1f} µm more"
-            yield f"between its vertices {off}: expected a finer mesh"
-        if (count := len(self.workpiece.triangles)) > MAX_FEATURE_TRIANGLES:
-            most = f"up to {MAX_FEATURE_TRIANGLES:,}"
-            yield f"{count:,} triangles: features, U95 and errors amid edges: in {most}"
+            excess = f"up to {self.interpolation_um:.1f} µm"
+            yield f"errors between vertices deviate by {excess} more; expected a finer mesh"
+        count = len(self.workpiece.triangles)
+        if count > MAX_FEATURE_TRIANGLES:
+            yield (
+                f"{count:,} triangles; features, U95 and errors between vertices are evaluated for"
+                f" up to {MAX_FEATURE_TRIANGLES:,}"
+            )
 
     def blocks(self) -> Iterator[Block]:
         x, y, z = self.deviation.max_at_mm
@@ -187,27 +190,29 @@ class PartResult(PartDeviation, Result):
         yield f"  clamped at {at} mm and degrees"
         yield f"  largest |E| {self.deviation.max_um:.2f} µm at x {x:.3f}, y {y:.3f}, z {z:.3f} mm"
         yield "  Geometry only: no forces, heat, wear or servo"
-        both = ("as cut", self), ("placed", self.placed)
+        states: dict[str, PartDeviation] = {"as cut": self, "placed": self.placed}
         ends = "min_um", "max_um"
         rows = [
-            (word, *one.deviation.four, *(one.normal[end] for end in ends)) for word, one in both
+            (name, *state.deviation.four, *(state.normal[end] for end in ends))
+            for name, state in states.items()
         ]
         heads = ("mean", "RMS", "P95", "max", "normal, min", "max")
         yield Table((Column("error", leads=True), *number_columns(heads, ".2f", "µm")), rows)
-        yield from u95_lines(self.uncertainty, {word: one.deviation for word, one in both})
-        for word, one in both if self.uncertainty else ():
-            low, high = (plus_minus(one.normal[f"u95_{end}"]) for end in ends)
-            yield f"  U95 along the normal, {word}: min {low}, max {high} µm"
+        deviations = {name: state.deviation for name, state in states.items()}
+        yield from u95_lines(self.uncertainty, deviations)
+        for name, state in states.items() if self.uncertainty else ():
+            low, high = (plus_minus(state.normal[f"u95_{end}"]) for end in ends)
+            yield f"  U95 along the normal, {name}: min {low}, max {high} µm"
         yield features_table(self.features)
 
     def output_files(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
-        """Spell the part in its own frame and unit: as it is cut, or so that it is cut nominal."""
+        """Write the part in the frame and unit of its mesh: actual, or predistorted."""
         nominal, moved = self.actual.point_mm, self.actual.error_um * MM_PER_UM
         for _ in range(2 * self.analysis.predistorted):
             moved = -evaluate_points(self.scene, nominal + moved).error_um * MM_PER_UM
         place, (unit, up) = self.workpiece.place, FORMATS[ending]
-        own = transforms.inverse(transforms.placed(place[:3], place[3:]))
-        point = transforms.apply(own, nominal + moved)
+        to_mesh = transforms.inverse(transforms.placed(place[:3], place[3:]))
+        point = transforms.apply(to_mesh, nominal + moved)
         if up == "y":
             point = to_gltf(point) * MM_PER_M
         cut = replace(self.workpiece, vertices_mm=point / UNITS_MM[self.workpiece.unit or unit])

@@ -1,7 +1,7 @@
-"""Pieces to start with: a mesh, its features with tolerances, and a program that finishes it.
+"""Test pieces: a mesh, its features with tolerances, and a finishing program.
 
-The frame of a piece has its zero in the middle of its lower side; the words of its program are
-places in this frame. The tool has no radius there.
+The origin of the frame of a piece is in the middle of its lower side; its program is written in
+this frame, for a tool radius of zero.
 """
 
 from collections.abc import Mapping
@@ -17,12 +17,12 @@ from warpspace.units import Array
 ON_RING = 144  # points: a multiple of 8, so that the corners of squares are among them
 HALF_APEX_DEG = 15.0  # of the cone
 ABOVE_MM = 10.0  # over the piece, where the tool moves across
-SQUARE, CIRCLE, DIAMOND = np.inf, 2, 1  # orders of the norms that are the same all around
+SQUARE, CIRCLE, DIAMOND = np.inf, 2, 1  # orders of the norms that are constant on an outline
 
 
 @dataclass(frozen=True)
 class Outline:
-    """A level line of a piece; one with a name is cut."""
+    """A level outline of a piece; one with a name is cut."""
 
     half_mm: float  # from its middle along x: of a diamond to a corner
     level_mm: float
@@ -40,30 +40,30 @@ class Outline:
         return np.round(ring, 9) + 0.0
 
     def blocks(self) -> list[str]:
-        """Write the blocks that cut along it."""
+        """Write the blocks that cut along the outline."""
         first = ON_RING // 8 if self.shape == SQUARE else 0
-        start, *others = (f"X{x:.4f} Y{y:.4f}" for x, y, _ in self.ring_mm[first :: ON_RING // 4])
-        cuts = [f"G1 {word}" for word in (*others, start)]
+        start, *corners = (f"X{x:.4f} Y{y:.4f}" for x, y, _ in self.ring_mm[first :: ON_RING // 4])
+        cuts = [f"G1 {word}" for word in (*corners, start)]
         if self.shape == CIRCLE:
             cuts = [f"G3 {start} I{-self.half_mm:.4f} J0"]
         return [f"({self.name})", f"G0 {start}", f"G1 Z{self.level_mm:.4f} F600", *cuts]
 
 
 PieceGeometry: TypeAlias = tuple[list[list[Outline]], list[dict[str, Any]]]
-"""Solids, each by the outlines that its surface passes on its way, and features."""
+"""Solids, each by the outlines of its surface in turn, and features."""
 
 
 def build_piece(name: str, size_mm: float | None = None) -> Mapping[str, Any]:
-    """Give the files of a piece by their endings; its size is a length, or a diameter, across."""
+    """Build the files of a piece by their endings; its size is an edge length or a diameter, mm."""
     from trimesh import Trimesh
 
-    words, standard, build = PIECES[name]
+    title, standard, build = PIECES[name]
     size = size_mm or standard
     solids, features = build(size / 2.0)
     walls = np.concatenate([
-        np.stack([one, np.roll(one, -1, axis=0), np.roll(other, -1, axis=0), other], axis=1)
+        np.stack([low, np.roll(low, -1, axis=0), np.roll(high, -1, axis=0), high], axis=1)
         for solid in solids
-        for one, other in pairwise(line.ring_mm for line in solid)
+        for low, high in pairwise(line.ring_mm for line in solid)
     ])  # fmt: skip
     _, which, times = np.unique(
         walls.mean(axis=1).round(6), axis=0, return_inverse=True, return_counts=True
@@ -72,18 +72,18 @@ def build_piece(name: str, size_mm: float | None = None) -> Mapping[str, Any]:
     mesh = Trimesh(walls.reshape(-1, 3), np.arange(4 * len(walls)).reshape(-1, 4))
     mesh.update_faces(mesh.nondegenerate_faces())
     above = f"G0 Z{walls[..., 2].max() + ABOVE_MM:.4f}"
-    cut = [one.blocks() for solid in solids for one in reversed(solid) if one.name]
+    cut = [line.blocks() for solid in solids for line in reversed(solid) if line.name]
     blocks = [line for lines in cut for line in (*lines, above)]
-    head = ["%", f"({words}, {size:g} mm; tool radius 0)", "G21 G17 G90 G40 G94 G54", above]
+    head = ["%", f"({title}, {size:g} mm; tool radius 0)", "G21 G17 G90 G40 G94 G54", above]
     return {
         ".stl": mesh.export(file_type="stl_ascii"),
         ".ngc": "\n".join([*head, *blocks, "M30", "%", ""]),
-        ".toml": "\n".join(spell_section("[features]", one) for one in features),
+        ".toml": "\n".join(spell_section("[features]", feature) for feature in features),
     }
 
 
-def _feature(name: str, kind: str, near: list[float], measure: str, **more: Any) -> dict[str, Any]:
-    return {"name": name, "is": kind, "near": near, "measure": measure, **more}
+def _feature(name: str, kind: str, near: list[float], measure: str, **kw: Any) -> dict[str, Any]:
+    return {"name": name, "is": kind, "near": near, "measure": measure, **kw}
 
 
 def _cube(half: float) -> PieceGeometry:
@@ -118,12 +118,12 @@ def _contour(half: float) -> PieceGeometry:
         Outline(0.2 * half, top, CIRCLE), Outline(0.2 * half, 0.0, CIRCLE, "bore"),
         replace(square, name=""),
     ]  # fmt: skip
-    turned, side, back = (middle + top) / 2.0, [half, 0.0, base / 2.0], [0.0, half, base / 2.0]
+    turned, side, rear = (middle + top) / 2.0, [half, 0.0, base / 2.0], [0.0, half, base / 2.0]
     return [solid], [
         _feature("circle", "cylinder", [0.0, 0.0, turned], "cylindricity", tolerance_um=15),
         _feature("bore", "cylinder", [0.0, 0.0, top / 2.0], "diameter", tolerance_um=20),
         _feature("side", "plane", side, "flatness", tolerance_um=10),
-        _feature("back", "plane", back, "squareness", tolerance_urad=100, to=["side"]),
+        _feature("back", "plane", rear, "squareness", tolerance_urad=100, to=["side"]),
     ]
 
 
@@ -147,4 +147,4 @@ PIECES = {
     "plate": ("plate of nine holes", 240.0, _plate),
     "cube": ("cube", 100.0, _cube),
 }
-"""What they are called, their sizes where none is given, mm, and what builds them."""
+"""Titles, standard sizes, mm, and builders of the pieces."""

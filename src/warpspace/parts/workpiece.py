@@ -1,8 +1,8 @@
-"""A part as the machine makes it: a mesh in the workpiece frame, moved by the relative error.
+"""Workpieces: meshes in the workpiece frame, and their vertices as the machine produces them.
 
 The error of a point is that of the tool against the workpiece, in the workpiece frame w, where the
-linear axes bring the tool to the point and the rotary axes stand as they do in the scene. The part
-as cut is the nominal one plus that error. Geometry only: no forces, heat, wear or servo.
+linear axes bring the tool to the point and the rotary axes are at their positions of the scene. The
+actual part is the nominal one plus that error. Geometry only: no forces, heat, wear or servo.
 """
 
 from collections.abc import Sequence
@@ -30,9 +30,9 @@ from warpspace.scene.model import Scene, evaluate
 from warpspace.scene.text_files import parse_number
 from warpspace.units import Array, Integers
 
-POINTS_AT_ONCE, PAIRS_AT_ONCE = 50_000, 500_000  # what lies between needs memory, too
-TOUCHING = 1e-5  # share of the largest coordinate up to which triangles only touch others
-TOGETHER, MOST_PAIRS = 100, 2e8  # triangles that are not parted any more; pairs that are looked at
+POINTS_AT_ONCE, PAIRS_AT_ONCE = 50_000, 500_000  # limits the memory of intermediate arrays
+TOUCH_SHARE = 1e-5  # share of the largest coordinate up to which triangles only touch
+GROUP_SIZE, MAX_PAIRS = 100, 2e8  # triangles of a group that is not split; pairs examined
 
 
 class Corners(NamedTuple):
@@ -52,7 +52,7 @@ class Workpiece:
     vertices_mm: Array  # [V, 3]
     triangles: NDArray[np.int32]  # [T, 3]
     unit: str | None = None  # of the numbers in its file; None for that of the format
-    warnings: tuple[str, ...] = ()  # open, inverted, crooked: shown and said
+    warnings: tuple[str, ...] = ()  # open, inverted or self-intersecting surface
     place: tuple[float, ...] = (0.0,) * 6  # where it is clamped, mm and degrees
 
     @cached_property
@@ -62,7 +62,7 @@ class Workpiece:
 
     @cached_property
     def surface(self) -> Any:
-        """The same as a mesh of trimesh, which knows its normals and neighbours."""
+        """Mesh of trimesh, with normals and adjacency."""
         from trimesh import Trimesh
 
         return Trimesh(self.vertices_mm, self.triangles, process=False)
@@ -93,68 +93,73 @@ def load_workpiece(
 ) -> Workpiece:
     """Read a mesh from a file, or from its bytes: in mm, .glb in m, unless a unit is given."""
     path = Path(path)
-    mesh, said = read_mesh(path, unit, max_triangles=MAX_PART_TRIANGLES, data=data)
+    mesh, warnings = read_mesh(path, unit, max_triangles=MAX_PART_TRIANGLES, data=data)
     part = Workpiece(path.stem, np.asarray(mesh.vertices), mesh.faces.astype(np.int32), unit)
     surface = "its surface passes through itself"
-    if (count := count_crossings(part)) is None:
-        said += (f"{path}: too many triangles, or too many in one place, to tell if {surface}",)
+    count = count_crossings(part)
+    if count is None:
+        checked = f"{path}: not checked whether {surface}"
+        warnings += (f"{checked} (too many triangles, in total or in one place)",)
     elif count:
-        said += (f"{path}: {surface} ({count:,} pairs of triangles); it is taken as it is",)
-    return replace(part, warnings=said)
+        warnings += (f"{path}: {surface} ({count:,} pairs of triangles); used as is",)
+    return replace(part, warnings=warnings)
 
 
 def count_crossings(part: Workpiece) -> int | None:
-    """Count pairs of triangles that pass through each other along a line.
+    """Count pairs of triangles that intersect along a line, without those that share a vertex.
 
-    Those with a common vertex do not count. None where there are too many to look at.
+    None where there are too many to examine.
     """
-    if len(triangles := part.triangles) > MAX_FEATURE_TRIANGLES:
+    triangles = part.triangles
+    if len(triangles) > MAX_FEATURE_TRIANGLES:
         return None
     corner, normal = part.vertices_mm[triangles], part.surface.face_normals
-    slack = TOUCHING * np.abs(corner).max()
+    slack = TOUCH_SHARE * np.abs(corner).max()
     low, high = (np.ascontiguousarray(end(corner, axis=1).T) for end in (np.min, np.max))
-    waiting, found, looked_at = [np.arange(len(triangles))], list[Integers](), 0
-    while waiting:
-        some = waiting.pop()
-        first, last = low[:, some], high[:, some]  # [3, n]
-        if len(some) > TOGETHER:  # part them where it saves most pairs
+    groups, crossings, n_pairs = [np.arange(len(triangles))], list[Integers](), 0
+    while groups:
+        group = groups.pop()
+        first, last = low[:, group], high[:, group]  # [3, n]
+        if len(group) > GROUP_SIZE:  # split where it saves most pairs
             cut = (first + last).mean(axis=1, keepdims=True) / 2.0
             is_above = last > cut + slack / 2.0
             is_below = (first < cut - slack / 2.0) | ~is_above  # what touches is on one side
             pairs = is_above.sum(axis=1) ** 2 + is_below.sum(axis=1) ** 2
-            if pairs[along := pairs.argmin()] < 0.8 * len(some) ** 2:
-                waiting += [some[is_above[along]], some[is_below[along]]]
+            along = pairs.argmin()
+            if pairs[along] < 0.8 * len(group) ** 2:
+                groups += [group[is_above[along]], group[is_below[along]]]
                 continue
-        for rows in np.array_split(np.arange(len(some)), 1 + len(some) ** 2 // PAIRS_AT_ONCE):
-            is_near = rows[:, None] > np.arange(len(some))
+        for rows in np.array_split(np.arange(len(group)), 1 + len(group) ** 2 // PAIRS_AT_ONCE):
+            is_near = rows[:, None] > np.arange(len(group))
             for begin, end in zip(first, last, strict=True):
                 is_near &= begin[rows, None] + slack < end
                 is_near &= begin + slack < end[rows, None]
             row, column = np.nonzero(is_near)
-            pair = some[np.stack([rows[row], column])]
-            looked_at += is_near.size + 8 * pair.shape[1]
+            pair = group[np.stack([rows[row], column])]
+            n_pairs += is_near.size + 8 * pair.shape[1]
             for _ in pair:  # each has corners on both sides of the other's plane
                 arm = corner[pair[0]] - corner[pair[1], :1]
                 away = np.einsum("nex,nx->en", arm, normal[pair[1]])
                 is_across = (away.max(axis=0) > slack) & (away.min(axis=0) < -slack)
                 pair = pair[::-1, is_across]
-            found.append(pair[0] * len(triangles) + pair[1])
-            looked_at += 200 * pair.shape[1]
-            if looked_at > MOST_PAIRS:
+            crossings.append(pair[0] * len(triangles) + pair[1])
+            n_pairs += 200 * pair.shape[1]
+            if n_pairs > MAX_PAIRS:
                 return None
-    pair = np.stack(np.divmod(np.unique(np.concatenate(found)), len(triangles)))
-    one, other = triangles[pair]
-    pair = pair[:, (one[:, :, None] != other[:, None]).all(axis=(1, 2))]
+    pair = np.stack(np.divmod(np.unique(np.concatenate(crossings)), len(triangles)))
+    first, second = triangles[pair]
+    pair = pair[:, (first[:, :, None] != second[:, None]).all(axis=(1, 2))]
     line = np.cross(*normal[pair])
     line /= np.linalg.norm(line, axis=1, keepdims=True)
-    ways = pair, pair[::-1]
-    ends = [_ends(corner[one], corner[other], normal[other], line) for one, other in ways]
+    orders = pair, pair[::-1]
+    ends = [_line_span(corner[a], corner[b], normal[b], line) for a, b in orders]
     return int(np.sum(np.min(ends, axis=0)[1] - np.max(ends, axis=0)[0] > slack))
 
 
-def _ends(one: Array, other: Array, normal: Array, line: Array) -> tuple[Array, Array]:
-    """Give where a triangle begins and ends on the line where its plane meets another one's."""
-    away, at = (np.einsum("nex,nx->ne", one - other[:, :1], way) for way in (normal, line))
+def _line_span(corner: Array, other: Array, normal: Array, line: Array) -> tuple[Array, Array]:
+    """Compute the ends of triangles along the lines where their planes meet those of others."""
+    arm = corner - other[:, :1]
+    away, at = (np.einsum("nex,nx->ne", arm, direction) for direction in (normal, line))
     at += np.einsum("nx,nx->n", other[:, 0], line)[:, None]
     ahead, to = np.roll(away, -1, axis=1), np.roll(at, -1, axis=1)
     passes = (away < 0.0) != (ahead < 0.0)  # edges through the plane of the other, two of three
@@ -163,19 +168,19 @@ def _ends(one: Array, other: Array, normal: Array, line: Array) -> tuple[Array, 
 
 
 def read_place(text: str, _scene: Scene | None) -> tuple[float, ...]:
-    """Read a place as it is typed: ``X,Y,Z`` or ``X,Y,Z,A,B,C``."""
+    """Parse a place: ``X,Y,Z`` or ``X,Y,Z,A,B,C``."""
     try:
-        found = tuple(parse_number(part) for part in text.split(","))
+        place = tuple(parse_number(part) for part in text.split(","))
     except ValueError:
-        found = ()
-    if len(found) not in (3, 6) or not all(abs(value) <= MAX_LENGTH_MM for value in found):
+        place = ()
+    if len(place) not in (3, 6) or not all(abs(number) <= MAX_LENGTH_MM for number in place):
         raise ValueError("expected three numbers in mm, or six with degrees, such as 0,0,50,0,0,90")
-    return found
+    return place
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorkpieceAnalysis(Analysis):
-    """A question about a part where it is clamped."""
+    """An analysis of a workpiece where it is clamped."""
 
     file: File = option(
         None, "Mesh, .stl, .obj, .ply or .glb", positional=True, unset="that of the scene"
@@ -187,15 +192,16 @@ class WorkpieceAnalysis(Analysis):
         unset="that of the scene, or the middle of the working volume",
     )
     unit: Literal["mm", "cm", "m", "in"] | None = option(
-        None, "Unit of its numbers", unset="mm, of .glb m"
+        None, "Unit of the mesh", unset="mm, of .glb m"
     )
-    mesh: Workpiece | None = None  # one that is read already
+    mesh: Workpiece | None = None  # instead of a file
 
     def load_mesh(self, scene: Scene) -> Workpiece:
-        """Read the mesh, or that of the scene where none is named."""
+        """Read the mesh of the analysis, else that of the scene."""
         if self.mesh is not None:
             return self.mesh
-        if (path := self.file or scene.part.path("file")) is None:
+        path = self.file or scene.part.path("file")
+        if path is None:
             raise OptionError("{file} is missing; expected a mesh, or a scene whose [part] has one")
         return load_workpiece(path, self.unit or (None if self.file else scene.part.unit or None))
 
@@ -203,7 +209,7 @@ class WorkpieceAnalysis(Analysis):
 def place_workpiece(
     mesh: Workpiece, scene: Scene, place: Sequence[float] | None = None
 ) -> Workpiece:
-    """Put a part into the workpiece frame: where told, else as the scene says, or in its middle."""
+    """Place a workpiece: at a given place, else at that of the scene, else in the middle."""
     at = scene.part.place if place is None else (*place, 0.0, 0.0, 0.0)[:6]
     if at is None:
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
@@ -214,22 +220,22 @@ def place_workpiece(
 
 @dataclass(frozen=True, eq=False)
 class ActualPoints:
-    """Points of the workpiece frame as the machine makes them."""
+    """Points of the workpiece frame and their errors."""
 
     point_mm: Array  # [n, 3], nominal, w
-    coordinates: dict[str, Array]  # [n] or one for all: where the axes stand
+    coordinates: dict[str, Array]  # [n] or one for all: axis positions
     error_um: Array  # [n, 3], w, actual − nominal
     outside: NDArray[np.bool_]  # [n], beyond the travel of a linear axis; errors are continued
 
 
 def evaluate_points(scene: Scene, point_mm: Array) -> ActualPoints:
-    """Find where the axes stand at points of w, [n, 3], mm, and what error they have there."""
+    """Compute axis positions and errors at points of w, [n, 3], mm."""
     stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
     at, error = follow(scene.model, stand, point_mm), np.empty(point_mm.shape)
     for first in range(0, len(point_mm), POINTS_AT_ONCE):
         rows = slice(first, first + POINTS_AT_ONCE)
-        here = {name: of[rows] if np.ndim(of) else of for name, of in at.items()}
-        error[rows] = evaluate(scene, at=here, loop=Loop.RELATIVE, frame="workpiece").error_um
+        axes = {name: of[rows] if np.ndim(of) else of for name, of in at.items()}
+        error[rows] = evaluate(scene, at=axes, loop=Loop.RELATIVE, frame="workpiece").error_um
     outside = ~np.broadcast_to(within_travel(scene.machine, at), len(point_mm))
     return ActualPoints(point_mm, at, error, outside)
 
@@ -237,7 +243,7 @@ def evaluate_points(scene: Scene, point_mm: Array) -> ActualPoints:
 def point_basis(
     scene: Scene, made: ActualPoints, keys: Sequence[str] | None = None, rows: Any = slice(None)
 ) -> ErrorBasis:
-    """Give the response of points to each parameter, [K, n, 3], in w: what a slider moves."""
+    """Compute the response of points to each parameter, [K, n, 3], in w."""
     keys = scene.parameter_keys if keys is None else keys
     at = {name: of[rows] if np.ndim(of) else of for name, of in made.coordinates.items()}
     point = transforms.apply(branch_pose(scene.model, "workpiece", at), made.point_mm[rows])
@@ -246,23 +252,24 @@ def point_basis(
 
 
 def point_uncertainty(scene: Scene, made: ActualPoints) -> FieldUncertainty | None:
-    """Say how sure errors of points are; None where a scene does not say."""
-    if (doubt := scene_uncertainty(scene, Loop.RELATIVE)) is None:
+    """Return the uncertainty of errors at points; None where the scene states none."""
+    uncertainty = scene_uncertainty(scene, Loop.RELATIVE)
+    if uncertainty is None:
         return None
     point = transforms.apply(branch_pose(scene.model, "workpiece", made.coordinates), made.point_mm)
     view = scene.view(Loop.RELATIVE, "workpiece")
-    basis = doubt.respond(scene.model, made.coordinates, view, point)
-    return combine(doubt, basis.position, made.error_um)
+    basis = uncertainty.respond(scene.model, made.coordinates, view, point)
+    return combine(uncertainty, basis.position, made.error_um)
 
 
 def subtract_best_fit(point_mm: Array, error_um: Array) -> Array:
-    """Give errors, [..., n, 3], µm, less the rigid motion of the points, [n, 3], that fits best."""
+    """Subtract from errors, [..., n, 3], µm, the best-fit rigid motion of points, [n, 3]."""
     arm = point_mm - point_mm.mean(axis=0)
     shift = error_um.mean(axis=-2, keepdims=True)
     inertia = np.sum(arm * arm) * np.eye(3) - arm.T @ arm
     # a cross product of each pair takes five times longer
-    both = np.swapaxes(error_um, -1, -2) @ arm
-    moment = (both - np.swapaxes(both, -1, -2))[..., [2, 0, 1], [1, 2, 0]]
-    # points on a line do not tell the turn about it: the smallest one counts
+    product = np.swapaxes(error_um, -1, -2) @ arm
+    moment = (product - np.swapaxes(product, -1, -2))[..., [2, 0, 1], [1, 2, 0]]
+    # points on a line leave the rotation about it undetermined: the smallest one is taken
     turn = moment @ np.linalg.pinv(inertia, rcond=1e-12, hermitian=True)
     return error_um - shift + arm @ transforms.skew(turn)

@@ -20,8 +20,8 @@ from warpspace.scene.schema import Problems
 from warpspace.units import Array
 
 Weights = tuple[float, float]
-MOST_SAMPLES = 20_001
-CLOSE = 1e-5  # largest deviation of a sampled sum half way between its points, by its largest value
+MAX_SAMPLES = 20_001
+SAMPLING_TOLERANCE = 1e-5  # largest deviation of a sampled sum half way between its points, by its largest value
 
 
 def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> ErrorFunction:
@@ -30,11 +30,11 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
         if isinstance(other, Constant) and other.value == 0.0:
             return one.scaled(weight)
     if isinstance(first, Directional) or isinstance(second, Directional):
-        there, back = (
-            combine_curves(_way(first, way), _way(second, way), weights)
+        forward, backward = (
+            combine_curves(_directed_curve(first, way), _directed_curve(second, way), weights)
             for way in ("forward", "backward")
         )
-        return Directional(span, there, back)
+        return Directional(span, forward, backward)
     if isinstance(first, TwoArguments) or isinstance(second, TwoArguments):
         return _surface(first, second, weights)
     match first, second:
@@ -59,8 +59,8 @@ def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights
     return _sampled(first, second, weights)
 
 
-def _way(curve: ErrorFunction, way: str) -> ErrorFunction:
-    return getattr(curve, way) if isinstance(curve, Directional) else curve
+def _directed_curve(curve: ErrorFunction, direction: str) -> ErrorFunction:
+    return getattr(curve, direction) if isinstance(curve, Directional) else curve
 
 
 def _surface(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> TwoArguments:
@@ -104,13 +104,13 @@ def _coefficients(curve: Constant | Ramp | Poly) -> tuple[float, ...]:
 def _terms(
     first: Constant | Harmonics, second: Constant | Harmonics, weights: Weights
 ) -> tuple[tuple[float, float, float], ...]:
-    found: dict[tuple[float, float], float] = {}
+    amplitudes: dict[tuple[float, float], float] = {}
     for curve, weight in zip((first, second), weights, strict=True):
-        own = ((0.0, curve.value, 0.0),) if isinstance(curve, Constant) else curve.terms
-        for order, amplitude, phase in own:
+        terms = ((0.0, curve.value, 0.0),) if isinstance(curve, Constant) else curve.terms
+        for order, amplitude, phase in terms:
             place = (order, phase)
-            found[place] = found.get(place, 0.0) + weight * amplitude
-    return tuple((order, value, phase) for (order, phase), value in found.items())
+            amplitudes[place] = amplitudes.get(place, 0.0) + weight * amplitude
+    return tuple((order, value, phase) for (order, phase), value in amplitudes.items())
 
 
 def _table(first: ErrorFunction, second: ErrorFunction, weights: Weights, at: Array) -> TableCurve:
@@ -122,15 +122,15 @@ def _sampled(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
     kinks = [q for q in (*first.kinks, *second.kinks) if first.span[0] < q < first.span[1]]
     count = 65
     while True:
-        at = np.union1d(np.linspace(*first.span, count), kinks[: limits.MAX_POINTS - MOST_SAMPLES])
-        found = _table(first, second, weights, at)
+        at = np.union1d(np.linspace(*first.span, count), kinks[: limits.MAX_POINTS - MAX_SAMPLES])
+        curve = _table(first, second, weights, at)
         between = (at[1:] + at[:-1]) / 2.0
         exact = weights[0] * first.evaluate(between) + weights[1] * second.evaluate(between)
-        largest = max(float(np.abs(exact).max()), abs(found.amplitude))
-        off = float(np.abs(exact - found.evaluate(between)).max())
-        if off <= CLOSE * largest or count >= MOST_SAMPLES:
-            return found
-        count = min(2 * count - 1, MOST_SAMPLES)
+        largest = max(float(np.abs(exact).max()), abs(curve.amplitude))
+        deviation = float(np.abs(exact - curve.evaluate(between)).max())
+        if deviation <= SAMPLING_TOLERANCE * largest or count >= MAX_SAMPLES:
+            return curve
+        count = min(2 * count - 1, MAX_SAMPLES)
 
 
 GUIDES = "guides"  # key of the positioning errors of the two guides of a gantry
@@ -154,9 +154,9 @@ def _read_csv(path: Path, read: Callable[[text_files.CsvRows], T]) -> T:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = text_files.CsvRows(file, source, limits.MAX_POINTS)
-            found = read(rows)
+            content = read(rows)
             rows.check()
-            return found
+            return content
     except UnicodeDecodeError:
         text_files.read_text(path, limits.MAX_CSV_BYTES)  # names the byte
         raise
@@ -165,12 +165,12 @@ def _read_csv(path: Path, read: Callable[[text_files.CsvRows], T]) -> T:
 
 
 def _column(rows: text_files.CsvRows, column: str) -> int:
-    behind = rows.header[1:]
-    if behind.count(column) == 1:
-        return behind.index(column) + 1
-    found = "stands there twice" if column in behind else "not found"
-    hint = "" if column in behind else near_miss(column, behind)
-    raise SceneError(rows.source, [f"column {column!r} {found}{hint}"])
+    columns = rows.header[1:]
+    if columns.count(column) == 1:
+        return columns.index(column) + 1
+    problem = "stands there twice" if column in columns else "not found"
+    hint = "" if column in columns else near_miss(column, columns)
+    raise SceneError(rows.source, [f"column {column!r} {problem}{hint}"])
 
 
 def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
@@ -189,27 +189,27 @@ def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
 
 def _runs(rows: text_files.CsvRows, column: str) -> tuple[TravelRun, ...]:
     value_at = _column(rows, column)
-    run_at, way_at = (
+    run_at, direction_at = (
         rows.header.index(name) if name in rows.header else None for name in (RUN, DIRECTION)
     )
-    found: dict[tuple[str, str], list[tuple[float, float]]] = {}
+    readings: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for line, row in rows:
-        way = UNKNOWN if way_at is None else text_files.unguard_cell(row[way_at])
-        if way not in RUN_DIRECTIONS:
+        direction = UNKNOWN if direction_at is None else text_files.unguard_cell(row[direction_at])
+        if direction not in RUN_DIRECTIONS:
             rows.note(
-                f"line {line}: direction {text_files.spell_value(way)}; expected +, - or nothing"
+                f"line {line}: direction {text_files.spell_value(direction)}; expected +, - or nothing"
             )
         position = rows.number(row[0], line, limit=limits.MAX_LENGTH_MM)
         value = rows.number(row[value_at], line, limit=limits.MAX_ERROR)
         run = "" if run_at is None else text_files.unguard_cell(row[run_at])
-        found.setdefault((run, way), []).append((position, value))
-        if len(found) > limits.MAX_RUNS:
+        readings.setdefault((run, direction), []).append((position, value))
+        if len(readings) > limits.MAX_RUNS:
             raise SceneError(
                 rows.source, [f"has more than {limits.MAX_RUNS} runs; expected at most so many"]
             )
-    if not found and not rows.problems:
+    if not readings and not rows.problems:
         rows.note("has 0 rows below the header; expected at least one")
-    return tuple(TravelRun(way, tuple(points)) for (_, way), points in found.items())
+    return tuple(TravelRun(way, tuple(points)) for (_, way), points in readings.items())
 
 
 @dataclass(frozen=True)
@@ -276,8 +276,8 @@ class CurveReader:
             problems.add(where, expected, raw)
             return {}
         if gantry.rotation_key in keys:
-            found = f"follows from the guides of {key}; expected one of the two"
-            problems.add(f"errors.{gantry.rotation_key}", found)
+            problem = f"follows from the guides of {key}; expected one of the two"
+            problems.add(f"errors.{gantry.rotation_key}", problem)
         problems.only(where, raw, (GUIDES,), "key")
         pair = raw[GUIDES]
         entries = cast("list[object]", pair) if isinstance(pair, list) else []

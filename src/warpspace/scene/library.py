@@ -123,8 +123,8 @@ def parse_scene(
     points = problems.read(schema.POINTS, "points_mm", raw.get("points_mm", {}))
     view = problems.read(schema.VIEW, "view", raw.get("view", {}))
     part = problems.read(schema.PART, "part", raw.get("part", {})) or {}
-    for named in filter(part.get, ("file", "features", "program")):
-        machine_library.path_beside(part[named], f"part.{named}", folder, problems)
+    for name_key in filter(part.get, ("file", "features", "program")):
+        machine_library.path_beside(part[name_key], f"part.{name_key}", folder, problems)
     workspace = _workspace(problems.table("workspace", raw.get("workspace")), machine, problems)
     fixed = (convention or {}).get("reference_axis") == "fixed"
     document = _Document(raw, machine, workspace, machine.reference_keys * fixed, folder, problems)
@@ -172,19 +172,19 @@ def parse_scene(
 def _machine(
     raw: Mapping[str, object], name: str, folder: Path | None, problems: Problems
 ) -> Machine:
-    given, machine = raw.get("machine"), None
-    if not isinstance(given, str):
-        machine = machine_library.read_machine(given, "machine", name, problems, folder=folder)
-    elif given in machine_library.machine_names():
-        machine = machine_library.load_machine(given)
+    source, machine = raw.get("machine"), None
+    if not isinstance(source, str):
+        machine = machine_library.read_machine(source, "machine", name, problems, folder=folder)
+    elif source in machine_library.machine_names():
+        machine = machine_library.load_machine(source)
     else:
         problems.add(
-            "machine", f"unknown machine{near_miss(given, machine_library.machine_names())}", given
+            "machine", f"unknown machine{near_miss(source, machine_library.machine_names())}", source
         )
     problems.only("", raw, SECTIONS, "key")
     if machine is not None and "bodies" in raw:
-        own = machine_library.read_bodies(raw["bodies"], machine, folder, problems)
-        machine = replace(machine, bodies={**machine.bodies, **own})
+        bodies = machine_library.read_bodies(raw["bodies"], machine, folder, problems)
+        machine = replace(machine, bodies={**machine.bodies, **bodies})
     return machine or STAND_IN
 
 
@@ -192,33 +192,33 @@ def _conventions(
     convention: Mapping[str, Any], machine: Machine, problems: Problems
 ) -> tuple[tuple[str, tuple[tuple[str, str], ...]], dict[str, Any]]:
     kinds, default = ("linear", "rotary"), str(ComponentErrors.AFTER_MOTION)
-    asked = convention.get("component_errors", default)
-    table: Mapping[str, str] = {} if isinstance(asked, str) else asked
-    known = (*kinds, *machine.axes)
-    problems.only("convention.component_errors", table, known, "kind or axis")
+    setting = convention.get("component_errors", default)
+    table: Mapping[str, str] = {} if isinstance(setting, str) else setting
+    allowed = (*kinds, *machine.axes)
+    problems.only("convention.component_errors", table, allowed, "kind or axis")
     lines = dict(convention.get("measuring_line_mm", {}))
     problems.only("convention.measuring_line_mm", lines, machine.axes, OF_MACHINE)
-    if isinstance(asked, str):
-        return (asked, ()), lines
-    found = {
+    if isinstance(setting, str):
+        return (setting, ()), lines
+    order_of = {
         name: table.get(name, table.get(kinds[not axis.is_linear], default))
         for name, axis in machine.axes.items()
     }
-    names = list(found.values())
+    names = list(order_of.values())
     main = max(dict.fromkeys(names), key=names.count)
-    return (main, tuple(pair for pair in found.items() if pair[1] != main)), lines
+    return (main, tuple(pair for pair in order_of.items() if pair[1] != main)), lines
 
 
 def _reference(view: Any, workspace: Workspace, problems: Problems) -> dict[str, float] | None:
-    given = None if view is None else view["reference"]
-    if given is None:
+    reference = None if view is None else view["reference"]
+    if reference is None:
         return None
-    problems.only("view.reference", given, workspace.ranges, OF_MACHINE)
+    problems.only("view.reference", reference, workspace.ranges, OF_MACHINE)
     spanning = workspace.volume_axes
     middle = {
         name: q for name, q in workspace.positions.items() if is_linear(name) or name in spanning
     }
-    return {**middle, **given}
+    return {**middle, **reference}
 
 
 def _review(raw: object, machine: Machine, problems: Problems) -> tuple[Note, ...]:
@@ -229,34 +229,34 @@ def _review(raw: object, machine: Machine, problems: Problems) -> tuple[Note, ..
         if note.id in ids[:index]:
             expected = "another note has this id; expected one of its own"
             problems.add(f"{where}.id", expected, note.id)
-        for one in (note, *note.versions):
-            if one.id != note.id:
-                problems.add(f"{where}.versions", f"expected versions of {note.id}", one.id)
-            if one.on:
-                problems.only(f"{where}.on.body", [one.on.body], bodies, "body")
+        for version in (note, *note.versions):
+            if version.id != note.id:
+                problems.add(f"{where}.versions", f"expected versions of {note.id}", version.id)
+            if version.on:
+                problems.only(f"{where}.on.body", [version.on.body], bodies, "body")
             if machine is not STAND_IN:
-                problems.only(f"{where}.at", one.at, machine.axes, OF_MACHINE)
-            keys = [key.removeprefix(TOLERANCES) for key in one.change]
+                problems.only(f"{where}.at", version.at, machine.axes, OF_MACHINE)
+            keys = [key.removeprefix(TOLERANCES) for key in version.change]
             problems.only(f"{where}.change", keys, PARAMETERS, "error parameter")
     return notes
 
 
 def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) -> Workspace:
-    given: dict[str, Range] = {}
+    stated: dict[str, Range] = {}
     for name, value in raw.items():
         if name not in machine.axes:
             problems.only("workspace", [name], machine.axes, OF_MACHINE)
         elif valid := problems.read(schema.workspace_range, f"workspace.{name}", value):
-            given[name] = valid
-    ranges = _complete(given, machine)
-    moving = [name for name in reversed(sort_axes(given)) if given[name][0] < given[name][1]]
-    said = ""
+            stated[name] = valid
+    ranges = _complete(stated, machine)
+    moving = [name for name in reversed(sort_axes(stated)) if stated[name][0] < stated[name][1]]
+    problem = ""
     for name in (*moving, ""):
         try:
             find_volume_axes(ranges)
             break
         except OptionError as error:
-            said = said or str(error)
+            problem = problem or str(error)
         if name:
             middle = sum(ranges[name]) / 2.0
             ranges[name] = (middle, middle)
@@ -264,28 +264,28 @@ def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) 
                 "expected one position in degrees for a rotary axis of a machine whose linear axes"
                 " span the volume"
             )
-            problems.add(f"workspace.{name}", said if is_linear(name) else still, raw[name])
+            problems.add(f"workspace.{name}", problem if is_linear(name) else still, raw[name])
     return Workspace(ranges)
 
 
-def _complete(given: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
+def _complete(stated: Mapping[str, Range], machine: Machine) -> dict[str, Range]:
     spanned = {
         direction_index(name)
-        for name, (low, high) in given.items()
+        for name, (low, high) in stated.items()
         if is_linear(name) and low < high
     }
-    found: dict[str, Range] = {}
+    ranges: dict[str, Range] = {}
     for name, axis in machine.axes.items():
-        if name in given:
-            found[name] = given[name]
+        if name in stated:
+            ranges[name] = stated[name]
         elif axis.is_linear and axis.index not in spanned:
-            found[name] = axis.travel
+            ranges[name] = axis.travel
             spanned.add(axis.index)
         else:
             low, high = axis.travel
             at = min(max(0.0, low), high) if axis.is_linear else 0.0
-            found[name] = (at, at)
-    return found
+            ranges[name] = (at, at)
+    return ranges
 
 
 NPZ_ARRAYS = {"keys.npy": (1, "U", 4 * 64), "matrix.npy": (2, "fiu", 8)}
@@ -304,12 +304,12 @@ def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | Non
 
 def _read_array(packed: ZipFile, name: str) -> list[Any]:
     """Read an array whose header states dimensions and a kind that a covariance has."""
-    dimensions, kinds, most = NPZ_ARRAYS[name]
+    dimensions, kinds, max_bytes = NPZ_ARRAYS[name]
     with packed.open(name) as file:
         is_usual = np.lib.format.read_magic(file) == (1, 0)
         shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=1000)
         fits = len(shape) == dimensions and max(shape) <= limits.MAX_COVARIANCE
-        if not (is_usual and fits) or dtype.kind not in kinds or not 0 < dtype.itemsize <= most:
+        if not (is_usual and fits) or dtype.kind not in kinds or not 0 < dtype.itemsize <= max_bytes:
             raise ValueError(f"{name}: {dtype} {shape}")
         content = file.read(math.prod(shape) * dtype.itemsize)
     return np.frombuffer(content, dtype).reshape(shape, order="F" if is_fortran else "C").tolist()
@@ -327,7 +327,7 @@ class _Document:
     problems: Problems
 
     def parameter_entries(self, section: str) -> dict[str, object]:
-        known: dict[str, object] = {}
+        entries: dict[str, object] = {}
         machine, problems = self.machine, self.problems
         for key, value in problems.table(section, self.raw.get(section)).items():
             if (section, key) in {("tolerances", "default"), ("uncertainty", "covariance")}:
@@ -338,9 +338,9 @@ class _Document:
                 axis = PARAMETERS[key].axis
                 problems.add(f"{section}.{key}", f"the machine {machine.chain} has no axis {axis}")
             else:
-                known[key] = value
+                entries[key] = value
             self.check_free(f"{section}.{key}", key, value)
-        return known
+        return entries
 
     def check_free(self, where: str, key: str, value: object) -> None:
         """Refuse an error that is zero by definition of the frame."""
@@ -362,14 +362,14 @@ class _Document:
         return CurveReader(self.problems, span, axis, self.machine.axes, self.folder)
 
     def errors(self) -> ErrorSet:
-        found: dict[str, ErrorFunction] = {}
-        problems, known = self.problems, self.parameter_entries("errors")
-        given = cast("dict[str, object]", self.raw.get("errors") or {})
-        for key, value in known.items():
+        functions: dict[str, ErrorFunction] = {}
+        problems, entries = self.problems, self.parameter_entries("errors")
+        stated = cast("dict[str, object]", self.raw.get("errors") or {})
+        for key, value in entries.items():
             where, row, reader = f"errors.{key}", PARAMETERS[key], self.curves(key)
             if isinstance(value, dict) and GUIDES in value:
                 gantry, raw = self.machine.gantries.get(row.axis), cast("dict[str, object]", value)
-                curves = reader.guides(key, raw, where, gantry, given)
+                curves = reader.guides(key, raw, where, gantry, stated)
             else:
                 curve = reader.read(value, where, constant=row.is_constant)
                 curves = {} if curve is None else {key: curve}
@@ -382,21 +382,21 @@ class _Document:
                         f"{which}reaches {peak:g} {PARAMETERS[name].unit} within {low:g} …"
                         f" {high:g}; expected at most ±{limits.MAX_ERROR:g}",
                     )
-            found |= curves
-        return ErrorSet(found)
+            functions |= curves
+        return ErrorSet(functions)
 
     def tolerances(self) -> ToleranceSet:
         problems, table, default = self.problems, self.raw.get("tolerances"), None
         if isinstance(table, dict) and "default" in table:
             default = problems.read(schema.DEFAULTS, "tolerances.default", table["default"])
-        own: dict[str, Tolerance] = {}
+        ranges: dict[str, Tolerance] = {}
         for key, value in self.parameter_entries("tolerances").items():
             if valid := problems.read(schema.tolerance, f"tolerances.{key}", value):
-                own[key] = valid
-        return ToleranceSet(default or {}, own)
+                ranges[key] = valid
+        return ToleranceSet(default or {}, ranges)
 
     def uncertainties(self) -> dict[str, ErrorFunction]:
-        found: dict[str, ErrorFunction] = {}
+        curves: dict[str, ErrorFunction] = {}
         for key, raw in self.parameter_entries("uncertainty").items():
             where, constant = f"uncertainty.{key}", PARAMETERS[key].is_constant
             curve = self.curves(key).read(raw, where, constant=constant)
@@ -410,37 +410,37 @@ class _Document:
             if min(values) <= 0.0:
                 expected = "expected it above 0 everywhere; leave out what is not known"
                 self.problems.add(where, expected, min(values))
-            found[key] = curve
-        return found
+            curves[key] = curve
+        return curves
 
     def covariance(self, independent_keys: Collection[str]) -> Covariance | None:
         """Read how sure errors are together, of others than those that stand alone."""
         where, problems = "uncertainty.covariance", self.problems
-        given = self.raw.get("uncertainty")
-        raw = given.get("covariance") if isinstance(given, dict) else None
-        spelled = raw if isinstance(raw, dict) else {"matrix": raw}
-        if isinstance(name := spelled.get("matrix"), str):
+        section = self.raw.get("uncertainty")
+        raw = section.get("covariance") if isinstance(section, dict) else None
+        stated = raw if isinstance(raw, dict) else {"matrix": raw}
+        if isinstance(name := stated.get("matrix"), str):
             path = machine_library.path_beside(name, where, self.folder, problems)
             raw = read_npz(Path(path), where, problems) if path else None
-            if raw and spelled.get("sha256", "") not in ("", matrix_digest(raw["matrix"])):
+            if raw and stated.get("sha256", "") not in ("", matrix_digest(raw["matrix"])):
                 expected = "is not the matrix of this scene (its SHA-256 differs); expected the"
                 problems.add(f"{where}.matrix", f"{expected} file written with the scene", name)
-            raw = raw and raw | spelled | {"matrix": raw["matrix"]}
+            raw = raw and raw | stated | {"matrix": raw["matrix"]}
         if raw is None:
             return None
         before = len(problems.lines)
-        found: dict[str, Any] | None = problems.read(schema.COVARIANCE, where, raw)
-        if found is None:
+        entries: dict[str, Any] | None = problems.read(schema.COVARIANCE, where, raw)
+        if entries is None:
             return None
-        keys, rows, count = found["keys"], found["matrix"], len(found["keys"])
-        every = *keys, *found["undetermined"]
-        problems.only(f"{where}.keys", every, self.machine.allowed_keys, "error parameter")
+        keys, rows, count = entries["keys"], entries["matrix"], len(entries["keys"])
+        all_keys = *keys, *entries["undetermined"]
+        problems.only(f"{where}.keys", all_keys, self.machine.allowed_keys, "error parameter")
         problems.only(
-            f"{where}.measured_range", found["measured_range"], self.machine.axes, OF_MACHINE
+            f"{where}.measured_range", entries["measured_range"], self.machine.axes, OF_MACHINE
         )
-        for at, key in enumerate(every):
+        for at, key in enumerate(all_keys):
             self.check_free(f"{where}.keys", key, key)
-            if key in every[:at] or key in independent_keys:
+            if key in all_keys[:at] or key in independent_keys:
                 expected = "expected each error once, here or as uncertainty.KEY"
                 problems.add(f"{where}.keys", expected, key)
         lengths, where = [*map(len, rows)], f"{where}.matrix"
@@ -452,8 +452,8 @@ class _Document:
         for at, row in enumerate(rows):
             half[at, : len(row)] = row
         matrix = np.tril(half) + np.tril(half, -1).T
-        if (none := np.flatnonzero(np.diag(matrix) <= 0.0)).size:
-            at = int(none[0])
+        if (not_positive := np.flatnonzero(np.diag(matrix) <= 0.0)).size:
+            at = int(not_positive[0])
             expected = (
                 f"is no square of an uncertainty of {keys[at]}; expected its diagonal above 0"
             )
@@ -463,23 +463,23 @@ class _Document:
         for a, b in np.argwhere(np.abs(half - matrix) > ROUNDED * scale) if is_whole else ():
             other = f"is not symmetric; expected {float(half[b, a])!r} as in [{b}][{a}]"
             problems.add(f"{where}[{a}][{b}]", other, float(half[a, b]))
-        values, ways = np.linalg.eigh(matrix / scale)
+        values, vectors = np.linalg.eigh(matrix / scale)
         if values.min(initial=0.0) < -ROUNDED:
-            at = int(np.argmax(np.abs(ways[:, 0])))
+            at = int(np.argmax(np.abs(vectors[:, 0])))
             expected = f"is no covariance of {keys[at]} and others; expected a positive matrix"
             problems.add(f"{where}[{at}]", expected, rows[at])
         if len(problems.lines) > before:
             return None
-        del found["matrix"], found["sha256"]
-        return Covariance(**found, rows=tuple(map(tuple, matrix.tolist())))
+        del entries["matrix"], entries["sha256"]
+        return Covariance(**entries, rows=tuple(map(tuple, matrix.tolist())))
 
     def measurements(self) -> dict[str, Measurement]:
         found: dict[str, Measurement] = {}
         for key, raw in self.parameter_entries("measured").items():
             where = f"measured.{key}"
             if isinstance(raw, dict) and "csv" in raw:
-                named = self.problems.read(schema.CSV_RUNS, where, raw)
-                runs = self._csv_runs(where, **named) if named else ()
+                columns = self.problems.read(schema.CSV_RUNS, where, raw)
+                runs = self._csv_runs(where, **columns) if columns else ()
             else:
                 table = self.problems.read(schema.RUNS, where, raw)
                 runs: tuple[TravelRun, ...] = table["runs"] if table else ()

@@ -19,7 +19,7 @@ from warpspace.scene.text_files import one_line, parse_toml, read_text
 def read_bodies(
     raw: object, machine: definition.Machine, folder: Path | None, problems: Problems
 ) -> dict[str, definition.BodySource]:
-    found: dict[str, definition.BodySource] = {}
+    bodies: dict[str, definition.BodySource] = {}
     frames = (*machine.axes, *definition.BODY_FRAMES)
     for frame, value in problems.table("bodies", raw).items():
         if frame not in frames:
@@ -36,14 +36,14 @@ def read_bodies(
         elif body.shape and frame != "t":
             problems.add(f"{where}.shape", "only the tool t has one; expected a file", body.shape)
         elif body.shape:
-            found[frame] = definition.BodySource(shape=body.shape)
+            bodies[frame] = definition.BodySource(shape=body.shape)
         elif Path(body.file).suffix.lower() not in definition.MESH_ENDINGS:
-            known = ", ".join(definition.MESH_ENDINGS)
-            expected = f"unknown ending; expected a mesh that ends in {known}"
+            endings = ", ".join(definition.MESH_ENDINGS)
+            expected = f"unknown ending; expected a mesh that ends in {endings}"
             problems.add(where, expected, body.file)
         else:
-            found[frame] = replace(body, path=path_beside(body.file, where, folder, problems))
-    return found
+            bodies[frame] = replace(body, path=path_beside(body.file, where, folder, problems))
+    return bodies
 
 
 def path_beside(file: str, where: str, folder: Path | None, problems: Problems) -> str:
@@ -53,12 +53,12 @@ def path_beside(file: str, where: str, folder: Path | None, problems: Problems) 
     try:
         home = folder.resolve()
         path = (home / file).resolve()
-        inside, there = path.is_relative_to(home), path.is_file()
+        is_inside, is_file = path.is_relative_to(home), path.is_file()
     except (OSError, ValueError, RuntimeError):  # the last of links that lead in a circle
-        path, inside, there = folder, True, False
-    if not inside:
+        path, is_inside, is_file = folder, True, False
+    if not is_inside:
         problems.add(where, "leads out of the folder of this file; expected one in it", file)
-    elif not there:
+    elif not is_file:
         problems.add(where, "there is no such file beside this one", file)
     else:
         return str(path)
@@ -125,11 +125,11 @@ def read_machine(
         return None
     tables = {part: section[part] for part in ("offset_mm", "rotation_deg", "travel", "direction")}
     for part, entries in {**tables, **{k: section[k] for k in ("gantry", "columns")}}.items():
-        known = (
+        frames = (
             *chain.axes,
             *(definition.FIXED_FRAMES if part in ("offset_mm", "rotation_deg") else ()),
         )
-        problems.only(f"{prefix}{part}", entries, known, "frame of this machine")
+        problems.only(f"{prefix}{part}", entries, frames, "frame of this machine")
     machine = definition.build_machine(
         chain,
         **tables,
@@ -149,27 +149,27 @@ def _check_columns(
 ) -> None:
     named = {axis: section.get(axis, axis).lower() for axis in axes}
     for axis, name in section.items():
-        others = [other for other in axes if other != axis and named[other] == name.lower()]
-        if others:
-            expected = f"is the name of {others[0]} as well; expected a name for each axis"
+        duplicates = [other for other in axes if other != axis and named[other] == name.lower()]
+        if duplicates:
+            expected = f"is the name of {duplicates[0]} as well; expected a name for each axis"
             problems.add(f"{key}.{axis}", expected, name)
 
 
 def _gantries(
     section: Mapping[str, Mapping[str, Any]], axes: Sequence[str], key: str, problems: Problems
 ) -> dict[str, definition.Gantry]:
-    found: dict[str, definition.Gantry] = {}
-    for axis, given in section.items():
+    gantries: dict[str, definition.Gantry] = {}
+    for axis, entries in section.items():
         if axis not in axes:  # noted already
             continue
-        own = "xyz"[direction_index(axis)]
+        direction = "xyz"[direction_index(axis)]
         if not is_linear(axis):
             problems.add(f"{key}.{axis}", "expected a linear axis: a rotary one has no guides")
-        elif given["across"] == own:
-            others = " or ".join(f'"{name}"' for name in "xyz" if name != own)
-            expected = f"is the direction of the axis itself; expected {others}"
-            problems.add(f"{key}.{axis}.across", expected, given["across"])
+        elif entries["across"] == direction:
+            directions = " or ".join(f'"{name}"' for name in "xyz" if name != direction)
+            expected = f"is the direction of the axis itself; expected {directions}"
+            problems.add(f"{key}.{axis}.across", expected, entries["across"])
         else:
-            across = given["across"] or definition.default_across(axis)
-            found[axis] = definition.Gantry(axis, given["span_mm"], across)
-    return found
+            across = entries["across"] or definition.default_across(axis)
+            gantries[axis] = definition.Gantry(axis, entries["span_mm"], across)
+    return gantries

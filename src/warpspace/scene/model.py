@@ -49,8 +49,8 @@ class PartSource:
 
     def path(self, name: Literal["file", "features", "program"]) -> str | None:
         """Say where a file is; None where none is named, or it cannot be read from here."""
-        named: str = getattr(self, name)
-        return str(Path(self.folder, named)) if named and self.folder else None
+        file: str = getattr(self, name)
+        return str(Path(self.folder, file)) if file and self.folder else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +120,8 @@ class Scene:
     def parameter_keys(self) -> tuple[str, ...]:
         """Keys of the machine's default parameters and of any other constant the scene gives."""
         default = axes.default_keys(self.machine.chain.axes)
-        given = [*self.errors, *self.tolerances.own, *self.uncertainty]
-        extra = [key for key in self.machine.allowed_keys if key in given and key not in default]
+        stated = [*self.errors, *self.tolerances.own, *self.uncertainty]
+        extra = [key for key in self.machine.allowed_keys if key in stated and key not in default]
         return (*default, *extra)
 
     def axis_span(self, axis: str) -> tuple[float, float]:
@@ -131,8 +131,8 @@ class Scene:
 
     def view(self, loop: Loop = Loop.TOOL, frame: str = "machine") -> View:
         """Give the view of the scene through a loop, with the scene's reference."""
-        over = self.workspace if self.placed and loop is Loop.RELATIVE else None
-        return View(loop, frame, self.reference, over)
+        fitted_over = self.workspace if self.placed and loop is Loop.RELATIVE else None
+        return View(loop, frame, self.reference, fitted_over)
 
 
 FRAMES = ("machine", "workpiece")
@@ -195,9 +195,9 @@ def evaluate(
     scene = with_placement(scene, loop, placed=placed)
     view = choose_view(scene, loop, frame)
     if at is not None:
-        given = complete_coordinates(scene.machine, at, scene.workspace.positions)
-        check_magnitude(scene, given)
-        return evaluate_field(scene.model, scene.errors, given, view, exact=exact)
+        coordinates = complete_coordinates(scene.machine, at, scene.workspace.positions)
+        check_magnitude(scene, coordinates)
+        return evaluate_field(scene.model, scene.errors, coordinates, view, exact=exact)
     nodes = build_grid(scene.model, scene.workspace, DEFAULT_NODES if grid is None else grid)
     return evaluate_grid(scene, nodes, view, exact=exact)
 
@@ -293,12 +293,12 @@ def _direction_notes(machine: Machine) -> Iterator[str]:
     for name, axis in machine.axes.items():
         if not axis.is_linear or machine.sense(name) > 0:
             continue
-        said = f"machine.direction.{name} = {axis.direction}"
+        setting = f"machine.direction.{name} = {axis.direction}"
         if axis.direction_given:
-            yield f"{said} is against ISO 841"
+            yield f"{setting} is against ISO 841"
         else:
             yield (
-                f"{said} since none is given: positive {name} moves the tool towards −{name} over"
+                f"{setting} since none is given: positive {name} moves the tool towards −{name} over"
                 " the workpiece, against ISO 841; expected −1, or 1 given if the machine does so"
             )
 
@@ -330,21 +330,21 @@ def _costly_notes(errors: ErrorSet) -> Iterator[str]:
     waves = [curve for curve in curves if isinstance(curve, Harmonics)]
     if sum(curve.cosines for curve in waves) > MANY_COSINES:
         terms = sum(len(curve.terms) for curve in waves)
-        found = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
-        yield f"{found}: opening the scene takes seconds; fewer terms are faster"
+        problem = f"errors: {len(waves)} curves with {terms} harmonics, many of short wavelength"
+        yield f"{problem}: opening the scene takes seconds; fewer terms are faster"
 
 
 def _carried_notes(machine: Machine, errors: ErrorSet) -> Iterator[str]:
     for key in errors:
         row = axes.PARAMETERS[key]
-        own = axes.direction_index(row.axis)
-        is_squareness = row.kind is axes.ErrorKind.SQUARENESS and row.direction != own
+        index = axes.direction_index(row.axis)
+        is_squareness = row.kind is axes.ErrorKind.SQUARENESS and row.direction != index
         if not is_squareness or errors.amplitude(key) == 0.0:
             continue
         branches = (machine.chain.tool, machine.chain.workpiece)
         branch = next(branch for branch in branches if row.axis in branch)
         for other in branch[branch.index(row.axis) + 1 :]:
-            if axes.is_linear(other) and axes.direction_index(other) == 3 - row.direction - own:
+            if axes.is_linear(other) and axes.direction_index(other) == 3 - row.direction - index:
                 yield (
                     f"errors.{key} turns {other} as well, which rides on {row.axis}: the angle"
                     " between them stays, the pair turns as a whole"

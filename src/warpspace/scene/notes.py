@@ -75,18 +75,18 @@ class Note:
         """What this version is known by: a digest of what it says and of what it replaces."""
         from hashlib import sha256  # slow to import, and few scenes have notes
 
-        said = note_to_toml(replace(self, replies=(), versions=()))
+        content = note_to_toml(replace(self, replies=(), versions=()))
         # 275 and 275.0 are one number, as which of them a file gives is not for sure
-        same = json.loads(json.dumps(said, default=datetime.isoformat), parse_int=float)
-        text = json.dumps(same, sort_keys=True)
+        canonical = json.loads(json.dumps(content, default=datetime.isoformat), parse_int=float)
+        text = json.dumps(canonical, sort_keys=True)
         return sha256(text.encode()).hexdigest()[:12]
 
     def edited(self, **changes: Any) -> "Note":
         """Give the version after an edit; it replaces this one and those beside it."""
         heads = (self, *self.versions)
-        known = dict.fromkeys(digest for one in heads for digest in (*one.replaces, one.version))
+        replaced = dict.fromkeys(digest for one in heads for digest in (*one.replaces, one.version))
         # a copy that is older than these is kept beside the note when they are merged
-        return replace(self, **changes, replaces=(*known,)[-MAX_REPLACED:], versions=())
+        return replace(self, **changes, replaces=(*replaced,)[-MAX_REPLACED:], versions=())
 
     def answered(self, reply: Reply) -> "Note":
         if len(self.replies) >= MAX_REPLIES:
@@ -94,17 +94,17 @@ class Note:
         return replace(self, replies=(*self.replies, reply))
 
 
-def changed_number(then: Mapping[str, float], found: Mapping[str, float]) -> str:
+def changed_number(stored: Mapping[str, float], current: Mapping[str, float]) -> str:
     """Say which number of a note no longer holds, if any: "51.7 → 46.1 µm"."""
     for name in reversed(MEASURES):
-        was, now = then.get(name), found.get(name)
-        if was is None:
+        before, after = stored.get(name), current.get(name)
+        if before is None:
             continue
-        if now is None:
-            return f"{was:.1f} → nothing µm"
-        if abs(now - was) > PRINTED_UM * (1.0 + 1e-9):
-            digits = 1 if f"{was:.1f}" != f"{now:.1f}" else 2
-            return f"{was:.{digits}f} → {now:.{digits}f} µm"
+        if after is None:
+            return f"{before:.1f} → nothing µm"
+        if abs(after - before) > PRINTED_UM * (1.0 + 1e-9):
+            digits = 1 if f"{before:.1f}" != f"{after:.1f}" else 2
+            return f"{before:.{digits}f} → {after:.{digits}f} µm"
     return ""
 
 
@@ -115,10 +115,10 @@ def story(notes: Iterable[Note]) -> list[Note]:
 
 def with_note(notes: Sequence[Note], note: Note) -> tuple[Note, ...]:
     """Add a note, or put it in the place of the one with its identity."""
-    found = {one.id: one for one in (*notes, note)}
-    if len(found) > MAX_NOTES:
+    by_id = {one.id: one for one in (*notes, note)}
+    if len(by_id) > MAX_NOTES:
         raise OptionError(f"there are {len(notes)} notes already; expected at most {MAX_NOTES}")
-    return tuple(found.values())
+    return tuple(by_id.values())
 
 
 def merge_notes(*lists: Iterable[Note]) -> tuple[Note, ...]:
@@ -126,36 +126,36 @@ def merge_notes(*lists: Iterable[Note]) -> tuple[Note, ...]:
 
     The result is the same in whatever order and however often lists are merged.
     """
-    found: dict[str, list[Note]] = {}
+    copies: dict[str, list[Note]] = {}
     for one in (note for notes in lists for note in notes):
-        found.setdefault(one.id, []).append(one)
-    merged = [_merged(same) for same in found.values()]
+        copies.setdefault(one.id, []).append(one)
+    merged = [_merged(same) for same in copies.values()]
     if len(merged) > MAX_NOTES:
         raise OptionError(f"together {len(merged)} notes; expected at most {MAX_NOTES}")
     return tuple(sorted(merged, key=lambda one: (one.date, one.id)))
 
 
-def _merged(same: Sequence[Note]) -> Note:
-    heads = [head for one in same for head in (one, *one.versions)]
+def _merged(copies: Sequence[Note]) -> Note:
+    heads = [head for one in copies for head in (one, *one.versions)]
     by_version = {one.version: replace(one, replies=(), versions=()) for one in heads}
-    gone = {digest for one in heads for digest in one.replaces}
-    first, *others = [by_version[digest] for digest in sorted(by_version.keys() - gone)]
-    replies = {reply for one in same for reply in one.replies}
+    replaced = {digest for one in heads for digest in one.replaces}
+    first, *versions = [by_version[digest] for digest in sorted(by_version.keys() - replaced)]
+    replies = {reply for one in copies for reply in one.replies}
     answered = sorted(replies, key=lambda one: (one.date, one.author, one.text))
-    if max(len(answered), len(others)) > MAX_REPLIES:
+    if max(len(answered), len(versions)) > MAX_REPLIES:
         raise OptionError(
-            f"{first.id}: together {len(answered)} replies and {len(others)} other versions;"
+            f"{first.id}: together {len(answered)} replies and {len(versions)} other versions;"
             f" expected at most {MAX_REPLIES} of each"
         )
-    return replace(first, replies=tuple(answered), versions=tuple(others))
+    return replace(first, replies=tuple(answered), versions=tuple(versions))
 
 
 def note_to_toml(note: Note) -> dict[str, Any]:
     """Give the entries of a note in a file; what says nothing is left out."""
     entries = asdict(note, dict_factory=_filled)
-    for one in (entries, *entries.get("versions", ())):
-        if one["loop"] == "tool":
-            del one["loop"]
+    for version in (entries, *entries.get("versions", ())):
+        if version["loop"] == "tool":
+            del version["loop"]
     return entries
 
 

@@ -37,34 +37,34 @@ class Notation:
     measuring_line_mm: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
 
     def to_toml(self) -> dict[str, object]:
-        found: dict[str, object] = {}
+        entries: dict[str, object] = {}
         if self.squareness != SquarenessSign.RIGHT_HAND:
-            found["squareness"] = str(self.squareness)
+            entries["squareness"] = str(self.squareness)
         if self.measuring_line_mm:
             lines = {axis: list(place) for axis, place in self.measuring_line_mm.items()}
-            found["measuring_line_mm"] = lines
-        return found
+            entries["measuring_line_mm"] = lines
+        return entries
 
 
 def covered_spans(model: Model, workspace: Workspace) -> dict[str, Span]:
     """Give the range of each axis, mm or degrees, that numbers must hold in: travel and volume."""
-    found: dict[str, Span] = {}
+    spans: dict[str, Span] = {}
     for name, axis in model.machine.axes.items():
         low, high = workspace.ranges.get(name, axis.travel)
-        found[name] = (min(low, axis.travel[0]), max(high, axis.travel[1]))
-    return found
+        spans[name] = (min(low, axis.travel[0]), max(high, axis.travel[1]))
+    return spans
 
 
 def extend_to_ranges(errors: ErrorSet, model: Model, workspace: Workspace) -> ErrorSet:
     """Give every curve the range that it has in a scene; its values stay."""
-    chosen = dict(errors.functions)
+    functions = dict(errors.functions)
     for key, function in errors.functions.items():
         axis = parameter(key).axis
         low, high = workspace.ranges[axis]
         span = (low, high) if low < high else model.machine.axes[axis].travel
         if function.span != span:
-            chosen[key] = replace(function.for_span(span), span=span)
-    return ErrorSet(chosen)
+            functions[key] = replace(function.for_span(span), span=span)
+    return ErrorSet(functions)
 
 
 def read_errors(
@@ -92,25 +92,25 @@ def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
 
 
 def convert_covariance(
-    machine: Machine, found: Covariance | None, sign: SquarenessSign | str
+    machine: Machine, covariance: Covariance | None, sign: SquarenessSign | str
 ) -> Covariance | None:
     """Write a covariance with another sign of squareness, or read it; both are the same step."""
-    if found is None:
+    if covariance is None:
         return None
-    ones = ErrorSet({key: Constant((0.0, 1.0), 1.0) for key in found.keys})
-    turned = convert_squareness(machine, ones, sign)
-    way = [turned.amplitude(key) for key in found.keys]
-    return replace(found, rows=tuple(map(tuple, (found.matrix * np.outer(way, way)).tolist())))
+    ones = ErrorSet({key: Constant((0.0, 1.0), 1.0) for key in covariance.keys})
+    converted = convert_squareness(machine, ones, sign)
+    signs = [converted.amplitude(key) for key in covariance.keys]
+    return replace(covariance, rows=tuple(map(tuple, (covariance.matrix * np.outer(signs, signs)).tolist())))
 
 
-MOST_SPELLED = 30  # errors whose covariance stands in the scene itself
+MAX_INLINE_ERRORS = 30  # errors whose covariance stands in the scene itself
 _WRAP = 8  # entries of a list that stand on one line
 
 
 def scene_files(scene: Scene, stem: str) -> dict[str, str | bytes]:
     """Spell a scene by the ends of its files: a large covariance stands beside it, as numbers."""
     joint = convert_covariance(scene.machine, scene.covariance, Notation().squareness)
-    if joint is None or len(joint.keys) <= MOST_SPELLED:
+    if joint is None or len(joint.keys) <= MAX_INLINE_ERRORS:
         return {"": scene_to_toml(scene)}
     packed = BytesIO()
     np.savez_compressed(packed, keys=joint.keys, matrix=joint.matrix)
@@ -134,18 +134,18 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = 
     to the last bit. One thing the format cannot say is a ramp over another range than that of its
     axis in the working volume; it is written as the polynomial it is.
     """
-    known = _bundled(scene.machine)
+    bundled = _bundled(scene.machine)
     notation = notation or Notation()
     scene = replace(scene, errors=write_errors(scene, notation))
     head: dict[str, object] = {"title": scene.title}
-    if known is not None:
+    if bundled is not None:
         head["machine"] = scene.machine.name
     if scene.description:
         head["description"] = scene.description
     parts = [tomli_w.dumps(head, multiline_strings="\r" not in scene.description)]
-    if known is None:
+    if bundled is None:
         parts += _machine_sections(scene.machine)
-    parts.append(_bodies_section(scene.machine, known))
+    parts.append(_bodies_section(scene.machine, bundled))
     convention: dict[str, object] = {"component_errors": scene.model.convention_value}
     if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
         convention["reference_axis"] = "free"
@@ -184,24 +184,24 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = 
     return "\n".join(part for part in parts if part)
 
 
-def _covariance(found: Covariance | None, matrix: str) -> dict[str, object]:
+def _covariance(covariance: Covariance | None, matrix: str) -> dict[str, object]:
     """Spell a covariance: the file of its matrix, or of its rows what is up to the diagonal."""
-    if found is None:
+    if covariance is None:
         return {}
     values: dict[str, object] = {
-        "keys": found.keys,
-        "sha256": matrix_digest(found.matrix) if matrix else "",
-        "matrix": matrix or [row[: at + 1] for at, row in enumerate(found.rows)],
-        "dof": 0.0 if isinf(found.dof) else found.dof,
-        "measured_range": _ranges(found.measured_range),
-        "undetermined": found.undetermined,
-        "lack_of_fit": found.lack_of_fit,
+        "keys": covariance.keys,
+        "sha256": matrix_digest(covariance.matrix) if matrix else "",
+        "matrix": matrix or [row[: at + 1] for at, row in enumerate(covariance.rows)],
+        "dof": 0.0 if isinf(covariance.dof) else covariance.dof,
+        "measured_range": _ranges(covariance.measured_range),
+        "undetermined": covariance.undetermined,
+        "lack_of_fit": covariance.lack_of_fit,
     }
     return {"covariance": {name: value for name, value in values.items() if value}}
 
 
-def _ranges(found: Mapping[str, Span]) -> dict[str, object]:
-    return {axis: low if low == high else [low, high] for axis, (low, high) in found.items()}
+def _ranges(ranges: Mapping[str, Span]) -> dict[str, object]:
+    return {axis: low if low == high else [low, high] for axis, (low, high) in ranges.items()}
 
 
 def spell_note(note: Note) -> str:
@@ -213,16 +213,16 @@ def _bundled(machine: Machine) -> Machine | None:
     if machine.name not in machine_names():
         return None
     try:
-        known = load_machine(machine.name)
+        bundled = load_machine(machine.name)
     except SceneError:
         return None
-    return known if replace(known, bodies=machine.bodies) == machine else None
+    return bundled if replace(bundled, bodies=machine.bodies) == machine else None
 
 
-def _bodies_section(machine: Machine, known: Machine | None) -> str:
+def _bodies_section(machine: Machine, bundled: Machine | None) -> str:
     values: dict[str, object] = {}
     for frame, source in machine.bodies.items():
-        if known is not None and known.bodies.get(frame) == source:
+        if bundled is not None and bundled.bodies.get(frame) == source:
             continue
         plain = BodySource(source.file, source.path)
         entries = asdict(source)
@@ -265,8 +265,8 @@ def _tolerances_section(scene: Scene) -> str:
     values: dict[str, object] = {}
     if scene.tolerances.default:
         values["default"] = scene.tolerances.default
-    for key, own in scene.tolerances.own.items():
-        values[key] = asdict(own) if own.centre else own.half_width
+    for key, tolerance in scene.tolerances.own.items():
+        values[key] = asdict(tolerance) if tolerance.centre else tolerance.half_width
     return spell_section("tolerances", values, PARAMETERS)
 
 

@@ -36,8 +36,8 @@ class Problems:
         self.lines: list[str] = []
 
     def add(self, key: str, text: str, value: object = ...) -> None:
-        shown = "" if value is ... else f" = {spell_value(value)}"
-        self.lines.append(f"{key}{shown}: {text}" if key else text)
+        assignment = "" if value is ... else f" = {spell_value(value)}"
+        self.lines.append(f"{key}{assignment}: {text}" if key else text)
 
     def only(self, section: str, names: Iterable[str], known: Collection[str], what: str) -> None:
         """Note each name of a section that is not known."""
@@ -55,8 +55,8 @@ class Problems:
     def read(self, kind: Kind, key: str, value: object) -> Any:
         """Read one value; None where anything is wrong with it."""
         reader = ValueReader()
-        found = kind(reader, value, ())
-        return found if self.add_findings(key, reader) else None
+        content = kind(reader, value, ())
+        return content if self.add_findings(key, reader) else None
 
     def table(self, key: str, value: object) -> dict[str, object]:
         """Give a table as a dictionary; note a problem and give an empty one for anything else."""
@@ -69,8 +69,8 @@ def _number(
     return lambda reader, value, path: reader.number(value, path, low, high, least, expected)
 
 
-def _numbers(spelling: str, *most: float) -> Kind:
-    limits = [(-one, one) for one in most]
+def _numbers(spelling: str, *bounds: float) -> Kind:
+    limits = [(-one, one) for one in bounds]
     return lambda reader, value, path: reader.row(value, path, spelling, limits)
 
 
@@ -92,28 +92,28 @@ def _by_name(kind: Kind, known: Collection[str] = ()) -> Kind:
     return read
 
 
-def _text(longest: int, least: int = 0, only: str = "", words: str = "") -> Kind:
+def _text(max_length: int, min_length: int = 0, pattern: str = "", expected: str = "") -> Kind:
     def read(reader: ValueReader, value: Any, path: Path) -> str:
-        found = reader.text(value, path, longest, least)
-        if only and not re.fullmatch(only, found):
-            reader.note(path, f"expected {words}", value)
-        return found
+        text = reader.text(value, path, max_length, min_length)
+        if pattern and not re.fullmatch(pattern, text):
+            reader.note(path, f"expected {expected}", value)
+        return text
 
     return read
 
 
-def _choice(names: Callable[[], Iterable[object]], words: str = "{} or {}") -> Kind:
+def _choice(names: Callable[[], Iterable[object]], template: str = "{} or {}") -> Kind:
     def read(reader: ValueReader, value: Any, path: Path) -> Any:
-        known = list(names())
-        is_alike = isinstance(value, bool) == isinstance(known[0], bool)  # True and 1 are equal
-        if value in known and is_alike and type(value) is not float:
+        choices = list(names())
+        is_alike = isinstance(value, bool) == isinstance(choices[0], bool)  # True and 1 are equal
+        if value in choices and is_alike and type(value) is not float:
             return value
-        *others, last = [spell_value(name) for name in known]
-        if "{}" in words:
-            reader.note(path, f"expected {words.format(', '.join(others), last)}", value)
+        *first_names, last = [spell_value(name) for name in choices]
+        if "{}" in template:
+            reader.note(path, f"expected {template.format(', '.join(first_names), last)}", value)
         else:
-            reader.note(path, f"expected {words} {', '.join([*others, last])}", value)
-        return known[0]
+            reader.note(path, f"expected {template} {', '.join([*first_names, last])}", value)
+        return choices[0]
 
     return read
 
@@ -162,9 +162,9 @@ def _step(reader: ValueReader, value: Any, path: Path) -> int:
     return int(number) if number % 1.0 == 0.0 else 0
 
 
-def _list(kind: Kind, most: int, least: int = 0) -> Kind:
+def _list(kind: Kind, max_count: int, min_count: int = 0) -> Kind:
     def read(reader: ValueReader, value: Any, path: Path) -> tuple[Any, ...]:
-        entries = reader.entries(value, path, most, least)
+        entries = reader.entries(value, path, max_count, min_count)
         return tuple(kind(reader, entry, (*path, index)) for index, entry in enumerate(entries))
 
     return read
@@ -182,13 +182,13 @@ class TableSchema:
         table = reader.dictionary(value, path)
         if len(reader.findings) > before:
             return None
-        found: dict[str, Any] = {}
+        entries: dict[str, Any] = {}
         for name, (kind, default) in self.fields.items():
             if (entry := table.get(name, default)) is MISSING:
                 reader.note((*path, name), "", MISSING)
-            found[name] = kind(reader, entry, (*path, name)) if name in table else entry
+            entries[name] = kind(reader, entry, (*path, name)) if name in table else entry
         reader.only(table, path, self.fields)
-        return self.build(**found)
+        return self.build(**entries)
 
 
 LIMIT = (-limits.MAX_LENGTH_MM, limits.MAX_LENGTH_MM)
@@ -288,11 +288,11 @@ def workspace_range(reader: ValueReader, value: Any, path: Path) -> tuple[float,
 _RUN = TableSchema(
     {
         "direction": (_choice(lambda: RUN_DIRECTIONS, "{} or {} (not known)"), UNKNOWN),
-        "points": (_list(_READING, limits.MAX_POINTS, least=1), MISSING),
+        "points": (_list(_READING, limits.MAX_POINTS, min_count=1), MISSING),
     },
     TravelRun,
 )
-RUNS = TableSchema({"runs": (_list(_RUN, limits.MAX_RUNS, least=1), MISSING)})
+RUNS = TableSchema({"runs": (_list(_RUN, limits.MAX_RUNS, min_count=1), MISSING)})
 CSV_RUNS = TableSchema(
     {"csv": (_text(MAX_FILE_NAME, 1), MISSING), "column": (_text(MAX_COLUMN_NAME, 1), MISSING)}
 )
@@ -335,14 +335,14 @@ _MEASURED = _by_name(_number(0.0, limits.MAX_ERROR * 10.0), MEASURES)
 _VERSION = _text(16, 1, r"[a-z0-9]*", "small letters and digits")
 # what people write has lines and tabulators, but no other control characters
 _PLAIN = r"[^\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]*", "a text without control characters"
-_MARK = TableSchema(
+_ANCHOR = TableSchema(
     {"loop": (_one_of(Loop), ""), "point_mm": (POINT, None), "body": (_text(8), "")}, NoteAnchor
 )
 _NOTE: dict[str, tuple[Kind, Any]] = {
     "id": (_VERSION, MISSING),
     "kind": (_one_of(KINDS), "note"),
     "at": (_by_name(LENGTH), {}),
-    "on": (_MARK, None),
+    "on": (_ANCHOR, None),
     "text": (_text(limits.MAX_NOTE_TEXT, 1, *_PLAIN), MISSING),
     "author": (_text(100, 0, *_LINE), ""),
     "date": (_date, MISSING),
@@ -356,18 +356,18 @@ _NOTE: dict[str, tuple[Kind, Any]] = {
     "replaces": (_list(_VERSION, limits.MAX_REPLACED), ()),
 }
 _REPLY = TableSchema({name: _NOTE[name] for name in ("text", "author", "date")}, Reply)
-_BESIDE: dict[str, tuple[Kind, Any]] = {
+_ATTACHED: dict[str, tuple[Kind, Any]] = {
     "replies": (_list(_REPLY, limits.MAX_REPLIES), ()),
     "versions": (_list(TableSchema(_NOTE, Note), limits.MAX_REPLIES), ()),
 }
-NOTES = _list(TableSchema(_NOTE | _BESIDE, Note), limits.MAX_NOTES)
+NOTES = _list(TableSchema(_NOTE | _ATTACHED, Note), limits.MAX_NOTES)
 
 
 def _band(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     if isinstance(value, list | tuple):
         return _span(reader, value, path)
-    most = reader.number(value, path, *_HALF_WIDTH[:2], expected="a number or [lower, upper]")
-    return -most, most
+    half_width = reader.number(value, path, *_HALF_WIDTH[:2], expected="a number or [lower, upper]")
+    return -half_width, half_width
 
 
 _FEATURE = TableSchema(

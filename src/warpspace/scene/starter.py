@@ -11,7 +11,7 @@ from warpspace.machine.definition import ORIGIN, Chain, Range, Vector, parse_cha
 from warpspace.scene.library import parse_scene
 from warpspace.scene.model import Scene
 
-LYING: Vector = (90.0, 0.0, 180.0)
+HORIZONTAL_DEG: Vector = (90.0, 0.0, 180.0)
 """Turns the frames of a machine with a horizontal spindle, degrees: y points up, z to the rear."""
 LEVEL_TRAVEL: Mapping[int, Range] = {0: (-300.0, 300.0), 1: (-250.0, 250.0), 2: (-250.0, 250.0)}
 """Of the first linear axis along a level direction x, y or z, mm."""
@@ -49,40 +49,40 @@ class StarterDimensions:
 
 def compute_dimensions(chain: Chain) -> StarterDimensions:
     spanning = _spanning(chain)
-    lying = _is_lying(chain)
-    up = 1 if lying else 2
-    arms = () if lying else _arms(chain)
+    horizontal = _is_horizontal(chain)
+    up = 1 if horizontal else 2
+    arms = () if horizontal else _arms(chain)
     travel = {axis: _travel(axis, up, axis in spanning, axis in arms) for axis in chain.axes}
     ranges = {axis: travel[axis] if axis in spanning else (0.0, 0.0) for axis in chain.axes}
     ranges |= dict(zip(arms, ARM_RANGES, strict=False))
     half = [min(map(abs, travel[axis])) for axis in spanning if direction_index(axis) != up]
     radius = WORKPIECE_SHARE * min(half, default=LEVEL_TRAVEL[1][1])
     lowest = [0.0 - travel[axis][0] for axis in spanning if direction_index(axis) == up]
-    tool = _tool_places(chain, arms, max(lowest, default=ABOVE_TABLE), lying=lying)
+    tool = _tool_places(chain, arms, max(lowest, default=ABOVE_TABLE), horizontal=horizontal)
     workpiece = _workpiece_places(chain, up)
-    first = (next(iter(tool)), next(iter(workpiece))) if lying else ()
+    first = (next(iter(tool)), next(iter(workpiece))) if horizontal else ()
     rim = (0.0, radius, WORKPIECE_HEIGHT)
     return StarterDimensions(
-        {**_steps(tool, lying=lying), **_steps(workpiece, lying=lying)},
-        dict.fromkeys(first, LYING),
+        {**_steps(tool, horizontal=horizontal), **_steps(workpiece, horizontal=horizontal)},
+        dict.fromkeys(first, HORIZONTAL_DEG),
         travel,
         {axis: -1 for axis in chain.workpiece if is_linear(axis)},
         ranges,
-        ((radius, 0.0, 0.0), _turned(rim) if lying else rim),
+        ((radius, 0.0, 0.0), _turned(rim) if horizontal else rim),
     )
 
 
-def _is_lying(chain: Chain) -> bool:
+def _is_horizontal(chain: Chain) -> bool:
     turning = [direction_index(axis) for axis in chain.workpiece if not is_linear(axis)]
     return 2 not in turning and turning[-1:] == [1]
 
 
 def _spanning(chain: Chain) -> tuple[str, ...]:
-    found: dict[int, str] = {}
+    axis_of: dict[int, str] = {}
     for axis in chain.axes:
         if is_linear(axis):
-            found.setdefault(direction_index(axis), axis)
-    return tuple(found.values())
+            axis_of.setdefault(direction_index(axis), axis)
+    return tuple(axis_of.values())
 
 
 def _arms(chain: Chain) -> tuple[str, ...]:
@@ -102,10 +102,10 @@ def _travel(axis: str, up: int, spans: bool, is_arm: bool) -> Range:
 
 
 def _tool_places(
-    chain: Chain, arms: tuple[str, ...], tip: float, *, lying: bool
+    chain: Chain, arms: tuple[str, ...], tip: float, *, horizontal: bool
 ) -> dict[str, Vector]:
     linear = [axis for axis in chain.tool if is_linear(axis)]
-    over = ARM_END if len(arms) == len(ARMS_AT) else ARMS_AT[1] if arms else (0.0, 0.0)
+    plan_mm = ARM_END if len(arms) == len(ARMS_AT) else ARMS_AT[1] if arms else (0.0, 0.0)
     places: dict[str, Vector] = {}
     for axis in chain.tool:
         if axis in arms:
@@ -114,12 +114,12 @@ def _tool_places(
         elif is_linear(axis):
             # guides stand behind the tool, each nearer to it than the one that carries it
             nearer = (linear.index(axis) + 1) / (len(linear) + 1)
-            y = over[1] if arms else round(600.0 * (1.0 - nearer), -1)
-            places[axis] = (over[0], y, 250.0 + round(200.0 * nearer, -1))
+            y = plan_mm[1] if arms else round(600.0 * (1.0 - nearer), -1)
+            places[axis] = (plan_mm[0], y, 250.0 + round(200.0 * nearer, -1))
         else:
-            places[axis] = (*over, TURNING_HEAD if direction_index(axis) == 2 else PIVOT)
-    places |= {"S": (*over, TOOL_LENGTH), "t": (*over, 0.0)}
-    if lying:
+            places[axis] = (*plan_mm, TURNING_HEAD if direction_index(axis) == 2 else PIVOT)
+    places |= {"S": (*plan_mm, TOOL_LENGTH), "t": (*plan_mm, 0.0)}
+    if horizontal:
         return {frame: (x, y + along, tip) for frame, (x, y, along) in places.items()}
     return {frame: (x, y, tip + along) for frame, (x, y, along) in places.items()}
 
@@ -134,15 +134,15 @@ def _workpiece_places(chain: Chain, up: int) -> dict[str, Vector]:
     return {**places, "w": ORIGIN}
 
 
-def _steps(places: Mapping[str, Vector], *, lying: bool) -> dict[str, Vector]:
+def _steps(places: Mapping[str, Vector], *, horizontal: bool) -> dict[str, Vector]:
     before: Vector = ORIGIN
-    found: dict[str, Vector] = {}
+    steps: dict[str, Vector] = {}
     for frame, (x, y, z) in places.items():
         step = (x - before[0], y - before[1], z - before[2])
         # the first frame stands in R itself
-        found[frame] = _turned(step) if lying and found else step
+        steps[frame] = _turned(step) if horizontal and steps else step
         before = (x, y, z)
-    return found
+    return steps
 
 
 def _turned(vector: Vector) -> Vector:
@@ -201,12 +201,12 @@ def _spell(value: Any) -> str:
 
 
 def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
-    given, further = _example_keys(chain)
+    examples, table_keys = _example_keys(chain)
     lines = [_line("[errors]", "examples; what is absent is 0, # takes one out")]
-    for key, kind in given:
+    for key, kind in examples:
         (value, why), row = EXAMPLES[kind], parameter(key)
         lines.append(_line(f"{key} = {value}", f"{row.name}, {row.unit}: {why}"))
-    for key in further:
+    for key in table_keys:
         row = parameter(key)
         low, high = travel[row.axis]
         table = f"{key} = {{ table = [[{low:g}, 0], [{high:g}, 5]] }}"
@@ -217,7 +217,7 @@ def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
 
 
 def _example_keys(chain: Chain) -> tuple[list[tuple[str, str]], list[str]]:
-    given: list[tuple[str, str]] = []
+    examples: list[tuple[str, str]] = []
     # those of the tool side first: the first picture is that of the tool point
     axes = sorted(chain.axes, key=lambda axis: axis not in chain.tool)
     linear = [axis for axis in axes if is_linear(axis)]
@@ -228,11 +228,11 @@ def _example_keys(chain: Chain) -> tuple[list[tuple[str, str]], list[str]]:
     )
     if linear:
         first = linear[0]
-        own = direction_index(first)
-        given.append((f"E{'XYZ'[own]}{first}", "positioning"))
-        given.append((f"E{'ABC'[(own + 1) % 3]}{first}", "pitch"))
-    given += [(row.key, "squareness") for row in rows if row.kind is ErrorKind.SQUARENESS][:1]
-    given += [(row.key, "orientation") for row in rows if row.kind is ErrorKind.ORIENTATION][:1]
+        index = direction_index(first)
+        examples.append((f"E{'XYZ'[index]}{first}", "positioning"))
+        examples.append((f"E{'ABC'[(index + 1) % 3]}{first}", "pitch"))
+    examples += [(row.key, "squareness") for row in rows if row.kind is ErrorKind.SQUARENESS][:1]
+    examples += [(row.key, "orientation") for row in rows if row.kind is ErrorKind.ORIENTATION][:1]
     if rotary:
-        given.append((f"E{'ABC'[(direction_index(rotary[0]) + 1) % 3]}{rotary[0]}", "wobble"))
-    return given, [f"E{'XYZ'[(direction_index(axis) + 1) % 3]}{axis}" for axis in linear[:1]]
+        examples.append((f"E{'ABC'[(direction_index(rotary[0]) + 1) % 3]}{rotary[0]}", "wobble"))
+    return examples, [f"E{'XYZ'[(direction_index(axis) + 1) % 3]}{axis}" for axis in linear[:1]]

@@ -50,8 +50,8 @@ _TOKENS = re.compile(
 def check_outline(text: str, source: str) -> None:
     """Refuse text whose keys, nesting or number of keys no scene needs."""
     dots = depth = keys = 0
-    for count, found in enumerate(_TOKENS.finditer(text)):
-        mark = found[0]
+    for count, match in enumerate(_TOKENS.finditer(text)):
+        mark = match[0]
         if mark == ".":  # between the parts of a key; a number has one at most
             dots += 1
         elif mark[0] not in "\"'#":
@@ -75,7 +75,7 @@ def check_outline(text: str, source: str) -> None:
             problem = f"is not valid TOML: nested too deeply, more than {MAX_NESTING} levels"
         else:
             continue
-        line = text.count("\n", 0, found.start()) + 1
+        line = text.count("\n", 0, match.start()) + 1
         raise SceneError(source, [f"line {line}: {problem}"])
 
 
@@ -160,7 +160,7 @@ def parse_toml(text: str, source: str) -> dict[str, object]:
         raise SceneError(source, [f"is not valid TOML: {reason}"]) from None
 
 
-SHOWN = 60  # characters of a value or a key that a message shows
+MAX_VALUE_LENGTH = 60  # characters of a value or a key that a message shows
 _DEPTH = 6
 _ENTRIES = 8
 _HUGE_BITS = 512
@@ -175,12 +175,12 @@ def one_line(text: str) -> str:
 
 def spell_value(value: object) -> str:
     """Spell a value as TOML does, in at most a line."""
-    return _cut(_spell(value, _DEPTH))
+    return _shorten(_spell(value, _DEPTH))
 
 
 def spell_key(name: str) -> str:
     """Spell a key as TOML does: bare where it may be, else between quotes."""
-    return _cut(name if _BARE_KEY.fullmatch(name) else _quoted(name))
+    return _shorten(name if _BARE_KEY.fullmatch(name) else _quoted(name))
 
 
 def location(key: str, parts: Iterable[int | str]) -> str:
@@ -194,15 +194,15 @@ def location(key: str, parts: Iterable[int | str]) -> str:
     return text
 
 
-def _cut(text: str) -> str:
-    return text if len(text) <= SHOWN else text[: SHOWN - 1] + "…"
+def _shorten(text: str) -> str:
+    return text if len(text) <= MAX_VALUE_LENGTH else text[: MAX_VALUE_LENGTH - 1] + "…"
 
 
 def _quoted(text: str) -> str:
-    shown = text[: SHOWN + 1]
+    shortened = text[: MAX_VALUE_LENGTH + 1]
     return (
         '"'
-        + "".join(_ESCAPES.get(c, c if c.isprintable() else f"\\u{ord(c):04x}") for c in shown)
+        + "".join(_ESCAPES.get(c, c if c.isprintable() else f"\\u{ord(c):04x}") for c in shortened)
         + '"'
     )
 
@@ -218,17 +218,17 @@ def _spell(value: object, depth: int) -> str:
         return value.isoformat()
     if not isinstance(value, list | tuple | dict):
         return repr(value)
-    left, right = "{}" if isinstance(value, dict) else "[]"
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
     if not value:
-        return left + right
+        return opening + closing
     if depth == 0:
-        return f"{left}…{right}"
+        return f"{opening}…{closing}"
     if isinstance(value, dict):
         pairs = list(value.items())[:_ENTRIES]
-        shown = [f"{spell_key(str(name))} = {_spell(entry, depth - 1)}" for name, entry in pairs]
+        entries = [f"{spell_key(str(name))} = {_spell(entry, depth - 1)}" for name, entry in pairs]
     else:
-        shown = [_spell(entry, depth - 1) for entry in value[:_ENTRIES]]
-    inside = ", ".join([*shown, "…"] if len(value) > _ENTRIES else shown)
+        entries = [_spell(entry, depth - 1) for entry in value[:_ENTRIES]]
+    inside = ", ".join([*entries, "…"] if len(value) > _ENTRIES else entries)
     return f"{{ {inside} }}" if isinstance(value, dict) else f"[{inside}]"
 
 
@@ -271,9 +271,9 @@ def parse_whole(text: str) -> int:
 def plain_heading(text: str) -> str:
     """Spell a heading with its unit behind an underscore: ``angle (°)`` is ``angle_deg``."""
     bare = text.strip()
-    for left, right in ("[]", "()"):
-        name, _, unit = bare[:-1].rpartition(left)
-        if bare.endswith(right) and name.strip() and unit.strip() and not {*"[]()"} & {*unit}:
+    for opening, closing in ("[]", "()"):
+        name, _, unit = bare[:-1].rpartition(opening)
+        if bare.endswith(closing) and name.strip() and unit.strip() and not {*"[]()"} & {*unit}:
             return f"{name.rstrip()}_{unit.strip().translate(_UNIT)}"
     return bare
 
@@ -285,8 +285,8 @@ def radian_notes(columns: Mapping[str, Sequence[float]]) -> tuple[str, ...]:
         low, high = min(values), max(values)
         if not name.endswith("_deg") or not 0.0 < max(-low, high) < _TURN_RAD:
             continue
-        whole = all(abs(value - round(value)) < _WHOLE_DEG for value in map(math.degrees, values))
-        if whole or high - low > 0.9 * _TURN_RAD:
+        is_whole = all(abs(value - round(value)) < _WHOLE_DEG for value in map(math.degrees, values))
+        if is_whole or high - low > 0.9 * _TURN_RAD:
             turned = f"{math.degrees(low):.4g} … {math.degrees(high):.4g}°"
             notes.append(
                 f"{name} runs {low:.4g} … {high:.4g}: in radians that would be {turned}; taken as"
@@ -323,7 +323,7 @@ class CsvRows:
 
     def __init__(self, file: TextIO, source: str, max_rows: int, *, unique: bool = False) -> None:
         self.source, self.problems = source, list[str]()
-        self._file, self._most, self._once = file, max_rows, unique
+        self._file, self._max_rows, self._unique = file, max_rows, unique
         self._number = self._since_row = 0
         self._signs: dict[str, str] = {}
         self._repeated: list[str] = []
@@ -353,20 +353,20 @@ class CsvRows:
     def __iter__(self) -> Iterator[Row]:
         """Give the rows below the header that have as many cells."""
         width = len(self.header)
-        seen: dict[tuple[str, ...], int] = {}
+        first_lines: dict[tuple[str, ...], int] = {}
         for count, (line, cells) in enumerate(self._rows):
-            if count >= self._most:
-                found = f"line {line}: more than {self._most:,} rows below the header"
-                raise SceneError(self.source, [f"{found}; expected at most so many"])
+            if count >= self._max_rows:
+                problem = f"line {line}: more than {self._max_rows:,} rows below the header"
+                raise SceneError(self.source, [f"{problem}; expected at most so many"])
             while self._trails and len(cells) > width and not cells[-1]:
                 cells.pop()
             if len(cells) != width:
                 commas = self.mark == "," and len(cells) > width
                 hint = " (decimal commas? then semicolons or tabs must part the columns)"
-                found = f"{len(cells)} fields; expected {width} as in the header"
-                self.note(f"line {line}: {found}{hint if commas else ''}")
-            elif self._once and seen.setdefault(tuple(cells), line) != line:
-                self._repeated.append(f"line {line} is line {seen[tuple(cells)]} again")
+                problem = f"{len(cells)} fields; expected {width} as in the header"
+                self.note(f"line {line}: {problem}{hint if commas else ''}")
+            elif self._unique and first_lines.setdefault(tuple(cells), line) != line:
+                self._repeated.append(f"line {line} is line {first_lines[tuple(cells)]} again")
             else:
                 yield line, cells
 
@@ -404,11 +404,11 @@ class CsvRows:
         while line := self._file.readline(MAX_CSV_LINE + 1):
             self._number += 1
             if len(line) > MAX_CSV_LINE:
-                found = f"is longer than {MAX_CSV_LINE:,} characters; expected at most so many"
-                raise SceneError(self.source, [f"line {self._number} {found}"])
+                problem = f"is longer than {MAX_CSV_LINE:,} characters; expected at most so many"
+                raise SceneError(self.source, [f"line {self._number} {problem}"])
             if self._number > MAX_CSV_LINES:
-                found = f"has more than {MAX_CSV_LINES:,} lines; expected at most so many"
-                raise SceneError(self.source, [found])
+                problem = f"has more than {MAX_CSV_LINES:,} lines; expected at most so many"
+                raise SceneError(self.source, [problem])
             if not self._since_row and line.lstrip().startswith("#"):
                 continue
             self._since_row += 1
@@ -429,10 +429,10 @@ class CsvRows:
                 self._since_row = 0
                 cells = [cell.strip() for cell in row]
                 if len(cells) > MAX_CSV_COLUMNS:
-                    found = f"has {len(cells)} fields; expected at most {MAX_CSV_COLUMNS}"
-                    raise SceneError(self.source, [f"line {self._number} {found}"])
+                    problem = f"has {len(cells)} fields; expected at most {MAX_CSV_COLUMNS}"
+                    raise SceneError(self.source, [f"line {self._number} {problem}"])
                 if any(cells):
                     yield self._number, cells
         except csv.Error as error:
-            found = f"line {self._number}: is not valid CSV: {error}"
-            raise SceneError(self.source, [found]) from None
+            problem = f"line {self._number}: is not valid CSV: {error}"
+            raise SceneError(self.source, [problem]) from None

@@ -38,11 +38,11 @@ JOINT_TYPES = (*MOVING, "fixed", "floating", "planar")
 def read_robot(path: Path) -> tuple[Any, tuple[str, ...]]:
     source = str(path)
     text = read_text(path, limits.MAX_SCENE_BYTES)
-    others = _check_xml(text, source)
+    other_tags = _check_xml(text, source)
     robot = _parse(text, source)
     if problems := list(_problems(robot)):
         raise SceneError(source, problems)
-    return robot, others
+    return robot, other_tags
 
 
 def _check_xml(text: str, source: str) -> tuple[str, ...]:
@@ -134,8 +134,8 @@ def _problems(robot: Any) -> Iterable[str]:
     if not roots:
         yield "every link has a parent: a loop; expected one link that hangs on nothing"
     elif len(roots) > 1:
-        shown = ", ".join(map(repr, roots[:6]))
-        yield f"links {shown} hang on nothing; expected one such link, the frame of the machine"
+        listed = ", ".join(map(repr, roots[:6]))
+        yield f"links {listed} hang on nothing; expected one such link, the frame of the machine"
 
 
 def _twice(names: list[str]) -> list[str]:
@@ -149,11 +149,11 @@ def root_of(robot: Any) -> str:
 
 def path_to(robot: Any, link: str) -> list[Any]:
     by_child = {joint.child: joint for joint in robot.joints}
-    found: list[Any] = []
-    while link in by_child and len(found) <= len(by_child):
-        found.append(by_child[link])
+    path: list[Any] = []
+    while link in by_child and len(path) <= len(by_child):
+        path.append(by_child[link])
         link = by_child[link].parent
-    return found[::-1]
+    return path[::-1]
 
 
 PARALLEL = 1e-9  # deviation of a direction from x, y or z below which the frame is not turned
@@ -163,14 +163,14 @@ def axis_frame(origin_mm: Array, direction: Array) -> tuple[Array, int]:
     """Give the frame of an axis in R, [4, 4], mm, and whether it moves with or against its name."""
     index = int(np.argmax(np.abs(direction)))
     sign = 1 if direction[index] > 0.0 else -1
-    own = np.zeros(3)
-    own[index] = sign
+    nominal = np.zeros(3)
+    nominal[index] = sign
     pose = np.eye(4)
     pose[:3, 3] = origin_mm
-    if np.abs(direction - own).max() > PARALLEL:
+    if np.abs(direction - nominal).max() > PARALLEL:
         from scipy.spatial.transform import Rotation
 
-        pose[:3, :3] = Rotation.align_vectors(direction, own)[0].as_matrix()
+        pose[:3, :3] = Rotation.align_vectors(direction, nominal)[0].as_matrix()
     return pose, sign
 
 
@@ -235,12 +235,12 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
         if joint.type != "fixed"
     ]
     branches = [path[shared:] for path in paths]
-    every = [joint for branch in branches for joint in branch]
-    if problems := list(_joint_problems(every)):
+    branch_joints = [joint for branch in branches for joint in branch]
+    if problems := list(_joint_problems(branch_joints)):
         raise SceneError(source, problems)
-    still = [joint.name for joint in every if _stands(joint)]
-    notes += [f"joint {name!r} has one position only: taken as fixed at zero" for name in still]
-    joints = [joint for joint in every if joint.type in MOVING and joint.name not in still]
+    fixed_names = [joint.name for joint in branch_joints if _stands(joint)]
+    notes += [f"joint {name!r} has one position only: taken as fixed at zero" for name in fixed_names]
+    joints = [joint for joint in branch_joints if joint.type in MOVING and joint.name not in fixed_names]
     lengths = {joint.name: float(np.linalg.norm(joint.axis)) for joint in joints}
     notes += [
         f"joint {name!r}: its axis has the length {length:g}; taken as 1"
@@ -248,8 +248,8 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
         if abs(length - 1.0) > 1e-3
     ]
     if not 1 <= len(joints) <= MAX_AXES:
-        found = f"{len(joints)} moving joints between workpiece and tool"
-        raise SceneError(source, [f"has {found}; expected one to {MAX_AXES}"])
+        problem = f"{len(joints)} moving joints between workpiece and tool"
+        raise SceneError(source, [f"has {problem}; expected one to {MAX_AXES}"])
     moving = {joint.name for joint in joints}
     places = {
         joint.name: _pose_mm(branch[: index + 1])
@@ -283,7 +283,7 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
     )
     notes += [f"joint {name!r} is axis {axis}" for name, axis in names.items() if name != axis]
     start = _pose_mm(paths[0][:shared])
-    return RobotMachine(machine, _frames_of_links(robot, names, still, poses, start), notes)
+    return RobotMachine(machine, _frames_of_links(robot, names, fixed_names, poses, start), notes)
 
 
 def _end(robot: Any, source: str, what: str, wanted: str) -> str:
@@ -303,8 +303,8 @@ def _end(robot: Any, source: str, what: str, wanted: str) -> str:
     carried = [name for name in leaves if any(j.type in MOVING for j in path_to(robot, name))]
     if len(carried) == 1:
         return carried[0]
-    shown = ", ".join(map(repr, (carried or leaves)[:8]))
-    raise SceneError(source, [f"ends in {shown}; expected --tool LINK to say which is the tool"])
+    listed = ", ".join(map(repr, (carried or leaves)[:8]))
+    raise SceneError(source, [f"ends in {listed}; expected --tool LINK to say which is the tool"])
 
 
 def _joint_problems(joints: Sequence[Any]) -> Iterable[str]:
@@ -355,21 +355,21 @@ def _axis_names(joints: Sequence[Any], directions: dict[str, Array]) -> dict[str
         ]
         for joint in joints
     }
-    found: dict[str, str] = {}
+    axis_of: dict[str, str] = {}
     for joint in joints:
         name, letter = joint.name, letters[joint.name]
         fits = is_axis_name(name) and is_linear(name) == is_linear(letter)
         if fits and direction_index(name) == direction_index(letter):
-            found[name] = name
+            axis_of[name] = name
     for joint in joints:
-        if joint.name in found:
+        if joint.name in axis_of:
             continue
         letter = letters[joint.name]
-        alone = sum(other == letter for other in letters.values()) == 1
-        names = [letter] if alone else []
+        is_unique = sum(other == letter for other in letters.values()) == 1
+        names = [letter] if is_unique else []
         names += [f"{letter}{digit}" for digit in range(1, 10)]
-        found[joint.name] = next(name for name in names if name not in found.values())
-    return {joint.name: found[joint.name] for joint in joints}
+        axis_of[joint.name] = next(name for name in names if name not in axis_of.values())
+    return {joint.name: axis_of[joint.name] for joint in joints}
 
 
 def _travel(joint: Any, axis: str, notes: list[str]) -> Range:
@@ -394,9 +394,9 @@ def _travel(joint: Any, axis: str, notes: list[str]) -> Range:
 
 
 def _frames_of_links(
-    robot: Any, names: dict[str, str], still: list[str], poses: dict[str, Array], start: Array
+    robot: Any, names: dict[str, str], fixed_names: list[str], poses: dict[str, Array], start: Array
 ) -> dict[str, tuple[str, Array]]:
-    found: dict[str, tuple[str, Array]] = {}
+    frame_of: dict[str, tuple[str, Array]] = {}
     below: dict[str, list[Any]] = {}
     for joint in robot.joints:
         below.setdefault(joint.parent, []).append(joint)
@@ -404,13 +404,13 @@ def _frames_of_links(
     waiting = [(root_of(robot), "R", np.eye(4))]
     while waiting:
         link, frame, pose = waiting.pop()
-        found[link] = (frame, before[frame] @ pose)
+        frame_of[link] = (frame, before[frame] @ pose)
         for joint in below.get(link, ()):
-            moves = joint.type != "fixed" and joint.name not in still
+            moves = joint.type != "fixed" and joint.name not in fixed_names
             if not moves or joint.name in names:
                 onto = names[joint.name] if moves else frame
                 waiting.append((joint.child, onto, pose @ _pose_mm([joint])))
-    return found
+    return frame_of
 
 
 TOLERANCES = {"translation": 10.0, "rotation": 20.0, "squareness": 25.0}
@@ -440,32 +440,32 @@ def imported_text(
 
 
 def _plain(text: str) -> str:
-    shown = "".join(letter if letter.isprintable() else "?" for letter in text)
-    return shown if len(shown) <= LONGEST_NOTE else shown[: LONGEST_NOTE - 1] + "…"
+    printable = "".join(letter if letter.isprintable() else "?" for letter in text)
+    return printable if len(printable) <= LONGEST_NOTE else printable[: LONGEST_NOTE - 1] + "…"
 
 
 def _ranges(machine: Machine) -> dict[str, Range]:
-    taken: set[int] = set()
-    found: dict[str, Range] = {}
+    spanned: set[int] = set()
+    ranges: dict[str, Range] = {}
     for name, axis in machine.axes.items():
         low, high = axis.travel
         at = min(max(0.0, low), high)
-        found[name] = (at, at)
-        if is_linear(name) and direction_index(name) not in taken:
-            taken.add(direction_index(name))
-            found[name] = axis.travel
-    free = 3 - len(taken)
+        ranges[name] = (at, at)
+        if is_linear(name) and direction_index(name) not in spanned:
+            spanned.add(direction_index(name))
+            ranges[name] = axis.travel
+    free = 3 - len(spanned)
     turning = [name for name in machine.chain.tool if not is_linear(name)]
     if free > 1:
         for name in turning[:free]:
             low, high = machine.axes[name].travel
             middle = min(max(0.0, low + ARM_RANGE), high - ARM_RANGE)
             ends = max(low, middle - ARM_RANGE), min(high, middle + ARM_RANGE)
-            found[name] = ends if ends[0] < ends[1] else found[name]
-    return found
+            ranges[name] = ends if ends[0] < ends[1] else ranges[name]
+    return ranges
 
 
-SHOWN = 6  # names that a remark lists
+MAX_LISTED = 6  # names that a remark lists
 
 _NO_PLACE: tuple[tuple[str, str, Callable[[Any], object]], ...] = (
     ("links", "masses and inertias", lambda link: link.inertial is not None),
@@ -484,11 +484,11 @@ _NO_PLACE: tuple[tuple[str, str, Callable[[Any], object]], ...] = (
 )
 
 
-def omitted_notes(robot: Any, others: Sequence[str], kept: Collection[str]) -> list[str]:
-    gone = [link.name for link in robot.links if link.name not in kept]
-    mimics = [one.name for one in robot.joints if one.child in gone and one.mimic is not None]
-    found = [
-        ("not between workpiece and tool, left out: links", gone),
+def omitted_notes(robot: Any, other_tags: Sequence[str], placed_links: Collection[str]) -> list[str]:
+    omitted = [link.name for link in robot.links if link.name not in placed_links]
+    mimics = [one.name for one in robot.joints if one.child in omitted and one.mimic is not None]
+    lists = [
+        ("not between workpiece and tool, left out: links", omitted),
         ("mimic joints, left out:", mimics),
         *(
             (
@@ -497,12 +497,12 @@ def omitted_notes(robot: Any, others: Sequence[str], kept: Collection[str]) -> l
             )
             for kind, what, has in _NO_PLACE
         ),
-        ("have no place:", list(dict.fromkeys(others))),
+        ("have no place:", list(dict.fromkeys(other_tags))),
     ]
-    return [f"{what} {_listed(names)}" for what, names in found if names]
+    return [f"{what} {_listed(names)}" for what, names in lists if names]
 
 
 def _listed(names: Iterable[str]) -> str:
-    found = [repr(name) for name in names]
-    more = len(found) - SHOWN
-    return ", ".join(found[:SHOWN]) + (f" and {more} more" if more > 0 else "")
+    quoted = [repr(name) for name in names]
+    omitted = len(quoted) - MAX_LISTED
+    return ", ".join(quoted[:MAX_LISTED]) + (f" and {omitted} more" if omitted > 0 else "")

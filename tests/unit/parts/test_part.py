@@ -89,7 +89,7 @@ FIN = trimesh.creation.cylinder(radius=50.0, height=300.0, sections=400)  # all 
 
 
 @pytest.mark.parametrize("turned", [0.0, 0.3, 1.0, 2.5])
-def test_a_surface_that_passes_through_itself_is_said(turned):
+def test_a_surface_that_passes_through_itself_has_a_warning(turned):
     turn = trimesh.transformations.rotation_matrix(turned, (1.0, 2.0, 3.0), (9.0, 0.0, 0.0))
 
     def said(mesh):
@@ -97,7 +97,7 @@ def test_a_surface_that_passes_through_itself_is_said(turned):
         return [text for text in warnings if "passes through itself" in text]
 
     (text,) = said(beside(BOX, 30.0, 20.0, 10.0))
-    assert "(15 pairs of triangles); it is taken as it is" in text
+    assert "(15 pairs of triangles); used as is" in text
     assert said(prism((0, 0), (40, 0), (0, 40), (40, 40)))  # walls cross midway
     assert said(prism((0, 0), (40, 0), (40, 30), (10, -10), (5, 20)))
     assert said(beside(BALL, 40.0, 3.0, 5.0))
@@ -107,10 +107,10 @@ def test_a_surface_that_passes_through_itself_is_said(turned):
         assert not said(beside(BOX, *shift))
 
 
-def test_triangles_of_a_heap_are_not_all_looked_at():
+def test_triangles_of_a_heap_are_not_all_examined():
     points = 100.0 * np.random.default_rng(0).standard_normal((60_000, 3))
     heap = trimesh.Trimesh(points, np.arange(60_000).reshape(-1, 3), process=False)
-    assert any("to tell if its surface passes" in text for text in mesh_of(heap).warnings)
+    assert any("not checked whether its surface passes" in text for text in mesh_of(heap).warnings)
 
 
 def test_a_part_stands_in_the_middle_or_where_it_is_put():
@@ -196,7 +196,7 @@ def test_what_waves_between_vertices_is_said_and_leaves_verdicts_undecided(limit
     asked = Part(mesh=mesh_of(BOX), place=(0.0, 0.0, 0.0), tolerances=("f", KEEPS % limit))
     found = asked.run(parse_scene(WAVE, "s"), ignore_progress)
     assert [*found.caveats()] == [
-        "between its vertices errors are off by up to 10.0 µm more: expected a finer mesh"
+        "errors between vertices deviate by up to 10.0 µm more; expected a finer mesh"
     ]
     (one,) = [m for f in found.features for m in f.measures.values() if "verdict" in m]
     assert one["verdict"] == verdict

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from warpspace.exceptions import SceneError
 from warpspace.machine.limits import MAX_KEY_PARTS, MAX_KEYS, MAX_MARKS, MAX_NESTING, MAX_POINTS
 from warpspace.resources import assets_dir, scenes_dir
-from warpspace.scene.text_files import SHOWN, check_outline, parse_toml, spell_value
+from warpspace.scene.text_files import MAX_VALUE_LENGTH, check_outline, parse_toml, spell_value
 
 FILES = [*scenes_dir().glob("*.toml"), *assets_dir().rglob("*.toml")]
 BARE = st.text("abcXYZ019_-", min_size=1, max_size=6)
@@ -155,6 +155,6 @@ def nested(depth, kind):
 )
 def test_value_is_spelled_in_a_line_however_large_or_deep(value):
     spelling = spell_value(value)
-    assert len(spelling) <= SHOWN
+    assert len(spelling) <= MAX_VALUE_LENGTH
     assert "…" in spelling
     assert "\n" not in spelling
