@@ -1,1 +1,1 @@
-"""What a machine looks like: meshes, generated or read with trimesh."""
+"""Bodies of machines: meshes, generated or read with trimesh."""

@@ -24,7 +24,7 @@ from warpspace.units import Array
 _LIGHT_TOOLS = ("probe", "nozzle", "gripper")
 _COAXIAL, _ACROSS = 0.96, 0.45
 """Cosines between axis and tool: along it above the one, across it below the other."""
-# round parts of a tool: from where to where in its length, and the radii there in walls
+# round parts of a tool: ends as shares of its length, and radii there in walls
 _TOOLS = {
     "cutter": ((0.0, 0.5, 0.09, 0.09), (0.5, 0.8, 0.22, 0.22), (0.8, 1.0, 0.34, 0.34)),
     "probe": ((0.6, 1.0, 0.3, 0.3),),
@@ -36,10 +36,10 @@ _TOOLS = {
 
 @dataclass(frozen=True)
 class Mount:
-    """Where the head ends."""
+    """Mount of the head."""
 
     point_mm: Array  # [3]; middle of its upper face, in R at home
-    half_mm: float  # half width of what should carry it there, mm
+    half_mm: float  # half width of the carrier, mm
     inner: tuple[HomeAxis, ...]  # axes that carry it, the bed's first
 
     @property
@@ -90,7 +90,7 @@ class Head:
                 self._add(axis.name, "rotor", cylinder(1.25 * u, (top, top + 1.0 * u), self.centre))
                 top += 1.0 * u
             return self._mount(top, (0.8 if self.tool in _LIGHT_TOOLS else 1.15) * u, inner)
-        nose: float | None = length  # where the spindle starts, until it is there
+        nose: float | None = length  # start of the spindle, until it is built
         carriers = [*(axis.name for axis in axes[1:]), inner[-1].name if inner else BASE]
         for axis, carrier in zip(axes, carriers, strict=True):
             share = abs(float(self._line(axis)[0][2]))
@@ -106,7 +106,8 @@ class Head:
 
     def _mount(self, top: float, width: float, inner: tuple[HomeAxis, ...]) -> Mount:
         height = max(top, self.volume_top)
-        mount = Mount(self.turn @ np.array([*self.centre, height]) + self.place[:3, 3], width, inner)
+        point = self.turn @ np.array([*self.centre, height]) + self.place[:3, 3]
+        mount = Mount(point, width, inner)
         if top < height:
             half = [0.8 * width, 0.8 * width, (height - top) / 2.0 + 1.0]
             self._add(mount.carrier, "neck", block([*self.centre, (top + height) / 2.0], half))
@@ -219,10 +220,10 @@ class WorkpieceSide:
         self.half_mm = 1.08 * layout.half_mm[:2]  # [2]; half edges of its lowest body so far
         # height of its lower side so far, mm; in the end the top of the bed
         self.bed_mm = origin if below - 4.0 * self.u < origin < below else below
-        self.swept_mm = self.half_mm.copy()  # [2]; half edges of what the moving stack sweeps
+        self.swept_mm = self.half_mm.copy()  # [2]; half edges of the volume swept by the stack
 
     def range(self, k: int, share: float = 1.0) -> Range:
-        """Give its range along x or y, mm."""
+        """Return its range along x or y, mm."""
         return about(self.centre_mm[k], share * float(self.half_mm[k]))
 
     def build(self) -> None:
@@ -249,7 +250,7 @@ class WorkpieceSide:
         self.parts.stand(self.range(0), self.range(1))
 
     def _lower(self, height: float) -> Range:
-        """Give the range upwards of a body under the stack, which it is then part of, mm."""
+        """Add a body under the stack and return its vertical range, mm."""
         self.bed_mm -= height
         return (self.bed_mm, self.bed_mm + height)
 
@@ -284,7 +285,7 @@ class WorkpieceSide:
             self.parts.add(
                 axis.name, "lift", cylinder(radius, (z - 2.0 * reach, z), self.centre_mm)
             )
-            # room for the way down, and for the column to end within the bed
+            # clearance for the travel, and for the column to end within the bed
             self.bed_mm -= max(0.1 * u + reach, 2.0 * reach - 1.4 * u)
             self.half_mm = 0.75 * self.half_mm
             return

@@ -1,7 +1,7 @@
-"""What carries the head, walked from it to the bed: rams, carriages, beams, portals, columns, arms.
+"""Bodies between head and bed: rams, carriages, beams, portals, columns, arms.
 
-i is the direction across (along a beam), j the depth, in which everything is put behind what is
-there: along the spindle where that is level, towards the back of R where it comes from above.
+i is the direction across (along a beam), j the depth, in which each body is placed behind the
+previous one: along a level spindle, towards the rear of R for one from above.
 """
 
 from dataclasses import dataclass
@@ -36,11 +36,11 @@ _LONG = 1.5
 
 
 class _ToolSide:
-    """The tool side while it is built: what all of its bodies are placed by."""
+    """State of the tool side while it is built."""
 
     i: int  # index of the direction across: 0 or 1
     sign: float  # of the depth along the other one in R
-    zero_mm: float  # where depths count from
+    zero_mm: float  # origin of depths
 
     def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:
         self.layout, self.parts, self.mount, self.stack = parts.layout, parts, mount, stack
@@ -85,7 +85,7 @@ class _ToolSide:
 
 
 class _Behind(_ToolSide):
-    """What carries a level head from behind: headstock, ram, and a column that may travel."""
+    """Carrier of a level head: headstock, ram, and a column that may travel."""
 
     def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:
         super().__init__(parts, mount, stack)
@@ -96,8 +96,8 @@ class _Behind(_ToolSide):
     def build(self) -> None:
         u, w, middle = self.u, self.mount.half_mm, float(self.spine[2])
         start, column_at, half, high = self.depth(self.spine), 0.0, w + 0.4 * u, middle + 2.4 * u
-        hangs = True  # the head, so far, on nothing that slides upwards
-        axes = self.axes.copy()  # those that are not built yet
+        hangs = True  # no vertical slide so far
+        axes = self.axes.copy()  # not built yet
         while axes and axes[0].is_linear:
             axis, reach = axes[0], axes[0].reach_mm
             if axis.k == 2:
@@ -143,19 +143,19 @@ class _Behind(_ToolSide):
 
 @dataclass
 class _Rear:
-    """The upright plane that the bodies so far end with; the next body is put behind it."""
+    """Rear plane of the bodies so far; the next body is placed behind it."""
 
     plane: float  # position along j, mm
     low: float  # ends upwards, mm
     high: float
     half: float  # half width across, mm
-    # what has to come next: "plate", "beam", "ledge", "column", "posts", "rails"
+    # kind of the next body: "plate", "beam", "ledge", "column", "posts", "rails"
     need: str = "plate"
-    reach: float = 0.0  # half travel along i (or upwards) that the next body has to cover, mm
+    reach: float = 0.0  # half travel along i (or upwards) that the next body covers, mm
 
 
 class _Overhead(_ToolSide):
-    """What carries a head from above."""
+    """Carrier of a head from above."""
 
     def __init__(self, parts: Parts, mount: Mount, stack: WorkpieceSide) -> None:
         super().__init__(parts, mount, stack)

@@ -1,4 +1,4 @@
-"""Binary glTF files: coloured surfaces and lines that no light changes."""
+"""Binary glTF files: unlit coloured surfaces and lines."""
 
 import json
 import struct
@@ -17,14 +17,14 @@ UNLIT = "KHR_materials_unlit"
 LINES, _TRIANGLES = 1, 4  # modes of a primitive
 _M_PER_MM = 1e-3
 _LARGEST_UINT16 = 65534
-_VERTICES, _INDICES = 34962, 34963  # what a view of the buffer is for
+_VERTICES, _INDICES = 34962, 34963  # targets of buffer views
 _COMPONENTS = {"<u2": 5123, "<u4": 5125, "<f4": 5126}
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """How a part is coloured."""
+    """Colour of a part."""
 
     name: str = "unlit"
     srgb: tuple[int, int, int] = (255, 255, 255)  # colours of the points are multiplied with it
@@ -36,7 +36,7 @@ class GltfNode:
     """A surface or a set of lines, with a node of its own."""
 
     name: str
-    points: Array  # [V, 3]; as they stand in the file: by the standard metres, Y up
+    points: Array  # [V, 3]; as in the file: metres, Y up
     # [T, 3] or [S, 2]; numbers of the points of triangles, or of the ends of pieces of line
     indices: NDArray[np.integer[Any]]
     material: Material = Material()
@@ -101,7 +101,7 @@ def build_gltf(
 
 
 class _Arrays:
-    """Arrays one after the other; equal ones are stored once."""
+    """A buffer of arrays; equal ones are stored once."""
 
     def __init__(self) -> None:
         self.body = bytearray()
@@ -110,7 +110,7 @@ class _Arrays:
         self._known: dict[tuple[str, int, bytes], int] = {}
 
     def put(self, values: NDArray[Any], kind: str, target: int | None = None) -> int:
-        """Store numbers, [n] or [n, 1 to 4]; gives the number of their accessor and view."""
+        """Store numbers, [n] or [n, 1 to 4]; return the number of their accessor and view."""
         rows = np.asarray(values, kind).reshape(len(values), -1)
         data = rows.tobytes()
         at = self._known.setdefault((kind, rows.shape[1], data), len(self.views))

@@ -1,4 +1,4 @@
-"""A body of a machine as a mesh, and the way trimesh opens files of meshes."""
+"""Bodies of machines as meshes, and mesh files opened by trimesh."""
 
 import io
 import json
@@ -17,8 +17,6 @@ from warpspace.machine import limits
 from warpspace.scene.text_files import read_bytes
 from warpspace.units import Array
 
-# A small file can ask for much.
-
 _STL_HEAD = 84
 _STL_ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
 _MIXERS = 0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9  # odd numbers of 64 bits
@@ -35,11 +33,11 @@ _GLB_COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3":
 _DAE_REFERENCES = 20
 """Nodes of a DAE file by reference: each may hold others, so that they multiply."""
 NUMBERS_PER_TRIANGLE, WORDS_PER_TRIANGLE, BYTES_PER_TRIANGLE = 12, 40, 200
-"""Of a triangle in a file: numbers in lists or lines; words of a text, 21 in STL; bytes."""
+"""Limits per triangle of a file: numbers in lists or lines; words of a text, 21 in STL; bytes."""
 
 
 def count_mesh(data: bytes, ending: str, max_triangles: int = limits.MAX_TRIANGLES) -> bytes:
-    """Refuse a mesh file that holds more than can be built in a moment."""
+    """Raise an error for a mesh file above the limits; return its normalised content."""
     if ending == ".obj":
         text = data.decode("utf-8", "replace").replace("\r\n", "\n").replace("\\\n", "")
         data = _GROUPS.sub("", text).encode()
@@ -74,7 +72,7 @@ def _is_binary(data: bytes) -> bool:
 
 
 def _merge_stl(data: bytes) -> Any:
-    """Give what trimesh makes of a binary STL, equal corners merged; None where keys are shared."""
+    """Read a binary STL with equal corners merged; None for a collision of keys."""
     import trimesh
 
     rows = np.frombuffer(data, _STL_ROW, offset=_STL_HEAD)
@@ -85,7 +83,7 @@ def _merge_stl(data: bytes) -> Any:
     order = np.argsort(key)
     key = key[order]
     is_new = np.append(True, key[1:] != key[:-1])[: len(key)]
-    first, place = np.unique(order[is_new], return_inverse=True)  # near ones stay near
+    first, place = np.unique(order[is_new], return_inverse=True)  # neighbours stay close in memory
     vertices, faces = corner[first], np.empty(len(corner), np.int32)
     faces[order] = place.astype(np.int32)[np.cumsum(is_new, dtype=np.int32) - 1]
     del key, order, is_new
@@ -137,7 +135,7 @@ def _count_ply(data: bytes, max_triangles: int) -> None:
 def _count_glb(data: bytes, max_triangles: int) -> None:
     size = int.from_bytes(data[12:16], "little")
     if data[:4] != b"glTF" or size > len(data):
-        return  # whoever reads it says what it is not
+        return  # the reader reports the problem
     _check_count(size, limits.MAX_MESH_HEADER[".glb"], "bytes of description")
     offset, chunks = 20 + size, 0
     while offset + 8 <= len(data) and chunks <= limits.MAX_MESH_PARTS:
@@ -209,21 +207,21 @@ CREASE_DEG = 30.0  # angle from flat above which an edge is drawn
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One body of a machine, in the frame it rides on."""
+    """One body of a machine, in its frame."""
 
-    name: str  # what it is, for instance ``X_saddle``
-    frame: str  # frame it rides on: R, an axis, S, t or w
+    name: str  # for instance ``X_saddle``
+    frame: str  # R, an axis, S, t or w
     colour: tuple[int, int, int]  # sRGB; greys, since colour means error
     vertices_mm: Array  # [V, 3]
     triangles: NDArray[np.int32]  # [T, 3]; Counter-clockwise seen from outside
     edges_mm: Array  # [E, 2, 3]; ends of the edges worth drawing
-    warnings: tuple[str, ...] = ()  # what is wrong with its surface
+    warnings: tuple[str, ...] = ()  # on its surface
 
 
 def build_body(
     mesh: Any, name: str, frame: str, colour: tuple[int, int, int], lines_mm: Array | None = None
 ) -> Body:
-    """Turn a mesh of trimesh, vertices in mm, into a body; its edges are where it bends."""
+    """Build a body from a mesh of trimesh, mm, with its sharp edges."""
     is_sharp = mesh.face_adjacency_angles > np.deg2rad(CREASE_DEG)
     edges = np.asarray(mesh.vertices[mesh.face_adjacency_edges[is_sharp]], dtype=float)
     return Body(
@@ -237,14 +235,14 @@ def build_body(
 
 
 def _check_geometry(scene: Any, max_triangles: int) -> None:
-    """Refuse what trimesh takes as it comes: points in a plane, vertices that are not there."""
+    """Raise an error for plane points or missing vertices, which trimesh does not check."""
     for mesh in scene.geometry.values():
-        mesh.metadata.clear()  # of a PLY file it holds all again
+        mesh.metadata.clear()  # of a PLY file a copy of all data
         if np.shape(getattr(mesh, "vertices", ()))[1:] != (3,):
             raise ValueError("it has points without three coordinates")
         faces = np.asarray(getattr(mesh, "faces", ()))
         if faces.size and not (int(faces.min()) >= 0 and int(faces.max()) < len(mesh.vertices)):
-            raise ValueError("a triangle names a vertex that is not there")
+            raise ValueError("a triangle refers to a missing vertex")
         if len(faces) > max_triangles:
             raise ValueError(f"{len(faces):,} triangles; expected at most {max_triangles:,}")
 
@@ -257,7 +255,7 @@ def open_meshes(
     *,
     has_materials: bool = False,
 ) -> Any:
-    """Open a mesh file; without its materials, whose pictures may need any amount of memory."""
+    """Open a mesh file, by default without its materials, whose memory is unlimited."""
     try:
         data = read_bytes(path, BYTES_PER_TRIANGLE * max_triangles) if data is None else data
     except SceneError as error:
@@ -266,7 +264,7 @@ def open_meshes(
         raise OptionError(f"{path}: the file is empty; expected a {what}")
     import trimesh
 
-    # it logs what it makes of a damaged file, traceback included; the message says it
+    # it logs tracebacks of damaged files; the error message suffices
     logging.getLogger("trimesh").addHandler(logging.NullHandler())
     try:
         with np.errstate(all="ignore"):
@@ -281,6 +279,6 @@ def open_meshes(
             return scene
     except OptionError as error:
         raise OptionError(f"{path}: {error}. Reduce it before") from None
-    except Exception as error:  # noqa: BLE001  # trimesh raises whatever a damaged file leads to
+    except Exception as error:  # noqa: BLE001  # trimesh raises any error for a damaged file
         reason = str(error) or type(error).__name__
         raise OptionError(f"{path}: no {what} that can be read ({reason})") from None

@@ -1,4 +1,4 @@
-"""Meshes of a user: those a machine names, and what the links of a robot look like."""
+"""Mesh files of users: bodies of machines, and links of robots."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -16,16 +16,16 @@ from warpspace.machine.limits import MAX_FEATURE_TRIANGLES, MAX_TRIANGLES, MAX_U
 from warpspace.units import Array
 
 UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-"""Units of length a mesh may be in, in mm."""
+"""Units of length of meshes, mm."""
 FORMATS = {".stl": ("mm", "z"), ".obj": ("mm", "z"), ".ply": ("mm", "z"), ".glb": ("m", "y")}
-"""Endings that are read, with the unit and the upward axis taken where none is given."""
+"""Endings with their default unit and upward axis."""
 SMALL_MM, LARGE_MM = 10.0, 100_000.0
-"""A body whose longest edge lies beyond is probably in another unit."""
-MOST_SHELL_PAIRS = 20_000_000  # of a shell and a cavity in a mesh that are looked at
+"""Longest edges beyond suggest another unit."""
+MAX_SHELL_PAIRS = 20_000_000  # of a shell and a cavity that are examined
 
 
 def load_mesh(path: str | Path, frame: str, unit: str | None = None) -> Body:
-    """Read a body from a file of a user; it can be drawn whatever its warnings say."""
+    """Read a body from a mesh file; it can be drawn despite warnings."""
     path = Path(path)
     mesh, warnings = read_mesh(path, unit)
     mesh.update_faces(mesh.nondegenerate_faces())
@@ -37,16 +37,17 @@ def load_mesh(path: str | Path, frame: str, unit: str | None = None) -> Body:
 def read_mesh(
     path: Path, unit: str | None, max_triangles: int = MAX_TRIANGLES, data: bytes | None = None
 ) -> tuple[Any, tuple[str, ...]]:
-    """Give a file as one mesh of trimesh, in mm with z upwards, and what is wrong with it.
+    """Read a file as one mesh of trimesh, in mm with z upwards, and its warnings.
 
-    Vertices are merged, triangles without three of them left out, closed surfaces face outwards.
+    Vertices are merged, degenerate triangles removed, closed surfaces face outwards.
     """
     from trimesh import graph, grouping
 
     if path.suffix.lower() not in FORMATS:
         raise OptionError(f"{path}: unknown ending; expected one of {', '.join(FORMATS)}")
     has_unit, (standard, up) = unit is not None, FORMATS[path.suffix.lower()]
-    if (unit := unit or standard) not in UNITS_MM:
+    unit = unit or standard
+    if unit not in UNITS_MM:
         raise OptionError(f"{path}: {unit!r}; expected one of {', '.join(UNITS_MM)}")
     scene = open_meshes(path, f"{path.suffix[1:].upper()} file", max_triangles, data)
     nodes = scene.graph.nodes_geometry
@@ -69,24 +70,24 @@ def read_mesh(
         is_usual = longest < 1.0 if unit == "mm" else longest > LARGE_MM
         other = {"mm": "m", "m": "mm"}[unit] if is_usual else "another unit"
         raise OptionError(
-            f"{path}: taken as {unit}, its longest edge is {longest:.4g} mm. It is probably in"
+            f"{path}: in {unit}, its longest edge is {longest:.4g} mm. It is probably in"
             f" {other}; give its unit ({', '.join(UNITS_MM)})"
         )
     if not (is_closed or _is_closed(mesh.faces)):
         warning = f"{path}: the surface is not closed, or its triangles do not agree on the outside"
         count = len(grouping.group_rows(mesh.edges_sorted, require_count=1))
-        return mesh, (f"{warning} ({count:,} open edges); it is taken as it is",)
+        return mesh, (f"{warning} ({count:,} open edges); used as is",)
     x, y, z = np.ascontiguousarray((mesh.vertices - mesh.vertices[0]).T)
-    first, second, third = mesh.faces.T
-    across = (y[second] - y[first]) * (z[third] - z[first]) - (z[second] - z[first]) * (y[third] - y[first])
-    across *= x[first] + x[second] + x[third]  # six times the volume
+    a, b, c = mesh.faces.T
+    across = (y[b] - y[a]) * (z[c] - z[a]) - (z[b] - z[a]) * (y[c] - y[a])
+    across *= x[a] + x[b] + x[c]  # six times the volume
     if across.sum() < 0.0:
         mesh.invert()
-        return mesh, (f"{path}: its triangles face inwards; they are turned outwards",)
+        return mesh, (f"{path}: its triangles faced inwards and were inverted",)
     if len(mesh.faces) > MAX_FEATURE_TRIANGLES:
         return mesh, ()
     shell = graph.connected_component_labels(mesh.edges, node_count=len(x))
-    volume, low, high = np.bincount(shell[first], across), *np.full((2, shell.max() + 1, 3), np.inf)
+    volume, low, high = np.bincount(shell[a], across), *np.full((2, shell.max() + 1, 3), np.inf)
     np.minimum.at(low, shell, mesh.vertices)
     np.minimum.at(high, shell, -mesh.vertices)
     cavities, n_pairs = np.flatnonzero(volume < 0.0), 0
@@ -95,20 +96,21 @@ def read_mesh(
         is_inside = is_within.all(axis=1) & (volume[outer] > -volume[cavities])
         n_pairs += len(cavities)
         cavities = cavities[~is_inside]
-        if not len(cavities) or n_pairs > MOST_SHELL_PAIRS:
+        if not len(cavities) or n_pairs > MAX_SHELL_PAIRS:
             break
-    if len(cavities) and n_pairs > MOST_SHELL_PAIRS:
-        return mesh, (f"{path}: too many shells to tell if some face inwards",)
+    if len(cavities) and n_pairs > MAX_SHELL_PAIRS:
+        return mesh, (f"{path}: not checked whether shells face inwards (too many shells)",)
     if len(cavities):
-        return mesh, (f"{path}: some of its shells face inwards; they are taken as they are",)
+        return mesh, (f"{path}: some of its shells face inwards; used as is",)
     return mesh, ()
 
 
 def _is_closed(faces: NDArray[np.int64]) -> bool:
-    """Tell whether each edge is passed as often in one direction as in the other."""
+    """Check that each edge occurs equally often in both directions."""
     count = faces.max(initial=0) + 1
-    begin_weight, end_weight = np.random.default_rng(0).integers(2**64, size=(2, count), dtype=np.uint64)
-    # each direction adds its own random number; only opposite ones cancel
+    random = np.random.default_rng(0)
+    begin_weight, end_weight = random.integers(2**64, size=(2, count), dtype=np.uint64)
+    # a random number per direction; only opposite ones cancel
     sums = [
         int(np.sum(begin_weight[begin] * end_weight[end] - end_weight[begin] * begin_weight[end]))
         for begin, end in zip(faces.T, np.roll(faces, 1, axis=1).T, strict=True)
@@ -237,7 +239,8 @@ def _mesh(geometry: Any, folders: tuple[Path, Path], meshes: dict[Path, Any]) ->
             meshes[path] = loaded if len(loaded.faces) else "it is empty"
         except OptionError as error:
             meshes[path] = str(error)
-    if isinstance(mesh := meshes[path], str):
+    mesh = meshes[path]
+    if isinstance(mesh, str):
         raise WarpspaceError(f"mesh {name!r}: {mesh}; left out")
     bare = trimesh.Trimesh(np.array(mesh.vertices), np.array(mesh.faces), process=False)
     if geometry.scale is not None:

@@ -1,4 +1,4 @@
-"""Schematic bodies of a machine: read from its folder, placed and bent like its errors say."""
+"""Bodies of a machine, placed and displaced by its errors."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ def scene_motions(
     amplitudes: Mapping[str, float] | None = None,
     positions: Mapping[str, float] | None = None,
 ) -> dict[str, BodyMotion]:
-    """Find how the bodies move as a view sees it, so that they agree with its deformed grid."""
+    """Compute the motions of bodies in a view, consistent with its deformed grid."""
     model, errors = scene.model, scene.errors
     if amplitudes is None:
         amplitudes = {key: errors.amplitude(key) for key in errors}
@@ -91,7 +91,7 @@ def _held_displacement(model: Model, motions: Mapping[str, BodyMotion], loop: Lo
 
 
 def place_points(motion: BodyMotion, points_mm: Array, exaggeration: float) -> Array:
-    """Give where points of a body are drawn in R."""
+    """Return the drawn places of points of a body in R."""
     pose = motion.drawn(exaggeration)
     return points_mm @ pose[:3, :3].T + pose[:3, 3]
 
@@ -100,7 +100,7 @@ def place_points(motion: BodyMotion, points_mm: Array, exaggeration: float) -> A
 class PlacedBody:
     """One body of a machine."""
 
-    body: Body  # its mesh in the frame it rides on
+    body: Body  # mesh in its frame
     motion: BodyMotion  # nominal place of that frame, and its small motion
     exaggeration: float  # display factor of the small motion
 
@@ -112,17 +112,17 @@ class PlacedBody:
 
     @cached_property
     def vertices_mm(self) -> Array:
-        """Vertices where they are drawn, [V, 3], mm in R."""
+        """Drawn vertices, [V, 3], mm in R."""
         return place_points(self.motion, self.body.vertices_mm, self.exaggeration)
 
     @cached_property
     def nominal_mm(self) -> Array:
-        """Vertices where they nominally are, [V, 3], mm in R."""
+        """Nominal vertices, [V, 3], mm in R."""
         return place_points(self.motion, self.body.vertices_mm, 0.0)
 
     @cached_property
     def edges_mm(self) -> Array:
-        """Edges where they are drawn, [E, 2, 3], mm in R."""
+        """Drawn edges, [E, 2, 3], mm in R."""
         return place_points(self.motion, self.body.edges_mm, self.exaggeration)
 
 
@@ -135,7 +135,7 @@ def place_bodies(
     amplitudes: Mapping[str, float] | None = None,
     positions: Mapping[str, float] | None = None,
 ) -> tuple[PlacedBody, ...]:
-    """Place the bodies of a scene, or of some of its frames, bent by its errors or by others."""
+    """Place the bodies of a scene, or of some of its frames, displaced by its errors or others."""
     motions = scene_motions(scene, view, amplitudes, positions)
     return tuple(
         PlacedBody(body, motions[body.frame], exaggeration)

@@ -23,7 +23,7 @@ LINES = " lines"
 
 @lru_cache(maxsize=8)
 def read_bodies(path: Path) -> tuple[Body, ...]:
-    """Read a file of bodies; the result is kept, since every session draws the same."""
+    """Read a file of bodies, cached for all sessions."""
     if not path.is_file():
         return ()
     scene = open_meshes(path, _WHAT, has_materials=True)
@@ -104,12 +104,12 @@ def about(middle: float, half: float) -> Range:
 
 
 def pair(middle: float, apart: float, half: float) -> tuple[Range, Range]:
-    """Give two mirrored ranges, such as two rails: how far from the middle, and how wide."""
+    """Return two mirrored ranges, such as two rails, by distance and half width."""
     return about(middle - apart, half), about(middle + apart, half)
 
 
 def mirrored_walls(middle: float, inner: float, thick: float) -> tuple[Range, Range]:
-    """Give two mirrored ranges, such as two walls, by the inner faces."""
+    """Return two mirrored ranges, such as two walls, by their inner faces."""
     return pair(middle, inner + thick / 2.0, thick / 2.0)
 
 
@@ -147,13 +147,12 @@ def bar(start: Array, end: Array, half_width: float, half_height: float) -> Shap
     return mesh
 
 
-# Everything is built where the machine stands at home, in R: linear axes in the middle of their
-# travel, rotary axes at zero or as near as their travel allows. A machine whose slides are turned
-# against R, as on the slant bed of a lathe, is built upright along its own slides, turned as they
-# are, and stands on a wedge.
+# All bodies are built with the machine at home, in R: linear axes in the middle of their travel,
+# rotary axes at zero or as near as their travel allows. A machine whose slides are rotated against
+# R, as on the slant bed of a lathe, is built upright along its slides, rotated, and set on a wedge.
 
 _SHARE_OF_VOLUME, _SMALLEST_MM = 0.2, 12.0
-_FLAT = 0.3  # of the longest half edge: what a volume is taken to have where no axis moves
+_FLAT = 0.3  # assumed half edge without an axis, as a share of the longest
 _ARMS = 0.4  # of the length of all arms: half edge of the place before a robot without level axes
 _STEEP = 0.75  # cosine of an angle to a direction below which an axis counts as pointing along it
 _ALIGNED, _SQUARE = 0.9994, 0.02
@@ -162,18 +161,18 @@ _ALIGNED, _SQUARE = 0.9994, 0.02
 
 @dataclass(frozen=True)
 class HomeAxis:
-    """How an axis moves at home, in R."""
+    """An axis at home, in R."""
 
     name: str
     is_linear: bool
     direction: Array  # [3]; unit vector along or about which it moves
     origin_mm: Array  # [3]; of its frame
-    k: int  # index of the axis of R nearest to it: 2 where it points up or down
+    k: int  # index of the nearest axis of R: 2 for up or down
     reach_mm: float  # half its travel; 0 for a rotary axis
 
     @property
     def slides_level(self) -> bool:
-        """Tell whether it is linear and level."""
+        """Whether it is linear and level."""
         return self.is_linear and self.k != 2
 
 
@@ -192,7 +191,7 @@ class MachineLayout:
     unit_mm: float  # thickness of a wall; every other size of a body is a multiple of it
     gap_mm: float  # clear space kept around the working volume
     length_mm: float  # of the tool, down from the spindle nose
-    # [3, 3]; what everything above is turned by in R: the unit matrix, but for a slanted machine
+    # [3, 3]; rotation of all of the above in R: identity except for a slanted machine
     slant: Array
 
 
@@ -229,9 +228,8 @@ def build_layout(machine: Machine) -> MachineLayout:
         radius = _ARMS * sum(float(np.hypot(*axis.offset_mm[:2])) for axis in axes)
         filled[flat] = half[:2].max() if len(flat) == 1 else max(radius, filled[:2].max())
     tip = poses["t"][:3, 3]
-    tool, workpiece = (
-        tuple(home_axes[axis.name] for axis in machine.branch(side)) for side in ("tool", "workpiece")
-    )
+    tool = tuple(home_axes[axis.name] for axis in machine.branch("tool"))
+    workpiece = tuple(home_axes[axis.name] for axis in machine.branch("workpiece"))
     low, high = tip - filled, tip + filled
     length = -float(machine.fixed_mm.get("t", (0.0, 0.0, 0.0))[2])
     return MachineLayout(
@@ -308,10 +306,10 @@ class _BodyShapes:
 
 @dataclass
 class Parts:
-    """Shapes in R at home, by the body they belong to."""
+    """Shapes in R at home, by body."""
 
     layout: MachineLayout
-    # [2, 2], mm; rectangles, lower and upper corner, that the bed has to carry
+    # [2, 2], mm; rectangles, lower and upper corner, that the bed carries
     floor: list[Array] = field(default_factory=list[Array])
     _parts: dict[str, _BodyShapes] = field(default_factory=dict[str, _BodyShapes])
 
@@ -346,14 +344,14 @@ class Parts:
         self.add(frame, what, box(x, y, z), colour=colour)
 
     def stand(self, i: Range, j: Range, *, along: int = 0) -> None:
-        """Note a rectangle that the bed has to carry, its ranges as those of a box."""
+        """Add a rectangle that the bed carries, its ranges as those of a box."""
         corners = np.array([i, j]).T
         self.floor.append(corners[:, ::-1] if along else corners)
 
     def bodies(self) -> tuple[Body, ...]:
         from trimesh import util
 
-        found: list[Body] = []
+        built: list[Body] = []
         for name, part in self._parts.items():
             mesh = util.concatenate(part.shapes)
             inverse = np.linalg.inv(self.layout.poses[part.frame])
@@ -361,5 +359,5 @@ class Parts:
             lines_mm = None
             if part.lines_mm:
                 lines_mm = np.array(part.lines_mm) @ inverse[:3, :3].T + inverse[:3, 3]
-            found.append(build_body(mesh, name, part.frame, part.colour, lines_mm))
-        return tuple(found)
+            built.append(build_body(mesh, name, part.frame, part.colour, lines_mm))
+        return tuple(built)

@@ -1,4 +1,4 @@
-"""From the raw value of an error in a scene file to its curve; each kind of curve reads its own."""
+"""Readers of the curves of errors in scene files, and sums of curves."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
@@ -21,18 +21,18 @@ from warpspace.units import Array
 
 Weights = tuple[float, float]
 MAX_SAMPLES = 20_001
-SAMPLING_TOLERANCE = 1e-5  # largest deviation of a sampled sum half way between its points, by its largest value
+SAMPLING_TOLERANCE = 1e-5  # of a sampled sum between its points, as a share of its largest value
 
 
 def combine_curves(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> ErrorFunction:
     span = first.span
-    for one, other, weight in ((first, second, weights[0]), (second, first, weights[1])):
+    for curve, other, weight in ((first, second, weights[0]), (second, first, weights[1])):
         if isinstance(other, Constant) and other.value == 0.0:
-            return one.scaled(weight)
+            return curve.scaled(weight)
     if isinstance(first, Directional) or isinstance(second, Directional):
         forward, backward = (
-            combine_curves(_directed_curve(first, way), _directed_curve(second, way), weights)
-            for way in ("forward", "backward")
+            combine_curves(_directed_curve(first, name), _directed_curve(second, name), weights)
+            for name in ("forward", "backward")
         )
         return Directional(span, forward, backward)
     if isinstance(first, TwoArguments) or isinstance(second, TwoArguments):
@@ -67,8 +67,8 @@ def _surface(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
     surfaces = [curve for curve in (first, second) if isinstance(curve, TwoArguments)]
     axes = surfaces[0].axes
     if any(surface.axes != axes for surface in surfaces):
-        one, other = (surface.axes[1] for surface in surfaces)
-        raise OptionError(f"guides depend on {one} and on {other}; expected one second axis")
+        names = " and on ".join(surface.axes[1] for surface in surfaces)
+        raise OptionError(f"guides depend on {names}; expected one second axis")
     zero = Constant(first.span)
     plain = [
         curve
@@ -76,18 +76,17 @@ def _surface(first: ErrorFunction, second: ErrorFunction, weights: Weights) -> T
         else _sampled(curve, zero, (1.0, 0.0))
         for curve in (first, second)
     ]
-    own = np.unique(np.concatenate([np.array(curve.kinks) for curve in plain]))
-    other = np.unique(np.concatenate([np.array(one.positions[1]) for one in surfaces]))
-    if len(own) * len(other) > limits.MAX_POINTS:
-        raise OptionError(
-            f"guides need {len(own) * len(other):,} points; at most {limits.MAX_POINTS:,}"
-        )
-    at = {axes[0]: own[:, None], axes[1]: other}
+    first_q = np.unique(np.concatenate([np.array(curve.kinks) for curve in plain]))
+    second_q = np.unique(np.concatenate([np.array(s.positions[1]) for s in surfaces]))
+    count = len(first_q) * len(second_q)
+    if count > limits.MAX_POINTS:
+        raise OptionError(f"guides need {count:,} points; at most {limits.MAX_POINTS:,}")
+    at = {axes[0]: first_q[:, None], axes[1]: second_q}
     total = sum(
-        weight * np.broadcast_to(curve.evaluate_at(axes[0], at), (len(own), len(other)))
+        weight * np.broadcast_to(curve.evaluate_at(axes[0], at), (len(first_q), len(second_q)))
         for weight, curve in zip(weights, plain, strict=True)
     )
-    positions = (tuple(own.tolist()), tuple(other.tolist()))
+    positions = (tuple(first_q.tolist()), tuple(second_q.tolist()))
     return TwoArguments(first.span, axes, positions, tuple(map(tuple, np.asarray(total).tolist())))
 
 
@@ -144,7 +143,7 @@ def read_csv_column(path: Path, column: str) -> list[tuple[float, float]]:
 
 
 def read_csv_runs(path: Path, column: str) -> tuple[TravelRun, ...]:
-    """Read the runs of one error, a row a reading; ``run`` and ``direction`` tell them apart."""
+    """Read the runs of one error, one reading per row, with columns ``run`` and ``direction``."""
     return _read_csv(path, lambda rows: _runs(rows, column))
 
 
@@ -168,7 +167,7 @@ def _column(rows: text_files.CsvRows, column: str) -> int:
     columns = rows.header[1:]
     if columns.count(column) == 1:
         return columns.index(column) + 1
-    problem = "stands there twice" if column in columns else "not found"
+    problem = "occurs twice" if column in columns else "not found"
     hint = "" if column in columns else near_miss(column, columns)
     raise SceneError(rows.source, [f"column {column!r} {problem}{hint}"])
 
@@ -196,9 +195,8 @@ def _runs(rows: text_files.CsvRows, column: str) -> tuple[TravelRun, ...]:
     for line, row in rows:
         direction = UNKNOWN if direction_at is None else text_files.unguard_cell(row[direction_at])
         if direction not in RUN_DIRECTIONS:
-            rows.note(
-                f"line {line}: direction {text_files.spell_value(direction)}; expected +, - or nothing"
-            )
+            spelling = text_files.spell_value(direction)
+            rows.note(f"line {line}: direction {spelling}; expected +, - or nothing")
         position = rows.number(row[0], line, limit=limits.MAX_LENGTH_MM)
         value = rows.number(row[value_at], line, limit=limits.MAX_ERROR)
         run = "" if run_at is None else text_files.unguard_cell(row[run_at])
@@ -214,7 +212,7 @@ def _runs(rows: text_files.CsvRows, column: str) -> tuple[TravelRun, ...]:
 
 @dataclass(frozen=True)
 class CurveReader:
-    """Reads curves of the errors of one axis."""
+    """A reader of the curves of one axis."""
 
     problems: Problems
     span: tuple[float, float]
@@ -234,17 +232,18 @@ class CurveReader:
             self.problems.add(where, "is missing")
             return None
         reader = ValueReader(
-            # a constant must be a number: the file that a table names need not be read
+            # a constant is a number: the file of a table is not read
             (lambda _file, _column: ()) if constant else self.folder and self._csv_points,
             axis=self.axis,
             axes=self.axes,
             curve=lambda inner, path: self._read(inner, text_files.location(where, path), constant),
         )
         table = cast("dict[str, object]", raw) if isinstance(raw, dict) else {}
+        form_of_table = find_form(table)
         if is_number(raw):
             curve, form = Constant.read(raw, self.span, reader), ()
-        elif found := find_form(table):
-            kind, form = found
+        elif form_of_table is not None:
+            kind, form = form_of_table
             curve = kind.read({**dict.fromkeys(form, MISSING), **table}, self.span, reader)
         else:
             self.problems.add(where, f"expected {spell_forms()}", raw)
@@ -267,7 +266,7 @@ class CurveReader:
         """Read ``{ guides = [CURVE, CURVE] }`` of a gantry: a mean, and a rotation."""
         axis, problems = self.axis, self.problems
         if gantry is None:
-            # The rest is checked all the same, with a distance that plays no part.
+            # an arbitrary distance, to check the remaining entries
             expected = f"[machine.gantry] {axis} = {{ span_mm = 1800 }} (a linear axis)"
             problems.add(where, f"guides need the distance between them; expected {expected}")
             gantry = Gantry(axis, 1000.0, default_across(axis))

@@ -1,4 +1,4 @@
-"""Finding scenes and reading them: bundled by name, or any file by path, each in one pass."""
+"""Scenes: bundled by name, or read from a file."""
 
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -85,7 +85,7 @@ def load_scene(name_or_path: str | Path) -> Scene:
     'wCBFXYZt'
     """
     path = scene_path(name_or_path)
-    name = path.stem.encode(errors="replace").decode()  # bytes that are no text become "?"
+    name = path.stem.encode(errors="replace").decode()  # bytes that are not text become "?"
     return parse_scene(read_text(path, limits.MAX_SCENE_BYTES), name, str(path), path.parent)
 
 
@@ -105,10 +105,10 @@ SECTIONS = (
     "part",
     "notes",
 )
-ROUNDED = 1e-9  # of a covariance: by how much its two halves may differ, and what is zero of it
-OF_MACHINE = "axis of this machine"  # what a name is that is not known
+ROUNDED = 1e-9  # relative tolerance of symmetry and of positive eigenvalues of a covariance
+OF_MACHINE = "axis of this machine"  # in messages
 STAND_IN = build_machine("wFXYZABCt")
-"""Has every axis there is: with it the rest of a document is checked whose machine is unusable."""
+"""Machine with every axis, to check the remainder of a document with an invalid machine."""
 
 
 def parse_scene(
@@ -137,7 +137,7 @@ def parse_scene(
     if lines and (uncertainty or covariance):
         expected = "expected uncertainties and errors of the origins of the frames"
         problems.add(
-            "convention.measuring_line_mm", f"would move what [uncertainty] is of; {expected}"
+            "convention.measuring_line_mm", f"would move the errors of [uncertainty]; {expected}"
         )
     if problems.lines:
         raise SceneError(source, problems.lines)
@@ -178,9 +178,8 @@ def _machine(
     elif source in machine_library.machine_names():
         machine = machine_library.load_machine(source)
     else:
-        problems.add(
-            "machine", f"unknown machine{near_miss(source, machine_library.machine_names())}", source
-        )
+        hint = near_miss(source, machine_library.machine_names())
+        problems.add("machine", f"unknown machine{hint}", source)
     problems.only("", raw, SECTIONS, "key")
     if machine is not None and "bodies" in raw:
         bodies = machine_library.read_bodies(raw["bodies"], machine, folder, problems)
@@ -246,8 +245,10 @@ def _workspace(raw: Mapping[str, object], machine: Machine, problems: Problems) 
     for name, value in raw.items():
         if name not in machine.axes:
             problems.only("workspace", [name], machine.axes, OF_MACHINE)
-        elif valid := problems.read(schema.workspace_range, f"workspace.{name}", value):
-            stated[name] = valid
+            continue
+        span = problems.read(schema.workspace_range, f"workspace.{name}", value)
+        if span:
+            stated[name] = span
     ranges = _complete(stated, machine)
     moving = [name for name in reversed(sort_axes(stated)) if stated[name][0] < stated[name][1]]
     problem = ""
@@ -289,13 +290,13 @@ def _complete(stated: Mapping[str, Range], machine: Machine) -> dict[str, Range]
 
 
 NPZ_ARRAYS = {"keys.npy": (1, "U", 4 * 64), "matrix.npy": (2, "fiu", 8)}
-"""Arrays of a file of numpy: dimensions, kinds and largest size of an entry, bytes."""
+"""Arrays of an npz file: dimensions, kinds and largest size of an entry, bytes."""
 
 
 def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | None:
-    """Read the arrays of a covariance as lists; note what is wrong with it."""
+    """Read the arrays of a covariance as lists; note a problem for any other file."""
     data = BytesIO(read_bytes(path, limits.MAX_SCENE_BYTES))
-    with suppress(Exception), ZipFile(data) as packed:  # whatever a damaged file leads to
+    with suppress(Exception), ZipFile(data) as packed:  # any error of a damaged file
         if {"matrix.npy"} <= {*packed.namelist()} <= {*NPZ_ARRAYS}:
             return {name[:-4]: _read_array(packed, name) for name in packed.namelist()}
     problems.add(where, "expected a file of numpy with the arrays keys and matrix", path.name)
@@ -303,13 +304,14 @@ def read_npz(path: Path, where: str, problems: Problems) -> dict[str, Any] | Non
 
 
 def _read_array(packed: ZipFile, name: str) -> list[Any]:
-    """Read an array whose header states dimensions and a kind that a covariance has."""
+    """Read an array with the dimensions and kinds of a covariance."""
     dimensions, kinds, max_bytes = NPZ_ARRAYS[name]
     with packed.open(name) as file:
         is_usual = np.lib.format.read_magic(file) == (1, 0)
         shape, is_fortran, dtype = np.lib.format.read_array_header_1_0(file, max_header_size=1000)
         fits = len(shape) == dimensions and max(shape) <= limits.MAX_COVARIANCE
-        if not (is_usual and fits) or dtype.kind not in kinds or not 0 < dtype.itemsize <= max_bytes:
+        fits = fits and dtype.kind in kinds and 0 < dtype.itemsize <= max_bytes
+        if not (is_usual and fits):
             raise ValueError(f"{name}: {dtype} {shape}")
         content = file.read(math.prod(shape) * dtype.itemsize)
     return np.frombuffer(content, dtype).reshape(shape, order="F" if is_fortran else "C").tolist()
@@ -317,7 +319,7 @@ def _read_array(packed: ZipFile, name: str) -> list[Any]:
 
 @dataclass(frozen=True)
 class _Document:
-    """A document whose machine and working volume are known."""
+    """A document with its machine and working volume."""
 
     raw: Mapping[str, object]
     machine: Machine
@@ -343,7 +345,7 @@ class _Document:
         return entries
 
     def check_free(self, where: str, key: str, value: object) -> None:
-        """Refuse an error that is zero by definition of the frame."""
+        """Note a problem for an error that is zero by definition of the frame."""
         if key in self.refused:
             reference = PARAMETERS[key].axis
             usual = [name for name in self.machine.parameter_keys if PARAMETERS[name].is_constant]
@@ -355,7 +357,7 @@ class _Document:
             )
 
     def curves(self, key: str) -> CurveReader:
-        """Give the reader of an error's curves, which run over `Scene.axis_span`."""
+        """Return the reader of the curves of an error, over `Scene.axis_span`."""
         axis = PARAMETERS[key].axis
         low, high = self.workspace.ranges[axis]
         span = (low, high) if low < high else self.machine.axes[axis].travel
@@ -391,8 +393,9 @@ class _Document:
             default = problems.read(schema.DEFAULTS, "tolerances.default", table["default"])
         ranges: dict[str, Tolerance] = {}
         for key, value in self.parameter_entries("tolerances").items():
-            if valid := problems.read(schema.tolerance, f"tolerances.{key}", value):
-                ranges[key] = valid
+            tolerance = problems.read(schema.tolerance, f"tolerances.{key}", value)
+            if tolerance:
+                ranges[key] = tolerance
         return ToleranceSet(default or {}, ranges)
 
     def uncertainties(self) -> dict[str, ErrorFunction]:
@@ -408,18 +411,19 @@ class _Document:
                 continue
             values = [curve.value] if isinstance(curve, Constant) else [v for _, v in curve.points]
             if min(values) <= 0.0:
-                expected = "expected it above 0 everywhere; leave out what is not known"
+                expected = "expected a number above 0; omit unknown uncertainties"
                 self.problems.add(where, expected, min(values))
             curves[key] = curve
         return curves
 
     def covariance(self, independent_keys: Collection[str]) -> Covariance | None:
-        """Read how sure errors are together, of others than those that stand alone."""
+        """Read the covariance of errors other than the independent ones."""
         where, problems = "uncertainty.covariance", self.problems
         section = self.raw.get("uncertainty")
         raw = section.get("covariance") if isinstance(section, dict) else None
         stated = raw if isinstance(raw, dict) else {"matrix": raw}
-        if isinstance(name := stated.get("matrix"), str):
+        name = stated.get("matrix")
+        if isinstance(name, str):
             path = machine_library.path_beside(name, where, self.folder, problems)
             raw = read_npz(Path(path), where, problems) if path else None
             if raw and stated.get("sha256", "") not in ("", matrix_digest(raw["matrix"])):
@@ -452,7 +456,8 @@ class _Document:
         for at, row in enumerate(rows):
             half[at, : len(row)] = row
         matrix = np.tril(half) + np.tril(half, -1).T
-        if (not_positive := np.flatnonzero(np.diag(matrix) <= 0.0)).size:
+        not_positive = np.flatnonzero(np.diag(matrix) <= 0.0)
+        if not_positive.size:
             at = int(not_positive[0])
             expected = (
                 f"is no square of an uncertainty of {keys[at]}; expected its diagonal above 0"
@@ -474,7 +479,7 @@ class _Document:
         return Covariance(**entries, rows=tuple(map(tuple, matrix.tolist())))
 
     def measurements(self) -> dict[str, Measurement]:
-        found: dict[str, Measurement] = {}
+        measured: dict[str, Measurement] = {}
         for key, raw in self.parameter_entries("measured").items():
             where = f"measured.{key}"
             if isinstance(raw, dict) and "csv" in raw:
@@ -483,11 +488,12 @@ class _Document:
             else:
                 table = self.problems.read(schema.RUNS, where, raw)
                 runs: tuple[TravelRun, ...] = table["runs"] if table else ()
-            found[key] = Measurement(runs)
-            if (count := found[key].count) > limits.MAX_POINTS:
+            measured[key] = Measurement(runs)
+            count = measured[key].count
+            if count > limits.MAX_POINTS:
                 expected = f"expected at most {limits.MAX_POINTS:,}"
                 self.problems.add(f"{where}.runs", f"have {count:,} readings; {expected}")
-        return found
+        return measured
 
     def _csv_runs(self, where: str, csv: str, column: str) -> tuple[TravelRun, ...]:
         if self.folder is None:

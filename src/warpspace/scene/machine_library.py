@@ -47,14 +47,14 @@ def read_bodies(
 
 
 def path_beside(file: str, where: str, folder: Path | None, problems: Problems) -> str:
-    """Find a file in the folder of a description, or note that it is not; empty without one."""
+    """Return the path of a file within a folder; note a problem if there is none."""
     if folder is None:
         return ""
     try:
         home = folder.resolve()
         path = (home / file).resolve()
         is_inside, is_file = path.is_relative_to(home), path.is_file()
-    except (OSError, ValueError, RuntimeError):  # the last of links that lead in a circle
+    except (OSError, ValueError, RuntimeError):  # the last for circular links
         path, is_inside, is_file = folder, True, False
     if not is_inside:
         problems.add(where, "leads out of the folder of this file; expected one in it", file)
@@ -66,7 +66,7 @@ def path_beside(file: str, where: str, folder: Path | None, problems: Problems) 
 
 
 def body_notes(machine: definition.Machine) -> tuple[str, ...]:
-    """Remark on meshes that are named and cannot be drawn, since an upload has no folder."""
+    """List meshes that cannot be read, since an upload has no folder."""
     return tuple(
         f"bodies.{frame}: {source.file} cannot be read from here (the text came without its"
         " folder); a schematic body is drawn instead"
@@ -80,7 +80,7 @@ def machine_names() -> tuple[str, ...]:
 
 
 def machine_picture(name: str) -> Path | None:
-    """Give the picture of a bundled machine; None where it has none."""
+    """Return the picture of a bundled machine; None where it has none."""
     path = assets_dir() / "machines" / name / "picture.png"
     return path if path.is_file() else None
 

@@ -1,4 +1,4 @@
-"""A scene as the program holds it: validated, frozen, without a trace of its file; evaluated."""
+"""Validated scenes, and the evaluation of their error fields."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -37,18 +37,18 @@ from warpspace.scene.notes import Note
 
 @dataclass(frozen=True, slots=True)
 class PartSource:
-    """What is to be made on a machine: files as a scene names them, and how they are meant."""
+    """Workpiece of a scene: files of its mesh, features and program, and its placement."""
 
     file: str = ""  # mesh
-    place: tuple[float, ...] | None = None  # (6,), mm and degrees; where it is clamped
-    unit: str = ""  # of the mesh; empty for the one of its format
+    place: tuple[float, ...] | None = None  # (6,), mm and degrees; fixture position
+    unit: str = ""  # of the mesh; empty for that of its format
     features: str = ""  # names and tolerances
     program: str = ""
-    tcp: str = ""  # how the program means its tool centre point
-    folder: str = field(default="", compare=False)  # of the scene; empty where it has none
+    tcp: str = ""  # tool centre point mode of the program
+    folder: str = field(default="", compare=False)  # of the scene, if any
 
     def path(self, name: Literal["file", "features", "program"]) -> str | None:
-        """Say where a file is; None where none is named, or it cannot be read from here."""
+        """Return the path of a file; None where none is stated, or the scene has no folder."""
         file: str = getattr(self, name)
         return str(Path(self.folder, file)) if file and self.folder else None
 
@@ -62,7 +62,7 @@ class Scene:
     name : str
         Bundled name or file stem.
     title, description : str
-        What a picture is headed with, and what a reader should know.
+        Heading of pictures; remarks for readers.
     model : Model
         Machine, conventions and functional points.
     workspace : Workspace
@@ -74,7 +74,7 @@ class Scene:
     exaggeration : float or None
         Display factor of displacements; None chooses a round one.
     reference : mapping of str to float or None
-        Axis coordinates of the point held still; None is absolute.
+        Axis coordinates of the point with zero displacement; None is absolute.
     placed : bool
         Whether the placement of the workpiece is fitted out of relative errors over the workspace.
     notes : tuple of str
@@ -82,15 +82,15 @@ class Scene:
     uncertainty : mapping of str to ErrorFunction
         Standard uncertainty (k = 1) of errors along their axes by key, µm or µrad, above 0.
     covariance : Covariance or None
-        How sure the amplitudes of other errors are, together.
+        Joint uncertainty of the amplitudes of other errors.
     measured : mapping of str to Measurement
-        Readings that errors were made from, by key.
+        Readings that errors were fitted to, by key.
     limit_um : float or None, µm
         Largest length of an error that is accepted.
     review : tuple of Note
-        What people have pinned, asked and decided.
+        Review notes.
     part : PartSource
-        What is to be made.
+        Workpiece.
     """
 
     name: str
@@ -118,19 +118,19 @@ class Scene:
 
     @property
     def parameter_keys(self) -> tuple[str, ...]:
-        """Keys of the machine's default parameters and of any other constant the scene gives."""
+        """Keys of the default parameters of the machine and of other constants of the scene."""
         default = axes.default_keys(self.machine.chain.axes)
         stated = [*self.errors, *self.tolerances.own, *self.uncertainty]
         extra = [key for key in self.machine.allowed_keys if key in stated and key not in default]
         return (*default, *extra)
 
     def axis_span(self, axis: str) -> tuple[float, float]:
-        """Give the range over which curves of an axis run, mm or degrees: else its travel."""
+        """Return the range of the curves of an axis, mm or degrees; without one its travel."""
         low, high = self.workspace.ranges[axis]
         return (low, high) if low < high else self.machine.axes[axis].travel
 
     def view(self, loop: Loop = Loop.TOOL, frame: str = "machine") -> View:
-        """Give the view of the scene through a loop, with the scene's reference."""
+        """Return the view of the scene for a loop, with the reference of the scene."""
         fitted_over = self.workspace if self.placed and loop is Loop.RELATIVE else None
         return View(loop, frame, self.reference, fitted_over)
 
@@ -191,7 +191,7 @@ def evaluate(
     (11, 11, 11, 3)
     """
     if at is not None and grid is not None:
-        raise OptionError("give either points (at) or a grid, not both")
+        raise OptionError("expected either points (at) or a grid, not both")
     scene = with_placement(scene, loop, placed=placed)
     view = choose_view(scene, loop, frame)
     if at is not None:
@@ -223,17 +223,17 @@ def with_direction(scene: Scene, direction: str | None) -> Scene:
     if direction is None:
         return scene
     if direction not in [*axes.TravelDirection]:
-        known = ", ".join(axes.TravelDirection)
-        raise OptionError(f"direction {direction!r}; expected one of {known}")
+        names = ", ".join(axes.TravelDirection)
+        raise OptionError(f"direction {direction!r}; expected one of {names}")
     return replace(scene, model=replace(scene.model, direction=axes.TravelDirection(direction)))
 
 
 def with_placement(scene: Scene, loop: Loop | str, *, placed: bool = True) -> Scene:
-    """Give a scene whose relative errors leave out where the workpiece lies, if that is wanted."""
+    """Return a scene with a best-fit placement of the workpiece, if `placed`."""
     if placed and loop != Loop.RELATIVE:
         raise OptionError(
-            f"placed: the {loop} loop does not show where the workpiece lies; expected loop"
-            f" {Loop.RELATIVE}"
+            f"placed: the {loop} loop does not contain the placement of the workpiece; expected"
+            f" loop {Loop.RELATIVE}"
         )
     return replace(scene, placed=True) if placed else scene
 
@@ -268,19 +268,18 @@ def second_order(
 ) -> SecondOrder:
     """Compare the first order with the exact chain, over the grid unless at points."""
     nodes = CHECK_NODES if at is None else None
-    first, exact = (
-        evaluate(scene, at=at, grid=nodes, loop=loop, exact=way).error_um for way in (False, True)
-    )
-    return compare_orders(first, exact)
+    first = evaluate(scene, at=at, grid=nodes, loop=loop)
+    exact = evaluate(scene, at=at, grid=nodes, loop=loop, exact=True)
+    return compare_orders(first.error_um, exact.error_um)
 
 
-LEAST_SHARE = 0.5  # of its range that data of an axis cover, unsaid
+LEAST_SHARE = 0.5  # of the range of an axis that data cover without a note
 MANY_COSINES = 10_000_000
-"""Cosines that the curves of a scene take before it is said: about a second of computing."""
+"""Cosines of the curves of a scene without a note: about a second of computing time."""
 
 
 def scene_notes(machine: Machine, workspace: Workspace, errors: ErrorSet) -> tuple[str, ...]:
-    """Remark on directions, volumes beyond the travel, carried squareness and costly curves."""
+    """List notes on directions, volumes beyond the travel, carried squareness, costly curves."""
     return (
         *_direction_notes(machine),
         *_travel_notes(machine, workspace),
@@ -298,13 +297,13 @@ def _direction_notes(machine: Machine) -> Iterator[str]:
             yield f"{setting} is against ISO 841"
         else:
             yield (
-                f"{setting} since none is given: positive {name} moves the tool towards −{name} over"
-                " the workpiece, against ISO 841; expected −1, or 1 given if the machine does so"
+                f"{setting} by default: positive {name} moves the tool towards −{name} over the"
+                " workpiece, against ISO 841; expected −1, or an explicit 1 if the machine does so"
             )
 
 
 def coverage_notes(scene: Scene, measured: Mapping[str, tuple[float, float]]) -> Iterator[str]:
-    """Remark on axes whose measured range is less than half of the one that the scene covers."""
+    """List axes whose measured range is less than half of the range that the scene covers."""
     for axis, (low, high) in measured.items():
         first, last = scene.axis_span(axis)
         share, unit = (high - low) / (last - first), scene.machine.axes[axis].unit

@@ -1,8 +1,7 @@
-"""Review notes of a scene: what somebody pinned, asked or decided, and the numbers it rests on.
+"""Review notes of a scene: notes, questions and decisions with the numbers they are based on.
 
-A note is never changed in place: an edit is a new version that names those it replaces, so that two
-people's files merge without a loss. Where both have edited a note, the versions stand side by side
-until somebody chooses one.
+A note is never changed in place: an edit is a new version that lists those it replaces, so that
+files of two people merge without loss. Concurrent versions are kept until one is chosen.
 """
 
 import json
@@ -18,9 +17,9 @@ from warpspace.machine.limits import MAX_NOTES, MAX_REPLACED, MAX_REPLIES
 
 KINDS = ("note", "question", "decision")
 STATUSES = ("open", "done")
-TOLERANCES = "tolerances."  # before the key of a half width among what a decision changed
+TOLERANCES = "tolerances."  # prefix of the key of a half width in `Note.change`
 MEASURES = ("mean_um", "max_um", "here_um")
-PRINTED_UM = 0.01  # last digit of a stored number; a note whose numbers are off by more is stale
+PRINTED_UM = 0.01  # last digit of a stored number; a note whose numbers deviate by more is stale
 Pair = tuple[float, float]
 
 
@@ -30,7 +29,7 @@ def now() -> datetime:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """What somebody has answered to a note."""
+    """A reply to a note."""
 
     text: str
     author: str = ""
@@ -39,7 +38,7 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class NoteAnchor:
-    """What a note is pinned to, where it is not a point of the volume."""
+    """Anchor of a note that is not a point of the volume."""
 
     loop: str = ""  # of a trace of the rotary axes
     point_mm: Vector | None = None  # the traced point, in the workpiece (or tool) frame
@@ -52,40 +51,40 @@ class Note:
 
     id: str = field(default_factory=lambda: os.urandom(3).hex())
     kind: str = "note"
-    # mm or degrees; where the axes stand at the point it is about; empty: about the whole
+    # axis positions of its point, mm or degrees; empty: of the whole machine
     at: Mapping[str, float] = field(default_factory=dict[str, float])
     on: NoteAnchor | None = None  # the trace or body that the point belongs to
     text: str
     author: str = ""
     date: datetime = field(default_factory=now)
     status: str = "open"
-    loop: str = "tool"  # that its numbers are of
+    loop: str = "tool"  # of its numbers
     numbers: Mapping[str, float] = field(default_factory=dict[str, float])  # µm, by `MEASURES`
     # of a decision: the numbers before it, and from and to of each error, µm or µrad, by key
     before: Mapping[str, float] = field(default_factory=dict[str, float])
     change: Mapping[str, Pair] = field(default_factory=dict[str, Pair])
-    step: int = 0  # its place in the story; 0 for none
-    view: str = ""  # what was on the screen, as in a link
+    step: int = 0  # in the sequence of the story; 0 for none
+    view: str = ""  # state of the page, as in a link
     replies: tuple[Reply, ...] = ()
-    replaces: tuple[str, ...] = ()  # the versions that this one was made from, by `version`
-    versions: tuple["Note", ...] = ()  # edits that somebody else made of the same note
+    replaces: tuple[str, ...] = ()  # versions that this one replaces, by `version`
+    versions: tuple["Note", ...] = ()  # concurrent versions
 
     @property
     def version(self) -> str:
-        """What this version is known by: a digest of what it says and of what it replaces."""
+        """Digest of the content and of the replaced versions."""
         from hashlib import sha256  # slow to import, and few scenes have notes
 
         content = note_to_toml(replace(self, replies=(), versions=()))
-        # 275 and 275.0 are one number, as which of them a file gives is not for sure
+        # 275 and 275.0 are the same number
         canonical = json.loads(json.dumps(content, default=datetime.isoformat), parse_int=float)
         text = json.dumps(canonical, sort_keys=True)
         return sha256(text.encode()).hexdigest()[:12]
 
     def edited(self, **changes: Any) -> "Note":
-        """Give the version after an edit; it replaces this one and those beside it."""
+        """Return an edited version, which replaces this one and the concurrent ones."""
         heads = (self, *self.versions)
         replaced = dict.fromkeys(digest for one in heads for digest in (*one.replaces, one.version))
-        # a copy that is older than these is kept beside the note when they are merged
+        # copies older than the last ones remain concurrent when merged
         return replace(self, **changes, replaces=(*replaced,)[-MAX_REPLACED:], versions=())
 
     def answered(self, reply: Reply) -> "Note":
@@ -95,7 +94,7 @@ class Note:
 
 
 def changed_number(stored: Mapping[str, float], current: Mapping[str, float]) -> str:
-    """Say which number of a note no longer holds, if any: "51.7 → 46.1 µm"."""
+    """Format the number of a note that has changed, if any: "51.7 → 46.1 µm"."""
     for name in reversed(MEASURES):
         before, after = stored.get(name), current.get(name)
         if before is None:
@@ -109,12 +108,12 @@ def changed_number(stored: Mapping[str, float], current: Mapping[str, float]) ->
 
 
 def story(notes: Iterable[Note]) -> list[Note]:
-    """List the notes that tell a story, in their order."""
+    """List the notes of the story in sequence."""
     return sorted((one for one in notes if one.step), key=lambda one: (one.step, one.date, one.id))
 
 
 def with_note(notes: Sequence[Note], note: Note) -> tuple[Note, ...]:
-    """Add a note, or put it in the place of the one with its identity."""
+    """Add a note, or replace the one with its identity."""
     by_id = {one.id: one for one in (*notes, note)}
     if len(by_id) > MAX_NOTES:
         raise OptionError(f"there are {len(notes)} notes already; expected at most {MAX_NOTES}")
@@ -122,13 +121,14 @@ def with_note(notes: Sequence[Note], note: Note) -> tuple[Note, ...]:
 
 
 def merge_notes(*lists: Iterable[Note]) -> tuple[Note, ...]:
-    """Unite notes by identity: replies united, what was edited by several side by side.
+    """Merge notes by identity, with all replies and concurrent versions.
 
-    The result is the same in whatever order and however often lists are merged.
+    The result does not depend on the order or the number of merges.
     """
     copies: dict[str, list[Note]] = {}
-    for one in (note for notes in lists for note in notes):
-        copies.setdefault(one.id, []).append(one)
+    for notes in lists:
+        for note in notes:
+            copies.setdefault(note.id, []).append(note)
     merged = [_merged(same) for same in copies.values()]
     if len(merged) > MAX_NOTES:
         raise OptionError(f"together {len(merged)} notes; expected at most {MAX_NOTES}")
@@ -151,7 +151,7 @@ def _merged(copies: Sequence[Note]) -> Note:
 
 
 def note_to_toml(note: Note) -> dict[str, Any]:
-    """Give the entries of a note in a file; what says nothing is left out."""
+    """Return the entries of a note in a file, without empty ones."""
     entries = asdict(note, dict_factory=_filled)
     for version in (entries, *entries.get("versions", ())):
         if version["loop"] == "tool":

@@ -1,4 +1,4 @@
-"""Scenes back into the file format: the text reloads to the identical scene, in any notation."""
+"""Writer of scene files: the text is read back as the identical scene, in any notation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -28,9 +28,9 @@ from warpspace.scene.text_files import spell_key
 
 @dataclass(frozen=True, slots=True)
 class Notation:
-    """How numbers are written that mean the same errors."""
+    """Notation of errors in a scene file."""
 
-    # what a positive squareness means, one of `SquarenessSign`
+    # sign convention of squareness, one of `SquarenessSign`
     squareness: str = SquarenessSign.RIGHT_HAND
     # per axis the point of its moving body, in the frame of the axis, whose displacement its
     # translations are; axes left out have the origin of their frame
@@ -47,7 +47,7 @@ class Notation:
 
 
 def covered_spans(model: Model, workspace: Workspace) -> dict[str, Span]:
-    """Give the range of each axis, mm or degrees, that numbers must hold in: travel and volume."""
+    """Return the range of each axis, mm or degrees, that covers travel and volume."""
     spans: dict[str, Span] = {}
     for name, axis in model.machine.axes.items():
         low, high = workspace.ranges.get(name, axis.travel)
@@ -56,7 +56,7 @@ def covered_spans(model: Model, workspace: Workspace) -> dict[str, Span]:
 
 
 def extend_to_ranges(errors: ErrorSet, model: Model, workspace: Workspace) -> ErrorSet:
-    """Give every curve the range that it has in a scene; its values stay."""
+    """Return errors whose curves have the ranges of a scene, with the same values."""
     functions = dict(errors.functions)
     for key, function in errors.functions.items():
         axis = parameter(key).axis
@@ -94,21 +94,22 @@ def write_errors(scene: Scene, notation: Notation) -> ErrorSet:
 def convert_covariance(
     machine: Machine, covariance: Covariance | None, sign: SquarenessSign | str
 ) -> Covariance | None:
-    """Write a covariance with another sign of squareness, or read it; both are the same step."""
+    """Convert a covariance to another sign of squareness, or back."""
     if covariance is None:
         return None
     ones = ErrorSet({key: Constant((0.0, 1.0), 1.0) for key in covariance.keys})
     converted = convert_squareness(machine, ones, sign)
     signs = [converted.amplitude(key) for key in covariance.keys]
-    return replace(covariance, rows=tuple(map(tuple, (covariance.matrix * np.outer(signs, signs)).tolist())))
+    matrix = covariance.matrix * np.outer(signs, signs)
+    return replace(covariance, rows=tuple(map(tuple, matrix.tolist())))
 
 
-MAX_INLINE_ERRORS = 30  # errors whose covariance stands in the scene itself
-_WRAP = 8  # entries of a list that stand on one line
+MAX_INLINE_ERRORS = 30  # errors whose covariance is written in the scene itself
+_WRAP = 8  # entries of a list on one line
 
 
 def scene_files(scene: Scene, stem: str) -> dict[str, str | bytes]:
-    """Spell a scene by the ends of its files: a large covariance stands beside it, as numbers."""
+    """Write a scene as files by their endings; a large covariance is a file of its own."""
     joint = convert_covariance(scene.machine, scene.covariance, Notation().squareness)
     if joint is None or len(joint.keys) <= MAX_INLINE_ERRORS:
         return {"": scene_to_toml(scene)}
@@ -119,20 +120,20 @@ def scene_files(scene: Scene, stem: str) -> dict[str, str | bytes]:
 
 
 def matrix_digest(matrix: ArrayLike) -> str:
-    """Compute the SHA-256 of a matrix that stands in a file of its own."""
+    """Compute the SHA-256 of a matrix in a file of its own."""
     from hashlib import sha256  # slow to import, and few scenes have one
 
     return sha256(np.asarray(matrix, "<f8").tobytes()).hexdigest()
 
 
 def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = "") -> str:
-    """Spell a scene as the text of a scene file.
+    """Write a scene as the text of a scene file.
 
     Notes
     -----
     `warpspace.scene.library.parse_scene` with the same name gives an equal scene back, every number
-    to the last bit. One thing the format cannot say is a ramp over another range than that of its
-    axis in the working volume; it is written as the polynomial it is.
+    to the last bit. A ramp over another range than that of its axis in the working
+    volume is written as a polynomial.
     """
     bundled = _bundled(scene.machine)
     notation = notation or Notation()
@@ -185,7 +186,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = 
 
 
 def _covariance(covariance: Covariance | None, matrix: str) -> dict[str, object]:
-    """Spell a covariance: the file of its matrix, or of its rows what is up to the diagonal."""
+    """Return the entries of a covariance: the file of its matrix, or its lower triangle."""
     if covariance is None:
         return {}
     values: dict[str, object] = {
@@ -205,7 +206,7 @@ def _ranges(ranges: Mapping[str, Span]) -> dict[str, object]:
 
 
 def spell_note(note: Note) -> str:
-    """Spell a note as a table of a scene file, an entry a line."""
+    """Write a note as a table of a scene file, one entry per line."""
     return spell_section("[notes]", note_to_toml(note))
 
 
@@ -273,7 +274,7 @@ def _tolerances_section(scene: Scene) -> str:
 def spell_section(
     name: str, values: Mapping[str, object], remarks: Mapping[str, Parameter] | None = None
 ) -> str:
-    """Spell a table of a scene file; nothing where it holds nothing."""
+    """Write a table of a scene file; an empty text for an empty table."""
     if not values:
         return ""
     lines = [f"[{name}]"]
@@ -301,5 +302,5 @@ def _inline(value: object) -> str:
     if isinstance(value, int):
         return repr(value).lower()
     number = float(cast("float", value))
-    # a scaled curve may hold numbers so small that no reader takes them
+    # numbers of scaled curves may be too small for readers
     return repr(0.0 if 0.0 < abs(number) < MIN_NUMBER else number)

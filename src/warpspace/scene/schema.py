@@ -1,4 +1,4 @@
-"""What each section of a scene or machine file may hold, and the list that its problems go to."""
+"""Schemas of the sections of scene and machine files, and the list of their problems."""
 
 import math
 import re
@@ -26,11 +26,11 @@ from warpspace.scene.notes import KINDS, MEASURES, STATUSES, Note, NoteAnchor, R
 from warpspace.scene.text_files import location, spell_value
 
 Kind = Callable[[ValueReader, Any, Path], Any]
-"""Checks one raw value at its place: notes what is wrong with it, or gives what it means."""
+"""Reader of one raw value: returns the parsed value, or notes problems."""
 
 
 class Problems:
-    """What is wrong with a file, a line each."""
+    """Problems of a file, one per line."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -39,27 +39,27 @@ class Problems:
         assignment = "" if value is ... else f" = {spell_value(value)}"
         self.lines.append(f"{key}{assignment}: {text}" if key else text)
 
-    def only(self, section: str, names: Iterable[str], known: Collection[str], what: str) -> None:
-        """Note each name of a section that is not known."""
+    def only(self, section: str, names: Iterable[str], allowed: Collection[str], what: str) -> None:
+        """Note each name of a section that is not allowed."""
         for name in names:
-            if name not in known:
-                hint = near_miss(name, known) if len(self.lines) < SHOWN_PROBLEMS else ""
+            if name not in allowed:
+                hint = near_miss(name, allowed) if len(self.lines) < SHOWN_PROBLEMS else ""
                 self.lines.append(f"{location(section, [name])}: unknown {what}{hint}")
 
     def add_findings(self, key: str, reader: ValueReader) -> bool:
-        """Note what a reader has found below a key; tell whether that is nothing."""
+        """Note the findings of a reader below a key; return True without findings."""
         for finding in reader.findings:
             self.add(location(key, finding.path), finding.text, finding.value)
         return not reader.findings
 
     def read(self, kind: Kind, key: str, value: object) -> Any:
-        """Read one value; None where anything is wrong with it."""
+        """Read one value; None if it has problems."""
         reader = ValueReader()
         content = kind(reader, value, ())
         return content if self.add_findings(key, reader) else None
 
     def table(self, key: str, value: object) -> dict[str, object]:
-        """Give a table as a dictionary; note a problem and give an empty one for anything else."""
+        """Return a table as a dictionary; an empty one with a note for anything else."""
         return self.read(ValueReader.dictionary, key, {} if value is None else value) or {}
 
 
@@ -82,10 +82,10 @@ def _span(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
     return low, high
 
 
-def _by_name(kind: Kind, known: Collection[str] = ()) -> Kind:
+def _by_name(kind: Kind, allowed: Collection[str] = ()) -> Kind:
     def read(reader: ValueReader, value: Any, path: Path) -> dict[str, Any]:
         table = reader.dictionary(value, path)
-        names = known or table
+        names = allowed or table
         reader.only(table, path, names)
         return {name: kind(reader, table[name], (*path, name)) for name in names if name in table}
 
@@ -172,7 +172,7 @@ def _list(kind: Kind, max_count: int, min_count: int = 0) -> Kind:
 
 @dataclass(frozen=True)
 class TableSchema:
-    """A table whose keys are known: by key the kind of its value, and what stands for none."""
+    """Schema of a table: by key the reader of its value, and a default."""
 
     fields: Mapping[str, tuple[Kind, Any]]
     build: Callable[..., Any] = dict
@@ -184,9 +184,12 @@ class TableSchema:
             return None
         entries: dict[str, Any] = {}
         for name, (kind, default) in self.fields.items():
-            if (entry := table.get(name, default)) is MISSING:
+            if name in table:
+                entries[name] = kind(reader, table[name], (*path, name))
+                continue
+            if default is MISSING:
                 reader.note((*path, name), "", MISSING)
-            entries[name] = kind(reader, entry, (*path, name)) if name in table else entry
+            entries[name] = default
         reader.only(table, path, self.fields)
         return self.build(**entries)
 
@@ -278,7 +281,7 @@ _READING = _numbers("[position, value]", limits.MAX_LENGTH_MM, limits.MAX_ERROR)
 
 
 def workspace_range(reader: ValueReader, value: Any, path: Path) -> tuple[float, float]:
-    """Read the range of an axis in the working volume; equal ends where it stands still."""
+    """Read the range of an axis in the working volume; equal ends for one position."""
     if isinstance(value, list | tuple):
         return _span(reader, value, path)
     at = _PLACE(reader, value, path)
@@ -309,7 +312,7 @@ COVARIANCE = TableSchema(
         "lack_of_fit": (_number(0.0, 1e9), 0.0),
     }
 )
-ACTS = "each", "all", "scale"  # what a contribution acts on
+ACTS = "each", "all", "scale"  # readings that a contribution acts on
 DIVISORS = {"normal": 1.0, "rectangular": 3**0.5, "triangular": 6**0.5, "u-shaped": 2**0.5}
 _CONTRIBUTION = TableSchema(
     {
@@ -333,7 +336,7 @@ INSTRUMENT = TableSchema(
 )
 _MEASURED = _by_name(_number(0.0, limits.MAX_ERROR * 10.0), MEASURES)
 _VERSION = _text(16, 1, r"[a-z0-9]*", "small letters and digits")
-# what people write has lines and tabulators, but no other control characters
+# line breaks and tabulators, but no other control characters
 _PLAIN = r"[^\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]*", "a text without control characters"
 _ANCHOR = TableSchema(
     {"loop": (_one_of(Loop), ""), "point_mm": (POINT, None), "body": (_text(8), "")}, NoteAnchor

@@ -1,4 +1,4 @@
-"""A scene to start from: any chain, with sizes that fit together and a remark on every line."""
+"""Starter scenes: any chain, with consistent dimensions and a remark on every line."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ UP_TRAVEL: Mapping[int, Range] = {1: (0.0, 400.0), 2: (-400.0, 0.0)}
 SECOND_TRAVEL = (-100.0, 100.0)  # of a further linear axis along a direction, mm
 TILT_TRAVEL, TURN_TRAVEL, ARM_TRAVEL = (-90.0, 90.0), (0.0, 360.0), (-150.0, 150.0)
 """Of axes that tilt, of the upright one, and of arms that turn about z in series, degrees."""
-ARM_RANGES = ((-60.0, 60.0), (20.0, 140.0))  # where such arms reach the working volume, degrees
+ARM_RANGES = ((-60.0, 60.0), (20.0, 140.0))  # of such arms within the working volume, degrees
 ARMS_AT = ((-350.0, -200.0), (-50.0, -200.0))
 ARM_END = (200.0, -200.0)  # in a plan view with all arms at zero, mm
 TOOL_LENGTH, PIVOT, TURNING_HEAD = 150.0, 250.0, 400.0
@@ -32,14 +32,14 @@ WORKPIECE_HEIGHT, WORKPIECE_SHARE = 200.0, 0.8
 
 @dataclass(frozen=True, slots=True)
 class StarterDimensions:
-    """Sizes of a machine, all frames at zero of their axes."""
+    """Dimensions of a machine with all axes at zero."""
 
-    # origin of each frame in the frame before it; R stands in the middle of the table
+    # origin of each frame in the previous one; R is in the middle of the table
     offset_mm: Mapping[str, Vector]
     # of the first frame on either side, where the spindle is horizontal
     rotation_deg: Mapping[str, Vector]
     travel: Mapping[str, Range]  # mm or degrees
-    # −1 for linear axes that carry the workpiece: the tool then moves with the name over it
+    # −1 for linear axes that carry the workpiece: the tool moves along the name of the axis
     direction: Mapping[str, int]
     # mm or degrees; ranges of the axes that span the volume, and the positions of the others
     workspace: Mapping[str, Range]
@@ -112,7 +112,7 @@ def _tool_places(
             x, y = ARMS_AT[arms.index(axis)]
             places[axis] = (x, y, TURNING_HEAD)
         elif is_linear(axis):
-            # guides stand behind the tool, each nearer to it than the one that carries it
+            # guides are behind the tool, each nearer to it than the one that carries it
             nearer = (linear.index(axis) + 1) / (len(linear) + 1)
             y = plan_mm[1] if arms else round(600.0 * (1.0 - nearer), -1)
             places[axis] = (plan_mm[0], y, 250.0 + round(200.0 * nearer, -1))
@@ -139,7 +139,7 @@ def _steps(places: Mapping[str, Vector], *, horizontal: bool) -> dict[str, Vecto
     steps: dict[str, Vector] = {}
     for frame, (x, y, z) in places.items():
         step = (x - before[0], y - before[1], z - before[2])
-        # the first frame stands in R itself
+        # the first frame is placed in R
         steps[frame] = _turned(step) if horizontal and steps else step
         before = (x, y, z)
     return steps
@@ -166,7 +166,7 @@ def starter_scene(chain: str | Chain, title: str = "", name: str = "") -> Scene:
 
 
 def starter_text(chain: str | Chain, title: str = "") -> str:
-    """Spell a scene to start from: sizes that fit together, and a remark on what each line says."""
+    """Write a starter scene: consistent dimensions, and a remark on each line."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     parsed = parse_chain(chain) if isinstance(chain, str) else chain
@@ -218,7 +218,7 @@ def error_lines(chain: Chain, travel: Mapping[str, Range]) -> list[str]:
 
 def _example_keys(chain: Chain) -> tuple[list[tuple[str, str]], list[str]]:
     examples: list[tuple[str, str]] = []
-    # those of the tool side first: the first picture is that of the tool point
+    # tool side first: the first picture shows the tool point
     axes = sorted(chain.axes, key=lambda axis: axis not in chain.tool)
     linear = [axis for axis in axes if is_linear(axis)]
     rotary = [axis for axis in axes if not is_linear(axis)]

@@ -1,4 +1,4 @@
-"""The text files of scenes and of people: TOML and tables, with limits and plain messages."""
+"""Readers of text files: TOML and CSV tables, with limits and messages."""
 
 import csv
 import math
@@ -31,9 +31,8 @@ if sys.platform != "win32":
 
 LOCK_WAIT_S = 60.0
 
-# A TOML reader's memory grows with the square of the parts of one key, and each table costs far
-# more memory than its two brackets. One pass over the text counts what would be expensive; it takes
-# time in proportion to the length of the text and no memory.
+# The memory of a TOML reader grows with the square of the parts of one key, and with each table.
+# One pass over the text, in linear time, counts both.
 
 _TOKENS = re.compile(
     r'"""(?:[^"\\]++|\\.|"(?!""))*+(?:"{3,5})?'  # a text may end with two quotes of its own
@@ -44,11 +43,11 @@ _TOKENS = re.compile(
     r"|[.,=\n\[\]{}]",
     re.DOTALL,
 )
-"""What matters in TOML: punctuation, and whole texts and remarks, which are passed over."""
+"""Tokens of TOML: punctuation; texts and remarks, which are skipped."""
 
 
 def check_outline(text: str, source: str) -> None:
-    """Refuse text whose keys, nesting or number of keys no scene needs."""
+    """Raise an error for text with too many or too deeply nested keys."""
     dots = depth = keys = 0
     for count, match in enumerate(_TOKENS.finditer(text)):
         mark = match[0]
@@ -89,7 +88,7 @@ def read_text(path: Path, limit_bytes: int, source: str | None = None) -> str:
 
 
 def read_bytes(path: Path, limit_bytes: int, source: str | None = None) -> bytes:
-    """Read a file of limited size; a device or a pipe is refused before it is opened."""
+    """Read a file of limited size; devices and pipes are refused before opening."""
     source = source or str(path)
     check_file(path, limit_bytes, source)
     try:
@@ -97,13 +96,13 @@ def read_bytes(path: Path, limit_bytes: int, source: str | None = None) -> bytes
             content = file.read(limit_bytes + 1)
     except OSError as error:
         raise SceneError(source, [f"cannot be read: {error.strerror or error}"]) from None
-    if len(content) > limit_bytes:  # some files of the system say that they are empty
+    if len(content) > limit_bytes:  # some system files report a size of zero
         raise SceneError(source, [f"is too long; expected at most {limit_bytes:,} bytes"])
     return content
 
 
 def check_file(path: Path, limit_bytes: int, source: str) -> None:
-    """Refuse what is no file of limited size; a device or a pipe may never end."""
+    """Raise an error for anything but a file of limited size; a device may never end."""
     try:
         if path.is_dir():
             raise SceneError(source, ["is a folder; expected a file"])
@@ -125,8 +124,8 @@ def check_file(path: Path, limit_bytes: int, source: str) -> None:
 def lock_file(path: Path) -> Generator[None]:
     """Lock a file while it is read, changed and replaced; the lock ends with the process.
 
-    Others that lock it wait. Where there are no locks (Windows, some network drives), pass what was
-    read to `warpspace.outputs.file_output.write_atomically`, which refuses a file that has changed.
+    Where there are no locks (Windows, some network drives), pass the content read to
+    `warpspace.outputs.file_output.write_atomically`, which refuses a file that has changed.
     """
     check_file(path, MAX_SCENE_BYTES, str(path))
     last_s = clock.monotonic() + LOCK_WAIT_S
@@ -136,7 +135,7 @@ def lock_file(path: Path) -> Generator[None]:
                 file = opened.enter_context(path.open("rb"))
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                    break  # else it was replaced meanwhile
+                    break  # otherwise it was replaced meanwhile
             except BlockingIOError:
                 pass
             except OSError:
@@ -160,7 +159,7 @@ def parse_toml(text: str, source: str) -> dict[str, object]:
         raise SceneError(source, [f"is not valid TOML: {reason}"]) from None
 
 
-MAX_VALUE_LENGTH = 60  # characters of a value or a key that a message shows
+MAX_VALUE_LENGTH = 60  # characters of a value or a key in a message
 _DEPTH = 6
 _ENTRIES = 8
 _HUGE_BITS = 512
@@ -169,22 +168,22 @@ _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
 def one_line(text: str) -> str:
-    """Replace what would end a line or steer whatever shows it: all that is not printable."""
+    """Replace all characters that are not printable by spaces."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def spell_value(value: object) -> str:
-    """Spell a value as TOML does, in at most a line."""
+    """Write a value in TOML, in at most one line."""
     return _shorten(_spell(value, _DEPTH))
 
 
 def spell_key(name: str) -> str:
-    """Spell a key as TOML does: bare where it may be, else between quotes."""
+    """Write a key in TOML, with quotes where needed."""
     return _shorten(name if _BARE_KEY.fullmatch(name) else _quoted(name))
 
 
 def location(key: str, parts: Iterable[int | str]) -> str:
-    """Spell the place of a finding as it stands in the file."""
+    """Write the path of a finding as in the file."""
     text = key
     for part in parts:
         if isinstance(part, int):
@@ -232,23 +231,22 @@ def _spell(value: object, depth: int) -> str:
     return f"{{ {inside} }}" if isinstance(value, dict) else f"[{inside}]"
 
 
-# A line ``sep=;`` names what parts the columns; without it the first of semicolon, tab and comma
-# that the header has. Lines that begin with # are remarks, rows without any text and separators
-# behind the last column count for nothing. A file has one decimal sign: the point, or where
-# semicolons or tabs part the columns the comma.
+# A line ``sep=;`` defines the separator; otherwise it is the first of semicolon, tab and comma in
+# the header. Lines that begin with # are remarks; empty rows and separators behind the last column
+# are ignored. A file has one decimal sign: the point, or, with semicolons or tabs, the comma.
 
-MARKS = (";", "\t", ",")  # what may part columns, the most telling first
+MARKS = (";", "\t", ",")  # separators of columns by priority
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\uff1d", "\uff0b", "\uff0d", "\uff20")
-"""What a text must not begin with, or a spreadsheet would take it for a formula; wide, too."""
+"""Beginnings of a text that spreadsheets interpret as a formula; full-width ones too."""
 _MOST_PROBLEMS = 10_000
 _TURN_RAD = 1.001 * math.tau
 _WHOLE_DEG = 0.02
-_MAX_LINES_OF_ROW = 20  # lines that one row may take, where its texts hold line breaks
+_MAX_LINES_OF_ROW = 20  # lines of one row, with line breaks in texts
 _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?", re.ASCII)
 _SEP = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 _UNIT = str.maketrans({"µ": "u", "μ": "u", "°": "deg"})
 Row = tuple[int, list[str]]
-"""Number of the line that a row ends on, and its cells without the blanks around them."""
+"""Number of the last line of a row, and its cells without surrounding blanks."""
 
 
 def parse_number(text: str) -> float:
@@ -269,7 +267,7 @@ def parse_whole(text: str) -> int:
 
 
 def plain_heading(text: str) -> str:
-    """Spell a heading with its unit behind an underscore: ``angle (°)`` is ``angle_deg``."""
+    """Write a heading with its unit after an underscore: ``angle (°)`` is ``angle_deg``."""
     bare = text.strip()
     for opening, closing in ("[]", "()"):
         name, _, unit = bare[:-1].rpartition(opening)
@@ -279,13 +277,13 @@ def plain_heading(text: str) -> str:
 
 
 def radian_notes(columns: Mapping[str, Sequence[float]]) -> tuple[str, ...]:
-    """Say which columns ``…_deg`` look like radians: a whole turn of them, or whole degrees."""
+    """List columns ``…_deg`` that look like radians: a full turn, or whole degrees, of them."""
     notes: list[str] = []
     for name, values in columns.items():
         low, high = min(values), max(values)
         if not name.endswith("_deg") or not 0.0 < max(-low, high) < _TURN_RAD:
             continue
-        is_whole = all(abs(value - round(value)) < _WHOLE_DEG for value in map(math.degrees, values))
+        is_whole = all(abs(deg - round(deg)) < _WHOLE_DEG for deg in map(math.degrees, values))
         if is_whole or high - low > 0.9 * _TURN_RAD:
             turned = f"{math.degrees(low):.4g} … {math.degrees(high):.4g}°"
             notes.append(
@@ -296,7 +294,7 @@ def radian_notes(columns: Mapping[str, Sequence[float]]) -> tuple[str, ...]:
 
 
 def guard_cell(text: str) -> str:
-    """Put ' before a text that a spreadsheet would take for a formula; `unguard_cell` undoes it."""
+    """Put ' before a text that spreadsheets interpret as a formula; see `unguard_cell`."""
     return f"'{text}" if text.lstrip("'").startswith(FORMULA) else text
 
 
@@ -305,7 +303,7 @@ def unguard_cell(text: str) -> str:
 
 
 def spell_row(cells: Iterable[object]) -> str:
-    """Spell a row of a table that is written: texts guarded, None empty, a line feed behind."""
+    """Write a row of a table: texts guarded, None empty, with a line feed."""
     return ",".join(map(_spell_cell, cells)) + "\n"
 
 
@@ -319,7 +317,7 @@ def _spell_cell(value: object) -> str:
 
 
 class CsvRows:
-    """The rows of a table: memory does not grow with what is refused."""
+    """The rows of a table, in bounded memory."""
 
     def __init__(self, file: TextIO, source: str, max_rows: int, *, unique: bool = False) -> None:
         self.source, self.problems = source, list[str]()
@@ -344,14 +342,14 @@ class CsvRows:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was made of rows that stand there twice."""
+        """Notes on identical rows."""
         if not self._repeated:
             return ()
         count, rows = len(self._repeated), "rows" if len(self._repeated) > 1 else "row"
         return (f"{count} {rows} identical to an earlier one, counted once: {self._repeated[0]}",)
 
     def __iter__(self) -> Iterator[Row]:
-        """Give the rows below the header that have as many cells."""
+        """Return the rows below the header that have as many cells."""
         width = len(self.header)
         first_lines: dict[tuple[str, ...], int] = {}
         for count, (line, cells) in enumerate(self._rows):
@@ -373,7 +371,7 @@ class CsvRows:
     def number(
         self, text: str, line: int, what: str = "", limit: float = math.inf, hint: str = ""
     ) -> float:
-        """Read a cell; one that is no finite number within ± the limit is noted."""
+        """Read a finite number within ± the limit; note a problem for anything else."""
         place = f"line {line}, {what}" if what else f"line {line}"
         sign = next((mark for mark in ",." if mark in text), "")
         try:
@@ -401,7 +399,7 @@ class CsvRows:
             raise SceneError(self.source, self.problems)
 
     def _lines(self) -> Iterator[str]:
-        while line := self._file.readline(MAX_CSV_LINE + 1):
+        for line in iter(lambda: self._file.readline(MAX_CSV_LINE + 1), ""):
             self._number += 1
             if len(line) > MAX_CSV_LINE:
                 problem = f"is longer than {MAX_CSV_LINE:,} characters; expected at most so many"

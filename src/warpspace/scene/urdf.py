@@ -1,4 +1,4 @@
-"""Machines from URDF files, the format of robot simulators: read, checked, turned into a scene."""
+"""Machines from URDF files, the format of robot simulators."""
 
 import io
 import math
@@ -40,7 +40,8 @@ def read_robot(path: Path) -> tuple[Any, tuple[str, ...]]:
     text = read_text(path, limits.MAX_SCENE_BYTES)
     other_tags = _check_xml(text, source)
     robot = _parse(text, source)
-    if problems := list(_problems(robot)):
+    problems = list(_problems(robot))
+    if problems:
         raise SceneError(source, problems)
     return robot, other_tags
 
@@ -84,13 +85,13 @@ def _parse(text: str, source: str) -> Any:
     except ImportError:
         raise not_installed() from None
     try:
-        # numbers that are not finite are refused by name later
+        # numbers that are not finite are reported by name later
         with np.errstate(all="ignore"):
             loaded = URDF.load(
                 io.BytesIO(text.encode()), build_scene_graph=False, load_meshes=False, mesh_dir=""
             )
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, AssertionError) as error:
-        # yourdfpy reads without checking: what is missing or no number ends in one of these
+        # yourdfpy does not check: missing or invalid entries raise one of these
         reason = f"{type(error).__name__}: {error}".replace("\n", " ")[:200]
         problem = (
             f"is no complete URDF ({reason}); expected links, and joints with parent and child"
@@ -109,20 +110,20 @@ def not_installed() -> OptionError:
 def _problems(robot: Any) -> Iterable[str]:
     links = [link.name for link in robot.links]
     for name in _twice(links):
-        yield f"link {name!r} is there twice; expected each name once"
+        yield f"link {name!r} occurs twice; expected each name once"
     for name in _twice([joint.name for joint in robot.joints]):
-        yield f"joint {name!r} is there twice; expected each name once"
+        yield f"joint {name!r} occurs twice; expected each name once"
     if not links:
         yield "has no link"
         return
     parents: dict[str, str] = {}
-    known = set(links)
+    link_names = set(links)
     for joint in robot.joints:
         where = f"joint {joint.name!r}"
         if joint.type not in JOINT_TYPES:
             yield f"{where}: type {joint.type!r}; expected one of {', '.join(JOINT_TYPES)}"
         for end in (joint.parent, joint.child):
-            if end not in known:
+            if end not in link_names:
                 yield f"{where}: there is no link {end!r}"
         if joint.child in parents:
             yield (
@@ -160,7 +161,7 @@ PARALLEL = 1e-9  # deviation of a direction from x, y or z below which the frame
 
 
 def axis_frame(origin_mm: Array, direction: Array) -> tuple[Array, int]:
-    """Give the frame of an axis in R, [4, 4], mm, and whether it moves with or against its name."""
+    """Return the frame of an axis in R, [4, 4], mm, and the sign of its direction."""
     index = int(np.argmax(np.abs(direction)))
     sign = 1 if direction[index] > 0.0 else -1
     nominal = np.zeros(3)
@@ -205,14 +206,12 @@ WORKPIECE_NAMES = ("workpiece", "work", "w", "table")
 
 @dataclass(frozen=True, slots=True)
 class RobotMachine:
-    """A machine read from a robot, and what became of its parts."""
+    """A machine read from a robot, and the frames of its links."""
 
     machine: Machine
-    # by link: the frame of the machine it rides on, and its pose in that frame, [4, 4] in mm, all
-    # joints at zero
+    # by link: its frame of the machine, and its pose in that frame, [4, 4] in mm, joints at zero
     frame_of: dict[str, tuple[str, Array]]
-    # what was taken in another way, or has no place
-    notes: list[str] = field(default_factory=list[str])
+    notes: list[str] = field(default_factory=list[str])  # on converted or ignored entries
 
 
 def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") -> RobotMachine:
@@ -236,11 +235,15 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
     ]
     branches = [path[shared:] for path in paths]
     branch_joints = [joint for branch in branches for joint in branch]
-    if problems := list(_joint_problems(branch_joints)):
+    problems = list(_joint_problems(branch_joints))
+    if problems:
         raise SceneError(source, problems)
     fixed_names = [joint.name for joint in branch_joints if _stands(joint)]
-    notes += [f"joint {name!r} has one position only: taken as fixed at zero" for name in fixed_names]
-    joints = [joint for joint in branch_joints if joint.type in MOVING and joint.name not in fixed_names]
+    notes += [
+        f"joint {name!r} has one position only: taken as fixed at zero" for name in fixed_names
+    ]
+    moving_joints = (joint for joint in branch_joints if joint.type in MOVING)
+    joints = [joint for joint in moving_joints if joint.name not in fixed_names]
     lengths = {joint.name: float(np.linalg.norm(joint.axis)) for joint in joints}
     notes += [
         f"joint {name!r}: its axis has the length {length:g}; taken as 1"
@@ -255,7 +258,7 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
         joint.name: _pose_mm(branch[: index + 1])
         for branch in branches
         for index, joint in enumerate(branch)
-        if joint.name in moving  # a few; of each link it would take the square of their number
+        if joint.name in moving  # few; for all links the time is quadratic
     }
     directions = {
         joint.name: places[joint.name][:3, :3] @ (np.asarray(joint.axis) / lengths[joint.name])
@@ -286,16 +289,16 @@ def place_robot(robot: Any, source: str, tool: str = "", workpiece: str = "") ->
     return RobotMachine(machine, _frames_of_links(robot, names, fixed_names, poses, start), notes)
 
 
-def _end(robot: Any, source: str, what: str, wanted: str) -> str:
-    links = [link.name for link in robot.links]
-    if wanted:
-        if wanted not in links:
-            raise SceneError(source, [f"has no link {wanted!r}{near_miss(wanted, links)}"])
-        return wanted
+def _end(robot: Any, source: str, what: str, link: str) -> str:
+    links = [body.name for body in robot.links]
+    if link:
+        if link not in links:
+            raise SceneError(source, [f"has no link {link!r}{near_miss(link, links)}"])
+        return link
     lower = {name.lower(): name for name in reversed(links)}
-    known = TOOL_NAMES if what == "tool" else WORKPIECE_NAMES
-    if found := next((lower[name] for name in known if name in lower), ""):
-        return found
+    for name in TOOL_NAMES if what == "tool" else WORKPIECE_NAMES:
+        if name in lower:
+            return lower[name]
     if what == "workpiece":
         return root_of(robot)
     parents = {joint.parent for joint in robot.joints}
@@ -304,7 +307,7 @@ def _end(robot: Any, source: str, what: str, wanted: str) -> str:
     if len(carried) == 1:
         return carried[0]
     listed = ", ".join(map(repr, (carried or leaves)[:8]))
-    raise SceneError(source, [f"ends in {listed}; expected --tool LINK to say which is the tool"])
+    raise SceneError(source, [f"ends in {listed}; expected --tool LINK"])
 
 
 def _joint_problems(joints: Sequence[Any]) -> Iterable[str]:
@@ -484,8 +487,8 @@ _NO_PLACE: tuple[tuple[str, str, Callable[[Any], object]], ...] = (
 )
 
 
-def omitted_notes(robot: Any, other_tags: Sequence[str], placed_links: Collection[str]) -> list[str]:
-    omitted = [link.name for link in robot.links if link.name not in placed_links]
+def omitted_notes(robot: Any, other_tags: Sequence[str], links: Collection[str]) -> list[str]:
+    omitted = [link.name for link in robot.links if link.name not in links]
     mimics = [one.name for one in robot.joints if one.child in omitted and one.mimic is not None]
     lists = [
         ("not between workpiece and tool, left out: links", omitted),

@@ -308,7 +308,7 @@ def test_numbers_of_a_program_are_bounded_before_anything_moves(dvf: Scene, bloc
 
 def test_a_line_comes_to_a_limited_number_of_samples(dvf: Scene):
     read = read_program(dvf, ["G0 X0 Y0 Z0", "G2 I99999 P900"])
-    with pytest.raises(OptionError, match="line 2: its moves have .* at most 100,000"):
+    with pytest.raises(OptionError, match=r"line 2: its moves have .* at most 100,000"):
         trace_program(read)
 
 

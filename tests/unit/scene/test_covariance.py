@@ -70,9 +70,7 @@ def test_a_covariance_is_written_in_the_sign_of_its_squareness():
     assert "EB0Z = 30.0" in text
     assert parse_scene(text, "s").covariance == scene.covariance
     moved = SCENE + "[convention]\nmeasuring_line_mm = { X = [0, 0, 100] }\n"
-    with pytest.raises(
-        SceneError, match=r"measuring_line_mm: would move what \[uncertainty\] is of"
-    ):
+    with pytest.raises(SceneError, match=r"would move the errors of \[uncertainty\]"):
         parse_scene(moved, "s")
 
 
@@ -119,7 +117,7 @@ def test_what_is_wrong_is_said_with_its_row_and_value(old, new, said):
 def test_an_uncertainty_is_above_zero_at_every_position(curve, value):
     text = SCENE.replace("[uncertainty.", f"[uncertainty]\nEXX = {curve}\n[uncertainty.")
     with pytest.raises(
-        SceneError, match=rf"uncertainty.EXX = {value}.*: expected it above 0 every"
+        SceneError, match=rf"uncertainty.EXX = {value}.*: expected a number above 0"
     ):
         parse_scene(text, "s")
 
