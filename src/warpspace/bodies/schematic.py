@@ -172,7 +172,6 @@ class HomeAxis:
 
     @property
     def slides_level(self) -> bool:
-        """Whether it is linear and level."""
         return self.is_linear and self.k != 2
 
 

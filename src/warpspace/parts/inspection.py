@@ -49,12 +49,7 @@ MAX_FEATURES = 500  # the largest surfaces of a mesh; smaller ones are ignored
 RIGHT_RAD = 1e-4  # tolerance of nominal angles of 90° or 0, and of what datums fix
 STEP_SHARE = 1e-4  # step of difference quotients, as a share of an error
 LEVER_MM = 100.0  # weight of rotations against translations that datums leave free
-SHAPES = (
-    "plane",
-    "cylinder",
-    "cone",
-    "sphere",
-)  # in the order of trials
+SHAPES = "plane", "cylinder", "cone", "sphere"  # in the order of trials
 
 
 @dataclass(frozen=True, eq=False)

@@ -226,6 +226,7 @@ class Interpreter:
         self.unnamed_axes = {i for i, axis in enumerate(self.names) if is_linear(axis)}
         self.first = 0  # first row of the path
         self.once = ""  # non-modal code of the block: G4, G28 or G53
+        self.letters: Set[str] = set[str]()  # axes that the block names
         self.cycle: dict[str, float] = {}  # words of a cycle, and the level before it, mm
         self.rows, self.width = array("d"), 8 + len(self.names)
         stand = complete_coordinates(scene.machine, {}, scene.workspace.positions)
@@ -305,45 +306,39 @@ class Interpreter:
                 handler(self, code)
         self.cycle = self.cycle if self.motion in CYCLES else {}
         # X of G4 is a time
-        letters = set[str]() if self.once == "G4" else self.words.keys() & _AXES
-        for letter in letters - self.index.keys():
+        self.letters = set[str]() if self.once == "G4" else self.words.keys() & _AXES
+        for letter in self.letters - self.index.keys():
             axes = f"an axis of {self.scene.machine.chain}: {', '.join(self.index)}"
             self.fail(f"{letter}{self.words[letter]:g}; expected {axes}")
-        unused = _UNUSED_LETTERS.get(self.motion, "IJKLR") if letters else "L"
+        unused = _UNUSED_LETTERS.get(self.motion, "IJKLR") if self.letters else "L"
         for letter in self.words.keys() & {*unused}:
             self.unknown.setdefault(f"{letter} with {self.once or self.motion}", self.line)
-        replaces_motion = self.once == "G28" or (self.once == "G53" and letters)
-        MOTIONS[self.once if replaces_motion else self.motion](self, letters)
+        is_arc = self.motion in {"G2", "G3"} and self.words.keys() & {*"IJKR"}
+        if self.once == "G28" or (self.once == "G53" and self.letters):
+            MOTIONS[self.once](self)
+        elif self.letters or is_arc:
+            MOTIONS[self.motion](self)
 
     def set_once(self, code: str) -> None:
         self.once = code
 
-    def move_home(self, letters: Set[str]) -> None:
+    def move_home(self) -> None:
         """Move over the programmed point to axis positions zero, or the nearest end of travel."""
         target = self.target()
-        if letters and any(self.position[index] != at for index, at in target.items()):
+        if any(self.position[index] != at for index, at in target.items()):
             self.line_to(target, RAPID)
         axes, home = self.scene.machine.axes, dict[int, float]()
-        for letter in letters or self.index:
+        for letter in self.letters or self.index:
             index = self.index[letter]
             home[index] = float(np.clip(0.0, *axes[self.names[index]].travel))
         self.line_to(home, RAPID, bare=True)
 
-    def move_bare(self, letters: Set[str]) -> None:
+    def move_bare(self) -> None:
         """Move to axis positions (G53)."""
-        self.line_to({self.index[letter]: self.value(letter) for letter in letters}, bare=True)
+        self.line_to({self.index[x]: self.value(x) for x in self.letters}, bare=True)
 
-    def move_straight(self, letters: Set[str]) -> None:
-        if letters:
-            self.line_to(self.target())
-
-    def move_along_arc(self, letters: Set[str]) -> None:
-        if letters or self.words.keys() & {*"IJKR"}:
-            self.arc_to(self.target())
-
-    def run_cycle(self, letters: Set[str]) -> None:
-        if letters:
-            self.drill()
+    def move_straight(self) -> None:
+        self.line_to(self.target())
 
     def compensate(self, code: str) -> None:
         """Set the length compensation of the tool, and TCP."""
@@ -413,7 +408,8 @@ class Interpreter:
         self.record(kind)
         self.switch(tcp=tcp, length_mm=self.length_mm)
 
-    def arc_to(self, to: Mapping[int, float]) -> None:
+    def move_along_arc(self) -> None:
+        to = self.target()
         names, centres = PLANES[self.across], CENTRES[self.across]
         if not set(names) <= self.index.keys():
             self.fail(f"an arc in {names}; expected axes of {self.scene.machine.chain}")
@@ -498,10 +494,10 @@ CODES: Mapping[str, CodeHandler] = {
     **dict.fromkeys(_NO_EFFECT, lambda _control, _code: None),
 }  # fmt: skip
 """Effects of the supported codes."""
-MOTIONS: Mapping[str, Callable[[Interpreter, Set[str]], None]] = {
+MOTIONS: Mapping[str, Callable[[Interpreter], None]] = {
     **dict.fromkeys(("G0", "G1"), Interpreter.move_straight),
     **dict.fromkeys(("G2", "G3"), Interpreter.move_along_arc),
-    **dict.fromkeys(CYCLES, Interpreter.run_cycle),
+    **dict.fromkeys(CYCLES, Interpreter.drill),
     "G28": Interpreter.move_home, "G53": Interpreter.move_bare,
 }  # fmt: skip
-"""Motions of a block by its modal or non-modal code, with the letters of the axes it names."""
+"""Motions of a block by its modal or non-modal code."""

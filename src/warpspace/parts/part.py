@@ -172,7 +172,7 @@ class PartResult(PartDeviation, Result):
         yield from self.workpiece.warnings
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
-            yield f"{far} are beyond the travel; their errors are extrapolated"
+            yield f"{far} are beyond the travel; their errors are continued"
         if self.interpolation_um:
             excess = f"up to {self.interpolation_um:.1f} µm"
             yield f"errors between vertices deviate by {excess} more; expected a finer mesh"

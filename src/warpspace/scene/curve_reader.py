@@ -178,8 +178,8 @@ def _points(rows: text_files.CsvRows, column: str) -> list[tuple[float, float]]:
     for line, row in rows:
         position, value = (rows.number(row[at], line, limit=limits.MAX_ERROR) for at in (0, index))
         if points and position <= points[-1][0]:
-            found = f"position {position:g} after {points[-1][0]:g}"
-            rows.note(f"line {line}: {found}; expected ascending positions")
+            problem = f"position {position:g} after {points[-1][0]:g}"
+            rows.note(f"line {line}: {problem}; expected ascending positions")
         points.append((position, value))
     if not points and not rows.problems:
         rows.note("has 0 rows below the header; expected a header and at least one row")

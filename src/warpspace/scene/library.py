@@ -90,21 +90,9 @@ def load_scene(name_or_path: str | Path) -> Scene:
 
 
 SECTIONS = (
-    "title",
-    "description",
-    "machine",
-    "bodies",
-    "convention",
-    "workspace",
-    "points_mm",
-    "errors",
-    "tolerances",
-    "uncertainty",
-    "measured",
-    "view",
-    "part",
-    "notes",
-)
+    "title", "description", "machine", "bodies", "convention", "workspace", "points_mm", "errors",
+    "tolerances", "uncertainty", "measured", "view", "part", "notes",
+)  # fmt: skip
 ROUNDED = 1e-9  # relative tolerance of symmetry and of positive eigenvalues of a covariance
 OF_MACHINE = "axis of this machine"  # in messages
 STAND_IN = build_machine("wFXYZABCt")
