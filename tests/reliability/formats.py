@@ -72,7 +72,7 @@ def _mesh_seeds(ending: str) -> list[bytes]:
 
 
 def _read_mesh(ending: str, content: bytes, folder: Path) -> object:
-    from warpspace.bodies.own_meshes import load_mesh
+    from warpspace.bodies.mesh_files import load_mesh
 
     return load_mesh(_put(content, folder, f"x.{ending}"), "X")
 
@@ -93,7 +93,7 @@ URDF = """<?xml version="1.0"?>
 
 
 def _read_urdf(content: bytes, folder: Path) -> object:
-    from warpspace.bodies.own_meshes import frame_meshes
+    from warpspace.bodies.mesh_files import frame_meshes
     from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
 
     path = _put(content, folder, "r.urdf")

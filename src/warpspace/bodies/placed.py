@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.bodies.frame import generate_bodies
 from warpspace.bodies.mesh import Body
-from warpspace.bodies.own_meshes import machine_meshes
+from warpspace.bodies.mesh_files import machine_meshes
 from warpspace.bodies.schematic import BODY_FILE, read_bodies
 from warpspace.field.evaluate import View, find_placement, placement_effect
 from warpspace.kinematics import transforms

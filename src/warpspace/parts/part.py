@@ -17,7 +17,7 @@ from warpspace.analysis.options import File, option
 from warpspace.analysis.statistics import Numbers, Statistics, statistics
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, plus_minus, u95_lines
 from warpspace.bodies.gltf import to_gltf
-from warpspace.bodies.own_meshes import FORMATS, MM_PER_M, UNITS_MM
+from warpspace.bodies.mesh_files import FORMATS, MM_PER_M, UNITS_MM
 from warpspace.field.evaluate import ErrorField
 from warpspace.kinematics import transforms
 from warpspace.kinematics.model import Loop

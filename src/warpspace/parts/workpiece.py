@@ -19,7 +19,7 @@ from warpspace.analysis.options import File, Grammar, option
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, combine, scene_uncertainty
 from warpspace.bench.placing import ball_point, follow, within_travel
 from warpspace.bodies.mesh import CREASE_DEG
-from warpspace.bodies.own_meshes import read_mesh
+from warpspace.bodies.mesh_files import read_mesh
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorBasis, build_basis
 from warpspace.kinematics import transforms

@@ -17,7 +17,7 @@ import pytest
 import trimesh
 
 from warpspace.bodies.mesh import open_meshes
-from warpspace.bodies.own_meshes import FORMATS, frame_meshes, load_mesh, read_mesh
+from warpspace.bodies.mesh_files import FORMATS, frame_meshes, load_mesh, read_mesh
 from warpspace.exceptions import OptionError, SceneError, WarpspaceError
 from warpspace.scene.urdf import place_robot, read_robot
 
@@ -399,7 +399,7 @@ def test_a_chain_of_links_is_gone_through_once(tmp_path):
 
 
 def test_a_mesh_of_many_shapes_is_read_once_and_their_triangles_are_limited(tmp_path, monkeypatch):
-    import warpspace.bodies.own_meshes as module
+    import warpspace.bodies.mesh_files as module
 
     loads: list[Path] = []
     monkeypatch.setattr(

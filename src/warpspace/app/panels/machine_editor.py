@@ -33,7 +33,7 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves
 from warpspace.app.state.typed_numbers import spell_typed
-from warpspace.bodies.own_meshes import check_meshes
+from warpspace.bodies.mesh_files import check_meshes
 from warpspace.machine.definition import BodySource, Gantry
 from warpspace.picture.formatting import spell_at, spell_point
 from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lines

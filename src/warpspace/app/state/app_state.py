@@ -67,7 +67,7 @@ SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
 """What can be drawn of a comparison; the difference is the change from A to B."""
 PRESENT, NOBODY = "present errors", "nothing"
 """Names of what is steered, and of no other side."""
-_load_part = lru_cache(maxsize=4)(load_workpiece)
+_load_workpiece = lru_cache(maxsize=4)(load_workpiece)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +204,7 @@ class PartLook:
             if path := own.path("program"):
                 text = "".join(program_lines(path))
             if path := own.path("file"):
-                mesh = _load_part(path, own.unit or None)
+                mesh = _load_workpiece(path, own.unit or None)
         except WarpspaceError as error:
             notes.append(str(error))
         except Exception as error:  # noqa: BLE001 - whatever a file holds, the scene opens

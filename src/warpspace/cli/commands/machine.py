@@ -170,7 +170,7 @@ def check(
 
 def _check(scene: "Scene", *, as_json: bool) -> None:
     from warpspace.analysis.note_tables import notes_table
-    from warpspace.bodies.own_meshes import check_meshes
+    from warpspace.bodies.mesh_files import check_meshes
     from warpspace.scene.model import second_order
 
     remarks = (*scene.notes, *check_meshes(scene.machine))

@@ -253,7 +253,7 @@ def _import_robot(
     *,
     force: bool,
 ) -> None:
-    from warpspace.bodies.own_meshes import frame_meshes
+    from warpspace.bodies.mesh_files import frame_meshes
     from warpspace.outputs.file_output import mesh_files, write_with_meshes
     from warpspace.scene.library import parse_scene
     from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot

@@ -96,7 +96,7 @@ def view(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from warpspace.app.server.request_policy import Access
     from warpspace.app.server.viewer import run_viewer
-    from warpspace.bodies.own_meshes import check_meshes
+    from warpspace.bodies.mesh_files import check_meshes
     from warpspace.scene.library import load_scene, scene_names, scene_path
 
     path = scene_path(scene)
