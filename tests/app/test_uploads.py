@@ -7,7 +7,7 @@ import pytest
 
 from app.hostile import upload
 from app.wire import opened
-from warpspace.app.panels import part
+from warpspace.app.panels import part_panels as part
 from warpspace.exceptions import OptionError
 from warpspace.parts.workpiece import Workpiece
 from warpspace.resources import scenes_dir
