@@ -365,7 +365,7 @@ def test_what_is_stated_holds_for_95_percent_of_planted_machines(name, trials, n
     shares, (stated, kept) = held_by_planted_machines(name, trials)
     for what, share in shares.items():
         assert share == pytest.approx(0.95, abs=near), what
-    # verdicts as parts have them: kept or missed with at least 95 %, else it cannot be told
+    # verdicts as of parts: pass or fail with at least 95 %, else undecided
     assert kept[stated >= 0.95].mean() >= 0.95 - near
     assert (1.0 - kept)[stated <= 0.05].mean() >= 0.95 - near
     for low, high in ((0.0, 1.0), (0.01, 0.05), (0.05, 0.5), (0.5, 0.95), (0.95, 0.99)):

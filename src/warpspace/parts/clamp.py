@@ -60,7 +60,7 @@ U95 = "u95_max_um", "u95_placed_um"
 
 @dataclass(frozen=True, kw_only=True)
 class Clamp(WorkpieceAnalysis):
-    """Find the best fixture position of a part on the machine of SCENE.
+    """Find the best fixture position of a part on SCENE.
 
     Places over the travel in the allowed orientations are compared with the present place; those
     where a vertex is beyond the travel are excluded. Fixtures and collisions are not considered.

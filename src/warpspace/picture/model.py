@@ -115,7 +115,7 @@ class Picture:
     quantity: str = "position"
     uncertainty: FieldUncertainty | None = None  # of its errors; None where nothing is stated
     significant: bool = False  # whether colours fade where an error is not above its U95
-    # that colours hold |E| against; they fade where it cannot be told whether it is kept
+    # of |E| that colours show; they fade where the verdict is undecided
     limit_um: float | None = None
     # the colours where they are given, for instance shared with other pictures; None for round ends
     # that hold all values
