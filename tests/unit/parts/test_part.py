@@ -52,7 +52,7 @@ def test_what_is_wrong_with_a_surface_is_said(tmp_path):
     inside = BOX.copy()
     inside.invert()
     found = mesh_of(inside)
-    assert "face inwards" in found.warnings[0]
+    assert "faced inwards" in found.warnings[0]
     assert found.surface.volume == pytest.approx(240_000.0)
     hollow = BOX + BOX.copy().apply_scale(0.5)
     hollow.faces[12:] = hollow.faces[12:, ::-1]
