@@ -133,7 +133,7 @@ class Adjust(Analysis):
     def seen(self, scene: Scene) -> tuple[Scene, View]:
         if self.placed and self.seen_loop is not Loop.RELATIVE:
             raise OptionError(
-                f"{{placed}}: the {self.loop} loop does not show where the workpiece lies;"
+                f"{{placed}}: the {self.loop} loop does not contain the placement of the workpiece;"
                 f" expected loop {Loop.RELATIVE}"
             )
         scene = replace(scene, placed=True) if self.placed else scene
