@@ -19,7 +19,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check 
 
 .DEFAULT_GOAL := help
 .PHONY: help view test nightly reliability coverage lint style format bench screenshots docs linkcheck \
-    drawings dist packaging golden clean system-packages
+    drawings dist packaging golden clean system-packages nightly-packages
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 18
@@ -31,7 +31,7 @@ test: system-packages $(DEV_STAMP) ## install what is missing, then lint, type-c
 	$(MAKE) --no-print-directory style
 	bash .ci/tests.sh
 
-nightly: system-packages $(DOCS_STAMP) ## run the long tests, documentation included (ARGS="--minutes 40")
+nightly: nightly-packages $(DOCS_STAMP) ## run the long tests, documentation included (ARGS="--minutes 40")
 	HYPOTHESIS_PROFILE=nightly $(BIN)/python -m pytest -m "nightly or hypothesis" --durations=10 $(ARGS)
 
 golden: $(DEV_STAMP) ## keep the outputs of the commands anew (ARGS="report thesis-json"); read the difference
@@ -88,6 +88,9 @@ clean: ## remove what the other targets made, .venv included
 
 system-packages:
 	@bash .ci/system-packages.sh
+
+nightly-packages:
+	@bash .ci/system-packages.sh nginx-light openssl
 
 $(BIN)/python:
 	@bash .ci/check-python.sh "$(PYTHON)"
