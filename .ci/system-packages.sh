@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Install the Debian packages that the tests draw and browse with, or say which are missing.
-# Missing ones end a CI run; elsewhere the tests that need them are skipped.
+# Arguments: further packages. Missing ones end a CI run; elsewhere the tests that need them are skipped.
 set -u
-packages=(libegl1 libgl1-mesa-dri chromium fonts-dejavu-core)
+packages=(libegl1 libgl1-mesa-dri chromium fonts-dejavu-core "$@")
 
 installed() {
     [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2>/dev/null)" = installed ]

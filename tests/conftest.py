@@ -28,9 +28,12 @@ IN_CI = bool(os.environ.get("CI"))
 BEGAN = time.monotonic()
 LATE = pytest.StashKey[list[str]]()
 
-hypothesis.settings.register_profile("local", deadline=None)
-hypothesis.settings.register_profile("ci", deadline=None, derandomize=True)
-hypothesis.settings.load_profile("ci" if IN_CI else "local")
+PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "ci" if IN_CI else "local")  # or nightly
+
+hypothesis.settings.register_profile("local", deadline=None, max_examples=15)
+hypothesis.settings.register_profile("ci", deadline=None, max_examples=15, derandomize=True)
+hypothesis.settings.register_profile("nightly", deadline=None, max_examples=300, derandomize=IN_CI)
+hypothesis.settings.load_profile(PROFILE)
 
 NAMES_A_BROWSER = re.compile(r"\b(browser|page|tab|open_tab)\b")  # as .ci/tests.sh looks for them
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -127,10 +130,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what needs the browser, and put another part first each day where time may run out."""
+    """Mark what needs the browser, and put another part first each day where time may run out.
+
+    Of the journeys in a browser `make test` runs those marked as daily, the others are nightly.
+    """
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):
             item.add_marker("browser")
+            if not item.get_closest_marker("daily"):
+                item.add_marker("nightly")
             if not NAMES_A_BROWSER.search(item.path.read_text("utf-8")):
                 words = "names no browser, page, tab or open_tab: .ci/tests.sh would not find it"
                 raise pytest.UsageError(f"{item.path}: {words}")

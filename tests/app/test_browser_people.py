@@ -79,6 +79,7 @@ def test_words_of_a_scene_are_never_run(browser):
         end_work(viewer)
 
 
+@pytest.mark.daily
 def test_an_error_is_found_set_and_undone_without_a_mouse(tab):
     page, keys = tab.page, tab.page.keyboard.press
     # from the top over the errors and the drawing to the tasks, and the focus is seen

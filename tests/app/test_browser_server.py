@@ -57,6 +57,7 @@ def foreign_site():
         server.shutdown()
 
 
+@pytest.mark.daily
 def test_a_foreign_page_gets_neither_socket_nor_frame_nor_text(page):
     with Viewer(load_scene("dvf5000_nominal")) as viewer, foreign_site() as site:
         socket = viewer.url.replace("http", "ws", 1)
@@ -148,6 +149,7 @@ def change(page):
     return maximum(page)
 
 
+@pytest.mark.daily
 def test_killed_server_is_said_and_its_tab_restored(browser, tmp_path):
     page = new_visitor(browser).new_page()
     with running_app("dvf5000_first", folder=tmp_path) as server:

@@ -177,6 +177,7 @@ def test_every_view_looks_along_its_axis_through_both_lenses_with_right_scale_ba
     tab.until(lambda: tab.page.locator("[data-bar-scale]").count() == 0)
 
 
+@pytest.mark.daily
 def test_a_phone_has_the_drawing_on_top_and_the_columns_below(viewer, browser):
     context = new_visitor(browser, PHONE, device_scale_factor=1, is_mobile=True, has_touch=True)
     phone = Tab(context.new_page(), viewer)

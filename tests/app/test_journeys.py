@@ -18,6 +18,7 @@ MOST = (18, 12, 150)
 PITCH = b"X_mm,EBX_urad\n-275,0\n0,20\n275,60\n"
 
 
+@pytest.mark.daily
 def test_the_first_screen_is_calm(tab):
     tab.says("51.7 → 46.1 µm")  # the last that comes by itself
     tab.until(lambda: all(n <= most for n, most in zip(tab.seen(), MOST, strict=True)), 10.0)
@@ -64,6 +65,7 @@ def test_95_percent_within_40_um_in_three_actions_in_sight(tab):
     assert tab.in_sight("#ws-task .ws-told")
 
 
+@pytest.mark.daily
 def test_a_table_is_imported_in_four_actions_and_says_what_changes(tab):
     before = tab.state
     tab.give("pitch.csv", PITCH, tab.page.get_by_role("button", name="Open").first.click)
@@ -97,6 +99,7 @@ def test_a_sinumerik_table_is_saved_in_four_actions_without_a_scroll(tab):
     assert b"$AN_CEC" in text
 
 
+@pytest.mark.daily
 def test_two_machines_are_compared_with_a_picture_in_three_actions(tab, renderer):
     tab.task("Design")
     chooser = tab.page.get_by_label("Compare with another machine")
@@ -112,6 +115,7 @@ def test_two_machines_are_compared_with_a_picture_in_three_actions(tab, renderer
     assert min(Image.open(BytesIO(saved.value.path().read_bytes())).size) > 400
 
 
+@pytest.mark.daily
 def test_a_drag_ends_where_the_hand_stopped_and_digits_set_a_number(tab):
     slider = tab.page.locator("input[type=range][data-set='errors:set.EA0Z']")
     tab.page.evaluate(

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.parts import LIVE, body_of, lone_part
@@ -449,7 +449,6 @@ WORDS = st.one_of(
 SCENES = st.just(PLAIN) | st.sampled_from(scene_names()).map(load_scene)
 
 
-@settings(max_examples=60, deadline=None)
 @given(SCENES, st.lists(WORDS, min_size=1, max_size=6))
 def test_whatever_is_done_gives_a_scene_that_reads_back_or_leaves_the_old_one(scene, words):
     for word in words:

@@ -9,7 +9,7 @@ import tomllib
 import pytest
 
 from warpspace import load_scene
-from warpspace.analysis import reviewing
+from warpspace.analysis import note_tables
 from warpspace.scene.library import scene_path
 
 CORNER = {"X": 275.0, "Y": -225.0, "Z": -480.0}
@@ -205,13 +205,13 @@ def test_a_note_replaces_no_edit_made_while_it_was_computed_and_no_link(
     link.symlink_to(mine)
     assert warpspace("notes", link, "--add", "first").status == 0
     assert link.is_symlink()
-    compute = reviewing.note_numbers
+    compute = note_tables.note_numbers
 
     def edit_meanwhile(scene, review):
         mine.write_text(mine.read_text("utf-8") + "# edited\n", encoding="utf-8")
         return compute(scene, review)
 
-    monkeypatch.setattr(reviewing, "note_numbers", edit_meanwhile)
+    monkeypatch.setattr(note_tables, "note_numbers", edit_meanwhile)
     warpspace("notes", mine, "--add", "second").refused("has changed since it was read")
     assert mine.read_text("utf-8").endswith("# edited\n")
     assert [note.text for note in load_scene(mine).review] == ["first"]

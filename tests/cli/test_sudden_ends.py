@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from products import pairwise
-
 pytestmark = [pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")]
 MARK = "WARPSPACE_TEST_RUN"
 MAIN = "from warpspace.cli import main; main()"
@@ -109,10 +107,17 @@ def hidden(folder):
 
 @pytest.mark.parametrize(
     ("command", "how"),
-    pairwise(
-        [PICTURE, MOVIE, REPORT, SAMPLES],
-        [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP],
-    ),
+    [
+        (PICTURE, signal.SIGTERM),
+        (MOVIE, signal.SIGINT),
+        (REPORT, signal.SIGKILL),
+        (SAMPLES, signal.SIGHUP),
+        *(
+            pytest.param(command, how, marks=pytest.mark.nightly)
+            for command in (PICTURE, MOVIE, REPORT, SAMPLES)
+            for how in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+        ),
+    ],
 )
 def test_processes_end_with_their_command(command, how, tmp_path):
     process = start(tmp_path, *command)
@@ -199,7 +204,9 @@ main()
 """
 
 
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "how", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.nightly)]
+)
 def test_view_ends_at_once_while_a_figure_is_drawn(how, tmp_path):
     process = start(tmp_path, "view", "--no-browser", code=DRAWING_VIEW)
     wait_until(lambda: len(processes(tmp_path)) >= 3 and "is shown at" in said(tmp_path), process)

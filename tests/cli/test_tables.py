@@ -14,7 +14,7 @@ import pytest
 from warpspace.analysis.blocks import Column, number_columns
 from warpspace.cli import tables as module
 from warpspace.cli.tables import print_table, print_text, progress
-from warpspace.thesis import rows
+from warpspace.thesis_example import rows as thesis_rows
 
 AT = ("--at", "X=0,Y=-225,Z=-480", "--at", "X=10.5,B=-30.123456")
 COMMANDS = {
@@ -56,7 +56,7 @@ def once(function):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_output_fits_and_has_every_number(warpspace, monkeypatch, name):
-    monkeypatch.setattr(rows, "thesis", once(rows.thesis))
+    monkeypatch.setattr(thesis_rows, "thesis", once(thesis_rows.thesis))
     monkeypatch.setenv("COLUMNS", "1000")
     whole = warpspace(*COMMANDS[name]).out
     for width in (60, 80):

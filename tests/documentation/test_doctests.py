@@ -7,6 +7,7 @@ import pytest
 
 from doc_pages import ROOT, blocks, pages
 
+pytestmark = pytest.mark.nightly  # `make docs` runs them, too
 WITH_BLOCKS = [page for page in pages() if blocks(page.read_text("utf-8"), "pycon")]
 SOURCES = sorted((ROOT / "src").rglob("*.py"))
 MODULES = [path for path in SOURCES if ">>> " in path.read_text("utf-8")]

@@ -22,6 +22,7 @@ from warpspace.machine.curves.registry import curve_kinds
 from warpspace.scene.library import load_scene
 from warpspace.scene.schema import CONVENTION, POINTS, VIEW
 
+pytestmark = pytest.mark.nightly  # `make docs` runs them, too
 WORDS_OF_A_SECTION = 10
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 

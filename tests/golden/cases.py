@@ -95,3 +95,9 @@ CASES: dict[str, str] = {
     },
     **_ONCE,
 }
+DAILY = frozenset(f"{name}-dvf5000_first" for name in _EACH) | {
+    "scenes", "thesis-json", "new-machine", "compare-text", "contributions-text", "montecarlo-text",
+    "allocate-text", "concepts-text", "circular-text", "rotary", "klipper", "convert", "report",
+    "field-relative", "adjust-limits", "calibrate", "bad-option",
+}  # fmt: skip
+"""What `make test` runs of them."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from golden.cases import CASES
+from golden.cases import CASES, DAILY
 from golden.running import (
     INPUTS,
     KEPT,
@@ -17,7 +17,10 @@ from golden.running import (
 )
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[] if name in DAILY else pytest.mark.nightly) for name in CASES],
+)
 def test_it_says_and_writes_what_it_did(name, tmp_path):
     kept = (KEPT / f"{name}.txt").read_text("utf-8")
     found = differences(kept, run_case(name, tmp_path))

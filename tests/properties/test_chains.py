@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
@@ -64,7 +64,6 @@ REACH_MM = 8.0 * (MAX_OFFSET_MM + MAX_LINEAR_MM)
 SPAN = (-1.0, 1.0)
 
 
-@settings(max_examples=60)
 @given(data=st.data())
 def test_zero_errors_give_exactly_zero(data):
     model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
@@ -79,7 +78,6 @@ def test_zero_errors_give_exactly_zero(data):
             np.testing.assert_allclose(field.orientation_urad, 0.0, rtol=0, atol=1e-8)
 
 
-@settings(max_examples=60)
 @given(data=st.data())
 def test_exact_minus_first_order_shrinks_with_the_square_of_the_errors(data):
     model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
@@ -107,7 +105,6 @@ def test_exact_minus_first_order_shrinks_with_the_square_of_the_errors(data):
     assert np.linalg.norm(whole_tilt - 4.0 * half_tilt) <= turned**3 * 1e6 + 1e-6
 
 
-@settings(max_examples=40)
 @given(data=st.data())
 def test_frame_of_the_result_turns_vectors_and_keeps_their_lengths(data):
     model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))
@@ -128,7 +125,6 @@ TOLERANCE = 1e-6
 
 @pytest.mark.parametrize("convention", convention_names())
 @pytest.mark.parametrize("loop", Loop)
-@settings(max_examples=40)
 @given(data=st.data())
 def test_jacobian_is_the_central_difference_of_the_exact_chain(loop, convention, data):
     model = data.draw(models(convention))
@@ -144,7 +140,6 @@ def test_jacobian_is_the_central_difference_of_the_exact_chain(loop, convention,
     np.testing.assert_allclose(orientation, expected_orientation, rtol=0, atol=TOLERANCE)
 
 
-@settings(max_examples=60)
 @given(data=st.data())
 def test_every_parameter_of_every_axis_moves_some_point_of_its_loop_and_of_no_other(data):
     model = data.draw(models())
@@ -164,7 +159,6 @@ def test_every_parameter_of_every_axis_moves_some_point_of_its_loop_and_of_no_ot
         assert moved[other][index] == 0.0, key
 
 
-@settings(max_examples=40)
 @given(data=st.data())
 def test_lever_explains_the_gain_of_every_rotation(data):
     model, loop = data.draw(models()), data.draw(st.sampled_from(Loop))

@@ -45,7 +45,6 @@ def cases(draw):
     return replace(model, direction=draw(st.sampled_from(TravelDirection))), ErrorSet(errors)
 
 
-@settings(max_examples=40)
 @given(data=st.data())
 def test_the_response_is_the_derivative_of_the_exact_field_by_the_amplitude(data):
     model, errors = data.draw(cases())

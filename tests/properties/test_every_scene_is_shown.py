@@ -41,6 +41,7 @@ SLOW = settings(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 SIDE_NODES = 3
+EXAMPLES = settings.default.max_examples  # of the profile
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +76,7 @@ def states(draw):
     return state
 
 
-@settings(SLOW, max_examples=60)
+@settings(SLOW, max_examples=min(60, EXAMPLES))
 @given(state=states())
 def test_every_state_has_a_finite_picture(server, state):
     picture = LiveModel().evaluate(state)
@@ -110,7 +111,7 @@ def _check_finite(picture):
         assert np.isfinite(pieces).all()
 
 
-@settings(SLOW, max_examples=25)
+@settings(SLOW, max_examples=min(25, EXAMPLES))
 @given(state=states())
 def test_every_panel_has_words_for_it(state):
     picture = LiveModel().evaluate(state)
@@ -127,7 +128,7 @@ def test_every_panel_has_words_for_it(state):
         assert not {"nan", "inf"} & set(html.replace("<", " ").replace(">", " ").split())
 
 
-@settings(SLOW, max_examples=25)
+@settings(SLOW, max_examples=min(25, EXAMPLES))
 @given(scene=scenes())
 def test_what_is_drawn_can_be_picked(scene):
     state = replace(start_state(scene), nodes=SIDE_NODES)
@@ -140,7 +141,7 @@ def test_what_is_drawn_can_be_picked(scene):
     assert LiveModel().evaluate(with_picked(state, found[0])).state.picked == found[0]
 
 
-@settings(SLOW, max_examples=15)
+@settings(SLOW, max_examples=min(15, EXAMPLES))
 @given(scene=scenes())
 def test_every_scene_is_exported(scene):
     picture = evaluate_picture(scene, grid=SIDE_NODES)

@@ -1,7 +1,7 @@
 """What holds for sampled machines whatever the machine, the loop and the seed."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan, reduce_nodes
@@ -28,7 +28,6 @@ def run(chain, loop, scale, **plan):
     return montecarlo(Case(model, draws, Workspace(ranges), View(loop), SamplingPlan(**plan)))
 
 
-@settings(max_examples=30)
 @given(
     st.sampled_from(CHAINS),
     st.sampled_from([Loop.TOOL, Loop.RELATIVE]),
@@ -47,7 +46,6 @@ def test_errors_scale_with_the_tolerance_and_quantiles_are_in_order(chain, loop,
     assert 0.0 <= kept.low <= kept.probability <= kept.high <= 1.0
 
 
-@settings(max_examples=30)
 @given(st.integers(1, 400), st.integers(1, 12), st.integers(1, 2000), st.integers(0, 2**32))
 def test_blocks_of_any_size_give_what_one_product_gives(machines, keys, nodes, seed):
     rng = np.random.default_rng(seed)

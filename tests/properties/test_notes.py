@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta
 from functools import reduce
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from products import first
@@ -144,7 +144,6 @@ def notes(**more):
     )  # fmt: skip
 
 
-@settings(max_examples=40)
 @given(
     found=notes(id=st.just("a"), replies=st.lists(REPLIES, max_size=3).map(tuple)),
     versions=st.lists(notes(id=st.just("a")), max_size=2).map(tuple),
@@ -182,7 +181,6 @@ def test_numbers_hold_until_they_are_off_by_more_than_the_printed_digit():
     assert changed_number(then, {"max_um": 51.72}) == "46.0 → nothing µm"
 
 
-@settings(max_examples=40)
 @given(change=st.floats(-20.0, 20.0), x=st.floats(-275.0, 275.0), b=st.floats(-120.0, 30.0))
 def test_a_note_holds_for_its_scene_and_is_stale_where_the_error_at_its_point_changes(change, x, b):
     note = Note(text="x", at={"X": x, "Y": -225.0, "Z": -480.0, "B": b})

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from random_scenes import scenes
@@ -54,7 +54,6 @@ def check(scene, loop, frame):
     np.testing.assert_allclose(exact_found.orientation_urad, exact[1], **close)
 
 
-@settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_fields_of_random_scenes_are_those_of_a_response_and_of_a_chain(data):
     scene = data.draw(scenes(everything=True))
@@ -68,7 +67,6 @@ def test_fields_of_bundled_scenes_are_those_of_a_response_and_of_a_chain(name):
         check(scene, loop, frame)
 
 
-@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_batch_gives_what_a_loop_over_its_points_gives(data):
     scene = data.draw(scenes(everything=True))

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from warpspace import load_scene, scene_names
@@ -30,7 +30,6 @@ def test_every_bundled_scene_reloads_identically(name):
     assert parse_scene(scene_to_toml(scene), name) == scene
 
 
-@settings(max_examples=40)
 @given(
     title=st.text(max_size=60),
     value=finite,

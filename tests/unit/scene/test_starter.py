@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from chains import chains
 from warpspace import evaluate
@@ -30,7 +30,6 @@ LYING = ["wBZFXYt", "wXBFZYt", "wBFXYZt", "wBYFXZt", "wBAFXYZt", "wBXYZFt", "wBZ
 """With a table B under the workpiece: horizontal machining centres, Y upright."""
 
 
-@settings(max_examples=60)
 @given(chains())
 def test_every_chain_gives_a_scene_that_bends(chain):
     scene = starter_scene(chain)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import yourdfpy
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chains import models
@@ -41,7 +41,6 @@ def in_si(machine, at):
     return {name: q / 1000.0 if linear[name] else np.deg2rad(q) for name, q in at.items()}
 
 
-@settings(max_examples=30)
 @given(models(), st.randoms(use_true_random=False))
 def test_an_exported_machine_has_the_poses_of_yourdfpy(model, random):
     machine = model.machine
@@ -83,7 +82,6 @@ def robots(draw):
     )
 
 
-@settings(max_examples=30)
 @given(robots(), st.randoms(use_true_random=False))
 def test_an_imported_robot_has_the_poses_of_yourdfpy(tmp_path_factory, text, random):
     path = tmp_path_factory.mktemp("urdf") / "robot.urdf"
@@ -106,7 +104,6 @@ def test_an_imported_robot_has_the_poses_of_yourdfpy(tmp_path_factory, text, ran
     assert found_mm == pytest.approx(pose_by_yourdfpy_mm(robot, si), abs=SINGLE_PRECISION_MM)
 
 
-@settings(max_examples=30)
 @given(models())
 def test_a_machine_comes_back_with_its_names_and_places(model):
     machine = model.machine
