@@ -10,7 +10,7 @@ from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
-from warpspace.picture.formatting import own_axes, spell_at, spell_point
+from warpspace.picture.formatting import point_axes, spell_at, spell_point
 from warpspace.picture.model import (
     DIFFERENCE_LENGTH,
     Exaggeration,
@@ -78,39 +78,39 @@ def statistics_change(a: Statistics, b: Statistics) -> dict[str, float]:
 
 
 def statistics_blocks(
-    scene: Scene, names: Sequence[str], found: Sequence[Statistics]
+    scene: Scene, names: Sequence[str], fields: Sequence[Statistics]
 ) -> Iterator[Block]:
     """Say the statistics of fields over one volume, and where each is largest."""
     columns = [Column("|E|" if len(names) > 1 else "", leads=True)]
     columns += number_columns(names, unit="µm")
-    change = statistics_change(*found[:2]) if len(names) == 2 else {}
+    change = statistics_change(*fields[:2]) if len(names) == 2 else {}
     if change:
         columns.append(Column(CHANGE, "+.2f", "µm", joins=True))
-    if len(found) > len(names):
+    if len(fields) > len(names):
         columns.append(Column(DIFFERENCE_LENGTH, ".2f", "µm", joins=True))
     rows = [
         (
-            name, *(getattr(one, key) for one in found[: len(names)]),
+            name, *(getattr(one, key) for one in fields[: len(names)]),
             *([change[key]] if change else []),
-            *(getattr(one, key) for one in found[len(names) :]),
+            *(getattr(one, key) for one in fields[len(names) :]),
         )
         for name, key in STATISTICS.items()
     ]  # fmt: skip
     yield Table(tuple(columns), rows)
-    for name, part in zip((*names, DIFFERENCE_LENGTH), found, strict=False):
+    for name, part in zip((*names, DIFFERENCE_LENGTH), fields, strict=False):
         if part.max_um > 0.0:
-            worst = own_axes(scene, part.max_at_axes)
+            worst = point_axes(scene, part.max_at_axes)
             yield f"  max of {name} at {spell_point(worst, part.max_at_mm)} mm"
             yield f"  --at {spell_at(worst)}"
 
 
 def conditions_of_both(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
     """Say the conditions of two pictures: those of one with its letter, common ones once."""
-    own = [
+    distinct = [
         *(f"A {words}" for words in a if words not in b),
         *(f"B {words}" for words in b if words not in a),
     ]
-    return (*own, *(words for words in a if words in b))
+    return (*distinct, *(words for words in a if words in b))
 
 
 def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
@@ -142,11 +142,11 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
 
 
 def share_exaggeration(
-    pictures: Sequence[ScenePicture], wanted: Exaggeration
+    pictures: Sequence[ScenePicture], exaggeration: Exaggeration
 ) -> tuple[ScenePicture, ...]:
     """Give pictures one display factor: what is asked for, the first scene's, or a round one."""
     factor = choose_exaggeration(
-        wanted,
+        exaggeration,
         pictures[0].scene.exaggeration,
         max(picture.statistics.max_um for picture in pictures),
         max(picture.size_mm for picture in pictures),

@@ -29,7 +29,7 @@ def list_axes(at: Mapping[str, SupportsFloat]) -> str:
     return " ".join(f"{name} {spell_coordinate(q)}{units[name]}" for name, q in at.items())
 
 
-def own_axes(scene: Scene, at: Mapping[str, float]) -> dict[str, float]:
+def point_axes(scene: Scene, at: Mapping[str, float]) -> dict[str, float]:
     """Choose the axes that name a point: the linear ones, and those not at their scene's place."""
     placed = scene.workspace.positions
     return {
@@ -76,24 +76,24 @@ def u95_behind(u95: float | None) -> str:
     return f" {plus_minus(u95, '.2g' if u95 and u95 < 0.95 else '.1f')}"
 
 
-def length_words(found: FieldUncertainty | None, point: int = 0) -> str:
+def length_words(uncertainty: FieldUncertainty | None, point: int = 0) -> str:
     """Say U95 of |E| at a point of a field, by its flat number; empty where none is stated."""
-    return u95_behind(found.u95_at(point)) if found else ""
+    return u95_behind(uncertainty.u95_at(point)) if uncertainty else ""
 
 
 def beyond_words(scene: Scene, loop: Loop) -> str:
     """Say where axes of a loop stood at no time while a scene was measured: ``Z below −300``."""
     reach = scene.covariance.measured_range if scene.covariance else {}
     axes = loop_axes(scene.model, loop)
-    said: list[str] = []
+    ranges: list[str] = []
     for axis, (low, high) in reach.items():
         first, last = scene.workspace.ranges[axis]
         if axis in axes and first == last and not low <= first <= high:
-            said.append(f"{axis} at {spell_coordinate(first)}")
+            ranges.append(f"{axis} at {spell_coordinate(first)}")
         elif axis in axes:
-            said += [f"{axis} below {spell_coordinate(low)}"] if first < low else []
-            said += [f"{axis} above {spell_coordinate(high)}"] if last > high else []
-    return f"never measured: {', '.join(said)}" if said else ""
+            ranges += [f"{axis} below {spell_coordinate(low)}"] if first < low else []
+            ranges += [f"{axis} above {spell_coordinate(high)}"] if last > high else []
+    return f"never measured: {', '.join(ranges)}" if ranges else ""
 
 
 TIMES = "\N{MULTIPLICATION SIGN}"

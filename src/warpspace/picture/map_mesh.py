@@ -41,14 +41,14 @@ class MapPatch:
     values: Array
     drawn_of: Topology
     lifts: tuple[float, ...]
-    ways: Array  # direction of each axis of the grid, +1 or −1: an axis may run against its name
+    directions: Array  # direction of each axis of the grid, +1 or −1: an axis may run against its name
     faded: NDArray[np.bool_] | None = None
 
     def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
         """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
         ends = self.drawn_mm.reshape(-1, 3).take(segments, axis=0).astype(np.float32)
         return [
-            ends + (outwards * (lift * times * self.ways)).astype(np.float32) for lift in self.lifts
+            ends + (outwards * (lift * times * self.directions)).astype(np.float32) for lift in self.lifts
         ]
 
 
@@ -57,11 +57,11 @@ def map_parts(picture: Picture) -> list[MapPatch]:
     lift = LIFT * picture.size_mm
     lifts = (lift, -lift) if picture.slices else (lift,)
     parts: list[MapPatch] = []
-    for one in picture.slices or (picture,):
-        drawn_mm, values = thick_nodes(one, one.drawn_mm), spread(one.values)
-        faded = None if one.faded is None else spread(one.faded)
-        drawn_of = topology(values.shape, cut=one.cut)
-        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, one.grid.ways, faded))
+    for section in picture.slices or (picture,):
+        drawn_mm, values = thick_nodes(section, section.drawn_mm), spread(section.values)
+        faded = None if section.faded is None else spread(section.faded)
+        drawn_of = topology(values.shape, cut=section.cut)
+        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, section.grid.ways, faded))
     return parts
 
 
@@ -93,34 +93,34 @@ def map_mesh(picture: Picture) -> MapMesh:
 
 def line_mesh(picture: Picture, *, grid: bool = True) -> MapMesh:
     """Give the lines of a map alone: those of its grid too, or only its edges."""
-    found: list[tuple[MapPatch, Index, Index]] = []
+    patches: list[tuple[MapPatch, Index, Index]] = []
     for part in map_parts(picture):
         segments = part.drawn_of.edge_segments
         if grid:
             segments = np.concatenate([part.drawn_of.grid_segments, segments])
         used, numbered = np.unique(segments, return_inverse=True)
-        found.append((part, used, numbered.reshape(-1, 2)))
-    return _collect(found)
+        patches.append((part, used, numbered.reshape(-1, 2)))
+    return _collect(patches)
 
 
-def _collect(found: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
-    vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in found]
-    values = [part.values.reshape(-1).take(used) for part, used, _ in found]
-    faded = [part.faded.reshape(-1)[at] for part, at, _ in found if part.faded is not None]
-    where = np.concatenate(faded) if faded else None  # all parts have it, or none
-    if len(found) == 1:
-        return MapMesh(vertices[0], found[0][2], values[0], where)
+def _collect(patches: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
+    vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in patches]
+    values = [part.values.reshape(-1).take(used) for part, used, _ in patches]
+    faded = [part.faded.reshape(-1)[at] for part, at, _ in patches if part.faded is not None]
+    fading = np.concatenate(faded) if faded else None  # all parts have it, or none
+    if len(patches) == 1:
+        return MapMesh(vertices[0], patches[0][2], values[0], fading)
     first = np.cumsum([0, *map(len, vertices)])
-    cells = [cells + at for (_, _, cells), at in zip(found, first, strict=False)]
-    return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values), where)
+    cells = [cells + at for (_, _, cells), at in zip(patches, first, strict=False)]
+    return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values), fading)
 
 
 def grid_pieces(picture: Picture) -> Pieces:
     """Collect the grid lines on a map, [S, 2, 3], mm."""
-    found: list[Pieces] = []
+    lines: list[Pieces] = []
     for part in map_parts(picture):
-        found += part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
-    return _joined(found)
+        lines += part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
+    return _joined(lines)
 
 
 def edge_pieces(picture: Picture) -> Pieces:
@@ -136,24 +136,24 @@ def edge_pieces(picture: Picture) -> Pieces:
 def isoline_pieces(picture: Picture) -> Pieces:
     """Collect the lines of equal value on a map, at the ticks of its scale, [S, 2, 3], mm."""
     levels = isoline_levels(picture.scale)
-    found: list[Pieces] = []
+    lines: list[Pieces] = []
     for part in map_parts(picture):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
-        normals = part.drawn_of.normals * part.ways
-        found += [
+        normals = part.drawn_of.normals * part.directions
+        lines += [
             (np.stack([line[:-1], line[1:]], axis=1) + off).astype(np.float32)
             for lift in part.lifts
             for face, off in zip(part.drawn_of.faces, ISOLINE_LIFT * lift * normals, strict=True)
             for _, line in isolines(face, nodes, values, levels)
         ]
-    return _joined(found)
+    return _joined(lines)
 
 
 def _joined(parts: list[Pieces]) -> Pieces:
-    kept = [part for part in parts if len(part)]
-    if not kept:
+    nonempty = [part for part in parts if len(part)]
+    if not nonempty:
         return np.zeros((1, 2, 3), np.float32)
-    return kept[0] if len(kept) == 1 else np.concatenate(kept)
+    return nonempty[0] if len(nonempty) == 1 else np.concatenate(nonempty)
 
 
 # Where they stand, so that few of them say what each line means.
@@ -177,20 +177,20 @@ class IsolineLabel:
 def isoline_labels(picture: Picture) -> list[IsolineLabel]:
     """Choose where the lines of equal value carry their value: one on each face or slice."""
     levels = isoline_levels(picture.scale)
-    found: list[IsolineLabel] = []
+    lines: list[IsolineLabel] = []
     for part in map_parts(picture):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
-        normals = part.drawn_of.normals * part.ways
+        normals = part.drawn_of.normals * part.directions
         for face, normal in zip(part.drawn_of.faces, normals, strict=True):
             longest: dict[float, IsolineLabel] = {}
             for value, line in isolines(face, nodes, values, levels):
                 at, length = _part_way(line, ALONG_SLICE if picture.slices else 0.5)
                 if length > (longest[value].length_mm if value in longest else 0.0):
                     longest[value] = IsolineLabel(value, at, normal, length)
-            found += longest.values()
+            lines += longest.values()
     least = LEAST_LENGTH * picture.size_mm
-    kept = [label for label in found if label.length_mm >= least]
-    return sorted(kept, key=lambda label: -label.length_mm)[:MOST_LABELS]
+    long_enough = [label for label in lines if label.length_mm >= least]
+    return sorted(long_enough, key=lambda label: -label.length_mm)[:MOST_LABELS]
 
 
 def _part_way(line: Array, share: float) -> tuple[Array, float]:

@@ -165,22 +165,22 @@ class Picture:
     @cached_property
     def u95_um(self) -> Array | None:
         """U95 of the component of position errors, [nx, ny, nz]; None where it is not known."""
-        found = self.uncertainty
-        if found is None or not found.errors.is_known:
+        uncertainty = self.uncertainty
+        if uncertainty is None or not uncertainty.errors.is_known:
             return None
         if self.component == "norm":
-            return found.u95_norm_um
-        return component_values(found.u95_um, self.component)
+            return uncertainty.u95_norm_um
+        return component_values(uncertainty.u95_um, self.component)
 
     @cached_property
     def faded(self) -> NDArray[np.bool_] | None:
         """Where colours fade: nothing is sure there, [nx, ny, nz]; None if they do not."""
-        found = self.uncertainty
-        if found is None or self.u95_um is None or self.tilts:
+        uncertainty = self.uncertainty
+        if uncertainty is None or self.u95_um is None or self.tilts:
             return None
         if self.limit_um is not None:
-            kept = found.keeps(self.limit_um)
-            return (kept > 1.0 - SURE) & (kept < SURE)
+            probability = uncertainty.keeps(self.limit_um)
+            return (probability > 1.0 - SURE) & (probability < SURE)
         if not self.significant:
             return None
         return np.abs(coloured_values(self.field, self.component)) <= self.u95_um
@@ -235,22 +235,22 @@ def same_nodes(one_mm: Array, other_mm: Array) -> bool:
     )
 
 
-def subtract_pictures(one: P, other: Picture) -> P:
-    if not same_nodes(one.grid.nominal_mm, other.grid.nominal_mm):
+def subtract_pictures(minuend: P, subtrahend: Picture) -> P:
+    if not same_nodes(minuend.grid.nominal_mm, subtrahend.grid.nominal_mm):
         raise OptionError("the working volumes are not the same: there is no difference")
-    quantity = "position" if one.quantity == "uncertainty" else one.quantity
+    quantity = "position" if minuend.quantity == "uncertainty" else minuend.quantity
     return replace(
-        one, field=one.field - other.field, quantity=quantity, uncertainty=None, colours=None,
+        minuend, field=minuend.field - subtrahend.field, quantity=quantity, uncertainty=None, colours=None,
         is_difference=True,
     )  # fmt: skip
 
 
 def subtract_traces(
-    one: Sequence[TraceLines], other: Sequence[TraceLines]
+    minuends: Sequence[TraceLines], subtrahends: Sequence[TraceLines]
 ) -> tuple[TraceLines, ...]:
     return tuple(
         replace(first, error_um=first.error_um - second.error_um)
-        for first, second in zip(one, other, strict=False)
+        for first, second in zip(minuends, subtrahends, strict=False)
         if same_nodes(first.nominal_mm, second.nominal_mm)
     )
 
@@ -298,24 +298,24 @@ Exaggeration = float | Literal["auto"] | None
 """A display factor, "auto" for a round one that suits the errors, None for what the scene says."""
 
 
-def given_exaggeration(wanted: Exaggeration, own: float | None) -> float | None:
+def fixed_exaggeration(requested: Exaggeration, scene_factor: float | None) -> float | None:
     """Give the factor that is asked for, else the scene's own; None where one is to be chosen."""
-    factor = own if wanted is None else wanted
+    factor = scene_factor if requested is None else requested
     if factor is None or factor == "auto":
         return None
     low, high = EXAGGERATION
     if not low <= factor <= high:  # nor is NaN
-        found = f"exaggeration {factor:g}; expected auto or a number above 0"
-        raise OptionError(f"{found}, from {low:g} to {high:,.0f}")
+        problem = f"exaggeration {factor:g}; expected auto or a number above 0"
+        raise OptionError(f"{problem}, from {low:g} to {high:,.0f}")
     return float(factor)
 
 
 def choose_exaggeration(
-    wanted: Exaggeration, own: float | None, largest_um: float, size_mm: float
+    requested: Exaggeration, scene_factor: float | None, largest_um: float, size_mm: float
 ) -> float:
     """Choose the display factor of a picture, or of several that share one."""
-    given = given_exaggeration(wanted, own)
-    return surfaces.auto_exaggeration(largest_um, size_mm) if given is None else given
+    fixed = fixed_exaggeration(requested, scene_factor)
+    return surfaces.auto_exaggeration(largest_um, size_mm) if fixed is None else fixed
 
 
 LEAST_SIZE_MM = 100.0  # of a single point without traces, on a machine without linear axes
@@ -392,15 +392,15 @@ class ScenePicture(Picture):
 
 
 def field_remarks(scene: Scene, view: View, *, exact: bool = False) -> dict[str, str]:
-    held = view.reference
+    reference = view.reference
     placement = {} if view.placed_over is None else {"placement": "fitted out"}
     return {
         "scene": scene.name,
         "loop": str(view.loop),
         **placement,
         "reference": "absolute"
-        if held is None
-        else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
+        if reference is None
+        else " ".join(f"{axis}={at:g}" for axis, at in reference.items()),
         "component_errors": _one_text(scene.model.convention_value),
         "model": "exact chain" if exact else "first order",
         "program": f"warpspace {__version__}",

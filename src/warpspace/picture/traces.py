@@ -34,8 +34,8 @@ class Trace:
     @property
     def label(self) -> str:
         """Name for legends, for instance ``C 0…360° at B −30°``."""
-        held = ", ".join(f"{name} {value:g}°" for name, value in self.at.items())
-        return f"over {self.axis}" + (f" at {held}" if held else "")
+        positions = ", ".join(f"{name} {value:g}°" for name, value in self.at.items())
+        return f"over {self.axis}" + (f" at {positions}" if positions else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def build_traces(
     points_mm: Sequence[Vector],
     positions: Mapping[str, float],
     samples: int = SAMPLES,
-    held: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, Sequence[float]] | None = None,
 ) -> tuple[TraceGroup, ...]:
     """Lay the traces of points over every rotary axis of a machine."""
     groups: list[TraceGroup] = []
@@ -63,11 +63,11 @@ def build_traces(
         rotary = [axis.name for axis in model.machine.branch(side) if not axis.is_linear]
         if not rotary or not points_mm:
             continue
-        found = [
+        traces = [
             trace
             for point in points_mm
             for axis in rotary
-            for trace in _traces_of(model, axis, rotary, point, positions, held or {})
+            for trace in _traces_of(model, axis, rotary, point, positions, fixed or {})
         ]
         coordinates = {name: np.asarray(positions.get(name, 0.0), dtype=float) for name in axes}
         for name in rotary:
@@ -76,12 +76,12 @@ def build_traces(
             coordinates[name] = np.stack(
                 [
                     turn if trace.axis == name else np.full(samples, trace.at[name])
-                    for trace in found
+                    for trace in traces
                 ]
             )
-        points = np.array([trace.point_mm for trace in found])[:, None, :]
+        points = np.array([trace.point_mm for trace in traces])[:, None, :]
         nominal = transforms.apply(branch_pose(model, side, coordinates), points)
-        groups.append(TraceGroup(loop, tuple(found), coordinates, nominal))
+        groups.append(TraceGroup(loop, tuple(traces), coordinates, nominal))
     return tuple(groups)
 
 
@@ -91,24 +91,24 @@ def _traces_of(
     rotary: Sequence[str],
     point: Vector,
     positions: Mapping[str, float],
-    chosen: Mapping[str, Sequence[float]],
+    fixed: Mapping[str, Sequence[float]],
 ) -> list[Trace]:
     low, high = model.machine.axes[axis].travel
     closed = high - low >= FULL_TURN_DEG
-    held = {name: positions.get(name, 0.0) for name in rotary if name != axis}
+    standing = {name: positions.get(name, 0.0) for name in rotary if name != axis}
     before, after = rotary[: rotary.index(axis)], rotary[rotary.index(axis) + 1 :]
     neighbour = before[-1] if before else (after[0] if after else "")
-    if chosen.get(neighbour):
-        return [Trace(axis, point, {**held, neighbour: at}, closed) for at in chosen[neighbour]]
+    if fixed.get(neighbour):
+        return [Trace(axis, point, {**standing, neighbour: at}, closed) for at in fixed[neighbour]]
     if not before:
-        return [Trace(axis, point, held, closed)]
+        return [Trace(axis, point, standing, closed)]
     tilting = before[-1]
     first, last = model.machine.axes[tilting].travel
-    here = positions.get(tilting, 0.0)
+    centre = positions.get(tilting, 0.0)
     tilts = sorted(
-        {here, *(at for at in (here - TILT_STEP_DEG, here + TILT_STEP_DEG) if first <= at <= last)}
+        {centre, *(at for at in (centre - TILT_STEP_DEG, centre + TILT_STEP_DEG) if first <= at <= last)}
     )
-    return [Trace(axis, point, {**held, tilting: tilt}, closed) for tilt in tilts]
+    return [Trace(axis, point, {**standing, tilting: tilt}, closed) for tilt in tilts]
 
 
 @dataclass(frozen=True)
@@ -188,23 +188,23 @@ def is_moved(line: TraceLine) -> bool:
 
 def name_trace(trace: Trace) -> str:
     """Name a trace: ``C at B −30°, point (275, 0, 0) mm``."""
-    held = ", ".join(f"{axis} {spell_short(value)}°" for axis, value in trace.at.items())
+    positions = ", ".join(f"{axis} {spell_short(value)}°" for axis, value in trace.at.items())
     point = ", ".join(map(spell_short, trace.point_mm))
-    return f"{trace.axis}{f' at {held}' if held else ''}, point ({point}) mm"
+    return f"{trace.axis}{f' at {positions}' if positions else ''}, point ({point}) mm"
 
 
 def evaluate_axis_motion(
     scene: Scene, line: TraceLine, evaluate: Callable[..., ErrorField] = evaluate_first_order
 ) -> AxisMotion | None:
     trace = line.trace
-    found = build_traces(
+    groups = build_traces(
         scene.model,
         (trace.point_mm,),
         {**scene.workspace.positions, **trace.at},
         MOTION_SAMPLES,
         {name: (at,) for name, at in trace.at.items()},
     )
-    group = next((g for g in found if g.loop is line.loop and trace in g.traces), None)
+    group = next((g for g in groups if g.loop is line.loop and trace in g.traces), None)
     if group is None:
         return None
     number = group.traces.index(trace)
@@ -222,7 +222,7 @@ def evaluate_axis_motion(
     return axis_motion(nominal, coordinates[trace.axis], on_axis, above, closed=trace.closed)
 
 
-WORDS = {1: "once a turn", 2: "twice a turn"}
+PERIODS = {1: "once a turn", 2: "twice a turn"}
 POSITIVE = {
     "radial": "towards the point",
     "axial": "along the axis",
@@ -254,4 +254,4 @@ def motion_lines(name: str, motion: AxisMotion, part: ErrorMotion) -> Lines:
 
 def turn_words(times: int | None) -> str:
     """Say how often a deviation comes back: ``twice a turn``; a dash where it does not vary."""
-    return "–" if times is None else WORDS.get(times, f"{times} times a turn")
+    return "–" if times is None else PERIODS.get(times, f"{times} times a turn")

@@ -124,11 +124,11 @@ class FigureSettings:
             raise OptionError(f"component {self.component!r}; expected one of {expected}")
         if self.view not in model.VIEWS:
             raise OptionError(f"view {self.view!r}; expected one of {', '.join(model.VIEWS)}")
-        model.given_exaggeration(self.exaggeration, None)
+        model.fixed_exaggeration(self.exaggeration, None)
         low, high = RANGE_TOP
         if self.range_top is not None and not low <= self.range_top <= high:
-            found = f"range_top {self.range_top:g}; expected a number above 0"
-            raise OptionError(f"{found}, from {low:g} to {high:,.0f}")
+            problem = f"range_top {self.range_top:g}; expected a number above 0"
+            raise OptionError(f"{problem}, from {low:g} to {high:,.0f}")
         check_size(self.size)
 
     @property

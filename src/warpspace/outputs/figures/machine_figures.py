@@ -64,7 +64,7 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     ]
     sheet = start_sheet("machine", settings, title, facts, scenes, legend, exact=exact)
     canvas, (left, bottom, right, top) = sheet.canvas, sheet.content
-    points = [map3d.map_room_mm(picture), *(part.vertices_mm for part in placed)]
+    points = [map3d.map_points_mm(picture), *(part.vertices_mm for part in placed)]
     side = canvas.px(20.0)
     room = (left + side, bottom + side, right - canvas.px(150.0), top - side)
     projection = off_screen.fit_projection(settings.view, np.concatenate(points), room)

@@ -305,7 +305,7 @@ def _draw_needles(needles: Needles, stage: map3d.Stage) -> None:
     ):
         lines, _ = stage.split(ends)
         stage.canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
-        stage.taken.add_lines(lines)
+        stage.occupancy.add_lines(lines)
     found = surfaces.corners(stage.picture.shape)
     for corner, ends in zip(found, needles.ends_mm(nodes, found)[1], strict=True):
         if stage.split([ends])[0]:

@@ -90,10 +90,10 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
     bar, step = canvas.px(28.0), canvas.px(112.0)
     for name, drawn in (("A and B", maps[0]), (CHANGE, maps[2])):
         room, scale = 0.9 * step, drawn.picture.scale
-        canvas.text(left, top, name, size=SIZES.heading, weight="bold", va="top", room=room)
+        canvas.text(left, top, name, size=SIZES.heading, weight="bold", va="top", max_width=room)
         label = "" if canvas.printed else f"{scale.label}  "
         what, high = f"{label}[{scale.unit}]", top - canvas.px(26.0)
-        canvas.text(left, high, what, size=SIZES.small, va="top", room=room)
+        canvas.text(left, high, what, size=SIZES.small, va="top", max_width=room)
         box = (left, bottom + canvas.px(20.0), left + bar, top - canvas.px(62.0))
         draw_colour_bar(canvas, box, scale)
         left += step
@@ -242,7 +242,7 @@ def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> No
     room = right - left - canvas.px(16.0)
     x, scene, found = left + canvas.px(8.0), concept.scene, concept.sampled
     head, high = f"{letter}  {scene.title}", top - canvas.px(4.0)
-    canvas.text(x, high, head, size=SIZES.heading, weight="bold", va="top", room=room)
+    canvas.text(x, high, head, size=SIZES.heading, weight="bold", va="top", max_width=room)
     numbers = [
         f"mean {spell(found.mean_um)} µm",
         f"P95 {spell(found.p95_um)} µm",
@@ -258,4 +258,4 @@ def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> No
     lines = (" · ".join(shares), " · ".join(numbers), f"chain {scene.machine.chain}")
     for index, line in enumerate(lines[-1:] if canvas.printed else lines):
         y = bottom + canvas.px(10.0 + 21.0 * index)
-        canvas.text(x, y, line, size=SIZES.small, colour=canvas.theme.muted, room=room)
+        canvas.text(x, y, line, size=SIZES.small, colour=canvas.theme.muted, max_width=room)

@@ -22,7 +22,7 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.report.templating import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
-from warpspace.picture.formatting import TIMES, list_axes, own_axes, spell_in_r, u95_behind
+from warpspace.picture.formatting import TIMES, list_axes, point_axes, spell_in_r, u95_behind
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import spell, spell_short, spell_signed
@@ -114,7 +114,7 @@ class Reviewed:
     def worst_axes(self) -> str:
         """Spell where the axes stand at the worst point."""
         found = self.statistics
-        return list_axes(own_axes(self.scene, found.max_at_axes)) or spell_in_r(found.max_at_mm)
+        return list_axes(point_axes(self.scene, found.max_at_axes)) or spell_in_r(found.max_at_mm)
 
     @property
     def volume(self) -> str:

@@ -50,7 +50,7 @@ from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.formatting import (
     convention_sentences,
     list_axes,
-    own_axes,
+    point_axes,
     reference_words,
     spell_factor,
     spell_point,
@@ -377,7 +377,7 @@ def explanation(reviewed: Reviewed) -> Table:
     rows.append(("remainder", "second order", "", *remainder, ""))
     rows.append(("total", "exact chain", "", *map(spell_signed, found.error_um), ""))
     worst = reviewed.statistics
-    place = spell_point(own_axes(reviewed.scene, worst.max_at_axes), worst.max_at_mm)
+    place = spell_point(point_axes(reviewed.scene, worst.max_at_axes), worst.max_at_mm)
     title = (
         f"{reviewed.titled(reviewed.scene.title)}. What each error does to the worst point,"
         f" {place} mm. The parts along E add up to the length of the first-order error."
