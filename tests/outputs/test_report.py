@@ -42,7 +42,9 @@ def page_one(*scenes, **changes):
     review = build_review(scenes, replace(FAST, **changes))
     blocks = first_page(review, Text("the map", "body"))
     words = [str(astuple(block)) for block in blocks]
-    return plain(" | ".join(words)).replace("\\xa0", " "), [one.within for one in review.scenes]
+    return plain(" | ".join(words)).replace("\\xa0", " "), [
+        one.share_within for one in review.scenes
+    ]
 
 
 def test_verdict_on_a_limit_that_is_missed():
@@ -107,7 +109,7 @@ def test_verdicts_on_two_stand_in_one_table():
 def test_rows_of_zeros_are_counted_and_errors_that_are_zero():
     columns = (Column("key"), *number_columns(("x", "y")))
     rows = [("a", 0.0, 0.001), ("b", 0.0, 0.2), ("c", None, None)]
-    table, none = sections.said(
+    table, none = sections.report_blocks(
         [Table(columns, rows, "Of errors.", marks=("", "worse", "key")), Table(columns, rows[:1])]
     )
     assert [row[0] for row in table.rows] == ["b", "c"]

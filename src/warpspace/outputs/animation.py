@@ -23,7 +23,7 @@ from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, e
 from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
 from warpspace.outputs.figure_files import figure_bytes
 from warpspace.outputs.figures.machine_figures import draw_bodies
-from warpspace.outputs.figures.maps import isoline_words, say_statistics
+from warpspace.outputs.figures.maps import draw_statistics, isoline_words
 from warpspace.outputs.file_output import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
 from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
@@ -89,7 +89,7 @@ def _exaggeration_frame(scene: Scene, figure: FigureSettings, phase: float) -> D
     sheet = start_sheet("exaggeration", figure, title, facts, [scene], legend, exact=True)
     camera = fit_map(sheet.canvas, [picture, largest], sheet.content, figure.view)
     drawn = draw_map(sheet.canvas, picture, sheet.content, figure.view, projection=camera)
-    say_statistics(sheet, picture, camera.px_per_mm)
+    draw_statistics(sheet, picture, camera.px_per_mm)
     return sheet.finish(factor, [drawn])
 
 

@@ -42,8 +42,8 @@ def check_target(
             raise OutputError(f"{target}: is no regular file; expected the name of a file")
         ending = target.suffix.lower()
         if endings and ending not in endings:
-            given = f"unknown ending {ending!r}" if ending else "no ending"
-            raise OutputError(f"{target}: {given}; expected one of {', '.join(endings)}")
+            ending_problem = f"unknown ending {ending!r}" if ending else "no ending"
+            raise OutputError(f"{target}: {ending_problem}; expected one of {', '.join(endings)}")
         if exists:
             for source in inputs:
                 if _is_same(target, source):
@@ -169,8 +169,8 @@ def temporary_prefix() -> str:
 def clear_leftovers(folder: Path) -> None:
     """Remove the temporary files in a folder whose process has ended."""
     with suppress(OSError), os.scandir(folder) as entries:
-        found = [Path(entry.path) for entry in entries if _NAME.match(entry.name)]
-        for path in found:
+        temporaries = [Path(entry.path) for entry in entries if _NAME.match(entry.name)]
+        for path in temporaries:
             with suppress(OSError):
                 if _is_left_over(path):
                     if stat.S_ISDIR(path.lstat().st_mode):

@@ -185,16 +185,16 @@ def _work(pipe: "Connection[Any, Any]") -> None:
         except (EOFError, OSError):  # nobody is there any more
             os._exit(0)  # at once: Python takes 0.3 s to take a renderer down
         except Exception as error:  # noqa: BLE001 - something that cannot be read
-            found = None, error
+            outcome = None, error
         else:
-            found = _outcome(*task)
+            outcome = _outcome(*task)
         try:
-            pipe.send(found)
+            pipe.send(outcome)
         except OSError:
             return
         except Exception as error:  # noqa: BLE001 - something that cannot be sent
             pipe.send((None, error))
-        del found
+        del outcome
 
 
 def _outcome(

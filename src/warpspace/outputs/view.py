@@ -30,7 +30,7 @@ def draw_view(
     marks: Mapping[str, float],
     rows: Sequence[Row],
     bars: tuple[float, float] | None,  # px of a millimetre, display factor; None for no scale bars
-    words: Sequence[tuple[str, Array]],  # each beside a point, [2], px from the left bottom
+    labels: Sequence[tuple[str, Array]],  # each beside a point, [2], px from the left bottom
     dark: bool,
 ) -> bytes:
     """Draw it as a PNG."""
@@ -46,12 +46,16 @@ def draw_view(
               float(height))  # fmt: skip
     sheet = Sheet("view", canvas, title, drawn, column, (), FigureSettings(dark=dark))
     sheet.draw_panel(scale, f"{scale.label} [{scale.unit}]", list(marks.items()), rows, bars)
-    taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    occupancy = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     if pixels.shape[2] == 4:
-        taken.add_mask(pixels[..., 3] > 127, drawn)
-    for text, spot in words:
-        placed = write_label(canvas, text, [spot], drawn, taken)
+        occupancy.add_mask(pixels[..., 3] > 127, drawn)
+    for text, spot in labels:
+        placed = write_label(canvas, text, [spot], drawn, occupancy)
         if placed is not None and placed.distance > canvas.px(LEADER_FROM):
             draw_leader(canvas, placed, canvas.theme.ink)
-    said = {"Title": title, "Software": f"warpspace {__version__}", "Description": "; ".join(facts)}
-    return encode_figure(canvas.figure, "png", said)
+    facts_text = {
+        "Title": title,
+        "Software": f"warpspace {__version__}",
+        "Description": "; ".join(facts),
+    }
+    return encode_figure(canvas.figure, "png", facts_text)

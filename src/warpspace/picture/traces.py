@@ -106,7 +106,10 @@ def _traces_of(
     first, last = model.machine.axes[tilting].travel
     centre = positions.get(tilting, 0.0)
     tilts = sorted(
-        {centre, *(at for at in (centre - TILT_STEP_DEG, centre + TILT_STEP_DEG) if first <= at <= last)}
+        {
+            centre,
+            *(at for at in (centre - TILT_STEP_DEG, centre + TILT_STEP_DEG) if first <= at <= last),
+        }
     )
     return [Trace(axis, point, {**standing, tilting: tilt}, closed) for tilt in tilts]
 

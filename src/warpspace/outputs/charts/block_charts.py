@@ -74,7 +74,9 @@ def sheet(
         (title, TITLE, 0.2, "bold", ground().ink),
         (subtitle, SUBTITLE, 0.5, "normal", ground().muted),
     ):
-        text = figure.text(x_left, 1.0 - down / height, heading, size=size, weight=weight, color=colour)
+        text = figure.text(
+            x_left, 1.0 - down / height, heading, size=size, weight=weight, color=colour
+        )
         text.set(va="top", parse_math=False)  # a $ in what a user calls a scene is a dollar
         wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5:  # smaller, so that it does not run off the sheet
@@ -421,7 +423,10 @@ def histogram_chart(histogram: Histogram) -> Figure:
         }  # fmt: skip
         marks = [*histogram.marks, *([] if limit is None else [("limit", limit)])]
         _mark(axes, [(name, at, *styles.get(name, (ground().ink, "-"))) for name, at in marks])
-        placement = ((0.95, TEXT + 2.0, "bold", ground().ink), (0.83, SMALL, "normal", ground().muted))
+        placement = (
+            (0.95, TEXT + 2.0, "bold", ground().ink),
+            (0.83, SMALL, "normal", ground().muted),
+        )
         for line, (height, size, weight, colour) in zip(histogram.told, placement, strict=False):
             axes.text(
                 0.985, height, line, transform=axes.transAxes, ha="right", va="top", size=size,

@@ -65,7 +65,9 @@ def bench_chart(result: "BenchResult", title: str | None = None) -> Figure:
     columns = 1 if len(charts) == 1 else 2
     rows = -(-len(charts) // columns)
     numbers = NUMBERS_IN + VALUE_IN * (len(result.runs) - 1)
-    quantities = {one.key: (one.name, one.unit) for run in result.runs for one in run.outcome.quantities}
+    quantities = {
+        one.key: (one.name, one.unit) for run in result.runs for one in run.outcome.quantities
+    }
     names = dict(list(quantities.items())[:MOST_NUMBERS])
     # beside one chart, in the place of the fourth one, or below all
     below = 0.2 + LINE_IN * (len(names) + 1) + NOTE_IN * len(result.notes)
@@ -100,7 +102,9 @@ def _numbers(
         figure.text(place, y, run.who, size=SMALL, color=ground().muted, ha="right")
     for key, (name, unit) in names.items():
         rule = y - 0.07 / height
-        figure.add_artist(Line2D([x_left, right], [rule, rule], color=ground().faint, linewidth=0.6))
+        figure.add_artist(
+            Line2D([x_left, right], [rule, rule], color=ground().faint, linewidth=0.6)
+        )
         y -= LINE_IN / height
         figure.text(x_left, y, f"{name} [{unit}]", size=SMALL, color=ground().muted,
                     parse_math=False)  # fmt: skip
@@ -124,7 +128,9 @@ PLANES = ((0, 1), (0, 2), (1, 2))  # axes across and up of each slice
 def compensation_chart(compensation: "Compensation") -> Figure:
     """Draw |E| before, after on the same colours, and what is left on its own, in slices."""
     title = f"Compensation · {compensation.controller.scene.title}"
-    subtitle = f"{compensation.format.title} · loop {compensation.loop} · {compensation.points_words}"
+    subtitle = (
+        f"{compensation.format.title} · loop {compensation.loop} · {compensation.points_words}"
+    )
     planes, fields = _planes(compensation), _fields(compensation)
     with style():
         height = 1.3 + PLANE_IN * max(len(planes), 1)
@@ -155,7 +161,9 @@ def compensation_column(compensation: "Compensation") -> Figure:
         )
         for row, (title_text, field, largest) in zip(axes, _fields(compensation), strict=True):
             place = row[0].get_position()
-            figure.text(place.x0, place.y1 + 0.022, title_text, size=COLUMN_TEXT, color=ground().ink)
+            figure.text(
+                place.x0, place.y1 + 0.022, title_text, size=COLUMN_TEXT, color=ground().ink
+            )
             if not planes:
                 row[0].set_axis_off()
                 continue
@@ -186,7 +194,8 @@ def _planes(compensation: "Compensation") -> list[tuple[int, int]]:
 
 def _fields(compensation: "Compensation") -> Sequence[tuple[str, "ErrorField", float]]:
     before, after = (
-        max(float(field.norm_um.max()), LEAST_UM) for field in (compensation.before, compensation.after)
+        max(float(field.norm_um.max()), LEAST_UM)
+        for field in (compensation.before, compensation.after)
     )
     before_text, after_text = (
         f"mean {one.mean_um:.2f}, max {one.max_um:.2f} µm"
@@ -200,7 +209,11 @@ def _fields(compensation: "Compensation") -> Sequence[tuple[str, "ErrorField", f
 
 
 def _draw_slice(
-    axes: Axes, compensation: "Compensation", field: "ErrorField", plane: tuple[int, int], largest: float
+    axes: Axes,
+    compensation: "Compensation",
+    field: "ErrorField",
+    plane: tuple[int, int],
+    largest: float,
 ) -> AxesImage:
     worst = np.unravel_index(int(np.argmax(compensation.after.norm_um)), compensation.grid.shape)
     across, up = plane

@@ -95,7 +95,9 @@ def _length(line: Array) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
-def _label_position(line: Array, share: float, size: tuple[float, float]) -> tuple[float, float, float]:
+def _label_position(
+    line: Array, share: float, size: tuple[float, float]
+) -> tuple[float, float, float]:
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     spots = share * along[-1] + np.array([-0.5, 0.0, 0.5]) * size[0]
     x, y = (np.interp(spots, along, line[:, axis]) for axis in range(2))

@@ -190,7 +190,9 @@ def _draw(
             _add_body(plotter, body)
         if any(body.shaded for body in bodies):
             light_direction = projection.towards + 1.1 * projection.up - 0.7 * projection.right
-            plotter.add_light(pv.Light(position=tuple(light_direction), focal_point=(0.0, 0.0, 0.0)))
+            plotter.add_light(
+                pv.Light(position=tuple(light_direction), focal_point=(0.0, 0.0, 0.0))
+            )
         camera = plotter.camera
         camera.parallel_projection = True
         camera.position = focus + (1.0 - near) * projection.towards

@@ -212,7 +212,9 @@ def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     y -= canvas.px(14.0)
     for line in _wrap(canvas, facts, max_width):
         y -= canvas.px(24.0)
-        canvas.text(margin, y, line, size=SIZES.subtitle, colour=canvas.theme.muted, max_width=max_width)
+        canvas.text(
+            margin, y, line, size=SIZES.subtitle, colour=canvas.theme.muted, max_width=max_width
+        )
     y -= canvas.px(18.0)
     canvas.line(
         [(margin, y), (canvas.width - margin, y)], width=SIZES.hair, colour=canvas.theme.faint
@@ -295,7 +297,9 @@ def draw_footer(
         "error = actual − nominal",
         "coordinates in the machine frame R",
     ]
-    canvas.text(margin, y, " · ".join(words), size=SIZES.small, colour=theme.muted, max_width=text_width)
+    canvas.text(
+        margin, y, " · ".join(words), size=SIZES.small, colour=theme.muted, max_width=text_width
+    )
     for scene in reversed(scenes if errors else ()):
         y += canvas.px(25.0)
         head = "errors: " if len(scenes) == 1 else f"errors of {scene.name}: "
@@ -392,7 +396,13 @@ class Sheet:
             canvas.text(x_left, height, name, colour=canvas.theme.muted, max_width=room)
         y += len(visible_rows) * step + canvas.px(26.0)
         canvas.text(
-            x_left, top, heading, size=SIZES.heading, weight="bold", va="top", max_width=right - x_left
+            x_left,
+            top,
+            heading,
+            size=SIZES.heading,
+            weight="bold",
+            va="top",
+            max_width=right - x_left,
         )
         high = top - canvas.px(40.0)
         low = max(y, high - canvas.px(560.0))

@@ -60,10 +60,10 @@ class FieldRecord:
         found |= _by_component(vectors) | {"norm_um": self.field.norm_um} | _by_component(tilts)
         for name, values in self.u95.items():
             of, _, unit = name.rpartition("_")
-            more = {name: values}
+            u95_columns = {name: values}
             if values.ndim > len(self.shape):
-                more = _by_component({f"{of}_{frame}_{{}}_{unit}": values})
-            found |= more
+                u95_columns = _by_component({f"{of}_{frame}_{{}}_{unit}": values})
+            found |= u95_columns
         return found
 
     def blocks(self) -> Iterator[dict[str, Array]]:
@@ -132,12 +132,12 @@ def _write_parquet(record: FieldRecord, path: Path) -> None:
 
 
 def _arrays(record: FieldRecord) -> dict[str, Array]:
-    found = record.field
+    field = record.field
     return {
-        "nominal_mm": found.nominal_mm,
-        "error_um": found.error_um,
-        "norm_um": found.norm_um,
-        "orientation_urad": found.orientation_urad,
+        "nominal_mm": field.nominal_mm,
+        "error_um": field.error_um,
+        "norm_um": field.norm_um,
+        "orientation_urad": field.orientation_urad,
         **record.u95,
     }
 

@@ -29,18 +29,18 @@ class ExportFormat:
         return resolve_name(self.write) if isinstance(self.write, str) else self.write
 
 
-_HERE = "warpspace.outputs.exports"
+_PACKAGE = "warpspace.outputs.exports"
 _FORMATS: Registry[ExportFormat] = Registry("export format", {}, key="ending")
 export_formats, register_format = _FORMATS.every, _FORMATS.register
 unregister_format = _FORMATS.unregister
 for _form in (
-    ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.meshes:write_glb"),
-    ExportFormat(".vts", "ParaView", f"{_HERE}.fields:write_vts"),
-    ExportFormat(".csv", "the field", f"{_HERE}.fields:write_csv"),
+    ExportFormat(".glb", "3-D viewers, CAD", f"{_PACKAGE}.meshes:write_glb"),
+    ExportFormat(".vts", "ParaView", f"{_PACKAGE}.fields:write_vts"),
+    ExportFormat(".csv", "the field", f"{_PACKAGE}.fields:write_csv"),
     ExportFormat(
         ".urdf",
         "robot simulators: joints, limits, meshes",
-        f"{_HERE}.urdf_export:write_urdf",
+        f"{_PACKAGE}.urdf_export:write_urdf",
         in_app=False,
         left_out="errors, tolerances, conventions, gantries, working volume, functional points and"
         " view have no place in a URDF file: the machine is nominal",

@@ -64,12 +64,14 @@ def _bent(
     error_um: Array,
     indices: surfaces.Index,
     material: Material,
-    **more: Any,
+    **attributes: Any,
 ) -> GltfNode:
     """Build a part that is drawn displaced; its target leads back to where it nominally is."""
     drawn_mm = surfaces.deform(nominal_mm, error_um, picture.exaggeration)
-    back = to_gltf(error_um * (-picture.exaggeration * MM_PER_UM))
-    return GltfNode(name, to_gltf(drawn_mm), indices, material, targets={"nominal": back}, **more)
+    to_nominal = to_gltf(error_um * (-picture.exaggeration * MM_PER_UM))
+    return GltfNode(
+        name, to_gltf(drawn_mm), indices, material, targets={"nominal": to_nominal}, **attributes
+    )
 
 
 def _surface(picture: ScenePicture) -> GltfNode:
@@ -114,11 +116,13 @@ def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
 def _traces(picture: ScenePicture) -> Iterator[GltfNode]:
     nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
     for label, drawn in _named_traces(picture):
-        still, count = drawn.nominal_mm, len(drawn.nominal_mm)
+        nominal_mm, count = drawn.nominal_mm, len(drawn.nominal_mm)
         pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
-        yield GltfNode(f"trace nominal {label}", to_gltf(still), pairs, nominal, group="traces")
+        yield GltfNode(
+            f"trace nominal {label}", to_gltf(nominal_mm), pairs, nominal, group="traces"
+        )
         name = f"trace actual {label}"
-        yield _bent(picture, name, still, drawn.error_um, pairs, actual, group="traces")
+        yield _bent(picture, name, nominal_mm, drawn.error_um, pairs, actual, group="traces")
 
 
 def _bodies(picture: ScenePicture) -> list[GltfNode]:

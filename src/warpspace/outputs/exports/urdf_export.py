@@ -104,6 +104,6 @@ def _moving(axis: Axis, parent: str, child: str) -> Any:
 
 
 def _metres(pose: Array) -> Array:
-    found = np.array(pose, dtype=float)
-    found[:3, 3] /= MM_PER_M
-    return found
+    scaled = np.array(pose, dtype=float)
+    scaled[:3, 3] /= MM_PER_M
+    return scaled

@@ -63,9 +63,11 @@ def draw_figure(
     from warpspace.outputs.drawing.settings import FigureSettings
 
     kind = _KINDS.find(name)
-    most = kind.most_scenes or kind.scenes
-    if not kind.scenes <= len(scenes) <= most:
-        words = "one scene" if kind.scenes == 1 else "two scenes"
-        words = words if most == kind.scenes else f"{kind.scenes} to {most} scenes"
-        raise OptionError(f"figure {name!r} is drawn from {words}; given {len(scenes)}")
+    max_scenes = kind.most_scenes or kind.scenes
+    if not kind.scenes <= len(scenes) <= max_scenes:
+        expected = "one scene" if kind.scenes == 1 else "two scenes"
+        expected = (
+            expected if max_scenes == kind.scenes else f"{kind.scenes} to {max_scenes} scenes"
+        )
+        raise OptionError(f"figure {name!r} is drawn from {expected}; given {len(scenes)}")
     return kind.load()(scenes, settings or FigureSettings(), exact=exact)

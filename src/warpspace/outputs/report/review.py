@@ -50,9 +50,9 @@ class ReportSettings:
         loop, seed = Loop(self.loop), self.seed
         drawn = choose_distribution(self.distribution)
 
-        def machines(over: Over) -> MonteCarlo:
+        def machines(statistic: Over) -> MonteCarlo:
             return MonteCarlo(
-                loop=loop, distribution=drawn, seed=seed, samples=self.samples, over=over,
+                loop=loop, distribution=drawn, seed=seed, samples=self.samples, over=statistic,
                 limit_um=limit_um,
             )  # fmt: skip
 
@@ -76,12 +76,12 @@ class Reviewed:
     explanation: Explanation  # of the worst node
     linearisation_um: float  # largest difference between the exact chain and the first order
     results: Mapping[str, Result | str]  # of each analysis; why there is none
-    within: float  # share of the volume within the limit; 0 where there is none
+    share_within: float  # share of the volume within the limit; 0 where there is none
     advice: str  # the one thing to do
     uncertainty: FieldUncertainty | None  # how sure its errors are
 
     @property
-    def keeps(self) -> bool:
+    def is_within_limit(self) -> bool:
         """Whether its largest error is within its limit, where it has one."""
         limit = self.scene.limit_um
         return limit is None or self.statistics.max_um <= limit
@@ -92,29 +92,33 @@ class Reviewed:
 
     @property
     def statistics(self) -> Statistics:
-        found = self.picture.statistics
-        return self.uncertainty.with_expanded_uncertainty(found) if self.uncertainty else found
+        summary = self.picture.statistics
+        return self.uncertainty.with_expanded_uncertainty(summary) if self.uncertainty else summary
 
     @property
     def largest(self) -> str:
-        found = self.statistics
-        return f"{spell(found.max_um)}{_behind(found, 'max_um')}{UM} at {self.worst_axes}"
+        summary = self.statistics
+        return f"{spell(summary.max_um)}{_format_u95(summary, 'max_um')}{UM} at {self.worst_axes}"
 
     @property
-    def is_told(self) -> bool:
+    def is_decided(self) -> bool:
         """Whether the limit is kept, or missed, with enough probability (ISO 14253-1)."""
-        found, limit = self.statistics, self.scene.limit_um
-        u95 = found.expanded_uncertainty.get("u95_max_um")
+        summary, limit = self.statistics, self.scene.limit_um
+        u95 = summary.expanded_uncertainty.get("u95_max_um")
         if self.uncertainty is None or u95 is None or limit is None:
             return True
-        kept = float(self.uncertainty.errors.probability_within(found.max_um, u95, -np.inf, limit))
-        return not 1.0 - SURE < kept < SURE
+        probability = float(
+            self.uncertainty.errors.probability_within(summary.max_um, u95, -np.inf, limit)
+        )
+        return not 1.0 - SURE < probability < SURE
 
     @property
     def worst_axes(self) -> str:
         """Spell where the axes stand at the worst point."""
-        found = self.statistics
-        return list_axes(point_axes(self.scene, found.max_at_axes)) or spell_in_r(found.max_at_mm)
+        summary = self.statistics
+        return list_axes(point_axes(self.scene, summary.max_at_axes)) or spell_in_r(
+            summary.max_at_mm
+        )
 
     @property
     def volume(self) -> str:
@@ -167,36 +171,39 @@ def build_review(
 
 
 def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) -> Reviewed:
-    scene, found = picture.scene, picture.statistics
+    scene, summary = picture.scene, picture.statistics
     results = {
-        name: _ask(analysis, scene) for name, analysis in settings.analyses(scene.limit_um).items()
+        name: _run_analysis(analysis, scene)
+        for name, analysis in settings.analyses(scene.limit_um).items()
     }
-    at = {name: np.asarray(value) for name, value in found.max_at_axes.items()}
-    point = np.asarray(found.max_at_mm)
+    at = {name: np.asarray(value) for name, value in summary.max_at_axes.items()}
+    point = np.asarray(summary.max_at_mm)
     return Reviewed(
         letter,
         picture,
         explain(scene.model, scene.errors, at, picture.view, point),
         second_order(scene, settings.loop).um,
         results,
-        _within(picture),
+        _share_within(picture),
         _advice(picture, results["advice"], settings),
         volume_uncertainty(scene, picture.view, settings.grid),
     )
 
 
-def _behind(found: Statistics, name: str) -> str:
+def _format_u95(summary: Statistics, name: str) -> str:
     return (
-        u95_behind(found.expanded_uncertainty[f"u95_{name}"]) if found.expanded_uncertainty else ""
+        u95_behind(summary.expanded_uncertainty[f"u95_{name}"])
+        if summary.expanded_uncertainty
+        else ""
     )
 
 
-def _within(picture: ScenePicture) -> float:
+def _share_within(picture: ScenePicture) -> float:
     limit = picture.scene.limit_um
     return 0.0 if limit is None else share_below(picture.field, limit)
 
 
-def _ask(analysis: Analysis, scene: Scene) -> Result | str:
+def _run_analysis(analysis: Analysis, scene: Scene) -> Result | str:
     try:
         return analysis.run(scene, ignore_progress)
     except WarpspaceError as error:
@@ -209,7 +216,7 @@ def _difference(first: ScenePicture, second: ScenePicture | None = None) -> Stat
     return scene_change(first, second).statistics
 
 
-def given(value: float) -> str:
+def spell_setting(value: float) -> str:
     """Spell a number that somebody has chosen, with its sign and without trailing zeros."""
     return ("+" if value > 0.0 else "") + spell_short(value)
 
@@ -224,62 +231,62 @@ def verdict(review: Review) -> str:
     """Say what a reader must know: of two scenes which keeps its limit, and how they differ."""
     if len(review.scenes) == 1:
         return _verdict_on(review.scenes[0])
-    kept = [
-        f"{one.letter} {'keeps' if one.keeps else 'misses'} the limit of {spell_short(limit)}{UM}"
+    verdicts = [
+        f"{one.letter} {'keeps' if one.is_within_limit else 'misses'} the limit of {spell_short(limit)}{UM}"
         for one in review.scenes
         if (limit := one.scene.limit_um) is not None
     ]
     a, b = (one.statistics.mean_um for one in review.scenes)
     change = (b - a) / a if a else 0.0
-    words = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
-    words = words if abs(change) >= 0.005 else "the same as"
-    how = f"{words} A's {spell(a)}{UM}" if a else "where A has none"
-    limits = f"{'; '.join(kept)}. " if kept else ""
-    return f"{limits}The mean error of B is {spell(b)}{UM}: {how}."
+    comparison = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
+    comparison = comparison if abs(change) >= 0.005 else "the same as"
+    comment = f"{comparison} A's {spell(a)}{UM}" if a else "where A has none"
+    limits = f"{'; '.join(verdicts)}. " if verdicts else ""
+    return f"{limits}The mean error of B is {spell(b)}{UM}: {comment}."
 
 
-def _verdict_on(one: Reviewed) -> str:
-    limit, largest, worst = one.scene.limit_um, one.statistics.max_um, one.largest
-    volume = f"the working volume of {one.volume}"
+def _verdict_on(reviewed: Reviewed) -> str:
+    limit, largest, worst = reviewed.scene.limit_um, reviewed.statistics.max_um, reviewed.largest
+    volume = f"the working volume of {reviewed.volume}"
     if largest == 0.0:
         return f"The error is zero in {volume}."
     if limit is None:
         return f"No limit is set. The largest error in {volume} is {worst}."
-    if not one.is_told:
-        words = f"It cannot be told whether the limit of {spell_short(limit)}{UM} is kept"
-        return f"{words} in {volume}: the largest error is {worst}."
-    words = f"The limit of {spell_short(limit)}{UM} is"
-    if one.keeps:
-        return f"{words} kept in {volume}: the largest error is {worst}."
-    share = volume_share(one.within)
-    return f"{words} missed: {share} of {volume} is within it, and the worst is {worst}."
+    if not reviewed.is_decided:
+        statement = f"It cannot be told whether the limit of {spell_short(limit)}{UM} is kept"
+        return f"{statement} in {volume}: the largest error is {worst}."
+    statement = f"The limit of {spell_short(limit)}{UM} is"
+    if reviewed.is_within_limit:
+        return f"{statement} kept in {volume}: the largest error is {worst}."
+    share = volume_share(reviewed.share_within)
+    return f"{statement} missed: {share} of {volume} is within it, and the worst is {worst}."
 
 
-def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings) -> str:
+def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSettings) -> str:
     limit, before = picture.scene.limit_um, picture.statistics.max_um
     if before == 0.0:
         return "Nothing to adjust: the error is zero."
     if limit is not None and before <= limit:
         return "Nothing to adjust: the limit is kept."
-    if not isinstance(found, AdjustResult) or not found.adjustments:
+    if not isinstance(adjustment, AdjustResult) or not adjustment.adjustments:
         return "Nothing to adjust: no squareness or alignment acts in this loop."
-    after = evaluate_picture(found.changes()[0].scene, grid=settings.grid, loop=settings.loop)
+    after = evaluate_picture(adjustment.changes()[0].scene, grid=settings.grid, loop=settings.loop)
     largest = after.statistics.max_um
     if not largest < (1.0 - _WORTH) * before:
         return "No single adjustment lowers the largest error; several together may: see Repair."
-    ((key, value),) = found.adjustments[0].adjust.items()
+    ((key, value),) = adjustment.adjustments[0].adjust.items()
     row = parameter(key)
-    then = ""
+    consequence = ""
     if limit is not None:
-        share = volume_share(_within(after))
-        then = (
+        share = volume_share(_share_within(after))
+        consequence = (
             ", and the limit is kept"
             if largest <= limit
             else f", and {share} of the volume is within the limit"
         )
     return (
-        f"Adjust {key} ({row.name}) from {given(found.present[key])} to {spell_signed(value)}"
-        f" {row.unit}: the largest error falls from {spell(before)} to {spell(largest)}{UM}{then}."
+        f"Adjust {key} ({row.name}) from {spell_setting(adjustment.present[key])} to {spell_signed(value)}"
+        f" {row.unit}: the largest error falls from {spell(before)} to {spell(largest)}{UM}{consequence}."
     )
 
 
@@ -287,35 +294,37 @@ def first_page(review: Review, picture: Block) -> list[Block]:
     names = ["mean |E|", "P95", "max"]
     limited = any(one.scene.limit_um is not None for one in review.scenes)
     rows: list[list[str]] = []
-    for one in review.scenes:
-        found = one.statistics
+    for reviewed in review.scenes:
+        summary = reviewed.statistics
         numbers = ("mean_um", "p95_um", "max_um", "rms_um")
-        rows.append([spell(getattr(found, of)) + _behind(found, of) + UM for of in numbers])
+        rows.append([spell(getattr(summary, of)) + _format_u95(summary, of) + UM for of in numbers])
         if limited:
-            rows[-1][-1] = volume_share(one.within) if one.scene.limit_um is not None else "–"
+            rows[-1][-1] = (
+                volume_share(reviewed.share_within) if reviewed.scene.limit_um is not None else "–"
+            )
     names.append("within the limit" if limited else "RMS")
     if len(rows) == 1:
         remarks = ("", "95 % of the volume is below it", f"at {review.scenes[0].worst_axes}")
         cards = zip(names, rows[0], (*remarks, "of the volume" if limited else ""), strict=True)
-        said: Block = Cards(tuple(cards))
+        numbers_block: Block = Cards(tuple(cards))
     else:
         columns = (Column("scene"), *number_columns(names, "s"))
         titles = [one.titled(one.scene.title) for one in review.scenes]
-        marks: list[Mark] = ["" if one.keeps else "worse" for one in review.scenes]
+        marks: list[Mark] = ["" if one.is_within_limit else "worse" for one in review.scenes]
         numbered = [(title, *row) for title, row in zip(titles, rows, strict=True)]
-        said = Table(columns, numbered, marks=marks)
+        numbers_block = Table(columns, numbered, marks=marks)
     noted = (
         one.titled(f"{note.text} (note {number}{note.author and f', {note.author}'})")
         for one in review.scenes
         for number, note in enumerate(one.scene.review, 1)
         if (note.kind, note.status) == ("question", "open")
     )
-    asked = (*review.settings.questions, *noted)
+    questions = (*review.settings.questions, *noted)
     return [
         Text(verdict(review), "lead"),
-        said,
+        numbers_block,
         Text("What to do", "heading"),
         *(Text(one.titled(one.advice)) for one in review.scenes),
         picture,
-        *([Text("Open questions", "heading"), Items(asked)] if asked else []),
+        *([Text("Open questions", "heading"), Items(questions)] if questions else []),
     ]

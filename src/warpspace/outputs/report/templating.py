@@ -194,19 +194,19 @@ def _as_data(block: Block, folder: Path) -> dict[str, Any]:
     if isinstance(block, ReportFigure):
         path = folder / f"figure{len(list(folder.iterdir()))}.{block.form}"
         path.write_bytes(block.data)
-        found = {"caption": block.caption, "width": block.width, "file": path.name}
+        fields = {"caption": block.caption, "width": block.width, "file": path.name}
     elif isinstance(block, Table):
-        found = _table(block)
+        fields = _table(block)
     else:
-        found = asdict(block)
-    return {"kind": _kind(block), **found}
+        fields = asdict(block)
+    return {"kind": _kind(block), **fields}
 
 
 def _table(block: Table) -> dict[str, Any]:
     heads = [column.head.replace("\n", " ") for column in block.shown]
     rows = block.cells()
     longest = [max(map(len, cells)) for cells in zip(heads, *rows, strict=True)]
-    words = [max(map(len, head.split()), default=0) for head in heads]
+    longest_words = [max(map(len, head.split()), default=0) for head in heads]
     return {
         "caption": block.title,
         "heads": heads,
@@ -214,7 +214,7 @@ def _table(block: Table) -> dict[str, Any]:
         # shares of the page: as wide as its cells, within reason
         "widths": [
             min(max(cells if cells < 16 else 16 + 0.4 * (cells - 16), word), 32) + 2
-            for cells, word in zip(longest, words, strict=True)
+            for cells, word in zip(longest, longest_words, strict=True)
         ],
         "rows": rows,
         "marks": block.marks,
