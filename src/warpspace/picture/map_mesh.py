@@ -25,11 +25,11 @@ Pieces = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class MapMesh:
-    """What is drawn of a map, mm in R."""
+    """Mesh of a map, mm in R."""
 
     vertices_mm: Array  # [M, 3]
     triangles: NDArray[np.intp]  # [T, 3] or [S, 2]
-    values: Array  # [M]; what is coloured, in the unit of the picture's scale
+    values: Array  # [M]; in the unit of the picture's scale
     faded: NDArray[np.bool_] | None  # [M]; where colours fade; None for nowhere
 
 
@@ -56,7 +56,7 @@ class MapPatch:
 
 
 def map_parts(picture: Picture) -> list[MapPatch]:
-    """List the grids that the map of a picture consists of; a slice is seen from both sides."""
+    """List the grids of a map: the volume, or its slices, which are visible from both sides."""
     lift = LIFT * picture.size_mm
     lifts = (lift, -lift) if picture.slices else (lift,)
     parts: list[MapPatch] = []
@@ -69,13 +69,13 @@ def map_parts(picture: Picture) -> list[MapPatch]:
 
 
 def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
-    """Give nodes of a picture's grid as they are drawn, [mx, my, mz, 3], mm: a line as a bar."""
+    """Return the nodes of a grid for drawing, [mx, my, mz, 3], mm: a line becomes a bar."""
     thin = is_thin(picture.shape)
     return thicken(nodes_mm, THICKNESS * picture.size_mm) if thin else nodes_mm
 
 
 def solid_map(picture: Picture) -> tuple[Array, Index, Index]:
-    """Give what a ray can meet of a map: points, triangles, and the grid node of each point."""
+    """Build the surface that a ray can hit: points, triangles, and the grid node of each point."""
     thick = thick_nodes(picture, picture.drawn_mm)
     surface = topology(thick.shape[:3], cut=picture.cut).surface
     nodes = spread_nodes(picture.shape)[surface.nodes]
@@ -83,10 +83,10 @@ def solid_map(picture: Picture) -> tuple[Array, Index, Index]:
 
 
 def outline_pieces(picture: Picture, nodes_mm: Array) -> Pieces:
-    """Look up the edges of a picture's grid with its nodes elsewhere, [S, 2, 3], mm."""
+    """Collect the edges of a picture's grid with its nodes at other points, [S, 2, 3], mm."""
     thick = thick_nodes(picture, nodes_mm)
-    of = topology(thick.shape[:3], cut=picture.cut)
-    return thick.reshape(-1, 3)[of.edge_segments].astype(np.float32)
+    edges = topology(thick.shape[:3], cut=picture.cut).edge_segments
+    return thick.reshape(-1, 3)[edges].astype(np.float32)
 
 
 def map_mesh(picture: Picture) -> MapMesh:
@@ -95,7 +95,7 @@ def map_mesh(picture: Picture) -> MapMesh:
 
 
 def line_mesh(picture: Picture, *, grid: bool = True) -> MapMesh:
-    """Give the lines of a map alone: those of its grid too, or only its edges."""
+    """Build the lines of a map without its surface: grid and edges, or the edges only."""
     patches: list[tuple[MapPatch, Index, Index]] = []
     for part in map_parts(picture):
         segments = part.drawn_of.edge_segments
@@ -110,7 +110,7 @@ def _collect(patches: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
     vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in patches]
     values = [part.values.reshape(-1).take(used) for part, used, _ in patches]
     faded = [part.faded.reshape(-1)[at] for part, at, _ in patches if part.faded is not None]
-    fading = np.concatenate(faded) if faded else None  # all parts have it, or none
+    fading = np.concatenate(faded) if faded else None  # all patches have it, or none
     if len(patches) == 1:
         return MapMesh(vertices[0], patches[0][2], values[0], fading)
     first = np.cumsum([0, *map(len, vertices)])
@@ -159,11 +159,9 @@ def _joined(parts: list[Pieces]) -> Pieces:
     return nonempty[0] if len(nonempty) == 1 else np.concatenate(nonempty)
 
 
-# Where they stand, so that few of them say what each line means.
-
 LEAST_LENGTH = 0.2  # shortest line that carries its value, as a part of the longest edge
 ALONG_SLICE = 0.3
-"""Where along its line the value stands on a slice: in the middle another slice crosses it."""
+"""Position of the value along its line on a slice: in the middle another slice crosses it."""
 MOST_LABELS = 60
 
 
@@ -173,12 +171,12 @@ class IsolineLabel:
 
     value: float  # in the unit of the picture's scale
     at_mm: Array  # [3]; on the line, where it is drawn
-    outward: Array  # [3]; direction that the face with the line looks to; of a slice one of the two
+    outward: Array  # [3]; normal of the face with the line; of a slice one of the two
     length_mm: float  # of the line
 
 
 def isoline_labels(picture: Picture) -> list[IsolineLabel]:
-    """Choose where the lines of equal value carry their value: one on each face or slice."""
+    """Place the values of isolines: one for each level on each face or slice."""
     levels = isoline_levels(picture.scale)
     lines: list[IsolineLabel] = []
     for part in map_parts(picture):

@@ -1,4 +1,4 @@
-"""The traces of the rotary axes as they are drawn, and the error motion along one of them."""
+"""Traces of the rotary axes for drawing, and the error motion along one of them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ FULL_TURN_DEG = 360.0
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What one trace is: which point is turned by which axis, and where the other axes stand."""
+    """One trace: a point rotated by an axis, with the positions of the other rotary axes."""
 
     axis: str  # the axis that turns
     point_mm: Vector  # the point in the workpiece (or tool) frame
     at: dict[str, float]  # degrees; positions of the other rotary axes of the branch
-    closed: bool  # whether it is a full circle
+    closed: bool  # True for a full circle
 
     @property
     def label(self) -> str:
@@ -40,9 +40,9 @@ class Trace:
 
 @dataclass(frozen=True, slots=True)
 class TraceGroup:
-    """All traces of one branch, ready to be evaluated in one go."""
+    """All traces of one branch, evaluated together."""
 
-    loop: Loop  # loop whose error displaces the traces
+    loop: Loop  # whose error displaces the traces
     traces: tuple[Trace, ...]  # (T,)
     # mm or degrees; axis positions, [T, n] for the rotary axes of the branch, scalar for the others
     coordinates: dict[str, Array]
@@ -56,7 +56,7 @@ def build_traces(
     samples: int = SAMPLES,
     fixed: Mapping[str, Sequence[float]] | None = None,
 ) -> tuple[TraceGroup, ...]:
-    """Lay the traces of points over every rotary axis of a machine."""
+    """Build the traces of points over every rotary axis of a machine."""
     groups: list[TraceGroup] = []
     axes, sweep = model.machine.axes, np.linspace(0.0, 1.0, samples)
     for side, loop in (("workpiece", Loop.WORKPIECE), ("tool", Loop.TOOL)):
@@ -118,11 +118,11 @@ def _traces_of(
 class TraceLine:
     """One trace."""
 
-    trace: Trace  # which point is turned by which axis
+    trace: Trace
     loop: Loop  # loop whose error displaces it
     nominal_mm: Array  # [n, 3]
     error_um: Array  # [n, 3]
-    actual_mm: Array  # [n, 3]; where it is drawn
+    actual_mm: Array  # [n, 3]; displaced with the exaggeration
 
     @property
     def largest_um(self) -> float:
@@ -141,7 +141,7 @@ class TraceLines:
 
     @cached_property
     def actual_mm(self) -> Array:
-        """Where they are drawn, [T, n, 3], mm."""
+        """Displaced points, [T, n, 3], mm."""
         return deform(self.nominal_mm, self.error_um, self.exaggeration)
 
     def each(self) -> Iterator[TraceLine]:
@@ -181,7 +181,7 @@ def trace_lines(groups: Sequence[TraceLines]) -> tuple[TraceLine, ...]:
 
 
 LEAST_RADIUS_MM = 1e-3  # A point nearer to the axis is on it and has no direction from it
-LEAST_UM = 1e-6  # traces with smaller errors are moved by none
+LEAST_UM = 1e-6  # traces with smaller errors count as not displaced
 MOTION_SAMPLES = 181  # places of a turn: every two degrees
 
 
@@ -235,7 +235,7 @@ POSITIVE = {
 
 
 def motion_lines(name: str, motion: AxisMotion, part: ErrorMotion) -> Lines:
-    """Give one deviation as a polar chart around the position of its axis."""
+    """Build the polar chart of one deviation over the position of its axis."""
     turns = turn_words(part.times_a_turn) if motion.closed else "an arc"
     values = (
         f"peak to valley {part.peak_to_valley:.2f} {part.unit}, {turns};"
@@ -256,5 +256,5 @@ def motion_lines(name: str, motion: AxisMotion, part: ErrorMotion) -> Lines:
 
 
 def turn_words(times: int | None) -> str:
-    """Say how often a deviation comes back: ``twice a turn``; a dash where it does not vary."""
+    """Format the period of a deviation: ``twice a turn``; a dash where it does not vary."""
     return "–" if times is None else PERIODS.get(times, f"{times} times a turn")
