@@ -73,7 +73,7 @@ def draw_frame(scene: Scene, settings: AnimationSettings, number: int) -> Drawin
 
 
 def sweep_factor(top: float, phase: float) -> float:
-    """Give the display factor at a phase of the sweep: 1 at its ends, the top in its middle."""
+    """Compute the display factor at a phase of the sweep: 1 at its ends, the top in its middle."""
     share = (1.0 - np.cos(2.0 * np.pi * phase)) / 2.0
     return float(f"{1.0 + (top - 1.0) * share:.3g}")
 
@@ -97,7 +97,8 @@ def one_round(scene: Scene) -> tuple[str, Array, list[TraceLine]]:
     groups = evaluate_traces(scene, 1.0, _TRACE_SAMPLES)
     if not groups:
         raise OptionError(
-            f"{scene.name}: nothing turns; expected a rotary axis, and points in [points_mm] traces"
+            f"{scene.name}: no trace to animate; expected a rotary axis, and points in [points_mm]"
+            " traces"
         )
     positions, group = scene.workspace.positions, groups[0].group
     side = "workpiece" if group.loop is Loop.WORKPIECE else "tool"
@@ -206,7 +207,7 @@ def _pictures(
                 progress(1)
     except WorkersLostError:
         if pool.ended:
-            raise RenderError("the animation was given up: its renderers were ended") from None
+            raise RenderError("the animation was stopped: its renderers were ended") from None
         raise RenderError("the animation could not be drawn: the renderer crashed") from None
     finally:
         pool.kill()
@@ -258,7 +259,7 @@ def _find_encoder() -> str:
         return imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError):
         raise OutputError(
-            f"MP4 needs the package imageio-ffmpeg: {VIDEO_EXTRA}; GIF and WebP need nothing more"
+            f"MP4 needs the package imageio-ffmpeg: {VIDEO_EXTRA}; GIF and WebP need no package"
         ) from None
 
 

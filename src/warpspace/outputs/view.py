@@ -1,4 +1,4 @@
-"""What a page has drawn, as a figure: its pixels with heading, colours, scale bars and words."""
+"""The drawing of a page as a figure: its pixels with heading, colour bar, scale bars and labels."""
 
 from collections.abc import Mapping, Sequence
 
@@ -30,10 +30,10 @@ def draw_view(
     marks: Mapping[str, float],
     rows: Sequence[Row],
     bars: tuple[float, float] | None,  # px of a millimetre, display factor; None for no scale bars
-    labels: Sequence[tuple[str, Array]],  # each beside a point, [2], px from the left bottom
+    labels: Sequence[tuple[str, Array]],  # text and point, [2], px from the left bottom
     dark: bool,
 ) -> bytes:
-    """Draw it as a PNG."""
+    """Draw the figure as a PNG."""
     height, width = pixels.shape[:2]
     unit = factor(width, height)
     canvas = Canvas(
@@ -49,13 +49,10 @@ def draw_view(
     occupancy = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     if pixels.shape[2] == 4:
         occupancy.add_mask(pixels[..., 3] > 127, drawn)
-    for text, spot in labels:
-        placed = write_label(canvas, text, [spot], drawn, occupancy)
+    for text, point_px in labels:
+        placed = write_label(canvas, text, [point_px], drawn, occupancy)
         if placed is not None and placed.distance > canvas.px(LEADER_FROM):
             draw_leader(canvas, placed, canvas.theme.ink)
-    facts_text = {
-        "Title": title,
-        "Software": f"warpspace {__version__}",
-        "Description": "; ".join(facts),
-    }
-    return encode_figure(canvas.figure, "png", facts_text)
+    program, description = f"warpspace {__version__}", "; ".join(facts)
+    tags = {"Title": title, "Software": program, "Description": description}
+    return encode_figure(canvas.figure, "png", tags)

@@ -41,13 +41,11 @@ class MapPatch:
     values: Array
     drawn_of: Topology
     lifts: tuple[float, ...]
-    directions: (
-        Array  # direction of each axis of the grid, +1 or −1: an axis may run against its name
-    )
+    directions: Array  # of the axes of the grid, +1 or −1: an axis may run against its name
     faded: NDArray[np.bool_] | None = None
 
     def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
-        """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
+        """Lift pieces of line off the surface, on each visible side, [S, 2, 3] each, mm."""
         ends = self.drawn_mm.reshape(-1, 3).take(segments, axis=0).astype(np.float32)
         return [
             ends + (outwards * (lift * times * self.directions)).astype(np.float32)

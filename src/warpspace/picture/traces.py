@@ -105,12 +105,8 @@ def _traces_of(
     tilting = before[-1]
     first, last = model.machine.axes[tilting].travel
     centre = positions.get(tilting, 0.0)
-    tilts = sorted(
-        {
-            centre,
-            *(at for at in (centre - TILT_STEP_DEG, centre + TILT_STEP_DEG) if first <= at <= last),
-        }
-    )
+    neighbours = (centre - TILT_STEP_DEG, centre + TILT_STEP_DEG)
+    tilts = sorted({centre, *(at for at in neighbours if first <= at <= last)})
     return [Trace(axis, point, {**standing, tilting: tilt}, closed) for tilt in tilts]
 
 

@@ -74,10 +74,9 @@ def sheet(
         (title, TITLE, 0.2, "bold", ground().ink),
         (subtitle, SUBTITLE, 0.5, "normal", ground().muted),
     ):
-        text = figure.text(
-            x_left, 1.0 - down / height, heading, size=size, weight=weight, color=colour
-        )
-        text.set(va="top", parse_math=False)  # a $ in what a user calls a scene is a dollar
+        y = 1.0 - down / height
+        text = figure.text(x_left, y, heading, size=size, weight=weight, color=colour)
+        text.set(va="top", parse_math=False)  # a $ in the title of a scene is a dollar
         wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5:  # smaller, so that it does not run off the sheet
             text.set_fontsize(size * max((width - 0.5) / wide, LEAST_SHARE))
@@ -95,11 +94,11 @@ def quiet(axes: Axes, grid: str = "x") -> None:
 CHART_IN, ROW_IN, GAP_IN = 4.9, 4.6, 0.25
 """Width, height and distance of charts that stand side by side."""
 WIDTH_IN, PRINTED_IN = 11.0, 7.4
-"""Width of bars; of what a report has, without a heading and printed as wide as its page."""
+"""Width of bar charts; in a report, without a heading and printed as wide as its page."""
 HEAD_IN = 0.65
 BAR_IN = 0.235  # height of one bar; rows of two are wider
-FEW_ROWS = 8  # rows below which bars beside other charts grow no wider
-NUMBER_MARGIN = 1.14  # of the longest bar: room for the number beside it
+FEW_ROWS = 8  # below this number of rows, bars beside other charts stay as wide
+NUMBER_MARGIN = 1.14  # of the longest bar: space for the number beside it
 LEGEND_IN = 0.19
 DASHES: dict[str, Any] = {"line": "-", "dashed": (0, (4, 3)), "thin": "-", "dots": "none"}
 Box = tuple[float, float, float, float]
@@ -107,7 +106,7 @@ Box = tuple[float, float, float, float]
 
 
 def chart_figure(chart: Bars | Lines | Histogram) -> Figure:
-    """Draw one chart for a report, which says its heading."""
+    """Draw one chart for a report, which has a heading of its own."""
     if isinstance(chart, Lines):
         return charts_sheet([replace(chart, title="")], "", "")
     if isinstance(chart, Bars):
@@ -124,7 +123,7 @@ def charts_sheet(
     beside_in: float = 0.0,
     below_in: float = 0.0,
 ) -> Figure:
-    """Draw charts side by side on a sheet, so many in a row; there is room left for more."""
+    """Draw charts side by side on a sheet, with free space beside or below them on request."""
     columns = columns or len(charts)
     rows = -(-len(charts) // columns)
     width = columns * CHART_IN + beside_in
@@ -423,11 +422,9 @@ def histogram_chart(histogram: Histogram) -> Figure:
         }  # fmt: skip
         marks = [*histogram.marks, *([] if limit is None else [("limit", limit)])]
         _mark(axes, [(name, at, *styles.get(name, (ground().ink, "-"))) for name, at in marks])
-        placement = (
-            (0.95, TEXT + 2.0, "bold", ground().ink),
-            (0.83, SMALL, "normal", ground().muted),
-        )
-        for line, (height, size, weight, colour) in zip(histogram.told, placement, strict=False):
+        large = 0.95, TEXT + 2.0, "bold", ground().ink
+        styled = zip(histogram.told, (large, (0.83, SMALL, "normal", ground().muted)), strict=False)
+        for line, (height, size, weight, colour) in styled:
             axes.text(
                 0.985, height, line, transform=axes.transAxes, ha="right", va="top", size=size,
                 weight=weight, color=colour, bbox=_paper(),

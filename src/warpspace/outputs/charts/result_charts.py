@@ -1,4 +1,4 @@
-"""The chart of a result: its charts side by side; of a test its numbers; of a compensation maps."""
+"""Chart of a result: its charts side by side, the numbers of a test, maps of a compensation."""
 
 from collections.abc import Sequence
 from textwrap import fill
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 def result_chart(result: Result) -> Figure:
-    """Draw the only bars of a result, or all its charts under what it says first."""
+    """Draw the only bar chart of a result, or all its charts under its first lines."""
     blocks = list(result.blocks())
     charts = [block for block in blocks if isinstance(block, (Bars, Lines))]
     if len(charts) == 1 and isinstance(charts[0], Bars):
@@ -50,7 +50,7 @@ def result_chart(result: Result) -> Figure:
     texts = [block.strip() for block in blocks if isinstance(block, str)]
     title, subtitle = [*texts, ""][:2]
     if not charts:
-        raise OptionError(f"{title}: there is no chart of it")
+        raise OptionError(f"{title}: no chart is defined")
     return charts_sheet(charts, title, subtitle, 2 if len(charts) == 4 else min(len(charts), 3))
 
 
@@ -60,15 +60,14 @@ MOST_NUMBERS = 16
 
 
 def bench_chart(result: "BenchResult", title: str | None = None) -> Figure:
-    """Draw the customary figure of a test, its numbers where there is room."""
+    """Draw the customary figure of a test, with its numbers in the free space."""
     charts = result.charts
     columns = 1 if len(charts) == 1 else 2
     rows = -(-len(charts) // columns)
     numbers = NUMBERS_IN + VALUE_IN * (len(result.runs) - 1)
-    quantities = {
-        one.key: (one.name, one.unit) for run in result.runs for one in run.outcome.quantities
-    }
-    names = dict(list(quantities.items())[:MOST_NUMBERS])
+    quantities = (quantity for run in result.runs for quantity in run.outcome.quantities)
+    units = {quantity.key: (quantity.name, quantity.unit) for quantity in quantities}
+    names = dict(list(units.items())[:MOST_NUMBERS])
     # beside one chart, in the place of the fourth one, or below all
     below = 0.2 + LINE_IN * (len(names) + 1) + NOTE_IN * len(result.notes)
     below = 0.0 if len(charts) % 2 else below
@@ -102,9 +101,8 @@ def _numbers(
         figure.text(place, y, run.who, size=SMALL, color=ground().muted, ha="right")
     for key, (name, unit) in names.items():
         rule = y - 0.07 / height
-        figure.add_artist(
-            Line2D([x_left, right], [rule, rule], color=ground().faint, linewidth=0.6)
-        )
+        line = Line2D([x_left, right], [rule, rule], color=ground().faint, linewidth=0.6)
+        figure.add_artist(line)
         y -= LINE_IN / height
         figure.text(x_left, y, f"{name} [{unit}]", size=SMALL, color=ground().muted,
                     parse_math=False)  # fmt: skip
@@ -121,16 +119,15 @@ def _numbers(
 PLANE_IN = 3.2
 COLUMN_IN = 4.3, 5.0  # of the maps in a column of the app
 COLUMN_TEXT = 9.0
-LEAST_UM = 0.005  # upper end of a colour scale where nothing but the rounding of a file is left
+LEAST_UM = 0.005  # upper end of a colour scale where only rounding remains
 PLANES = ((0, 1), (0, 2), (1, 2))  # axes across and up of each slice
 
 
 def compensation_chart(compensation: "Compensation") -> Figure:
-    """Draw |E| before, after on the same colours, and what is left on its own, in slices."""
+    """Draw slices of |E| before and after in one colour scale, and of the residual in its own."""
     title = f"Compensation · {compensation.controller.scene.title}"
-    subtitle = (
-        f"{compensation.format.title} · loop {compensation.loop} · {compensation.points_words}"
-    )
+    table = f"{compensation.format.title} · loop {compensation.loop}"
+    subtitle = f"{table} · {compensation.points_words}"
     planes, fields = _planes(compensation), _fields(compensation)
     with style():
         height = 1.3 + PLANE_IN * max(len(planes), 1)
@@ -141,13 +138,13 @@ def compensation_chart(compensation: "Compensation") -> Figure:
             hspace=0.34,
         )  # fmt: skip
         for row, plane in zip(axes, planes, strict=False):
-            for column, (title_text, field, largest) in zip(row, fields, strict=True):
+            for column, (heading, field, largest) in zip(row, fields, strict=True):
                 mesh = _draw_slice(column, compensation, field, plane, largest)
                 bar = figure.colorbar(mesh, ax=column, fraction=0.05, pad=0.03)
                 bar.ax.tick_params(labelsize=SMALL - 1.5)
                 bar.set_label("|E| [µm]", fontsize=SMALL - 1.0)
                 if plane is planes[0]:
-                    column.set_title(title_text, fontsize=SMALL, color=ground().ink, loc="left")
+                    column.set_title(heading, fontsize=SMALL, color=ground().ink, loc="left")
         return figure
 
 
@@ -159,11 +156,10 @@ def compensation_column(compensation: "Compensation") -> Figure:
         figure.subplots_adjust(
             left=0.095, right=0.85, top=0.93, bottom=0.085, wspace=0.42, hspace=0.66
         )
-        for row, (title_text, field, largest) in zip(axes, _fields(compensation), strict=True):
+        for row, (heading, field, largest) in zip(axes, _fields(compensation), strict=True):
             place = row[0].get_position()
-            figure.text(
-                place.x0, place.y1 + 0.022, title_text, size=COLUMN_TEXT, color=ground().ink
-            )
+            y = place.y1 + 0.022
+            figure.text(place.x0, y, heading, size=COLUMN_TEXT, color=ground().ink)
             if not planes:
                 row[0].set_axis_off()
                 continue
@@ -193,18 +189,16 @@ def _planes(compensation: "Compensation") -> list[tuple[int, int]]:
 
 
 def _fields(compensation: "Compensation") -> Sequence[tuple[str, "ErrorField", float]]:
-    before, after = (
-        max(float(field.norm_um.max()), LEAST_UM)
-        for field in (compensation.before, compensation.after)
-    )
+    before, after = compensation.before, compensation.after
+    largest, residual = (max(float(field.norm_um.max()), LEAST_UM) for field in (before, after))
     before_text, after_text = (
-        f"mean {one.mean_um:.2f}, max {one.max_um:.2f} µm"
-        for one in (compensation.before_statistics, compensation.after_statistics)
+        f"mean {summary.mean_um:.2f}, max {summary.max_um:.2f} µm"
+        for summary in (compensation.before_statistics, compensation.after_statistics)
     )
     return (
-        (f"before: {before_text}", compensation.before, before),
-        (f"after, same colours: {after_text}", compensation.after, before),
-        ("what is left, colours of its own", compensation.after, after),
+        (f"before: {before_text}", before, largest),
+        (f"after, same colours: {after_text}", after, largest),
+        ("residual error, own colour scale", after, residual),
     )
 
 
@@ -215,15 +209,16 @@ def _draw_slice(
     plane: tuple[int, int],
     largest: float,
 ) -> AxesImage:
-    worst = np.unravel_index(int(np.argmax(compensation.after.norm_um)), compensation.grid.shape)
+    grid = compensation.grid
+    worst = np.unravel_index(int(np.argmax(compensation.after.norm_um)), grid.shape)
     across, up = plane
     normal = 3 - across - up
     values = np.take(field.norm_um, worst[normal], axis=normal)
-    names = compensation.grid.axes
+    names = grid.axes
 
     def along(index: int) -> Array:
         name = names[index]
-        return np.ravel(compensation.grid.coordinates[name]) if name else np.zeros(1)
+        return np.ravel(grid.coordinates[name]) if name else np.zeros(1)
 
     lines = [along(index) for index in plane]
     (x_left, right, half), (low, high, tall) = (

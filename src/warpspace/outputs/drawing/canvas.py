@@ -2,9 +2,9 @@
 
 matplotlib draws text and lines, at any size and in any format.
 
-Labels are measured before they are drawn, at sizes still to be chosen, and placed by the box of
-their ink: matplotlib's text paths give both, while `Text.get_window_extent` measures only drawn
-text and gives the height of a whole line, up to 8 px more.
+Labels are measured before they are drawn, at sizes not chosen yet, and placed by the box of their
+ink: matplotlib's text paths provide both, while `Text.get_window_extent` measures only drawn text
+and returns the height of a full line, up to 8 px more.
 """
 
 import math
@@ -90,7 +90,7 @@ class Canvas:
         self, text: str, max_width: float, size: float = SIZES.text, weight: str = "normal"
     ) -> tuple[str, float]:
         text = clean(text)
-        max_width *= 0.98  # what is drawn may be a little wider than what was measured
+        max_width *= 0.98  # drawn text may be slightly wider than measured
         width = self.text_size(text, size, weight)[0]
         if width <= max_width:
             return text, size
@@ -265,12 +265,12 @@ def _text_rect(
 _ANGLES = tuple(2.0 * math.pi * turn / 24 for turn in range(24))
 _DISTANCES = (8.0, 14.0, 22.0, 34.0, 50.0, 70.0, 100.0, 140.0)
 LEADER_FROM = 20.0
-"""Labels farther than this from what they name, px of a 1600 × 1200 figure, get a leader."""
+"""Labels farther than this from their point, px of a 1600 × 1200 figure, get a leader."""
 TEXT_COST, LINE_COST, BODY_COST = 40.0, 6.0, 1.2
 
 
 class Occupancy:
-    """A coarse picture of what is drawn already."""
+    """A coarse grid of the areas that are drawn on already."""
 
     def __init__(self, width: float, height: float, cell: float) -> None:
         self.cell = max(cell, 1.0)
@@ -325,9 +325,9 @@ class PlacedLabel:
 
     centre: tuple[float, float]  # px
     rect: Rect  # px
-    anchor: tuple[float, float]  # px; the point it names
+    anchor: tuple[float, float]  # px; the labelled point
     distance: float  # px; from the anchor to the nearest point of the box
-    cost: float  # what it covers; 0 where it covers nothing
+    cost: float  # of the area it covers; 0 for a free area
 
 
 def place_label(
@@ -380,7 +380,7 @@ def write_label(
     weight: str = "normal",
     colour: str | None = None,
 ) -> PlacedLabel | None:
-    """Write a label where there is room beside one of several points; none where there is none."""
+    """Write a label in free space beside one of several points; None where no space is free."""
     extent = canvas.text_size(text, size, weight)
     placed = place_label(anchors, extent, frame, occupancy, canvas.factor)
     if placed is not None:

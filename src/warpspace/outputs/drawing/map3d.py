@@ -40,12 +40,12 @@ class Stage:
     canvas: Canvas
     picture: Picture
     projection: Projection
-    raster: Raster | None  # the drawn body; None where there is no surface
+    raster: Raster | None  # the drawn body; None without a surface
     occupancy: Occupancy
-    frame: Rect | None  # that labels stay in; None where nothing is labelled
+    frame: Rect | None  # limits of the labels; None without labels
 
     def split(self, lines_mm: Iterable[Array]) -> tuple[list[Array], list[Array]]:
-        """Split polylines into what can be seen and what the body hides, px."""
+        """Split polylines into visible parts and parts hidden by the body, px."""
         return split_visible(lines_mm, self.projection, self.raster)
 
     def label(self, text: str, anchors: Points) -> None:
@@ -152,7 +152,7 @@ INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""
 SMALL_INSETS = (70.0, 74.0, 40.0, 40.0)
 GHOST_DASHES = (11.0, 7.0)
-LONE_LINE_COST = 8.0  # labels keep off the line that is all there is of a volume
+LONE_LINE_COST = 8.0  # of labels on the line that represents a volume without area
 Annotate = Callable[[Stage], None]
 
 
@@ -188,7 +188,7 @@ def draw_map(
 
 
 def surface_bodies(picture: Picture, faces: list[surfaces.Index]) -> list[RenderedBody]:
-    """Give the coloured surface where it is drawn; nothing where a volume has none."""
+    """Build the coloured surface of the displaced volume; empty for a volume without one."""
     surface = surfaces.triangulate(faces)
     if not len(surface.triangles):
         return []
@@ -214,7 +214,7 @@ def fit_map(
     labels: bool = True,
     beside_mm: Array | None = None,
 ) -> Projection:
-    """Choose the projection in which several maps, drawn alike, fill a box."""
+    """Fit one projection in which each of several maps fills a box."""
     insets = [canvas.px(inset) for inset in (INSETS if labels else SMALL_INSETS)]
     width, height = rect[2] - rect[0], rect[3] - rect[1]
     insets = [
@@ -248,7 +248,7 @@ def draw_maps_alike(
 
 
 def map_points_mm(picture: Picture) -> Array:
-    """Give what of a volume is to be seen, [n, 3], mm: where it is, where it is drawn."""
+    """Collect the points that a drawing of a volume contains, [n, 3], mm: nominal and displaced."""
     points = [picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)]
     if any(axis and not is_linear(axis) for axis in picture.grid.axes):
         nodes = np.concatenate(points)
@@ -373,7 +373,7 @@ def _draw_axis(stage: Stage, axis: int, ends_mm: Array, spots: Array) -> None:
     upright = abs(along[1]) > 2.0 * abs(along[0])
     if (normal[0] > 0.0) if upright else (normal[1] > 0.0):
         normal = -normal
-    # clear of what sticks out beyond the nominal edge, beside the length of the axis
+    # clear of nodes displaced beyond the nominal edge along the axis
     positions = (spots - start) @ along
     near = spots[(positions > 0.0) & (positions < np.hypot(*(end - start)))]
     sticking = float(((near - start) @ normal).max(initial=0.0))

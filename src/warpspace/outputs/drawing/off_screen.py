@@ -63,7 +63,7 @@ def view_axes(view: str) -> tuple[Array, Array, Array]:
 def fit_projection(
     view: str, points_mm: Array, rect: Rect, px_per_mm: float | None = None
 ) -> Projection:
-    """Choose the projection that makes points fill a box of the figure, or puts them amid it."""
+    """Fit the projection in which points fill a box of the figure, or are centred in it."""
     right, up, towards = view_axes(view)
     flat = points_mm.reshape(-1, 3)
     centre = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
@@ -101,12 +101,12 @@ class RenderedBody:
 
     vertices_mm: Array  # [M, 3]; where they are drawn
     triangles: NDArray[np.intp]  # [T, 3]
-    # [M]; what the colour shows; interpolated over each triangle before it becomes a colour
+    # [M]; coloured values; interpolated over each triangle before they become colours
     values: Array | None = None
     scale: ColourScale | None = None  # colours of the values
     # one colour (sRGB, 0 to 1) for a body without values
     colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
-    shaded: bool = False  # whether light falls on it: for machine bodies, never for coloured errors
+    shaded: bool = False  # lit: machine bodies, never coloured errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class Raster:
     """Drawn bodies."""
 
     rgba: Bytes  # [h, w, 4]; first row at the top
-    depth_mm: NDArray[np.float32]  # [h, w]; as `Projection.depth_mm`; infinite where nothing is
+    depth_mm: NDArray[np.float32]  # [h, w]; as `Projection.depth_mm`; infinite for the background
     # [h, w]; the largest depth within a pixel of the figure around each
     farthest_mm: NDArray[np.float32]
     rect: Rect  # px; box of the figure it covers
@@ -145,7 +145,7 @@ class Raster:
 
 
 def render_bodies(bodies: Sequence[RenderedBody], projection: Projection) -> Raster | None:
-    """Draw bodies; none where there are none."""
+    """Draw bodies; None without bodies."""
     if not bodies:
         return None
     from scipy.ndimage import maximum_filter
@@ -180,7 +180,7 @@ def _draw(
     margin = 1.0 + 0.02 * float(np.ptp(depths))
     near, far = float(depths.min()) - margin, float(depths.max()) + margin
 
-    # a theme of its own: what users set for their plotters does not reach the figures
+    # a separate theme: settings of users for their plotters do not affect the figures
     theme = pv.themes.Theme()
     theme.background = "black"
     plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", theme=theme)
@@ -189,10 +189,8 @@ def _draw(
         for body in bodies:
             _add_body(plotter, body)
         if any(body.shaded for body in bodies):
-            light_direction = projection.towards + 1.1 * projection.up - 0.7 * projection.right
-            plotter.add_light(
-                pv.Light(position=tuple(light_direction), focal_point=(0.0, 0.0, 0.0))
-            )
+            light = projection.towards + 1.1 * projection.up - 0.7 * projection.right
+            plotter.add_light(pv.Light(position=tuple(light), focal_point=(0.0, 0.0, 0.0)))
         camera = plotter.camera
         camera.parallel_projection = True
         camera.position = focus + (1.0 - near) * projection.towards
@@ -204,7 +202,7 @@ def _draw(
         depth_image = plotter.get_image_depth(fill_value=-np.inf, reset_camera_clipping_range=False)
     except (ValueError, AttributeError, RuntimeError) as error:
         raise RenderError(
-            f"the picture could not be drawn: VTK gave no pixels ({error})"
+            f"the picture could not be drawn: VTK returned no pixels ({error})"
         ) from error
     finally:
         plotter.close()
@@ -214,13 +212,13 @@ def _draw(
 
 @cache
 def check_renderer() -> None:
-    """Refuse to draw where VTK finds no OpenGL, since drawing there would end the program."""
+    """Check that VTK has OpenGL: without it, drawing would end the program."""
     if sys.platform == "linux":
         os.environ.setdefault(WINDOW_VARIABLE, "vtkEGLRenderWindow")
     from vtkmodules.vtkCommonCore import vtkLogger
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
-    import_module("vtkmodules.vtkRenderingOpenGL2")  # registers the windows there are
+    import_module("vtkmodules.vtkRenderingOpenGL2")  # registers the available windows
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     window = vtkRenderWindow().GetClassName()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_INFO)
@@ -287,7 +285,7 @@ def split_visible(
 
 
 def resample(line: Array, step: float) -> Array:
-    """Put points into a polyline, so far apart at most in its first two columns, [n, 2 or more]."""
+    """Insert points into a polyline up to a maximum distance in its first two columns, [n, ≥ 2]."""
     lengths = np.hypot(*np.diff(line[:, :2], axis=0).T)
     pieces = np.maximum(1, np.ceil(lengths / step)).astype(int)
     # position along the polyline, in numbers of its points
@@ -306,12 +304,12 @@ def _thin(spots: Array) -> Array:
 
 
 def _steady(visible: np.ndarray, shortest: int) -> np.ndarray:
-    result = visible.copy()
+    steady = visible.copy()
     for start, end in pairwise(_bounds(visible)):
         inner = start > 0 and end < len(visible)
         if inner and end - start < shortest:
-            result[start:end] = not visible[start]
-    return result
+            steady[start:end] = not visible[start]
+    return steady
 
 
 def _bounds(visible: np.ndarray) -> list[int]:

@@ -1,7 +1,7 @@
-"""What every figure carries around its content: heading, facts, legend, panel, provenance.
+"""The frame of every figure: heading, facts, legend, panel, provenance.
 
-The symbols of the legend are drawn with the strokes of the picture itself, and entries for which
-there is no room are left out; matplotlib's legend does neither.
+The symbols of the legend are drawn with the strokes of the picture itself, and entries that do not
+fit are omitted; matplotlib's legend does neither.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,11 +31,11 @@ from warpspace.units import MM_PER_UM, spell_short
 
 @dataclass(frozen=True, slots=True)
 class DrawnMap:
-    """A map as it stands in a figure: enough to read it back."""
+    """A map in a figure, with its projection and raster."""
 
     projection: Projection
     picture: Picture
-    raster: Raster | None  # the drawn body; None where there is no surface
+    raster: Raster | None  # the drawn body; None without a surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Drawing:
 
     figure: Figure
     title: str
-    facts: Mapping[str, str]  # scene, version, settings: what the file carries as metadata
+    facts: Mapping[str, str]  # metadata of the file: scene, version, settings
     maps: tuple[DrawnMap, ...] = ()
     rects: tuple[Rect, ...] = ()  # (n, 4), px; boxes of all text
 
@@ -94,7 +94,7 @@ def draw_legend(
 
 
 def isoline_entries(text: str, *, diverging: bool = False) -> list[LegendEntry]:
-    """Give the entry of isolines, a white line or a dark one on a coloured ground, if any."""
+    """Build the entry of isolines, a white or dark line on a coloured ground; none without text."""
 
     def symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
         height, theme = canvas.px(14.0), canvas.theme
@@ -201,7 +201,7 @@ def _draw_bar(
 
 
 HINTED = 0.92
-"""Share of a room that measured text may take beside other text: small letters are drawn wider."""
+"""Share of the width for measured text beside other text: hinting widens small letters."""
 
 
 def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
@@ -235,7 +235,7 @@ def _wrap(canvas: Canvas, facts: Sequence[str], max_width: float) -> list[str]:
 
 
 def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
-    """List what a reader must know of a picture: machine, volume, loop, reference, factor."""
+    """List the conditions of a picture: machine, volume, loop, reference, factor."""
     scene, grid = picture.scene, picture.grid
     title = scene.machine.title
     facts = [f"{title}, chain {scene.machine.chain}"]
@@ -292,26 +292,21 @@ def draw_footer(
         max_width=0.45 * max_width,
     )  # fmt: skip
     text_width = HINTED * (max_width - (source_rect[2] - source_rect[0])) - canvas.px(24.0)
-    words = [
-        " / ".join(dict.fromkeys(map(convention_words, scenes))),
-        "error = actual − nominal",
-        "coordinates in the machine frame R",
-    ]
-    canvas.text(
-        margin, y, " · ".join(words), size=SIZES.small, colour=theme.muted, max_width=text_width
-    )
+    conventions = " / ".join(dict.fromkeys(map(convention_words, scenes)))
+    text = f"{conventions} · error = actual − nominal · coordinates in the machine frame R"
+    canvas.text(margin, y, text, size=SIZES.small, colour=theme.muted, max_width=text_width)
     for scene in reversed(scenes if errors else ()):
         y += canvas.px(25.0)
         head = "errors: " if len(scenes) == 1 else f"errors of {scene.name}: "
-        words = _as_many(canvas, head, parameter_words(scene), max_width)
-        canvas.text(margin, y, words, size=SIZES.small, colour=theme.muted, max_width=max_width)
+        text = _fitting_text(canvas, head, parameter_words(scene), max_width)
+        canvas.text(margin, y, text, size=SIZES.small, colour=theme.muted, max_width=max_width)
     if legend:
         y += canvas.px(36.0)
         draw_legend(canvas, legend, margin, y, max_width)
     return y + canvas.px(30.0)
 
 
-def _as_many(canvas: Canvas, head: str, items: Sequence[str], max_width: float) -> str:
+def _fitting_text(canvas: Canvas, head: str, items: Sequence[str], max_width: float) -> str:
     if not items:
         return head + "all zero"
     for count in range(len(items), 0, -1):
@@ -363,12 +358,12 @@ def metadata(
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A figure with heading and footer, waiting for its content."""
+    """A figure with heading and footer, before its content is drawn."""
 
     name: str  # of the figure
     canvas: Canvas
     title: str
-    content: Rect  # px; room for the content and for the column beside it
+    content: Rect  # px; area of the content; `panel` is the column beside it
     panel: Rect
     scenes: Sequence[Scene]
     settings: FigureSettings

@@ -64,13 +64,13 @@ def _bent(
     error_um: Array,
     indices: surfaces.Index,
     material: Material,
-    **attributes: Any,
+    **options: Any,
 ) -> GltfNode:
-    """Build a part that is drawn displaced; its target leads back to where it nominally is."""
+    """Build a displaced node; its morph target leads back to the nominal points."""
     drawn_mm = surfaces.deform(nominal_mm, error_um, picture.exaggeration)
     to_nominal = to_gltf(error_um * (-picture.exaggeration * MM_PER_UM))
     return GltfNode(
-        name, to_gltf(drawn_mm), indices, material, targets={"nominal": to_nominal}, **attributes
+        name, to_gltf(drawn_mm), indices, material, targets={"nominal": to_nominal}, **options
     )
 
 
@@ -147,7 +147,7 @@ def to_pyvista(
     exaggeration: Exaggeration = "auto",
     parts: bool = False,
 ) -> "pv.MultiBlock":
-    """Give an evaluated scene as PyVista meshes.
+    """Build PyVista meshes of an evaluated scene.
 
     Parameters
     ----------
@@ -157,10 +157,10 @@ def to_pyvista(
     loop : Loop or str, optional
         "tool", "workpiece" or "relative".
     exaggeration : float, "auto" or None, optional
-        Display factor of what is drawn displaced: a number, "auto" for a round one that suits the
-        scene, None for what the scene says.
+        Display factor of displacements: a number, "auto" for a round one that suits the scene, None
+        for the scene's own.
     parts : bool, optional
-        Whether the part of each parameter in the error is wanted too.
+        Whether the contribution of each parameter to the error is added.
 
     Returns
     -------

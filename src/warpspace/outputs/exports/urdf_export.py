@@ -21,7 +21,7 @@ from warpspace.units import Array
 
 ROOT, LINKS = "frame", {"S": "spindle", "t": "tool", "w": "workpiece"}
 MM_PER_M = 1000.0
-EFFORT, VELOCITY = 1000.0, 1.0  # of every joint: URDF asks for them, machines do not say
+EFFORT, VELOCITY = 1000.0, 1.0  # of every joint: required by URDF, not part of a machine
 
 
 def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:

@@ -17,9 +17,9 @@ from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, Array
 
 SAMPLES = 361
-FEW_READINGS = 5000  # readings that are drawn at most, evenly picked from all
+FEW_READINGS = 5000  # largest number of readings drawn, evenly selected
 BAND = 5
-"""Colour of a tolerance that several errors of a chart share; one of its own has its error's."""
+"""Colour of a tolerance that several errors of a chart share; otherwise that of its error."""
 KINDS = (("XYZ", MICROMETRE, "translation"), ("ABC", MICRORADIAN, "rotation"))
 Errors = tuple[Axis, str, str, str]
 """An axis, the letters of the errors of one kind, their unit and the kind."""
@@ -60,7 +60,7 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
             box = (split / width, bottom / height, (right - split) / width, (top - bottom) / height)
             draw_beside(canvas.figure, bars, box, size)
     if not charts:
-        message = "No component error: every one is zero along its axis."
+        message = "All component errors are zero."
         text, small = canvas.fit(message, split - x_left, SIZES.heading)
         canvas.text((x_left + split) / 2.0, (bottom + top) / 2.0, text, size=small, ha="center")
     return sheet.finish(1.0)

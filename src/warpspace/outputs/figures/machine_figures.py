@@ -1,4 +1,4 @@
-"""Figures with the machine: its bent bodies around the bent volume, and the traces of its table."""
+"""Figures with the machine: displaced bodies around the deformed volume; traces of the table."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -36,7 +36,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MINUS, Array, spell
 
 VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
-"""Opacity of the coloured volume before bodies, and behind them."""
+"""Opacity of the coloured volume in front of bodies, and behind them."""
 DARKER = 0.62
 
 
@@ -204,7 +204,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     largest = max(line.largest_um for line in lines)
     nominal = np.concatenate([line.nominal_mm for line in lines])
     reach = float(np.ptp(nominal, axis=0).max())
-    # twice: traces are seen edge-on, a tenth of their reach is plenty
+    # twice: traces are often seen edge-on, where a tenth of their extent suffices
     factor = choose_exaggeration(settings.exaggeration, scene.exaggeration, 2.0 * largest, reach)
     traces = trace_lines([replace(group, exaggeration=factor) for group in groups])
     coloured = [component_values(line.error_um, settings.component) for line in traces]
@@ -212,14 +212,14 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     scale = choose_scale([values], settings.component, end=settings.range_top)
     picture = evaluate_picture(scene, grid=2, loop="workpiece", exaggeration=factor)
     turning = [axis.name for axis in scene.machine.axes.values() if not axis.is_linear]
-    # others would hide the traces
+    # other bodies would hide the traces
     placed = place_bodies(scene, picture.view, factor, (*turning, "w"))
     title = f"Traces of the rotary axes: {scene.title}"
     facts = [
         fact for fact in scene_facts(picture, factor) if not fact.startswith(("working", "2 "))
     ]
     if largest == 0.0:
-        facts.append("nothing moves these points: no error of a rotary axis")
+        facts.append("these points are not displaced: no error of a rotary axis")
     legend = [
         line_entry("nominal trace", lambda theme: theme.muted, SIZES.thin, TRACE_DASHES),
         LegendEntry(_trace_symbol, "actual trace, exaggerated, coloured by its error"),

@@ -77,7 +77,7 @@ def draw_statistics(
 
 
 def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
-    """Say how far apart isolines are; empty where there are none among the values."""
+    """Format the distance of isolines; empty if none lies within the values."""
     levels = surfaces.isoline_levels(scale)
     if values is not None:
         volume = sum(count > 1 for count in values.shape) > 1
@@ -168,7 +168,7 @@ def _cells(
     spans = {part.axis: np.ptp(part.grid.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
     x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
     x_left, bottom, right, top = rect
-    # axes and labels take the same room in every cell, the rest follows the lengths
+    # axes and labels take the same space in every cell; the remainder follows the lengths
     fixed = min(canvas.px(230.0), 0.3 * (right - x_left), 0.3 * (top - bottom))
     column = x_left + fixed + (right - x_left - 2.0 * fixed) * x / (x + y)
     row = bottom + fixed + (top - bottom - 2.0 * fixed) * z / (z + y)
@@ -204,10 +204,9 @@ def _draw_key(
     visible, hidden = off_screen.split_visible(edges, projection, raster)
     canvas.lines(visible, width=SIZES.thin, colour=theme.ghost, dashes=map3d.GHOST_DASHES)
     canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=map3d.GHOST_DASHES)
-    canvas.text(
-        (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0), "where they lie (not exaggerated)",
-        weight="bold", ha="center", va="top",
-    )  # fmt: skip
+    x, y = (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0)
+    heading = "positions of the slices (not exaggerated)"
+    canvas.text(x, y, heading, weight="bold", ha="center", va="top")
 
 
 LEAN_RAD = 0.45  # largest lean on screen that the factor aims at
@@ -224,10 +223,10 @@ class Needles:
     lean: Array  # [N, 3]; exaggerated lean of its end, per length of the needle
     length_mm: float
     tilt_urad: Array  # [N]
-    feet: surfaces.Index  # [n]; nodes where they stand
+    feet: surfaces.Index  # [n]; nodes of their lower ends
 
     def ends_mm(self, nodes_mm: Array, at: surfaces.Index) -> tuple[Array, Array]:
-        """Give nominal and drawn ends of needles, [n, 2, 3] each, mm."""
+        """Compute nominal and drawn ends of needles, [n, 2, 3] each, mm."""
         foot = nodes_mm[at]
         nominal = np.stack([foot, foot + self.length_mm * self.axis[at]], 1)
         drawn = np.stack([foot, foot + self.length_mm * (self.axis[at] + self.lean[at])], 1)
@@ -270,7 +269,7 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
         ("mean tilt", f"{spell(summary.mean_um)} {MICRORADIAN}"),
         ("P95", f"{spell(summary.p95_um)} {MICRORADIAN}"),
         *_place_rows(summary.max_at_axes, summary.max_at_mm),
-        ("1° of lean shown", f"{spell(per_degree)} {MICRORADIAN}"),
+        ("1° of drawn lean", f"{spell(per_degree)} {MICRORADIAN}"),
     ]
     marks = [("mean", float(values.mean())), ("max", float(values.max()))]
     if settings.component != "norm":

@@ -132,9 +132,9 @@ def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
     after = adjustment.changes()[-1].scene if adjustment.adjustments else scene
     pair = (
         replace(scene, title="before"),
-        replace(after, title="after", name=f"{scene.name}_repaired"),
+        replace(after, title="after", name=f"{scene.name}_adjusted"),
     )
-    title = f"Repair: {scene.title}"
+    title = f"Adjustment: {scene.title}"
     return _draw_pair("adjust", title, pair, settings, [_adjusted(adjustment)], exact=exact)
 
 
@@ -150,7 +150,7 @@ def _adjusted(adjustment: AdjustResult) -> str:
 
 BODY_ALPHA = 0.55
 CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
-"""Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
+"""Space in px above a picture for its title, below it for its numbers, and for labels of axes."""
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:

@@ -28,7 +28,7 @@ from warpspace.scene.model import Scene, second_order
 from warpspace.units import spell, spell_short, spell_signed
 
 UM, PERCENT = "\N{NO-BREAK SPACE}µm", "\N{NO-BREAK SPACE}%"
-_WORTH = 0.01  # share of the largest error that an adjustment must gain to be named
+_WORTH = 0.01  # least reduction of the largest error, as a share, by a recommended adjustment
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class ReportSettings:
     seed: int = 0
     distribution: str = "uniform"  # "uniform" or "normal"
     author: str = ""
-    questions: tuple[str, ...] = ()  # what is still open, on the first page
+    questions: tuple[str, ...] = ()  # open questions, on the first page
 
     def analyses(self, limit_um: float | None) -> dict[str, Analysis]:
         loop, seed = Loop(self.loop), self.seed
@@ -69,20 +69,20 @@ class ReportSettings:
 
 @dataclass(frozen=True, slots=True)
 class Reviewed:
-    """One scene, reviewed."""
+    """One scene of a review, with the results of its analyses."""
 
-    letter: str  # A or B in headings; nothing where it is alone
+    letter: str  # A or B in headings; empty for a single scene
     picture: ScenePicture  # evaluated scene with the display factor all scenes of the report share
     explanation: Explanation  # of the worst node
     linearisation_um: float  # largest difference between the exact chain and the first order
-    results: Mapping[str, Result | str]  # of each analysis; why there is none
-    share_within: float  # share of the volume within the limit; 0 where there is none
-    advice: str  # the one thing to do
-    uncertainty: FieldUncertainty | None  # how sure its errors are
+    results: Mapping[str, Result | str]  # of each analysis, or the reason for its failure
+    share_within: float  # of the volume within the limit; 0 without a limit
+    advice: str  # recommended adjustment
+    uncertainty: FieldUncertainty | None  # None where the scene states none
 
     @property
     def is_within_limit(self) -> bool:
-        """Whether its largest error is within its limit, where it has one."""
+        """True if the largest error is within the limit, or without a limit."""
         limit = self.scene.limit_um
         return limit is None or self.statistics.max_um <= limit
 
@@ -102,7 +102,7 @@ class Reviewed:
 
     @property
     def is_decided(self) -> bool:
-        """Whether the limit is kept, or missed, with enough probability (ISO 14253-1)."""
+        """True if conformity or non-conformity is verified (ISO 14253-1)."""
         summary, limit = self.statistics, self.scene.limit_um
         u95 = summary.expanded_uncertainty.get("u95_max_um")
         if self.uncertainty is None or u95 is None or limit is None:
@@ -114,7 +114,7 @@ class Reviewed:
 
     @property
     def worst_axes(self) -> str:
-        """Spell where the axes stand at the worst point."""
+        """Axis positions of the worst point, formatted."""
         summary = self.statistics
         return list_axes(point_axes(self.scene, summary.max_at_axes)) or spell_in_r(
             summary.max_at_mm
@@ -160,7 +160,7 @@ def build_review(
     settings: ReportSettings,
     pictures: Sequence[ScenePicture] | None = None,
 ) -> Review:
-    """Evaluate everything a report tells, where the volumes are not evaluated yet also those."""
+    """Evaluate the content of a report; `pictures` are the volumes where evaluated already."""
     pictures = pictures or share_pictures(scenes, settings)
     letters = ("",) if len(pictures) == 1 else ("A", "B")
     reviewed = [
@@ -217,32 +217,36 @@ def _difference(first: ScenePicture, second: ScenePicture | None = None) -> Stat
 
 
 def spell_setting(value: float) -> str:
-    """Spell a number that somebody has chosen, with its sign and without trailing zeros."""
+    """Format a set value with its sign and without trailing zeros."""
     return ("+" if value > 0.0 else "") + spell_short(value)
 
 
 def volume_share(share: float) -> str:
-    """Spell a share of the volume, 100 % only where it is all of it."""
+    """Format a share of the volume; 100 % only for the whole volume."""
     percent = 100.0 * share
     return f"{percent if share == 1.0 else min(percent, 99.9):.3g}{PERCENT}"
 
 
 def verdict(review: Review) -> str:
-    """Say what a reader must know: of two scenes which keeps its limit, and how they differ."""
+    """Format the verdict on the limit; of two scenes also the change of the mean error."""
     if len(review.scenes) == 1:
         return _verdict_on(review.scenes[0])
-    verdicts = [
-        f"{one.letter} {'keeps' if one.is_within_limit else 'misses'} the limit of {spell_short(limit)}{UM}"
-        for one in review.scenes
-        if (limit := one.scene.limit_um) is not None
-    ]
-    a, b = (one.statistics.mean_um for one in review.scenes)
+    verdicts = [_verdict_on_limit(reviewed) for reviewed in review.scenes]
+    a, b = (reviewed.statistics.mean_um for reviewed in review.scenes)
     change = (b - a) / a if a else 0.0
     comparison = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
-    comparison = comparison if abs(change) >= 0.005 else "the same as"
-    comment = f"{comparison} A's {spell(a)}{UM}" if a else "where A has none"
-    limits = f"{'; '.join(verdicts)}. " if verdicts else ""
-    return f"{limits}The mean error of B is {spell(b)}{UM}: {comment}."
+    if abs(change) < 0.005:
+        comparison = "the same as"
+    comment = f"{comparison} A's {spell(a)}{UM}" if a else "that of A is zero"
+    return f"{''.join(verdicts)}The mean error of B is {spell(b)}{UM}: {comment}."
+
+
+def _verdict_on_limit(reviewed: Reviewed) -> str:
+    limit = reviewed.scene.limit_um
+    if limit is None:
+        return ""
+    word = "pass" if reviewed.is_within_limit else "fail"
+    return f"{reviewed.letter}: {word}, limit {spell_short(limit)}{UM}. "
 
 
 def _verdict_on(reviewed: Reviewed) -> str:
@@ -252,37 +256,36 @@ def _verdict_on(reviewed: Reviewed) -> str:
         return f"The error is zero in {volume}."
     if limit is None:
         return f"No limit is set. The largest error in {volume} is {worst}."
+    limit_text = f"the limit of {spell_short(limit)}{UM}"
     if not reviewed.is_decided:
-        statement = f"It cannot be told whether the limit of {spell_short(limit)}{UM} is kept"
-        return f"{statement} in {volume}: the largest error is {worst}."
-    statement = f"The limit of {spell_short(limit)}{UM} is"
+        return f"Undecided: the largest error in {volume} is {worst}; {limit_text} is too close."
     if reviewed.is_within_limit:
-        return f"{statement} kept in {volume}: the largest error is {worst}."
+        return f"Pass: the largest error in {volume} is {worst}, within {limit_text}."
     share = volume_share(reviewed.share_within)
-    return f"{statement} missed: {share} of {volume} is within it, and the worst is {worst}."
+    return f"Fail: {share} of {volume} is within {limit_text}; the largest error is {worst}."
 
 
 def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSettings) -> str:
     limit, before = picture.scene.limit_um, picture.statistics.max_um
     if before == 0.0:
-        return "Nothing to adjust: the error is zero."
+        return "No adjustment required: the error is zero."
     if limit is not None and before <= limit:
-        return "Nothing to adjust: the limit is kept."
+        return "No adjustment required: the error is within the limit."
     if not isinstance(adjustment, AdjustResult) or not adjustment.adjustments:
-        return "Nothing to adjust: no squareness or alignment acts in this loop."
+        return "No adjustment possible: no squareness or alignment error acts in this loop."
     after = evaluate_picture(adjustment.changes()[0].scene, grid=settings.grid, loop=settings.loop)
     largest = after.statistics.max_um
     if not largest < (1.0 - _WORTH) * before:
-        return "No single adjustment lowers the largest error; several together may: see Repair."
+        return "No single adjustment reduces the largest error; a set may, see Adjustments."
     ((key, value),) = adjustment.adjustments[0].adjust.items()
     row = parameter(key)
     consequence = ""
     if limit is not None:
         share = volume_share(_share_within(after))
         consequence = (
-            ", and the limit is kept"
+            ", within the limit"
             if largest <= limit
-            else f", and {share} of the volume is within the limit"
+            else f"; {share} of the volume is within the limit"
         )
     return (
         f"Adjust {key} ({row.name}) from {spell_setting(adjustment.present[key])} to {spell_signed(value)}"
@@ -304,7 +307,7 @@ def first_page(review: Review, picture: Block) -> list[Block]:
             )
     names.append("within the limit" if limited else "RMS")
     if len(rows) == 1:
-        remarks = ("", "95 % of the volume is below it", f"at {review.scenes[0].worst_axes}")
+        remarks = ("", "not exceeded in 95 % of the volume", f"at {review.scenes[0].worst_axes}")
         cards = zip(names, rows[0], (*remarks, "of the volume" if limited else ""), strict=True)
         numbers_block: Block = Cards(tuple(cards))
     else:
@@ -323,7 +326,7 @@ def first_page(review: Review, picture: Block) -> list[Block]:
     return [
         Text(verdict(review), "lead"),
         numbers_block,
-        Text("What to do", "heading"),
+        Text("Recommended adjustment", "heading"),
         *(Text(one.titled(one.advice)) for one in review.scenes),
         picture,
         *([Text("Open questions", "heading"), Items(questions)] if questions else []),

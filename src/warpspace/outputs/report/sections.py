@@ -69,15 +69,15 @@ CHART = "warpspace.outputs.charts.block_charts:chart_figure"
 LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they are drawn
 Chart = Bars | Lines | Histogram
 Drawn = Callable[[], Block]
-"""Waits for a figure; gives what stands in its place where it cannot be drawn."""
+"""Waits for a figure; returns a replacement where it cannot be drawn."""
 Step = tuple[str, str, Sequence[Scene], FigureSettings]
 StorySteps = Callable[[Scene, int], Iterable[Step]]
-"""Gives the steps of a scene's story at so many nodes per axis, what was on the screen each time:
-caption, name of a figure, what it is of, its settings. It needs the app."""
+"""Returns the steps of a scene's story for a number of nodes per axis, each as shown on the page:
+caption, name of the figure, its scenes and settings. It needs the app."""
 
 
 class ReportFigures:
-    """Draws the figures of one report; its maps are begun as soon as it is there."""
+    """The figures of one report; drawing of the maps begins at once."""
 
     def __init__(
         self,
@@ -102,8 +102,8 @@ class ReportFigures:
         self.evidence: list[list[Drawn]] = []
         for number, picture in enumerate(pictures):
             scene = picture.scene
-            map_caption = f"Error map of {scene.title}; {drawn}; colour scale of its own."
-            # what would tell nothing: no trace displaced, the same machine again
+            map_caption = f"Error map of {scene.title}; {drawn}; own colour scale."
+            # without information: no trace displaced, the same machine again
             is_undisplaced = not any(trace.error_um.any() for trace in trace_lines(picture.traces))
             left_out = {"traces" if is_undisplaced else "", "machine" if number else ""}
             figures = [("error-map", map_caption)] if compares else []
@@ -128,8 +128,8 @@ class ReportFigures:
         caption: str,
         settings: FigureSettings | None = None,
     ) -> Drawn:
-        """Begin a figure; it is drawn a second time where the first fails, then it is missing."""
-        # the lean of the tool axis has a factor of its own, at which it is seen
+        """Begin a figure; if drawing fails twice, the figure is missing."""
+        # the lean of the tool axis needs a factor of its own to be visible
         factor = "auto" if name == "orientation-map" else self._factor
         figure_settings = settings or FigureSettings(
             exaggeration=factor, loop=self._loop, grid=self._grid
@@ -169,7 +169,7 @@ LOOPS = {
 
 
 Embed = Callable[..., str]
-"""Builds a page of a scene, given exaggeration, nodes, loop and largest |E|; it needs a server."""
+"""Builds a page of a scene for exaggeration, nodes, loop and largest |E|; it needs a server."""
 
 
 def write_report(
@@ -181,7 +181,7 @@ def write_report(
     overwrite: bool = True,
     **parts: Any,
 ) -> Report:
-    """Write the report of one scene or two; see `build_report` for its parts."""
+    """Write the report of one scene or two; `parts` are passed to `build_report`."""
     target = check_target(path, ENDINGS, overwrite=overwrite)
     page = target.suffix.lower() == ".html"
     form, embed = ("svg", embed) if page else ("pdf", None)
@@ -204,7 +204,7 @@ def build_report(
     files: Sequence[Path] = (),
     watch: ProgressCallback = ignore_progress,
 ) -> Report:
-    """Build a report; `watch` is called with the share of its figures that are drawn."""
+    """Build a report; `watch` is called with the share of figures drawn."""
     if form not in ("svg", "pdf"):
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
     settings = settings or ReportSettings()
@@ -212,15 +212,15 @@ def build_report(
     with FigureWorker() as worker:
         figures = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
         review = build_review(scenes, settings, pictures)
-        side_by_side = {"Concepts side by side": concept_blocks(review, concepts, figures)}
+        side_by_side = {"Comparison of concepts": concept_blocks(review, concepts, figures)}
         appendices = {
-            "Where the error is": map_blocks(review, figures, embed),
+            "Distribution of the error": map_blocks(review, figures, embed),
             "Error budget at the worst point": map(explanation, review.scenes),
-            "Repair": result_blocks(review, figures, "adjust"),
-            **({"What differs": differences(review)} if len(scenes) == 2 else {}),
+            "Adjustments": result_blocks(review, figures, "adjust"),
+            **({"Differences between A and B": differences(review)} if len(scenes) == 2 else {}),
             "Errors and tolerances": map(parameters, review.scenes),
-            "How errors arrive at the point": result_blocks(review, figures, "gains"),
-            "What the tolerances promise": result_blocks(
+            "Error gains": result_blocks(review, figures, "gains"),
+            "Errors within the tolerances": result_blocks(
                 review, figures, "worst", "sampled", "shares"
             ),
             **(side_by_side if concepts else {}),
@@ -263,7 +263,7 @@ def _letters(number: int) -> str:
 def report_blocks(
     blocks: Iterable[AnyBlock], figures: ReportFigures | None = None
 ) -> Iterator[Block]:
-    """Give what a result of any analysis says; its charts where somebody draws them."""
+    """Convert the blocks of a result to blocks of the report; charts only with `figures`."""
     for block in blocks:
         if isinstance(block, str):
             yield Text(block.strip(), "note" if block.startswith(" ") else "body")
@@ -271,8 +271,8 @@ def report_blocks(
             nonzero = [i for i, row in enumerate(block.rows) if not _is_zero(block.columns, row)]
             zero, omitted = len(block.rows) - len(nonzero), len(nonzero) - MOST_ROWS
             title = block.title.strip()
-            title += f" Rows of zeros left out: {zero}." if zero else ""
-            title += f" {omitted} more rows are left out." if omitted > 0 else ""
+            title += f" Rows of zeros omitted: {zero}." if zero else ""
+            title += f" {omitted} more rows omitted." if omitted > 0 else ""
             rows = [block.rows[i] for i in nonzero[:MOST_ROWS]]
             marks = [block.marks[i] for i in nonzero[:MOST_ROWS] if block.marks]
             shortened = replace(block, title=title.strip(), rows=rows, marks=marks)
@@ -310,9 +310,9 @@ def _first_bars(bars: Bars) -> Bars:
 def notes(
     review: Review, figures: ReportFigures, story_steps: StorySteps | None
 ) -> Iterator[Block]:
-    """Give what people have noted of each scene, and the story that they tell; a figure a step."""
+    """Build the notes of each scene, and the steps of its story, one figure each."""
     for reviewed in (one for one in review.scenes if one.scene.review):
-        title = reviewed.titled("Red where the numbers of a note no longer hold.")
+        title = reviewed.titled("Red: numbers that have changed since the note was written.")
         yield notes_table(reviewed.scene, title)
         if story_steps and (steps := story_steps(reviewed.scene, review.settings.grid)):
             yield Text(reviewed.titled("The story"), "heading")
@@ -321,7 +321,7 @@ def notes(
 
 
 def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterator[Block]:
-    """Give what analyses say of each scene; once where they say the same."""
+    """Build the results of analyses for each scene, identical results once."""
     for name in names:
         before = None
         for reviewed in review.scenes:
@@ -330,7 +330,7 @@ def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterat
                 yield Text(reviewed.titled(result), "note")
                 continue
             if (numbers := result.as_json()) == before:
-                yield Text(reviewed.titled("the same."), "note")
+                yield Text(reviewed.titled("identical results."), "note")
                 continue
             before = numbers
             title, *blocks = result.blocks()
@@ -345,12 +345,12 @@ def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterat
 
 
 def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> Iterator[Block]:
-    """Give statistics, the views that are turned with the mouse, and the maps."""
+    """Build the statistics, the interactive views and the maps."""
     names = [one.letter or "|E|" for one in review.scenes]
     summaries = [one.statistics for one in review.scenes]
     if review.difference is not None:
         summaries.append(review.difference)
-    yield Text("Each node counts for its share of the volume.")
+    yield Text("Each node is weighted by its share of the volume.")
     blocks = statistics_blocks(review.scenes[0].scene, names, summaries)
     yield from report_blocks(block for block in blocks if not str(block).startswith("  --at"))
     for reviewed_scene in review.scenes:
@@ -369,7 +369,7 @@ def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> I
                 loop=review.settings.loop,
                 largest=max(one.statistics.max_um for one in review.scenes),
             )
-            title = reviewed.titled(f"{reviewed.scene.title}: turn it with the mouse")
+            title = reviewed.titled(f"{reviewed.scene.title}: interactive view, drag to turn")
             yield Embedded(title, page)
         yield from (drawn() for drawn in figures.evidence[number])
 
@@ -393,10 +393,10 @@ def explanation(reviewed: Reviewed) -> Table:
     worst = reviewed.statistics
     place = spell_point(point_axes(reviewed.scene, worst.max_at_axes), worst.max_at_mm)
     title = (
-        f"{reviewed.titled(reviewed.scene.title)}. What each error does to the worst point,"
-        f" {place} mm. The parts along E add up to the length of the first-order error."
+        f"{reviewed.titled(reviewed.scene.title)}. Contribution of each error at the worst point,"
+        f" {place} mm. The components along E add up to the length of the first-order error."
         " The largest contribution is not always the one to adjust, since it may compensate other"
-        " errors elsewhere; see Repair."
+        " errors elsewhere; see Adjustments."
     )
     columns = (
         *(Column("key"), Column("error"), Column("value there", "s")),
@@ -429,11 +429,11 @@ def parameters(reviewed: Reviewed) -> Block:
         marks.append("worse" if conforms == "no" else "key" if value else "")
     title = reviewed.titled(f"Errors and tolerances of {scene.title}.")
     if not rows:
-        return Text(f"{title} All errors are zero; none is out of its tolerance.", "note")
-    title += f" Errors that are zero left out: {zero}." if zero else ""
+        return Text(f"{title} All errors are zero and within tolerance.", "note")
+    title += f" Errors equal to zero omitted: {zero}." if zero else ""
     columns = (
         *(Column("key"), Column("symbol"), Column("error"), Column("value", "s")),
-        *(Column("tolerance", "s"), Column("unit"), Column("kept"), Column("along the axis")),
+        *(Column("tolerance", "s"), Column("unit"), Column("within"), Column("along the axis")),
     )
     return Table(columns, rows, title, marks=marks)
 
@@ -457,7 +457,7 @@ def differences(review: Review) -> Iterator[Block]:
     no_difference = Text("The error sets of A and B are the same.", "note")
     yield Table(columns, rows, title) if rows else no_difference
     if review.difference is None:
-        yield Text("A and B have different working volumes: no difference is formed.", "note")
+        yield Text("The working volumes of A and B differ: no difference is formed.", "note")
 
 
 def concept_blocks(
@@ -475,7 +475,7 @@ def concept_blocks(
     )  # fmt: skip
     comparison = analysis.run_all(scenes, ignore_progress)
     yield from report_blocks(comparison.blocks())
-    caption = "The machines in one scale; colours are the RMS of |E| within tolerance."
+    caption = "The machines at one scale; colours: RMS of |E| within tolerance."
     figure_settings = FigureSettings(loop=str(analysis.loop), grid=settings.grid, concepts=analysis)
     yield figures.begin(
         "concepts", [one.scene for one in comparison.concepts], caption, figure_settings
@@ -505,7 +505,7 @@ def conventions(review: Review) -> Items:
             f"Loop: {loop}. {LOOPS[loop]}",
             *sentences,
             (
-                f"Displacement is drawn {spell_factor(review.exaggeration)} unless a picture says"
+                f"Displacement is drawn {spell_factor(review.exaggeration)} unless a figure states"
                 " otherwise; the dashed box is nominal."
             ),
             (
@@ -519,8 +519,10 @@ def conventions(review: Review) -> Items:
 
 def _reference(scene: Scene) -> str:
     if scene.reference is None:
-        return "Absolute: errors include the part that is the same everywhere."
-    return f"Relative to the reference point {list_axes(scene.reference)}, which is held still."
+        return "Absolute: errors include the part common to all points."
+    return (
+        f"Relative to the reference point {list_axes(scene.reference)}, whose error is subtracted."
+    )
 
 
 def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
@@ -543,8 +545,6 @@ def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
     rows += [(name, f"SHA-256 {hashlib.sha256(data).hexdigest()}") for name, data in inputs]
     yield Table((Column("what"), Column("value")), rows, "Program, settings and input.")
     for reviewed, text in zip(review.scenes, texts, strict=True):
-        heading = (
-            f"{reviewed.scene.name}.toml, complete: saved as a file it is the scene of this report."
-        )
+        heading = f"{reviewed.scene.name}.toml, complete; the scene of this report."
         yield Text(reviewed.titled(heading), "heading")
         yield Text(text.decode(), "code")

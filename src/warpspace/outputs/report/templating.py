@@ -23,12 +23,12 @@ POLICY = (
     " style-src 'unsafe-inline'; img-src data: blob:; font-src data: blob:;"
     " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
 )
-"""What the browser may load: what is in the file, and nothing else."""
+"""Content policy: the browser loads only what is in the file."""
 
 _PATH = re.compile(r' d="[^"]*"')
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _UNSAFE = re.compile(r"[%#]|[^\x20-\x7e]+")
-"""What the address of an image holds in code; the page's own escaping comes on top."""
+"""Characters to encode in the address of an image; the page escapes it in addition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Cards:
-    """Numbers to remember side by side: what each is, its value with unit, a remark."""
+    """Key numbers side by side: label, value with unit, remark."""
 
     cards: tuple[tuple[str, str, str], ...]
 
@@ -59,7 +59,7 @@ class ReportFigure:
 
 @dataclass(frozen=True, slots=True)
 class Embedded:
-    """A page of its own inside the page, for instance a 3-D view; left out on paper."""
+    """A page inside the page, for instance a 3-D view; omitted in print."""
 
     title: str
     html: str
@@ -77,7 +77,7 @@ Block = Text | Cards | Table | ReportFigure | Embedded | Items
 
 @dataclass(frozen=True, slots=True)
 class ReportSection:
-    """A part of the report with a heading; the first stands on the page read first."""
+    """A part of the report with a heading; the first is the first page."""
 
     heading: str
     blocks: tuple[Block, ...]
@@ -88,10 +88,10 @@ class Report:
     """A whole report."""
 
     title: str
-    overline: str  # what kind of document it is
+    overline: str  # kind of document
     facts: tuple[str, ...]  # machine, date, version: one line below the title
     sections: tuple[ReportSection, ...]
-    missing: tuple[str, ...] = ()  # figures that could not be drawn, and why
+    missing: tuple[str, ...] = ()  # figures that could not be drawn, with the reason
 
     @property
     def pictures(self) -> tuple[ReportFigure, ...]:
@@ -101,7 +101,7 @@ class Report:
 
 
 def report_time() -> datetime:
-    """Give the time of a report, UTC; ``SOURCE_DATE_EPOCH`` fixes it, so that files repeat."""
+    """Return the time of a report, UTC; ``SOURCE_DATE_EPOCH`` fixes it for reproducible files."""
     fixed = os.environ.get("SOURCE_DATE_EPOCH", "")
     if fixed.isascii() and fixed.isdigit() and len(fixed) < 12:
         return datetime.fromtimestamp(int(fixed), UTC)
@@ -146,7 +146,7 @@ def _rounded(number: re.Match[str]) -> str:
 
 
 def _attribute_page(page: str) -> Markup:
-    """Spell a page as the value of an attribute: only these two characters would change it."""
+    """Escape a page as the value of an attribute: only these two characters would change it."""
     return Markup(page.replace("&", "&amp;").replace('"', "&quot;"))  # noqa: S704
 
 
