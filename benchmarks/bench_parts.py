@@ -14,23 +14,23 @@ from warpspace.analysis.description import ignore_progress
 from warpspace.parts.part import Part
 from warpspace.parts.workpiece import load_part, make_points, point_basis
 
-AROUND = 1000  # vertices of a million
+CIRCUMFERENCE = 1000  # vertices of a million
 GROWING = (400, 566, 800, 1000)  # above what features are looked for in
 MEGABYTE = 1e6
 
 
-def ball(around: int) -> trimesh.Trimesh:
+def ball(circumference: int) -> trimesh.Trimesh:
     """Make a closed ball of around × around vertices and two poles."""
-    height, turn = np.linspace(0.0, np.pi, around + 2)[1:-1], np.arange(around)
-    turn = turn * 2.0 * np.pi / around
+    height, turn = np.linspace(0.0, np.pi, circumference + 2)[1:-1], np.arange(circumference)
+    turn = turn * 2.0 * np.pi / circumference
     rings = np.stack(np.broadcast_arrays(
         np.sin(height)[:, None] * np.cos(turn), np.sin(height)[:, None] * np.sin(turn),
         np.cos(height)[:, None],
     ), axis=-1)  # fmt: skip
     points = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    number = np.arange(around * around).reshape(around, around)
+    number = np.arange(circumference * circumference).reshape(circumference, circumference)
     beside = np.roll(number, -1, axis=1)
-    top, bottom = (np.full(around, around * around + pole) for pole in (0, 1))
+    top, bottom = (np.full(circumference, circumference * circumference + pole) for pole in (0, 1))
     quads = number[:-1], number[1:], beside[:-1], beside[:-1], number[1:], beside[1:]
     triangles = np.concatenate([
         np.stack(quads, axis=-1).reshape(-1, 3),
@@ -52,7 +52,7 @@ def measure() -> Section:
             for path in files
         ]
         files.append(files[-1].with_suffix(".stl"))
-        ball(AROUND).export(files[-1])
+        ball(CIRCUMFERENCE).export(files[-1])
         costs.append(best(lambda: Part(file=str(files[-1])).run(scene, ignore_progress), 3))
         rows = list[Row]()
         for path, cost in zip(files[-2:], costs[-2:], strict=True):

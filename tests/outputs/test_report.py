@@ -5,6 +5,8 @@ import shutil
 import subprocess
 from dataclasses import astuple, replace
 from functools import partial
+from importlib.resources import files
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from warpspace.exceptions import NoRendererError, RenderError
 from warpspace.outputs.report import ReportSettings, build_report, sections, write_report
 from warpspace.outputs.report.review import build_review, first_page
 from warpspace.outputs.report.templating import (
+    Block,
     Embedded,
     Items,
     Table,
@@ -63,18 +66,18 @@ def test_verdict_on_a_limit_that_is_missed():
 def test_the_limit_is_that_of_the_scene_unless_another_is_given():
     scene = replace(load_scene("dvf5000_first"), limit_um=60.0)
     text, shares = page_one(scene, spec_um=None)
-    assert "The limit of 60 µm is kept in the working volume" in text
-    assert "Nothing to adjust: the limit is kept." in text
+    assert "within the limit of 60 µm." in text
+    assert "No adjustment required: the error is within the limit." in text
     assert shares == [1.0]
-    assert "The limit of 50 µm is missed" in page_one(scene)[0]
+    assert "is within the limit of 50 µm; the largest error is" in page_one(scene)[0]
 
 
 @pytest.mark.parametrize(
     ("limit", "said"),
     [
-        (4.0, "The limit of 4 µm is missed"),
-        (4.9, "It cannot be told whether the limit of 4.9 µm is kept"),
-        (6.0, "The limit of 6 µm is kept"),
+        (4.0, "Fail: 0"),
+        (4.9, "Undecided: the largest error in the working volume"),
+        (6.0, "Pass: the largest error in the working volume"),
     ],
 )
 def test_a_verdict_is_given_where_it_holds_with_95_percent(limit, said):
@@ -94,15 +97,15 @@ def test_verdict_without_a_limit_and_on_a_perfect_machine():
     assert "falls from 51.7 to 46.1 µm." in text
     text, _ = page_one(load_scene("dvf5000_nominal"))
     assert "The error is zero" in text
-    assert "Nothing to adjust" in text
+    assert "No adjustment required" in text
     assert "nan" not in text
 
 
 def test_verdicts_on_two_stand_in_one_table():
     text, shares = page_one(load_scene("dvf5000_first"), load_scene("dvf5000_second"), grid=11)
-    assert "A misses the limit of 50 µm; B keeps the limit of 50 µm." in text
+    assert "A: fail, limit 50 µm. B: pass, limit 50 µm." in text
     assert "mean error of B is 14.6 µm: 53 % less than A's 30.9 µm" in text
-    assert "B: Nothing to adjust" in text
+    assert "B: No adjustment required" in text
     assert shares[0] < shares[1] == 1.0
 
 
@@ -167,7 +170,7 @@ def test_every_part_is_there(both):
 
 @pytest.mark.render
 def test_concepts_have_the_numbers_of_the_command(both):
-    section = next(part for part in both.sections if part.heading.endswith("Concepts side by side"))
+    section = next(part for part in both.sections if part.heading.endswith("Comparison of concepts"))
     table = next(block for block in section.blocks if isinstance(block, Table))
     scenes = [
         load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "machine_printer_3d")
@@ -178,6 +181,15 @@ def test_concepts_have_the_numbers_of_the_command(both):
         assert float(row[3]) == pytest.approx(concept.sampled.mean_um, rel=5e-3)
         assert float(row[4]) == pytest.approx(concept.sampled.p95_um, rel=5e-3)
         assert row[6] == f"{100 * concept.sampled.probability.probability:.2f}"
+
+
+@pytest.mark.parametrize("template", ["report.html.j2", "report.typ"])
+def test_templates_draw_every_kind_of_block(template):
+    folder = files("warpspace.outputs.report") / "templates"
+    text = (folder / template).read_text("utf-8")
+    printed = set(get_args(Block)) - ({Embedded} if template.endswith(".typ") else set())
+    missing = [kind for kind in printed if f'kind == "{kind.__name__.lower()}"' not in text]
+    assert missing == []
 
 
 @pytest.mark.render
@@ -215,7 +227,7 @@ def test_pdf_repeats_and_says_everything(renderer, tmp_path, monkeypatch):
     flat = re.sub(r"\s+", " ", text)
     for words in (
         "Error budget at the worst point",
-        "no advice",
+        "Recommended adjustment",
         "exact chain",
         "SHA-256",
         'machine = "dvf',

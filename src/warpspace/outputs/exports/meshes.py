@@ -204,8 +204,8 @@ def to_pyvista(
     if parts:
         basis = grid_basis(scene, picture.grid, picture.view)
         for key, response in zip(basis.keys, basis.position, strict=True):
-            if amplitude := scene.errors.amplitude(key):
-                arrays[f"part_{key}_um"] = amplitude * response
+            if scene.errors.amplitude(key):
+                arrays[f"part_{key}_um"] = scene.errors.amplitude(key) * response
     traces, bodies = pv.MultiBlock(), pv.MultiBlock()
     for label, drawn in _named_traces(picture):
         actual = pv.MultipleLines(drawn.actual_mm)

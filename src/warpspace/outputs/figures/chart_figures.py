@@ -6,6 +6,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from warpspace.analysis.blocks import Lines
 from warpspace.analysis.commands.gains import Gains
 from warpspace.analysis.commands.montecarlo import MonteCarlo, sampled_histogram
 from warpspace.analysis.description import ignore_progress
@@ -68,20 +69,18 @@ def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
             f"figure 'rotary': {scene.name} has no traces; expected a machine with a rotary axis"
             " and points in [points_mm] traces"
         )
-    charts = [
-        traces.motion_lines(traces.name_trace(line.trace), motion, part)
-        for line in lines
-        if (motion := traces.evaluate_axis_motion(scene, line)) is not None
-        for part in motion.motions
-    ]
     title = f"Error motions of the rotary axes: {scene.title}"
     subtitle = (
         "ISO 230-7 · over the position of the axis, at the height of the point and in its"
         " direction, which turns with it"
     )
-    for name in (traces.name_trace(line.trace) for line in lines):
-        if not any(chart.title.startswith(name) for chart in charts):
+    charts: list[Lines] = []
+    for line in lines:
+        name, motion = traces.name_trace(line.trace), traces.evaluate_axis_motion(scene, line)
+        if motion is None:
             subtitle += f" · {name}: the point lies on the axis"
+        else:
+            charts += [traces.motion_lines(name, motion, part) for part in motion.motions]
     return _draw("rotary", title, scene, settings, charts_sheet, charts, title, subtitle, 3)
 
 
@@ -89,8 +88,7 @@ def first_lines(scene: Scene) -> list[traces.TraceLine]:
     positions = scene.workspace.positions
     lines: dict[str, traces.TraceLine] = {}
     for line in traces.trace_lines(traces.evaluate_traces(scene, 1.0)):
-        at_positions = all(positions.get(axis, 0.0) == at for axis, at in line.trace.at.items())
-        if at_positions:
+        if all(positions.get(axis, 0.0) == at for axis, at in line.trace.at.items()):
             lines.setdefault(line.trace.axis, line)
     return list(lines.values())
 

@@ -191,11 +191,8 @@ def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) 
 
 
 def _format_u95(summary: Statistics, name: str) -> str:
-    return (
-        u95_behind(summary.expanded_uncertainty[f"u95_{name}"])
-        if summary.expanded_uncertainty
-        else ""
-    )
+    u95 = summary.expanded_uncertainty
+    return u95_behind(u95[f"u95_{name}"]) if u95 else ""
 
 
 def _share_within(picture: ScenePicture) -> float:
@@ -279,32 +276,28 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
         return "No single adjustment reduces the largest error; a set may, see Adjustments."
     ((key, value),) = adjustment.adjustments[0].adjust.items()
     row = parameter(key)
-    consequence = ""
-    if limit is not None:
-        share = volume_share(_share_within(after))
-        consequence = (
-            ", within the limit"
-            if largest <= limit
-            else f"; {share} of the volume is within the limit"
-        )
+    effect = f"the largest error falls from {spell(before)} to {spell(largest)}{UM}"
+    if limit is not None and largest <= limit:
+        effect += ", within the limit"
+    elif limit is not None:
+        effect += f"; {volume_share(_share_within(after))} of the volume is within the limit"
+    present = spell_setting(adjustment.present[key])
     return (
-        f"Adjust {key} ({row.name}) from {spell_setting(adjustment.present[key])} to {spell_signed(value)}"
-        f" {row.unit}: the largest error falls from {spell(before)} to {spell(largest)}{UM}{consequence}."
+        f"Adjust {key} ({row.name}) from {present} to {spell_signed(value)} {row.unit}: {effect}."
     )
 
 
 def first_page(review: Review, picture: Block) -> list[Block]:
     names = ["mean |E|", "P95", "max"]
-    limited = any(one.scene.limit_um is not None for one in review.scenes)
+    limits = [reviewed.scene.limit_um for reviewed in review.scenes]
+    limited = any(limit is not None for limit in limits)
     rows: list[list[str]] = []
-    for reviewed in review.scenes:
+    for reviewed, limit in zip(review.scenes, limits, strict=True):
         summary = reviewed.statistics
         numbers = ("mean_um", "p95_um", "max_um", "rms_um")
         rows.append([spell(getattr(summary, of)) + _format_u95(summary, of) + UM for of in numbers])
         if limited:
-            rows[-1][-1] = (
-                volume_share(reviewed.share_within) if reviewed.scene.limit_um is not None else "–"
-            )
+            rows[-1][-1] = "–" if limit is None else volume_share(reviewed.share_within)
     names.append("within the limit" if limited else "RMS")
     if len(rows) == 1:
         remarks = ("", "not exceeded in 95 % of the volume", f"at {review.scenes[0].worst_axes}")

@@ -314,9 +314,13 @@ def notes(
     for reviewed in (one for one in review.scenes if one.scene.review):
         title = reviewed.titled("Red: numbers that have changed since the note was written.")
         yield notes_table(reviewed.scene, title)
-        if story_steps and (steps := story_steps(reviewed.scene, review.settings.grid)):
+        steps = story_steps(reviewed.scene, review.settings.grid) if story_steps else ()
+        begun = [
+            figures.begin(name, scenes, caption, settings)
+            for caption, name, scenes, settings in steps
+        ]
+        if begun:
             yield Text(reviewed.titled("The story"), "heading")
-            begun = [figures.begin(name, of, caption, one) for caption, name, of, one in steps]
             yield from (drawn() for drawn in begun)
 
 
@@ -329,7 +333,8 @@ def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterat
             if isinstance(result, str):
                 yield Text(reviewed.titled(result), "note")
                 continue
-            if (numbers := result.as_json()) == before:
+            numbers = result.as_json()
+            if numbers == before:
                 yield Text(reviewed.titled("identical results."), "note")
                 continue
             before = numbers
@@ -383,7 +388,8 @@ def explanation(reviewed: Reviewed) -> Table:
         value = f"{spell_setting(part.value)} {row.unit}"
         numbers = map(spell_signed, (*part.error_um, part.along_um))
         rows.append((part.key, row.name, value, *numbers))
-    if remaining := ranked[MOST_ROWS:]:
+    remaining = ranked[MOST_ROWS:]
+    if remaining:
         vector = np.sum([part.error_um for part in remaining], axis=0)
         along = sum(part.along_um for part in remaining)
         rows.append((f"{len(remaining)} more", "", "", *map(spell_signed, (*vector, along))))
