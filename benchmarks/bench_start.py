@@ -10,14 +10,14 @@ def measure() -> Section:
     """Measure fresh interpreters."""
     bare = cheapest(lambda: python("-c", "pass"), REPEATS).processor_s
     package = cheapest(lambda: python("-c", "import warpspace"), REPEATS).processor_s
-    words = cheapest(lambda: python("-m", "warpspace", "-h"), REPEATS).processor_s
+    help_s = cheapest(lambda: python("-m", "warpspace", "-h"), REPEATS).processor_s
     command = ("-m", "warpspace", "field", "dvf5000_first", "--at", "X=0")
     point, numpy = commands_in_turns(command, ("-c", "import numpy"), REPEATS)
-    beside = "python -c pass"
+    baseline = "python -c pass"
     rows = [
-        Row("import warpspace, Python included", package, beside, bare),
-        Row("import warpspace alone", max(package - bare, 0.0), beside, bare, most=0.06),
-        Row("warpspace -h", words, beside, bare, most=0.3),
+        Row("import warpspace, Python included", package, baseline, bare),
+        Row("import warpspace alone", max(package - bare, 0.0), baseline, bare, most=0.06),
+        Row("warpspace -h", help_s, baseline, bare, most=0.3),
         Row(
             "warpspace field SCENE --at X=0",
             point.processor_s,

@@ -36,16 +36,16 @@ def expected() -> tuple[np.ndarray, dict[str, int]]:
     """Give the positions of the drag and the points that each must show."""
     values = np.linspace(-90.0, 90.0, POSITIONS).round(1)
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
-    shown = {
+    numbers = {
         packed(map_mesh(live.evaluate(state.with_amplitude(KEY, v))).vertices_mm.astype("<f4")): i
         for i, v in enumerate(values.tolist())
     }
-    assert len(shown) == POSITIONS, "positions cannot be told apart by their points"
-    return values, shown
+    assert len(numbers) == POSITIONS, "positions cannot be told apart by their points"
+    return values, numbers
 
 
 @dataclass(frozen=True)
-class Found:
+class TabTimes:
     """Latencies in s, processor time of a picture in s, its bytes, stale tabs, memory in MB."""
 
     median_s: float
@@ -71,11 +71,11 @@ async def drag(tab: Tab, values: np.ndarray, seconds: float, rate: float) -> lis
     return sent
 
 
-def latencies(sent: list[tuple], seen: list[tuple], shown: dict[str, int]) -> list[float]:
+def latencies(sent: list[tuple], received: list[tuple], numbers: dict[str, int]) -> list[float]:
     """Give the time until each position sent, or a later one, was answered, s."""
-    found, done = [], 0
-    for at, points in seen:
-        index = shown.get(points)
+    delays, done = [], 0
+    for at, points in received:
+        index = numbers.get(points)
         # the latest position sent before with these points
         newest = next(
             (
@@ -87,12 +87,12 @@ def latencies(sent: list[tuple], seen: list[tuple], shown: dict[str, int]) -> li
         )
         if newest is None:
             continue
-        found += [at - sent[i][0] for i in range(done, newest + 1)]
+        delays += [at - sent[i][0] for i in range(done, newest + 1)]
         done = newest + 1
-    return found
+    return delays
 
 
-async def drag_all(app: App, tabs: int, idle: int) -> Found:
+async def drag_all(app: App, tabs: int, idle: int) -> TabTimes:
     """Have some tabs drag beside some idle ones."""
     values, shown = expected()
     every = [Tab(app) for _ in range(tabs + idle)]
@@ -122,7 +122,7 @@ async def drag_all(app: App, tabs: int, idle: int) -> Found:
     for tab in every:
         await tab.close()
     p50, p95 = np.quantile(times, (0.5, 0.95))
-    return Found(p50, p95, used / max(pictures, 1), size, stale, memory)
+    return TabTimes(p50, p95, used / max(pictures, 1), size, stale, memory)
 
 
 def measure() -> Section:
@@ -131,34 +131,34 @@ def measure() -> Section:
         bare = app.memory_mb
         grown = [asyncio.run(drag_all(app, tabs, 0)) for tabs in GROWING]
     with running_app() as app:
-        found = asyncio.run(drag_all(app, TABS, IDLE))
+        times = asyncio.run(drag_all(app, TABS, IDLE))
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
     live.evaluate(state)
     moves = iter(np.linspace(-80.0, 80.0, 1000))
     model = best(lambda: live.evaluate(state.with_amplitude(KEY, float(next(moves)))), 50)
-    words = f"{TABS} tabs at {RATE:g} positions a second beside {IDLE} idle ones"
+    load_text = f"{TABS} tabs at {RATE:g} positions a second beside {IDLE} idle ones"
     tick = 1.0 / RATE
-    one = grown[0]
+    first_growth = grown[0]
     rows = [
-        Row(f"latency, median, wall: {words}", found.median_s, "between two positions", tick),
+        Row(f"latency, median, wall: {load_text}", times.median_s, "between two positions", tick),
         Row(
-            f"latency, P95, wall: {words}",
-            found.p95_s,
+            f"latency, P95, wall: {load_text}",
+            times.p95_s,
             "between two positions",
             tick,
             most_ratio=1.0,
         ),
-        Row("processor time of a picture of one tab", found.picture_s, "the model alone", model),
+        Row("processor time of a picture of one tab", times.picture_s, "the model alone", model),
         Row(
             "bytes of a picture",
-            found.size / 1e3,
+            times.size / 1e3,
             "one tab alone",
-            one.size / 1e3,
+            first_growth.size / 1e3,
             "kB",
             most=60.0,
         ),
-        Row("stale final values, + 1", found.stale + 1.0, "none, + 1", 1.0, "", most_ratio=1.0),
-        Row(f"memory with {TABS + IDLE} tabs", found.memory_mb, "with none", bare, "MB"),
+        Row("stale final values, + 1", times.stale + 1.0, "none, + 1", 1.0, "", most_ratio=1.0),
+        Row(f"memory with {TABS + IDLE} tabs", times.memory_mb, "with none", bare, "MB"),
     ]
     counts = [*map(float, GROWING)]
     growth = [

@@ -212,9 +212,8 @@ def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     y -= canvas.px(14.0)
     for line in _wrap(canvas, facts, max_width):
         y -= canvas.px(24.0)
-        canvas.text(
-            margin, y, line, size=SIZES.subtitle, colour=canvas.theme.muted, max_width=max_width
-        )
+        colour = canvas.theme.muted
+        canvas.text(margin, y, line, size=SIZES.subtitle, colour=colour, max_width=max_width)
     y -= canvas.px(18.0)
     canvas.line(
         [(margin, y), (canvas.width - margin, y)], width=SIZES.hair, colour=canvas.theme.faint
@@ -380,25 +379,16 @@ class Sheet:
         x_left, _, right, top = rect
         y = (rect[1] if bars is None else draw_scale_bars(canvas, rect, *bars)) + canvas.px(24.0)
         step = canvas.px(27.0)
-        room = top - y - canvas.px(150.0)
-        visible_rows = rows[: max(1, int(room / step))]
+        visible_rows = rows[: max(1, int((top - y - canvas.px(150.0)) / step))]
         for index, (name, value) in enumerate(reversed(visible_rows)):
             weight = "bold" if index == len(visible_rows) - 1 else "normal"
-            height = y + index * step
-            room = 0.8 * (right - x_left)
-            start = canvas.text(right, height, value, weight=weight, ha="right", max_width=room)[0]
-            room = start - x_left - canvas.px(8.0)
-            canvas.text(x_left, height, name, colour=canvas.theme.muted, max_width=room)
+            height, width = y + index * step, 0.8 * (right - x_left)
+            start = canvas.text(right, height, value, weight=weight, ha="right", max_width=width)[0]
+            width = start - x_left - canvas.px(8.0)
+            canvas.text(x_left, height, name, colour=canvas.theme.muted, max_width=width)
         y += len(visible_rows) * step + canvas.px(26.0)
-        canvas.text(
-            x_left,
-            top,
-            heading,
-            size=SIZES.heading,
-            weight="bold",
-            va="top",
-            max_width=right - x_left,
-        )
+        width, size = right - x_left, SIZES.heading
+        canvas.text(x_left, top, heading, size=size, weight="bold", va="top", max_width=width)
         high = top - canvas.px(40.0)
         low = max(y, high - canvas.px(560.0))
         draw_colour_bar(

@@ -131,12 +131,11 @@ class ReportFigures:
         """Begin a figure; if drawing fails twice, the figure is missing."""
         # the lean of the tool axis needs a factor of its own to be visible
         factor = "auto" if name == "orientation-map" else self._factor
-        figure_settings = settings or FigureSettings(
-            exaggeration=factor, loop=self._loop, grid=self._grid
-        )
+        if settings is None:
+            settings = FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
         size = PRINTED_PX, OTHER_PX.get(name, HEIGHT_PX)
-        figure_settings = replace(figure_settings, size=size, printed=True)
-        begin = partial(self._worker.begin, name, scenes, figure_settings, self._form)
+        settings = replace(settings, size=size, printed=True)
+        begin = partial(self._worker.begin, name, scenes, settings, self._form)
         begun = begin()
         self._begun += 1
 
@@ -161,6 +160,7 @@ class ReportFigures:
 ENDINGS = (".html", ".pdf")
 OVERLINE = "Design review · volumetric error"
 MOST_ROWS, MOST_BARS = 15, 20
+TOLERANCE_ANALYSES = ("worst", "sampled", "shares")  # names in `ReportSettings.analyses`
 LOOPS = {
     "tool": "The tool point, actual minus nominal.",
     "workpiece": "The workpiece point, actual minus nominal.",
@@ -212,6 +212,7 @@ def build_report(
     with FigureWorker() as worker:
         figures = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
         review = build_review(scenes, settings, pictures)
+        others = results or {}
         side_by_side = {"Comparison of concepts": concept_blocks(review, concepts, figures)}
         appendices = {
             "Distribution of the error": map_blocks(review, figures, embed),
@@ -220,14 +221,9 @@ def build_report(
             **({"Differences between A and B": differences(review)} if len(scenes) == 2 else {}),
             "Errors and tolerances": map(parameters, review.scenes),
             "Error gains": result_blocks(review, figures, "gains"),
-            "Errors within the tolerances": result_blocks(
-                review, figures, "worst", "sampled", "shares"
-            ),
+            "Errors within the tolerances": result_blocks(review, figures, *TOLERANCE_ANALYSES),
             **(side_by_side if concepts else {}),
-            **{
-                name: report_blocks(result.blocks(), figures)
-                for name, result in (results or {}).items()
-            },
+            **{name: report_blocks(other.blocks(), figures) for name, other in others.items()},
             "Conventions": [conventions(review)],
             "Provenance": provenance(review, files),
         }
@@ -307,21 +303,16 @@ def _first_bars(bars: Bars) -> Bars:
     return replace(bars, rows=rows, keys=keys, panels=tuple(panels))
 
 
-def notes(
-    review: Review, figures: ReportFigures, story_steps: StorySteps | None
-) -> Iterator[Block]:
+def notes(review: Review, figures: ReportFigures, story: StorySteps | None) -> Iterator[Block]:
     """Build the notes of each scene, and the steps of its story, one figure each."""
     for reviewed in (one for one in review.scenes if one.scene.review):
         title = reviewed.titled("Red: numbers that have changed since the note was written.")
         yield notes_table(reviewed.scene, title)
-        steps = story_steps(reviewed.scene, review.settings.grid) if story_steps else ()
-        begun = [
-            figures.begin(name, scenes, caption, settings)
-            for caption, name, scenes, settings in steps
-        ]
+        steps = story(reviewed.scene, review.settings.grid) if story else ()
+        begun = [figures.begin(name, of, caption, drawn) for caption, name, of, drawn in steps]
         if begun:
             yield Text(reviewed.titled("The story"), "heading")
-            yield from (drawn() for drawn in begun)
+            yield from (figure() for figure in begun)
 
 
 def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterator[Block]:
@@ -358,13 +349,9 @@ def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> I
     yield Text("Each node is weighted by its share of the volume.")
     blocks = statistics_blocks(review.scenes[0].scene, names, summaries)
     yield from report_blocks(block for block in blocks if not str(block).startswith("  --at"))
-    for reviewed_scene in review.scenes:
-        yield from report_blocks(
-            u95_lines(
-                reviewed_scene.uncertainty and reviewed_scene.uncertainty.errors,
-                {reviewed_scene.letter: reviewed_scene.statistics},
-            )
-        )
+    for reviewed in review.scenes:
+        errors = reviewed.uncertainty and reviewed.uncertainty.errors
+        yield from report_blocks(u95_lines(errors, {reviewed.letter: reviewed.statistics}))
     for number, reviewed in enumerate(review.scenes):
         if embed is not None:
             page = embed(
@@ -453,9 +440,7 @@ def differences(review: Review) -> Iterator[Block]:
         if shapes[0] == shapes[1] or (a == 0.0 and b == 0.0):
             continue
         row = parameter(key)
-        rows.append(
-            (key, row.name, spell_setting(a), spell_setting(b), spell_setting(b - a), row.unit)
-        )
+        rows.append((key, row.name, *map(spell_setting, (a, b, b - a)), row.unit))
     columns = (
         Column("key"), Column("error"), *number_columns(("A", "B", "B − A"), "s"), Column("unit")
     )  # fmt: skip
@@ -482,10 +467,9 @@ def concept_blocks(
     comparison = analysis.run_all(scenes, ignore_progress)
     yield from report_blocks(comparison.blocks())
     caption = "The machines at one scale; colours: RMS of |E| within tolerance."
-    figure_settings = FigureSettings(loop=str(analysis.loop), grid=settings.grid, concepts=analysis)
-    yield figures.begin(
-        "concepts", [one.scene for one in comparison.concepts], caption, figure_settings
-    )()
+    drawn = FigureSettings(loop=str(analysis.loop), grid=settings.grid, concepts=analysis)
+    machines = [concept.scene for concept in comparison.concepts]
+    yield figures.begin("concepts", machines, caption, drawn)()
 
 
 def conventions(review: Review) -> Items:
@@ -526,9 +510,7 @@ def conventions(review: Review) -> Items:
 def _reference(scene: Scene) -> str:
     if scene.reference is None:
         return "Absolute: errors include the part common to all points."
-    return (
-        f"Relative to the reference point {list_axes(scene.reference)}, whose error is subtracted."
-    )
+    return f"Relative to the reference point {list_axes(scene.reference)}; its error is subtracted."
 
 
 def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
