@@ -129,7 +129,7 @@ def model_part() -> dict[str, float]:
 
 
 class Recorder:
-    """What the app's sessions send, how long a step takes, and the bytes on the wire."""
+    """Recorder of the app's sessions: messages, durations of steps, bytes on the wire."""
 
     def __init__(self) -> None:
         self.bytes_sent = 0
@@ -166,12 +166,12 @@ class Recorder:
 
 
 def is_picture(message: Any) -> bool:
-    """Whether a message belongs to the 3-D scene or the camera."""
+    """Check that a message belongs to the 3-D scene or the camera."""
     return hasattr(message, "owner") or type(message).__name__.startswith("SetCamera")
 
 
 def replayed(messages: list[Any]) -> Iterator[Any]:
-    """Give what belongs to the drawing, writes pieces of the page, or moves what is drawn."""
+    """Select messages of the drawing, of pieces of the page, and of drawn nodes that move."""
     ours = ("warpspacePage.show(", "warpspaceRoom.", "warpspaceMesh.")
     for message in messages:
         lines = getattr(message, "source", "").split("\n")
@@ -183,7 +183,7 @@ def replayed(messages: list[Any]) -> Iterator[Any]:
 
 
 def as_sent(messages: list[tuple[float, Any]]) -> list[tuple[float, list[Any]]]:
-    """Give the picture of a move, and later messages with how long after it they came, s."""
+    """Return the picture of a move, and later messages with their delay, s."""
     picture = next(at for at, m in messages if "warpspaceMesh.bend(" in getattr(m, "source", ""))
     batches = [(0.0, [m for at, m in messages if at <= picture + TOGETHER_S])]
     for at, message in messages:
@@ -304,11 +304,11 @@ def page_part() -> dict[str, float]:
         browser.close()
     with contextlib.redirect_stdout(io.StringIO()):
         empty.stop()
-    found: dict[str, float] = {}
+    figures: dict[str, float] = {}
     for at, name in enumerate(("page", "page_drawn")):
         ours, floor = (statistics.median(t[at] for t in times[w][1:]) for w in ("ours", "empty"))
-        found |= {f"{name}_ms": ours, f"empty_{name}_ms": floor, f"{name}_ratio": ours / floor}
-    return found
+        figures |= {f"{name}_ms": ours, f"empty_{name}_ms": floor, f"{name}_ratio": ours / floor}
+    return figures
 
 
 def browser_part(
@@ -366,13 +366,15 @@ def measure() -> Section:
     bare = cheapest(lambda: python("-c", "import viser")).wall_s
     page = "viser's page with nothing in it"
     rows = [
-        Row("view until the page is served, wall", serving_s(), "python, viser", bare, most=3.0),
+        Row(
+            "view until the page is served, wall", serving_s(), "python, viser", bare, max_value=3.0
+        ),
         Row(
             "page until it can be used, wall",
             times["page_ms"] / 1e3,
             page,
             times["empty_page_ms"] / 1e3,
-            most_ratio=1.3,
+            max_ratio=1.3,
         ),
         Row(
             "page until it is drawn, wall",
@@ -388,7 +390,7 @@ def measure() -> Section:
                 times[f"click_to_pixels_ms{suffix}"] / 1e3,
                 "a bare viser page that replays it",
                 times[f"bare_click_to_pixels_ms{suffix}"] / 1e3,
-                most_ratio=1.1,
+                max_ratio=1.1,
             ),
             Row(
                 f"bytes of a slider move{suffix_text}",
@@ -396,7 +398,7 @@ def measure() -> Section:
                 "a bare viser page that replays it",
                 times[f"bare_bytes_per_move{suffix}"] / 1e3,
                 "kB",
-                most=200.0,
+                max_value=200.0,
             ),
             Row(
                 f"slider move on the server{suffix_text}",
@@ -412,7 +414,7 @@ def measure() -> Section:
             new_place,
             "a slider move",
             times["model_ms"] / 1e3,
-            most=0.1,
+            max_value=0.1,
         )
     )
     text = (

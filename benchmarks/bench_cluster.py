@@ -19,7 +19,7 @@ TRILLION = 10**12
 FLEET = 100_000
 SAMPLES = 100_000
 TASK_S = 1e-3
-"""What a Dask scheduler spends on a task: up to 1 ms (Dask documentation, "Best Practices")."""
+"""Time of a Dask scheduler for a task: up to 1 ms (Dask documentation, "Best Practices")."""
 
 
 def case(scene: warpspace.Scene, statistic: str, samples: int) -> Case:
@@ -64,7 +64,8 @@ def main() -> None:
         pass
     pickling_s = (time.process_time() - began) / 50.0
     print(
-        f"a machine of a fleet ({SAMPLES:,} samples): {spent:.2f} s, {sent:,} bytes out, {received:,}"
+        f"a machine of a fleet ({SAMPLES:,} samples): {spent:.2f} s, {sent:,} bytes sent,"
+        f" {received:,}"
         f" back; read {1e3 * loading:.1f} ms, the rest {1e3 * pickling_s:.1f} ms\n"
         f"{FLEET:,} machines: {FLEET * spent / 3600.0:,.0f} core h,"
         f" {FLEET * (sent + received) / 1e9:.2f} GB, {FLEET * (loading * 2 + TASK_S):,.0f} s of"

@@ -1,4 +1,4 @@
-"""How long the model takes: a slider move and a new basis."""
+"""Time of the model: a slider move and a new basis."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def uncertainty_move() -> Row:
 
     took, floor = in_turns(propagate, lambda: volume_statistics(basis.evaluate(values), grid), 50)
     label = f"U95 of a slider move, covariance of {COVARIANCE_SIZE} errors"
-    return Row(label, took, "the move itself, with its statistics", floor, most_ratio=5.0)
+    return Row(label, took, "the move itself, with its statistics", floor, max_ratio=5.0)
 
 
 def measure() -> Section:
@@ -63,10 +63,19 @@ def measure() -> Section:
         return grid_basis(scene, build_grid(scene.model, tilted, nodes), scene.view(loop))
 
     rows = []
-    for errors_text, values in (("7 errors", amplitudes), (f"all {len(all_amplitudes)} errors", all_amplitudes)):
+    for errors_text, values in (
+        ("7 errors", amplitudes),
+        (f"all {len(all_amplitudes)} errors", all_amplitudes),
+    ):
         took, floor = in_turns(lambda: basis.evaluate(values), lambda: values @ flat, 50)  # noqa: B023
         rows.append(
-            Row(f"slider move, position and tilt, {errors_text}", took, product, floor, most=5e-3)
+            Row(
+                f"slider move, position and tilt, {errors_text}",
+                took,
+                product,
+                floor,
+                max_value=5e-3,
+            )
         )
     writing = "filling one array of its size"
     for loop in Loop:
@@ -74,12 +83,15 @@ def measure() -> Section:
             lambda: new_basis(loop),  # noqa: B023
             lambda: np.zeros(basis.position.shape) + 1.0,
         )
-        rows.append(Row(f"basis for new B, C: {loop} loop", took, writing, floor, most=0.1))
+        rows.append(Row(f"basis for new B, C: {loop} loop", took, writing, floor, max_value=0.1))
 
     def part(count: int) -> ErrorBasis:
         selection = slice(count)
         return ErrorBasis(
-            basis.keys[selection], basis.nominal_mm, basis.position[selection], basis.orientation[selection]
+            basis.keys[selection],
+            basis.nominal_mm,
+            basis.position[selection],
+            basis.orientation[selection],
         )
 
     parts = {count: part(count) for count in PARAMETERS if count <= len(all_amplitudes)}

@@ -1,4 +1,4 @@
-"""How long sampling takes, beside the bare matrix products and beside a line of NumPy."""
+"""Time of sampling, relative to the bare matrix products and to a line of NumPy."""
 
 import numpy as np
 from scipy import stats
@@ -71,16 +71,27 @@ def measure() -> Section:
     for library, line in (("NumPy", numpy_line), ("SciPy", scipy_line)):
         took, floor = in_turns(ours, line, 3)
         baseline = f"one line of {library} at one node, P95 only"
-        rows.append(Row(f"montecarlo, {MACHINES:,} machines at random points", took, baseline, floor))
+        rows.append(
+            Row(f"montecarlo, {MACHINES:,} machines at random points", took, baseline, floor)
+        )
     baseline = f"the bare matrix products, {len(keys)} errors"
-    for over in ("max", "mean"):
-        took, floor = in_turns(lambda: engine(over), products, 2)  # noqa: B023
-        label = f"drawing {MACHINES:,} machines, {over} over {nodes} nodes"
-        rows.append(Row(label, took, baseline, floor, most_ratio=4.0))
+    for statistic in ("max", "mean"):
+        took, floor = in_turns(lambda: engine(statistic), products, 2)  # noqa: B023
+        label = f"drawing {MACHINES:,} machines, {statistic} over {nodes} nodes"
+        rows.append(Row(label, took, baseline, floor, max_ratio=4.0))
     many = python("-c", MANY)
     floor = "the amplitudes of all machines at once"
     samples_mb = 10_000_000 * len(keys) * 8 / 2**20
-    rows.append(Row("memory for 10,000,000 machines", many.peak_mb, floor, samples_mb, "MB", most=1024.0))
+    rows.append(
+        Row(
+            "memory for 10,000,000 machines",
+            many.peak_mb,
+            floor,
+            samples_mb,
+            "MB",
+            max_value=1024.0,
+        )
+    )
     scenes = [warpspace.load_scene(name) for name in LIBRARY]
     plan = Concepts(samples=20_000)
     growth = [

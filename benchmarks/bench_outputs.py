@@ -42,7 +42,7 @@ EXPORTS = (  # name, arguments, ending; seconds of processor and of the wall, an
 
 
 def peers(record: FieldRecord, folder: Path) -> dict[str, tuple[str, partial]]:
-    """What else writes the same numbers, all at once."""
+    """Return other writers of the same numbers, in memory."""
     shape = record.shape
     table = {
         name: np.broadcast_to(values, shape).reshape(-1) for name, values in record.columns.items()
@@ -84,21 +84,30 @@ def measure() -> Section:
             options = ("field", "dvf5000_first", "--grid", NODES, "--force", "-o")
             cost = cheapest(lambda: warpspace(*options, target.with_suffix(ending)), 2)  # noqa: B023
             label = f"field --grid {NODES} -o {ending}"
-            rows.append(Row(label, cost.processor_s, "python, numpy", floor.processor_s, most=3.0))
             rows.append(
-                Row(f"{label}, memory", cost.peak_mb, "the errors", result, "MB", most=500.0)
+                Row(label, cost.processor_s, "python, numpy", floor.processor_s, max_value=3.0)
+            )
+            rows.append(
+                Row(f"{label}, memory", cost.peak_mb, "the errors", result, "MB", max_value=500.0)
             )
         for label, arguments, ending, seconds, wall, size in EXPORTS:
-            written = folder / f"{label.split(',')[0].replace(' ', '_')}{ending}"
-            cost = python("-m", "warpspace", *arguments, "-o", written)
-            large = written.stat().st_size / 1e6
+            path = folder / f"{label.split(',')[0].replace(' ', '_')}{ending}"
+            cost = python("-m", "warpspace", *arguments, "-o", path)
+            large = path.stat().st_size / 1e6
             baseline = "python, numpy"
             rows += [
-                Row(label, cost.processor_s, baseline, floor.processor_s, most=seconds),
-                Row(f"{label}, wall", cost.wall_s, baseline, floor.wall_s, most=wall),
+                Row(label, cost.processor_s, baseline, floor.processor_s, max_value=seconds),
+                Row(f"{label}, wall", cost.wall_s, baseline, floor.wall_s, max_value=wall),
             ]
             rows.append(
-                Row(f"{label}, size", large, "the errors of 21³", 21**3 * 24e-6, "MB", most=size)
+                Row(
+                    f"{label}, size",
+                    large,
+                    "the errors of 21³",
+                    21**3 * 24e-6,
+                    "MB",
+                    max_value=size,
+                )
             )
     text = (
         "Whole commands with everything they load, beside the start of Python with numpy; fields"

@@ -64,15 +64,15 @@ def measure() -> Section:
             tracemalloc.stop()
             mesh_mb = (made.vertices_mm.nbytes + made.triangles.nbytes) / MEGABYTE
             about = f"memory for it, {of}", peak_mb, "its vertices and triangles", mesh_mb, "MB"
-            rows.append(Row(f"part of 10⁶ vertices, {of}", cost, baseline, copied, most=2.0))
-            rows.append(Row(*about, most_ratio=8.0))
+            rows.append(Row(f"part of 10⁶ vertices, {of}", cost, baseline, copied, max_value=2.0))
+            rows.append(Row(*about, max_ratio=8.0))
     small = load_part("ball.ply", data=ball(316).export(file_type="ply"))
     basis = point_basis(scene, make_points(scene, small.vertices_mm))
     values = np.array([scene.errors.amplitude(key) for key in basis.keys])
     moved = best(lambda: basis.evaluate(values))
     copied_small = best(basis.position.copy)
     labels = "slider move, 10⁵ vertices", moved, "copying their responses", copied_small
-    rows.append(Row(*labels, most=0.06))
+    rows.append(Row(*labels, max_value=0.06))
     counts = [float(around * around + 2) for around in GROWING]
     label = (
         "A closed mesh, read, checked, clamped, moved vertex by vertex by the relative error, and"

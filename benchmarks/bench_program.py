@@ -44,7 +44,7 @@ def measure() -> Section:
             best(lambda: trace(text, tcp), 3),  # noqa: B023
             "splitting its lines into words",
             split,
-            most=1.0,
+            max_value=1.0,
         )
         for tcp, words in (("program", "tool centre point"), ("never", "axes in proportion"))
     ]

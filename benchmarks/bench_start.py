@@ -1,4 +1,4 @@
-"""How long it takes until the package and the command line are there."""
+"""Start-up time of the package and the command line."""
 
 from table import Row, Section
 from timing import cheapest, commands_in_turns, python
@@ -16,14 +16,14 @@ def measure() -> Section:
     baseline = "python -c pass"
     rows = [
         Row("import warpspace, Python included", package, baseline, bare),
-        Row("import warpspace alone", max(package - bare, 0.0), baseline, bare, most=0.06),
-        Row("warpspace -h", help_s, baseline, bare, most=0.3),
+        Row("import warpspace alone", max(package - bare, 0.0), baseline, bare, max_value=0.06),
+        Row("warpspace -h", help_s, baseline, bare, max_value=0.3),
         Row(
             "warpspace field SCENE --at X=0",
             point.processor_s,
             "python -c 'import numpy'",
             numpy.processor_s,
-            most_ratio=2.0,
+            max_ratio=2.0,
         ),
     ]
     text = "Whole processes. What an import loads is what it costs; a test says what that is."

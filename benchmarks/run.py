@@ -71,7 +71,7 @@ def version_words() -> str:
 
 
 def load_words(before: float, after: float) -> str:
-    """Say what else the machine was doing."""
+    """Describe the other load of the machine."""
     cores = os.cpu_count() or 1
     load_text = f"{before:.1f} before, {after:.1f} at the end (mean of a minute, {cores} cores)"
     if max(before, after) > cores:
@@ -81,7 +81,7 @@ def load_words(before: float, after: float) -> str:
 
 def page_text(sections: list[Section], load: str, left_out: Sequence[str] = ()) -> str:
     """Spell the page, with the benchmarks that were left out."""
-    missed = [row.what for section in sections for row in section.rows if not row.is_met]
+    missed = [row.label for section in sections for row in section.rows if not row.is_met]
     head = HEAD.format(
         command="make bench",
         date=datetime.now(UTC).strftime("%Y-%m-%d"),

@@ -199,7 +199,12 @@ def zero() -> Figure:
             panel.spines[side].set_visible(False)
     panels[0].set_ylabel("EYY  [µm]", fontsize=FONT - 1)
     panels[1].text(
-        395, 5.6, f"EY0Y = {offset:.2f} µm\nmakes up for it", fontsize=FONT, ha="right", color=SECOND
+        395,
+        5.6,
+        f"EY0Y = {offset:.2f} µm\nmakes up for it",
+        fontsize=FONT,
+        ha="right",
+        color=SECOND,
     )
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.17, top=0.9, wspace=0.18)
     return figure

@@ -64,7 +64,7 @@ COLOURS, WIDE = 256, 2000  # of a picture; pixels from which on steps of colours
 
 @dataclass(frozen=True)
 class Visit:
-    """What is in a picture.
+    """Content of a picture.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Visit:
 
 
 def uncertain() -> Scene:
-    """Give a measured machine that states how sure its errors are, and where it was measured."""
+    """Build a measured machine with uncertainties and the measured range."""
     variances = np.diag(np.square(list(UNCERTAIN.values())))
     rows = tuple(map(tuple, variances.tolist()))
     covariance = Covariance(tuple(UNCERTAIN), rows, measured_range={"Z": (-400.0, -80.0)})
@@ -194,7 +194,7 @@ def noted(page: Page) -> None:
 
 
 def open_story(page: Page) -> None:
-    """Tell the story up to its second step, which shows the lever of an error."""
+    """Play the story up to its second step, which shows the lever arm of an error."""
     noted(page)
     press(page, "Tell the story")
     page.locator("[data-do='story:on']").click()

@@ -170,7 +170,8 @@ def test_every_part_is_there(both):
 
 @pytest.mark.render
 def test_concepts_have_the_numbers_of_the_command(both):
-    section = next(part for part in both.sections if part.heading.endswith("Comparison of concepts"))
+    heading = "Comparison of concepts"
+    section = next(part for part in both.sections if part.heading.endswith(heading))
     table = next(block for block in section.blocks if isinstance(block, Table))
     scenes = [
         load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "machine_printer_3d")
