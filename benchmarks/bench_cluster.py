@@ -65,8 +65,7 @@ def main() -> None:
     pickling_s = (time.process_time() - began) / 50.0
     print(
         f"a machine of a fleet ({SAMPLES:,} samples): {spent:.2f} s, {sent:,} bytes sent,"
-        f" {received:,}"
-        f" back; read {1e3 * loading:.1f} ms, the rest {1e3 * pickling_s:.1f} ms\n"
+        f" {received:,} back; read {1e3 * loading:.1f} ms, the rest {1e3 * pickling_s:.1f} ms\n"
         f"{FLEET:,} machines: {FLEET * spent / 3600.0:,.0f} core h,"
         f" {FLEET * (sent + received) / 1e9:.2f} GB, {FLEET * (loading * 2 + TASK_S):,.0f} s of"
         " the client and the scheduler"
