@@ -191,7 +191,7 @@ def _is_left_over(path: Path) -> bool:
     name, about = _NAME.match(path.name), path.lstat()
     if name is None or (hasattr(os, "geteuid") and about.st_uid != os.geteuid()):
         return False
-    if name[1] == _machine() and sys.platform != "win32":  # whatever the clock says
+    if name[1] == _machine() and sys.platform != "win32":  # regardless of its age
         return not _runs(int(name[2]))
     return time.time() - about.st_mtime > _OLD_S
 
@@ -228,7 +228,7 @@ def write_with_meshes(
     *,
     overwrite: bool,
 ) -> None:
-    """Write a file and the meshes it names, or nothing."""
+    """Write a file and its meshes, all or none."""
     with write_together([*files.values(), target], overwrite=overwrite) as temporaries:
         for temporary, frame in zip(temporaries, files, strict=False):
             meshes[frame].export(temporary, file_type="stl")

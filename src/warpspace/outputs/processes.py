@@ -210,7 +210,7 @@ def _outcome(
 def _follow_parent() -> None:
     """Prepare a process of a pool: it ignores Ctrl-C, and ends as soon as its parent has ended.
 
-    It prints nothing, nor do libraries in C: results and errors go through its pipe.
+    Neither it nor C libraries print anything: results and errors go through its pipe.
     A thread waits for the end of the parent on every system. Linux could send a signal by itself
     (PR_SET_PDEATHSIG), but it does so already when the *thread* that started the process ends.
     """

@@ -19,7 +19,7 @@ from warpspace.outputs.figure_files import encode_figure
 from warpspace.resources import __version__
 from warpspace.units import Array
 
-HEAD, PANEL = 190.0, 330.0  # room above and beside the pixels, px of a 1600 × 1200 figure
+HEAD, PANEL = 190.0, 330.0  # space above and beside the pixels, px of a 1600 × 1200 figure
 
 
 def draw_view(

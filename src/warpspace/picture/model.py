@@ -110,14 +110,14 @@ class Picture:
     # ... of the "position" error, µm, of the "orientation" error of the tool axis, µrad, or of the
     # "uncertainty" of the position error, its U95, µm.
     quantity: str = "position"
-    uncertainty: FieldUncertainty | None = None  # of its errors; None where nothing is stated
+    uncertainty: FieldUncertainty | None = None  # of its errors; None if not stated
     significant: bool = False  # whether colours fade where an error is not above its U95
     # limit of |E|; colours fade where the verdict is undecided
     limit_um: float | None = None
     # colour scale, for instance shared with other pictures; None for round ends around all values
     colours: ColourScale | None = None
     cut: bool = False  # whether the octant towards the operator is cut away
-    # slices that are drawn in place of the surface, where there are any
+    # slices drawn in place of the surface, if any
     slices: "tuple[Picture, ...]" = ()
     # restrictions that every output states: excluded errors, a colour range set by the user
     conditions: tuple[str, ...] = ()

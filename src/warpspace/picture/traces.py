@@ -115,7 +115,7 @@ class TraceLine:
     """One trace."""
 
     trace: Trace
-    loop: Loop  # loop whose error displaces it
+    loop: Loop  # whose error displaces it
     nominal_mm: Array  # [n, 3]
     error_um: Array  # [n, 3]
     actual_mm: Array  # [n, 3]; displaced with the exaggeration

@@ -22,7 +22,7 @@ from warpspace.outputs.drawing.settings import FONT, LIGHT, SAVE_RC, Theme
 
 DPI = 160.0
 TITLE, SUBTITLE, TEXT, SMALL = 13.0, 9.5, 9.5, 8.5
-LEAST_SHARE = 0.6  # of its size, what a title is drawn with at the least
+LEAST_SHARE = 0.6  # smallest size of a title, as a share of its regular size
 _THEME: ContextVar[Theme] = ContextVar("theme of the charts", default=LIGHT)
 
 
@@ -106,7 +106,7 @@ Box = tuple[float, float, float, float]
 
 
 def chart_figure(chart: Bars | Lines | Histogram) -> Figure:
-    """Draw one chart for a report, which has a heading of its own."""
+    """Draw one chart for a report, without its heading."""
     if isinstance(chart, Lines):
         return charts_sheet([replace(chart, title="")], "", "")
     if isinstance(chart, Bars):
@@ -339,7 +339,7 @@ def _lines(axes: Axes, chart: Lines, size: float) -> None:
         axes.set_aspect("equal", adjustable="datalim")
     else:
         values = np.concatenate([curve.y for curve in chart.curves])
-        if np.ptp(values) < LEAST and not chart.bands:  # nothing but rounding: no chart of noise
+        if np.ptp(values) < LEAST and not chart.bands:  # rounding only: no chart of noise
             middle = float(np.round(values.mean(), 6))
             axes.set_ylim(middle - 1.0, middle + 1.0)
     if chart.log:

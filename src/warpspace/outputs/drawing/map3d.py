@@ -324,7 +324,7 @@ def _draw_ghost(stage: Stage) -> None:
 
 GAP = 16.0  # between the body and an axis line
 TICK = 7.0
-SHORTEST = 40.0  # axes seen nearly end-on, shorter than this in the picture, are left out
+SHORTEST = 40.0  # axes that appear shorter, nearly end-on, are omitted
 
 
 def _draw_axes(stage: Stage) -> None:

@@ -319,7 +319,7 @@ def _fitting_text(canvas: Canvas, head: str, items: Sequence[str], max_width: fl
 def map_legend(
     isolines: str, *, surface: str = "deformed grid", diverging: bool = False
 ) -> list[LegendEntry]:
-    """Build the legend of a map; `isolines` is empty where there are none."""
+    """Build the legend of a map; an empty `isolines` has no entry."""
     return [
         line_entry("nominal volume", lambda theme: theme.ghost, dashes=(11.0, 7.0)),
         line_entry(surface, lambda theme: theme.ink),

@@ -28,7 +28,7 @@ EFFORT, VELOCITY = 1000.0, 1.0  # of every joint: required by URDF, not part of 
 
 
 def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the machine of a scene, nominal, with a mesh beside it for each frame with bodies."""
+    """Write the nominal machine of a scene, with one mesh file for each frame with bodies."""
     target, machine = Path(path), picture.scene.machine
     meshes = _meshes(picture)
     read = [Path(source.path) for source in machine.bodies.values() if source.path]

@@ -140,7 +140,7 @@ def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact:
 
 def _adjusted(adjustment: AdjustResult) -> str:
     if not adjustment.adjustments:
-        return "nothing to adjust"
+        return "no adjustment required"
     parts = ", ".join(
         f"{key} {adjustment.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
         for key, value in adjustment.adjustments[-1].adjust.items()

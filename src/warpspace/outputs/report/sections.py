@@ -531,7 +531,7 @@ def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
         *((f"file {path.name}", read_bytes(path, MAX_CSV_BYTES)) for path in files),
     ]
     rows += [(name, f"SHA-256 {hashlib.sha256(data).hexdigest()}") for name, data in inputs]
-    yield Table((Column("what"), Column("value")), rows, "Program, settings and input.")
+    yield Table((Column("item"), Column("value")), rows, "Program, settings and input.")
     for reviewed, text in zip(review.scenes, texts, strict=True):
         heading = f"{reviewed.scene.name}.toml, complete; the scene of this report."
         yield Text(reviewed.titled(heading), "heading")
