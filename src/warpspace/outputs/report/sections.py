@@ -212,7 +212,7 @@ def build_report(
     with FigureWorker() as worker:
         figures = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
         review = build_review(scenes, settings, pictures)
-        others = results or {}
+        extra = results or {}
         side_by_side = {"Comparison of concepts": concept_blocks(review, concepts, figures)}
         appendices = {
             "Distribution of the error": map_blocks(review, figures, embed),
@@ -223,7 +223,7 @@ def build_report(
             "Error gains": result_blocks(review, figures, "gains"),
             "Errors within the tolerances": result_blocks(review, figures, *TOLERANCE_ANALYSES),
             **(side_by_side if concepts else {}),
-            **{name: report_blocks(other.blocks(), figures) for name, other in others.items()},
+            **{name: report_blocks(result.blocks(), figures) for name, result in extra.items()},
             "Conventions": [conventions(review)],
             "Provenance": provenance(review, files),
         }

@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import matplotlib as mpl
+import typst
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Table, table_html
@@ -113,8 +116,6 @@ def _kind(block: Block) -> str:
 
 
 def render_html(report: Report) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     templates = Environment(
         loader=PackageLoader("warpspace.outputs.report"),
         autoescape=True,
@@ -151,9 +152,6 @@ def _attribute_page(page: str) -> Markup:
 
 
 def render_pdf(report: Report) -> bytes:
-    import matplotlib as mpl
-    import typst
-
     try:
         with temporary_folder() as folder:
             template = files("warpspace.outputs.report") / "templates" / TEMPLATE
