@@ -53,13 +53,13 @@ def page_one(*scenes, **changes):
 def test_verdict_on_a_limit_that_is_missed():
     scene = load_scene("dvf5000_first")
     text, (within,) = page_one(scene, grid=11, spec_um=40.0, author="me", questions=("Why?",))
-    assert "The limit of 40 µm is missed: 90.6 % of the working volume of 550 × 450 × 400" in text
-    assert "the worst is 51.7 µm at X 275 Y −225 Z −480." in text
+    assert "Fail: 90.6 % of the working volume of 550 × 450 × 400 mm is within the limit" in text
+    assert "the largest error is 51.7 µm at X 275 Y −225 Z −480." in text
     assert within == share_below(evaluate(scene, grid=11), 40.0)
     for number in ("30.9 µm", "41.3 µm", "'within the limit', '90.6 %'"):
         assert number in text
     assert "Adjust EA0Z (squareness of Z to Y) from +33.9 to +30.0 µrad" in text
-    assert "falls from 51.7 to 46.1 µm, and 94.7 % of the volume is within the limit" in text
+    assert "falls from 51.7 to 46.1 µm; 94.7 % of the volume is within the limit" in text
     assert "Why?" in text
 
 
@@ -117,12 +117,12 @@ def test_rows_of_zeros_are_counted_and_errors_that_are_zero():
     )
     assert [row[0] for row in table.rows] == ["b", "c"]
     assert table.marks == ["worse", "key"]
-    assert none == Text("Rows of zeros left out: 1.", "note")
-    assert table.title == "Of errors. Rows of zeros left out: 1."
+    assert none == Text("Rows of zeros omitted: 1.", "note")
+    assert table.title == "Of errors. Rows of zeros omitted: 1."
     reviewed = build_review((load_scene("dvf5000_first"),), FAST).scenes[0]
     found = sections.parameters(reviewed)
     assert len(found.rows) == 7
-    assert found.title.endswith("Errors that are zero left out: 34.")
+    assert found.title.endswith("Errors equal to zero omitted: 34.")
     assert {
         row[0] for row, mark in zip(found.rows, found.marks, strict=True) if mark == "worse"
     } == {"EAY", "EAZ", "EA0Z"}
