@@ -253,11 +253,12 @@ def _verdict_on(reviewed: Reviewed) -> str:
         return f"The error is zero in {volume}."
     if limit is None:
         return f"No limit is set. The largest error in {volume} is {worst}."
+    finding = f"the largest error in {volume} is {worst}"
     limit_text = f"the limit of {spell_short(limit)}{UM}"
     if not reviewed.is_decided:
-        return f"Undecided: the largest error in {volume} is {worst}; {limit_text} is too close."
+        return f"Undecided: {finding}; {limit_text} is in the uncertainty zone."
     if reviewed.is_within_limit:
-        return f"Pass: the largest error in {volume} is {worst}, within {limit_text}."
+        return f"Pass: {finding}, within {limit_text}."
     share = volume_share(reviewed.share_within)
     return f"Fail: {share} of {volume} is within {limit_text}; the largest error is {worst}."
 
