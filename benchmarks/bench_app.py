@@ -110,10 +110,10 @@ def serving_s() -> float:
         url = next(word for word in line.split() if word.startswith("http"))
         with urllib.request.urlopen(url) as page:
             page.read(100)
-        taken = time.perf_counter() - start
+        elapsed_s = time.perf_counter() - start
         running.terminate()
         running.communicate()
-    return taken
+    return elapsed_s
 
 
 def model_part() -> dict[str, float]:
@@ -129,7 +129,7 @@ def model_part() -> dict[str, float]:
 
 
 class Recorder:
-    """What the app's sessions send, how long a step takes, and the bytes on the wire."""
+    """Recorder of the app's sessions: messages, durations of steps, bytes on the wire."""
 
     def __init__(self) -> None:
         self.bytes_sent = 0
@@ -166,12 +166,12 @@ class Recorder:
 
 
 def is_picture(message: Any) -> bool:
-    """Whether a message belongs to the 3-D scene or the camera."""
+    """Check that a message belongs to the 3-D scene or the camera."""
     return hasattr(message, "owner") or type(message).__name__.startswith("SetCamera")
 
 
 def replayed(messages: list[Any]) -> Iterator[Any]:
-    """Give what belongs to the drawing, writes pieces of the page, or moves what is drawn."""
+    """Select messages of the drawing, of pieces of the page, and of drawn nodes that move."""
     ours = ("warpspacePage.show(", "warpspaceRoom.", "warpspaceMesh.")
     for message in messages:
         lines = getattr(message, "source", "").split("\n")
@@ -183,7 +183,7 @@ def replayed(messages: list[Any]) -> Iterator[Any]:
 
 
 def as_sent(messages: list[tuple[float, Any]]) -> list[tuple[float, list[Any]]]:
-    """Give the picture of a move, and later messages with how long after it they came, s."""
+    """Return the picture of a move, and later messages with their delay, s."""
     picture = next(at for at, m in messages if "warpspaceMesh.bend(" in getattr(m, "source", ""))
     batches = [(0.0, [m for at, m in messages if at <= picture + TOGETHER_S])]
     for at, message in messages:
@@ -253,10 +253,10 @@ def timed_move(page: Page, slider: str | None, value: float) -> float:
     page.bring_to_front()
     page.wait_for_timeout(SETTLED_MS)
     page.evaluate(DRAWN)
-    taken = page.evaluate(MOVE, [slider, SLIDER, value])
+    elapsed_ms = page.evaluate(MOVE, [slider, SLIDER, value])
     page.wait_for_timeout(SETTLED_MS)
     page.evaluate(DRAWN)  # the pages share one renderer: what is left would meet the other
-    return taken
+    return elapsed_ms
 
 
 def all_views(state: AppState) -> AppState:
@@ -304,11 +304,11 @@ def page_part() -> dict[str, float]:
         browser.close()
     with contextlib.redirect_stdout(io.StringIO()):
         empty.stop()
-    found: dict[str, float] = {}
+    figures: dict[str, float] = {}
     for at, name in enumerate(("page", "page_drawn")):
         ours, floor = (statistics.median(t[at] for t in times[w][1:]) for w in ("ours", "empty"))
-        found |= {f"{name}_ms": ours, f"empty_{name}_ms": floor, f"{name}_ratio": ours / floor}
-    return found
+        figures |= {f"{name}_ms": ours, f"empty_{name}_ms": floor, f"{name}_ratio": ours / floor}
+    return figures
 
 
 def browser_part(
@@ -346,7 +346,7 @@ def browser_part(
         with contextlib.redirect_stdout(io.StringIO()):
             bare.server.stop()
     app, floor = statistics.median(app_ms[2:]), statistics.median(bare_ms[2:])
-    found = {
+    times = {
         "whole_step_ms": statistics.median(recorder.step_ms),
         "bytes_per_move": app_bytes / (moves + 2),
         "bare_bytes_per_move": bare_bytes / (moves + 2),
@@ -354,65 +354,67 @@ def browser_part(
         "bare_click_to_pixels_ms": floor,
         "click_to_pixels_ratio": app / floor,
     }
-    return {name + suffix: value for name, value in found.items()}
+    return {name + suffix: value for name, value in times.items()}
 
 
 def measure() -> Section:
     """Measure the server, the page and the moves of a slider."""
-    found = {**model_part(), **page_part()}
+    times = {**model_part(), **page_part()}
     recorder = Recorder()
-    found |= browser_part(MOVES, recorder, lambda state: state)
-    found |= browser_part(MOVES, recorder, all_views, "_all_views")
+    times |= browser_part(MOVES, recorder, lambda state: state)
+    times |= browser_part(MOVES, recorder, all_views, "_all_views")
     bare = cheapest(lambda: python("-c", "import viser")).wall_s
     page = "viser's page with nothing in it"
     rows = [
-        Row("view until the page is served, wall", serving_s(), "python, viser", bare, most=3.0),
+        Row(
+            "view until the page is served, wall", serving_s(), "python, viser", bare, max_value=3.0
+        ),
         Row(
             "page until it can be used, wall",
-            found["page_ms"] / 1e3,
+            times["page_ms"] / 1e3,
             page,
-            found["empty_page_ms"] / 1e3,
-            most_ratio=1.3,
+            times["empty_page_ms"] / 1e3,
+            max_ratio=1.3,
         ),
         Row(
             "page until it is drawn, wall",
-            found["page_drawn_ms"] / 1e3,
+            times["page_drawn_ms"] / 1e3,
             page,
-            found["empty_page_drawn_ms"] / 1e3,
+            times["empty_page_drawn_ms"] / 1e3,
         ),
     ]
-    for suffix, words in (("", ""), ("_all_views", ", all views on")):
+    for suffix, suffix_text in (("", ""), ("_all_views", ", all views on")):
         rows += [
             Row(
-                f"slider move, click to pixels, wall{words}",
-                found[f"click_to_pixels_ms{suffix}"] / 1e3,
+                f"slider move, click to pixels, wall{suffix_text}",
+                times[f"click_to_pixels_ms{suffix}"] / 1e3,
                 "a bare viser page that replays it",
-                found[f"bare_click_to_pixels_ms{suffix}"] / 1e3,
-                most_ratio=1.1,
+                times[f"bare_click_to_pixels_ms{suffix}"] / 1e3,
+                max_ratio=1.1,
             ),
             Row(
-                f"bytes of a slider move{words}",
-                found[f"bytes_per_move{suffix}"] / 1e3,
+                f"bytes of a slider move{suffix_text}",
+                times[f"bytes_per_move{suffix}"] / 1e3,
                 "a bare viser page that replays it",
-                found[f"bare_bytes_per_move{suffix}"] / 1e3,
+                times[f"bare_bytes_per_move{suffix}"] / 1e3,
                 "kB",
-                most=200.0,
+                max_value=200.0,
             ),
             Row(
-                f"slider move on the server{words}",
-                found[f"whole_step_ms{suffix}"] / 1e3,
+                f"slider move on the server{suffix_text}",
+                times[f"whole_step_ms{suffix}"] / 1e3,
                 "the model alone",
-                found["model_ms"] / 1e3,
+                times["model_ms"] / 1e3,
             ),
         ]
-    new_place = found["new_place_ms"] / 1e3
+    new_place = times["new_place_ms"] / 1e3
     rows.append(
         Row(
             "new rotary position, model",
             new_place,
             "a slider move",
-            found["model_ms"] / 1e3,
-            most=0.1,
+            times["model_ms"] / 1e3,
+            max_value=0.1,
         )
     )
     text = (

@@ -20,7 +20,7 @@ CURVE = ((-500.0, 1.0), (-100.0, 6.0), (0.0, -4.0), (500.0, 3.0))
 
 
 def with_errors(scene: Scene, count: int) -> Scene:
-    """Give every parameter a curve: the worst a field has to do."""
+    """Set a curve for every parameter: the worst case of a field."""
     keys = [key for key in scene.machine.allowed_keys if parameter(key).axis in scene.machine.axes]
     spread = [keys[index] for index in np.linspace(0, len(keys) - 1, count).round().astype(int)]
     functions = {
@@ -55,16 +55,16 @@ def measure() -> Section:
 
     rows = []
     floor = "copying the errors once"
-    for words, scene in (("7 curves", plain), (f"all {count} errors, curves", full)):
-        for model, exact, most in (("first order", False, 120.0), ("exact", True, 400.0)):
+    for errors_text, scene in (("7 curves", plain), (f"all {count} errors, curves", full)):
+        for model, exact, limit in (("first order", False, 120.0), ("exact", True, 400.0)):
             took = best(lambda: evaluate(scene, grid=NODES, exact=exact))  # noqa: B023
             copied = best(copy, 20)
-            what = f"{NODES}³ nodes, {model}, {words}"
-            rows.append(Row(what, took, floor, copied, most_ratio=most))
+            label = f"{NODES}³ nodes, {model}, {errors_text}"
+            rows.append(Row(label, took, floor, copied, max_ratio=limit))
     for model, exact in (("first order", False), ("exact", True)):
         peak = peak_bytes(lambda: evaluate(full, grid=NODES, exact=exact))  # noqa: B023
-        what = f"memory of {NODES}³ nodes, {model}"
-        rows.append(Row(what, peak / 1e6, "the errors", result.nbytes / 1e6, "MB", most_ratio=4.0))
+        label = f"memory of {NODES}³ nodes, {model}"
+        rows.append(Row(label, peak / 1e6, "the errors", result.nbytes / 1e6, "MB", max_ratio=4.0))
     took = best(lambda: build_grid(plain.model, plain.workspace, NODES))
     rows.append(Row(f"the grid of {NODES}³ nodes alone", took, floor, best(copy, 20)))
     nodes = [float(n**3) for n in GROWING]

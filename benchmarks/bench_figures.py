@@ -1,4 +1,4 @@
-"""How long figures take, beside a bare PyVista render, and whether memory stays flat."""
+"""Time of figures relative to a bare PyVista render, and growth of memory."""
 
 import os
 import tempfile
@@ -70,17 +70,17 @@ def measure() -> Section:
     took, other = in_turns(lambda: draw("png", "svg", "pdf"), bare_render, 2)
     rows.append(Row("PNG, SVG and PDF", took, "PyVista, empty window", other))
     ours, bare = picture_costs()
-    beside = "a bare script: PyVista, matplotlib, 21³"
+    baseline = "a bare script: PyVista, matplotlib, 21³"
     rows += [
-        Row("draw", ours.processor_s, beside, bare.processor_s, most_ratio=1.3),
-        Row("draw, wall", ours.wall_s, beside, bare.wall_s),
+        Row("draw", ours.processor_s, baseline, bare.processor_s, max_ratio=1.3),
+        Row("draw, wall", ours.wall_s, baseline, bare.wall_s),
     ]
     process = psutil.Process()
     memory: list[float] = []
     for _ in range(PICTURES):
         draw("png")
         memory.append(process.memory_info().rss / 1e6)
-    what = f"memory of {PICTURES} pictures, at most"
-    rows.append(Row(what, max(memory), "after one", memory[0], "MB", most_ratio=1.1))
+    label = f"memory of {PICTURES} pictures, at most"
+    rows.append(Row(label, max(memory), "after one", memory[0], "MB", max_ratio=1.1))
     text = "Bodies are drawn by PyVista, lines and words around them by matplotlib."
     return Section("Figures", text, rows)

@@ -1,4 +1,4 @@
-"""How long pages of the library's machines take to open, beside that of the scene shown by default.
+"""Time to open pages of the library's machines, relative to the scene shown by default.
 
 Every machine is opened in turns with the default scene in one Chromium, so that other load meets
 both. A page counts as open when all of it is there: box, bodies, every tab.
@@ -28,7 +28,7 @@ READY = """() => window.__viserMutable?.nodeRefFromName['/box/surface']
 
 def measure(names: list[str], pairs: int) -> dict[str, dict[str, float]]:
     """Open pages in pairs; give times and their ratio by machine."""
-    found: dict[str, dict[str, float]] = {}
+    times_by_machine: dict[str, dict[str, float]] = {}
     with ExitStack() as viewers, sync_playwright() as playwright:
         default = viewers.enter_context(Viewer(load_scene(DEFAULT)))
         browser = launch(playwright)
@@ -42,13 +42,13 @@ def measure(names: list[str], pairs: int) -> dict[str, dict[str, float]]:
                     [opened_ms(browser, url, READY)[0] for url in (viewer.url, default.url)]
                     for _ in range(pairs)
                 ]
-            ours, beside = (statistics.median(column) for column in zip(*times, strict=True))
+            ours, bare = (statistics.median(column) for column in zip(*times, strict=True))
             ratio = statistics.median(own / other for own, other in times)
-            found[name] = {
-                "triangles": triangles, "ms": ours, "default_ms": beside, "ratio": ratio,
+            times_by_machine[name] = {
+                "triangles": triangles, "ms": ours, "default_ms": bare, "ratio": ratio,
             }  # fmt: skip
         browser.close()
-    return found
+    return times_by_machine
 
 
 def main() -> None:
@@ -61,20 +61,21 @@ def main() -> None:
     options = parser.parse_args()
     if unknown := [name for name in options.machines if name not in library]:
         parser.error(f"unknown machine {', '.join(unknown)}; expected {', '.join(library)}")
-    found = measure(options.machines or library, options.pairs)
-    median = statistics.median(entry["ratio"] for entry in found.values())
-    worst = max(found, key=lambda name: found[name]["ratio"])
+    times_by_machine = measure(options.machines or library, options.pairs)
+    median = statistics.median(entry["ratio"] for entry in times_by_machine.values())
+    worst = max(times_by_machine, key=lambda name: times_by_machine[name]["ratio"])
     if options.json:
-        print(json.dumps({"machines": found, "median_ratio": median}))
+        print(json.dumps({"machines": times_by_machine, "median_ratio": median}))
     else:
-        for name, entry in found.items():
+        for name, entry in times_by_machine.items():
             print(
                 f"{name:26} {entry['triangles']:6.0f} triangles {entry['ms']:7.0f} ms beside"
                 f" {entry['default_ms']:7.0f} ms  ratio {entry['ratio']:.2f}"
             )
         print(f"median ratio {median:.2f}  (at most {MEDIAN_LIMIT:g})")
-        print(f"worst ratio  {found[worst]['ratio']:.2f}  {worst} (at most {WORST_LIMIT:g})")
-    if median > MEDIAN_LIMIT or found[worst]["ratio"] > WORST_LIMIT:
+        largest = times_by_machine[worst]["ratio"]
+        print(f"worst ratio  {largest:.2f}  {worst} (at most {WORST_LIMIT:g})")
+    if median > MEDIAN_LIMIT or times_by_machine[worst]["ratio"] > WORST_LIMIT:
         sys.exit("over the limit")
 
 

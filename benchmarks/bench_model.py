@@ -1,4 +1,4 @@
-"""How long the model takes: a slider move and a new basis."""
+"""Time of the model: a slider move and a new basis."""
 
 from dataclasses import replace
 
@@ -22,30 +22,30 @@ NODES = 21
 PARAMETERS = (5, 10, 20, 40)
 
 
-SURE = 60  # errors of a full covariance
+COVARIANCE_SIZE = 60  # errors of a full covariance
 AXES = "wC1B1FXYZUA2C2t"  # that a chain of eight axes has
 
 
-def sure_move() -> Row:
+def uncertainty_move() -> Row:
     """Measure U95 of a slider move: of mean, RMS, P95 and max, and at each node."""
     bare = parse_scene(starter_text(AXES, "eight axes"), "eight axes")
-    rng, keys = np.random.default_rng(0), bare.parameter_keys[:SURE]
+    rng, keys = np.random.default_rng(0), bare.parameter_keys[:COVARIANCE_SIZE]
     errors = ErrorSet({key: Constant(bare.axis_span(parameter(key).axis), 1.0) for key in keys})
-    half = rng.standard_normal((SURE, SURE))
+    half = rng.standard_normal((COVARIANCE_SIZE, COVARIANCE_SIZE))
     rows = tuple(map(tuple, (half @ half.T).tolist()))
     scene = replace(bare, errors=errors, covariance=Covariance(keys, rows))
     grid = build_grid(scene.model, scene.workspace, NODES)
-    basis, found = grid_basis(scene, grid), volume_uncertainty(scene, scene.view(), NODES)
+    basis, uncertainty = grid_basis(scene, grid), volume_uncertainty(scene, scene.view(), NODES)
     values = rng.standard_normal(len(basis.keys))
     moved = basis.evaluate(values).error_um
 
-    def sure() -> object:
-        now = replace(found, error_um=moved)
-        return now.statistics(), now.u95_norm_um
+    def propagate() -> object:
+        moved_uncertainty = replace(uncertainty, error_um=moved)
+        return moved_uncertainty.statistics(), moved_uncertainty.u95_norm_um
 
-    took, floor = in_turns(sure, lambda: volume_statistics(basis.evaluate(values), grid), 50)
-    what = f"U95 of a slider move, covariance of {SURE} errors"
-    return Row(what, took, "the move itself, with its statistics", floor, most_ratio=5.0)
+    took, floor = in_turns(propagate, lambda: volume_statistics(basis.evaluate(values), grid), 50)
+    label = f"U95 of a slider move, covariance of {COVARIANCE_SIZE} errors"
+    return Row(label, took, "the move itself, with its statistics", floor, max_ratio=5.0)
 
 
 def measure() -> Section:
@@ -54,7 +54,7 @@ def measure() -> Section:
     grid = build_grid(scene.model, scene.workspace, NODES)
     basis = grid_basis(scene, grid)
     amplitudes = amplitudes_of(scene.errors, basis.keys)
-    every = np.arange(1.0, len(basis.keys) + 1.0)
+    all_amplitudes = np.arange(1.0, len(basis.keys) + 1.0)
     flat = np.random.default_rng(0).standard_normal((len(basis.keys), grid.nominal_mm.size))
     product = f"numpy's product, {flat.shape[0]} × {flat.shape[1]}"
     tilted = scene.workspace.moved({"B": -30.0, "C": 45.0})
@@ -63,10 +63,19 @@ def measure() -> Section:
         return grid_basis(scene, build_grid(scene.model, tilted, nodes), scene.view(loop))
 
     rows = []
-    for words, values in (("7 errors", amplitudes), (f"all {len(every)} errors", every)):
+    for errors_text, values in (
+        ("7 errors", amplitudes),
+        (f"all {len(all_amplitudes)} errors", all_amplitudes),
+    ):
         took, floor = in_turns(lambda: basis.evaluate(values), lambda: values @ flat, 50)  # noqa: B023
         rows.append(
-            Row(f"slider move, position and tilt, {words}", took, product, floor, most=5e-3)
+            Row(
+                f"slider move, position and tilt, {errors_text}",
+                took,
+                product,
+                floor,
+                max_value=5e-3,
+            )
         )
     writing = "filling one array of its size"
     for loop in Loop:
@@ -74,23 +83,26 @@ def measure() -> Section:
             lambda: new_basis(loop),  # noqa: B023
             lambda: np.zeros(basis.position.shape) + 1.0,
         )
-        rows.append(Row(f"basis for new B, C: {loop} loop", took, writing, floor, most=0.1))
+        rows.append(Row(f"basis for new B, C: {loop} loop", took, writing, floor, max_value=0.1))
 
     def part(count: int) -> ErrorBasis:
-        few = slice(count)
+        selection = slice(count)
         return ErrorBasis(
-            basis.keys[few], basis.nominal_mm, basis.position[few], basis.orientation[few]
+            basis.keys[selection],
+            basis.nominal_mm,
+            basis.position[selection],
+            basis.orientation[selection],
         )
 
-    parts = {count: part(count) for count in PARAMETERS if count <= len(every)}
+    parts = {count: part(count) for count in PARAMETERS if count <= len(all_amplitudes)}
     growth = [
         Growth(
             f"slider move, {NODES}³ nodes",
             "errors",
             [*map(float, parts)],
-            [best(lambda: small.evaluate(every[:n]), 50) for n, small in parts.items()],  # noqa: B023
+            [best(lambda: small.evaluate(all_amplitudes[:n]), 50) for n, small in parts.items()],  # noqa: B023
         )
     ]
-    rows.append(sure_move())
+    rows.append(uncertainty_move())
     text = f"What the app works out, over {NODES}³ = {NODES**3} nodes."
     return Section("The model behind a slider", text, rows, growth)

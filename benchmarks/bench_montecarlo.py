@@ -1,4 +1,4 @@
-"""How long sampling takes, beside the bare matrix products and beside a line of NumPy."""
+"""Time of sampling, relative to the bare matrix products and to a line of NumPy."""
 
 import numpy as np
 from scipy import stats
@@ -48,9 +48,9 @@ def measure() -> Section:
                 block = amplitudes[start : start + len(out)]
                 np.matmul(block, gain, out=out[: len(block)])
 
-    def engine(over: str) -> None:
+    def engine(statistic: str) -> None:
         for _ in sample_chunks(
-            lambda rng, count: reduce_nodes(draws.draw(rng, count), gains, over),
+            lambda rng, count: reduce_nodes(draws.draw(rng, count), gains, statistic),
             SamplingPlan(samples=MACHINES),
         ):
             pass
@@ -68,19 +68,30 @@ def measure() -> Section:
         return warpspace.montecarlo(scene, samples=MACHINES)
 
     rows = []
-    for words, line in (("NumPy", numpy_line), ("SciPy", scipy_line)):
+    for library, line in (("NumPy", numpy_line), ("SciPy", scipy_line)):
         took, floor = in_turns(ours, line, 3)
-        beside = f"one line of {words} at one node, P95 only"
-        rows.append(Row(f"montecarlo, {MACHINES:,} machines at random points", took, beside, floor))
-    beside = f"the bare matrix products, {len(keys)} errors"
-    for over in ("max", "mean"):
-        took, floor = in_turns(lambda: engine(over), products, 2)  # noqa: B023
-        what = f"drawing {MACHINES:,} machines, {over} over {nodes} nodes"
-        rows.append(Row(what, took, beside, floor, most_ratio=4.0))
+        baseline = f"one line of {library} at one node, P95 only"
+        rows.append(
+            Row(f"montecarlo, {MACHINES:,} machines at random points", took, baseline, floor)
+        )
+    baseline = f"the bare matrix products, {len(keys)} errors"
+    for statistic in ("max", "mean"):
+        took, floor = in_turns(lambda: engine(statistic), products, 2)  # noqa: B023
+        label = f"drawing {MACHINES:,} machines, {statistic} over {nodes} nodes"
+        rows.append(Row(label, took, baseline, floor, max_ratio=4.0))
     many = python("-c", MANY)
     floor = "the amplitudes of all machines at once"
-    held = 10_000_000 * len(keys) * 8 / 2**20
-    rows.append(Row("memory for 10,000,000 machines", many.peak_mb, floor, held, "MB", most=1024.0))
+    samples_mb = 10_000_000 * len(keys) * 8 / 2**20
+    rows.append(
+        Row(
+            "memory for 10,000,000 machines",
+            many.peak_mb,
+            floor,
+            samples_mb,
+            "MB",
+            max_value=1024.0,
+        )
+    )
     scenes = [warpspace.load_scene(name) for name in LIBRARY]
     plan = Concepts(samples=20_000)
     growth = [

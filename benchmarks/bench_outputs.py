@@ -42,7 +42,7 @@ EXPORTS = (  # name, arguments, ending; seconds of processor and of the wall, an
 
 
 def peers(record: FieldRecord, folder: Path) -> dict[str, tuple[str, partial]]:
-    """What else writes the same numbers, all at once."""
+    """Return other writers of the same numbers, in memory."""
     shape = record.shape
     table = {
         name: np.broadcast_to(values, shape).reshape(-1) for name, values in record.columns.items()
@@ -71,34 +71,43 @@ def measure() -> Section:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         target = folder / "f"
-        for ending, (words, peer) in peers(record, folder).items():
+        for ending, (baseline_name, peer) in peers(record, folder).items():
             took, other = in_turns(
                 lambda: write_field(record, target.with_suffix(ending)),  # noqa: B023
                 peer,
                 3,
             )
-            what = f"writing {PEER_NODES}³ nodes as {ending}"
-            rows.append(Row(what, took, words, other))
+            label = f"writing {PEER_NODES}³ nodes as {ending}"
+            rows.append(Row(label, took, baseline_name, other))
         result = 101**3 * 3 * 8 / 1e6
         for ending in FIELD_ENDINGS:
             options = ("field", "dvf5000_first", "--grid", NODES, "--force", "-o")
             cost = cheapest(lambda: warpspace(*options, target.with_suffix(ending)), 2)  # noqa: B023
-            what = f"field --grid {NODES} -o {ending}"
-            rows.append(Row(what, cost.processor_s, "python, numpy", floor.processor_s, most=3.0))
+            label = f"field --grid {NODES} -o {ending}"
             rows.append(
-                Row(f"{what}, memory", cost.peak_mb, "the errors", result, "MB", most=500.0)
+                Row(label, cost.processor_s, "python, numpy", floor.processor_s, max_value=3.0)
             )
-        for what, arguments, ending, seconds, wall, size in EXPORTS:
-            written = folder / f"{what.split(',')[0].replace(' ', '_')}{ending}"
-            cost = python("-m", "warpspace", *arguments, "-o", written)
-            large = written.stat().st_size / 1e6
-            beside = "python, numpy"
+            rows.append(
+                Row(f"{label}, memory", cost.peak_mb, "the errors", result, "MB", max_value=500.0)
+            )
+        for label, arguments, ending, seconds, wall, size in EXPORTS:
+            path = folder / f"{label.split(',')[0].replace(' ', '_')}{ending}"
+            cost = python("-m", "warpspace", *arguments, "-o", path)
+            large = path.stat().st_size / 1e6
+            baseline = "python, numpy"
             rows += [
-                Row(what, cost.processor_s, beside, floor.processor_s, most=seconds),
-                Row(f"{what}, wall", cost.wall_s, beside, floor.wall_s, most=wall),
+                Row(label, cost.processor_s, baseline, floor.processor_s, max_value=seconds),
+                Row(f"{label}, wall", cost.wall_s, baseline, floor.wall_s, max_value=wall),
             ]
             rows.append(
-                Row(f"{what}, size", large, "the errors of 21³", 21**3 * 24e-6, "MB", most=size)
+                Row(
+                    f"{label}, size",
+                    large,
+                    "the errors of 21³",
+                    21**3 * 24e-6,
+                    "MB",
+                    max_value=size,
+                )
             )
     text = (
         "Whole commands with everything they load, beside the start of Python with numpy; fields"

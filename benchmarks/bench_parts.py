@@ -14,28 +14,28 @@ from warpspace.analysis.description import ignore_progress
 from warpspace.parts.part import Part
 from warpspace.parts.workpiece import evaluate_points, load_workpiece, point_basis
 
-AROUND = 1000  # vertices of a million
+CIRCUMFERENCE = 1000  # vertices of a million
 GROWING = (400, 566, 800, 1000)  # above what features are looked for in
 MEGABYTE = 1e6
 
 
-def ball(around: int) -> trimesh.Trimesh:
+def ball(circumference: int) -> trimesh.Trimesh:
     """Make a closed ball of around × around vertices and two poles."""
-    height, turn = np.linspace(0.0, np.pi, around + 2)[1:-1], np.arange(around)
-    turn = turn * 2.0 * np.pi / around
+    height, turn = np.linspace(0.0, np.pi, circumference + 2)[1:-1], np.arange(circumference)
+    turn = turn * 2.0 * np.pi / circumference
     rings = np.stack(np.broadcast_arrays(
         np.sin(height)[:, None] * np.cos(turn), np.sin(height)[:, None] * np.sin(turn),
         np.cos(height)[:, None],
     ), axis=-1)  # fmt: skip
     points = np.concatenate([rings.reshape(-1, 3), [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    number = np.arange(around * around).reshape(around, around)
-    beside = np.roll(number, -1, axis=1)
-    top, bottom = (np.full(around, around * around + pole) for pole in (0, 1))
-    quads = number[:-1], number[1:], beside[:-1], beside[:-1], number[1:], beside[1:]
+    number = np.arange(circumference * circumference).reshape(circumference, circumference)
+    neighbour = np.roll(number, -1, axis=1)
+    top, bottom = (np.full(circumference, circumference * circumference + pole) for pole in (0, 1))
+    quads = number[:-1], number[1:], neighbour[:-1], neighbour[:-1], number[1:], neighbour[1:]
     triangles = np.concatenate([
         np.stack(quads, axis=-1).reshape(-1, 3),
-        np.stack([top, number[0], beside[0]], axis=-1),
-        np.stack([bottom, beside[-1], number[-1]], axis=-1),
+        np.stack([top, number[0], neighbour[0]], axis=-1),
+        np.stack([bottom, neighbour[-1], number[-1]], axis=-1),
     ])  # fmt: skip
     return trimesh.Trimesh(80.0 * points, triangles, process=False)
 
@@ -45,38 +45,38 @@ def measure() -> Section:
     scene = load_scene("dvf5000_first")
     with TemporaryDirectory() as folder:
         files = [Path(folder) / f"{around}.ply" for around in GROWING]
-        for around, path in zip(GROWING, files, strict=True):
-            ball(around).export(path)
+        for circumference, path in zip(GROWING, files, strict=True):
+            ball(circumference).export(path)
         costs = [
             best(lambda: Part(file=str(path)).run(scene, ignore_progress), 3)  # noqa: B023
             for path in files
         ]
         files.append(files[-1].with_suffix(".stl"))
-        ball(AROUND).export(files[-1])
+        ball(CIRCUMFERENCE).export(files[-1])
         costs.append(best(lambda: Part(file=str(files[-1])).run(scene, ignore_progress), 3))
         rows = list[Row]()
         for path, cost in zip(files[-2:], costs[-2:], strict=True):
-            of, beside = path.suffix[1:].upper(), "reading and copying it"
+            of, baseline = path.suffix[1:].upper(), "reading and copying it"
             copied = best(lambda: trimesh.load_mesh(path, process=False).copy(), 3)  # noqa: B023
             tracemalloc.start()
             made = Part(file=str(path)).run(scene, ignore_progress).workpiece
-            most = tracemalloc.get_traced_memory()[1] / MEGABYTE
+            peak_mb = tracemalloc.get_traced_memory()[1] / MEGABYTE
             tracemalloc.stop()
-            own = (made.vertices_mm.nbytes + made.triangles.nbytes) / MEGABYTE
-            about = f"memory for it, {of}", most, "its vertices and triangles", own, "MB"
-            rows.append(Row(f"part of 10⁶ vertices, {of}", cost, beside, copied, most=2.0))
-            rows.append(Row(*about, most_ratio=8.0))
+            mesh_mb = (made.vertices_mm.nbytes + made.triangles.nbytes) / MEGABYTE
+            about = f"memory for it, {of}", peak_mb, "its vertices and triangles", mesh_mb, "MB"
+            rows.append(Row(f"part of 10⁶ vertices, {of}", cost, baseline, copied, max_value=2.0))
+            rows.append(Row(*about, max_ratio=8.0))
     small = load_workpiece("ball.ply", data=ball(316).export(file_type="ply"))
     basis = point_basis(scene, evaluate_points(scene, small.vertices_mm))
     values = np.array([scene.errors.amplitude(key) for key in basis.keys])
     moved = best(lambda: basis.evaluate(values))
     copied_small = best(basis.position.copy)
-    said = "slider move, 10⁵ vertices", moved, "copying their responses", copied_small
-    rows.append(Row(*said, most=0.06))
+    labels = "slider move, 10⁵ vertices", moved, "copying their responses", copied_small
+    rows.append(Row(*labels, max_value=0.06))
     counts = [float(around * around + 2) for around in GROWING]
-    words = (
+    label = (
         "A closed mesh, read, checked, clamped, moved vertex by vertex by the relative error, and"
         " summed up as it is and after the best fit. The memory is the most that was held at once."
     )
     growth = [Growth("part as it is cut", "vertices", counts, costs[:-1])]
-    return Section("A part as it is cut", words, rows, growth)
+    return Section("A part as it is cut", label, rows, growth)

@@ -39,8 +39,8 @@ def configurations(model: Model, count: int) -> tuple[dict, dict]:
 def shift_and_turn(axis: str, values: dict, middle: str) -> tuple[np.ndarray, np.ndarray]:
     """The errors of an axis: shift in mm and rotation vector in rad, [n, 3] each."""
     zero = np.zeros_like(next(iter(values.values())))
-    found = np.stack([values.get(f"E{letter}{middle}{axis}", zero) for letter in DIRECTIONS], -1)
-    return found[:, :3] * 1e-3, found[:, 3:] * 1e-6
+    vectors = np.stack([values.get(f"E{letter}{middle}{axis}", zero) for letter in DIRECTIONS], -1)
+    return vectors[:, :3] * 1e-3, vectors[:, 3:] * 1e-6
 
 
 def moved_axis(axis: Axis, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,18 +150,20 @@ def measure() -> Section:
         ("pinocchio, one point after the other", by_pinocchio, 1),
     )
     errors = len(values)
-    for words, peer, repeats in peers:
+    for peer_name, peer, repeats in peers:
         run = lambda: peer(model, coordinates, values, point)  # noqa: B023, E731
-        off = float(np.abs(ours() - run()).max())
-        if off > AGREE_UM:
-            raise RuntimeError(f"{words}: {off} µm from ours")
+        difference = float(np.abs(ours() - run()).max())
+        if difference > AGREE_UM:
+            raise RuntimeError(f"{peer_name}: {difference} µm from ours")
         took, other = in_turns(ours, run, repeats)
-        what = f"exact errors at {POINTS:,} scattered points, {errors} errors each"
-        rows.append(Row(what, took, f"{words}, agrees to {off:.0e} µm", other, most_ratio=1.0))
-    one = {name: at[:1] for name, at in coordinates.items()}
+        label = f"exact errors at {POINTS:,} scattered points, {errors} errors each"
+        rows.append(
+            Row(label, took, f"{peer_name}, agrees to {difference:.0e} µm", other, max_ratio=1.0)
+        )
+    single_point = {name: at[:1] for name, at in coordinates.items()}
     only = {key: value[:1] for key, value in values.items()}
     branch = Branch(model, "tool")
-    state = branch.states(one, only)[0]
+    state = branch.states(single_point, only)[0]
     keys = model.machine.allowed_keys
 
     def joint_jacobians() -> None:

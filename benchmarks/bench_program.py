@@ -44,20 +44,20 @@ def measure() -> Section:
             best(lambda: trace(text, tcp), 3),  # noqa: B023
             "splitting its lines into words",
             split,
-            most=1.0,
+            max_value=1.0,
         )
         for tcp, words in (("program", "tool centre point"), ("never", "axes in proportion"))
     ]
     texts = [program(blocks) for blocks in GROWING]
     costs = [best(lambda: trace(text), 3) for text in texts]  # noqa: B023
     growth = [Growth("program, tool centre point", "blocks", [*map(float, GROWING)], costs)]
-    asked = [Program(file="x", text=program(blocks)) for blocks in MENDED]
-    ran = [one.run(scene, ignore_progress) for one in asked]
+    analyses = [Program(file="x", text=program(blocks)) for blocks in MENDED]
+    ran = [one.run(scene, ignore_progress) for one in analyses]
     costs = [best(one.output_files, 2) for one in ran]
     growth.append(Growth("program mended", "blocks", [*map(float, MENDED)], costs))
-    words = (
+    label = (
         "A program in G-code whose short blocks move five axes: read, its modal words followed,"
         " the path sampled so that it bends by 0.01 mm at most between samples, and the error of"
         " each sample, to first order."
     )
-    return Section("A program of five-axis blocks", words, rows, growth)
+    return Section("A program of five-axis blocks", label, rows, growth)

@@ -1,4 +1,4 @@
-"""How long it takes until the package and the command line are there."""
+"""Start-up time of the package and the command line."""
 
 from table import Row, Section
 from timing import cheapest, commands_in_turns, python
@@ -10,20 +10,20 @@ def measure() -> Section:
     """Measure fresh interpreters."""
     bare = cheapest(lambda: python("-c", "pass"), REPEATS).processor_s
     package = cheapest(lambda: python("-c", "import warpspace"), REPEATS).processor_s
-    words = cheapest(lambda: python("-m", "warpspace", "-h"), REPEATS).processor_s
+    help_s = cheapest(lambda: python("-m", "warpspace", "-h"), REPEATS).processor_s
     command = ("-m", "warpspace", "field", "dvf5000_first", "--at", "X=0")
     point, numpy = commands_in_turns(command, ("-c", "import numpy"), REPEATS)
-    beside = "python -c pass"
+    baseline = "python -c pass"
     rows = [
-        Row("import warpspace, Python included", package, beside, bare),
-        Row("import warpspace alone", max(package - bare, 0.0), beside, bare, most=0.06),
-        Row("warpspace -h", words, beside, bare, most=0.3),
+        Row("import warpspace, Python included", package, baseline, bare),
+        Row("import warpspace alone", max(package - bare, 0.0), baseline, bare, max_value=0.06),
+        Row("warpspace -h", help_s, baseline, bare, max_value=0.3),
         Row(
             "warpspace field SCENE --at X=0",
             point.processor_s,
             "python -c 'import numpy'",
             numpy.processor_s,
-            most_ratio=2.0,
+            max_ratio=2.0,
         ),
     ]
     text = "Whole processes. What an import loads is what it costs; a test says what that is."

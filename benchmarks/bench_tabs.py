@@ -29,23 +29,23 @@ KEY = "EAY"
 POSITIONS = 61
 OPENED_S = 3.0  # until what a page computes once it has opened is done: no part of a drag
 FINAL_S = 10.0
-"""How long the last value may take to be shown before it counts as stale."""
+"""Time after which a last value that is not shown counts as stale."""
 
 
 def expected() -> tuple[np.ndarray, dict[str, int]]:
-    """Give the positions of the drag and the points that each must show."""
+    """Return the positions of the drag and the points that each must show."""
     values = np.linspace(-90.0, 90.0, POSITIONS).round(1)
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
-    shown = {
+    numbers = {
         packed(map_mesh(live.evaluate(state.with_amplitude(KEY, v))).vertices_mm.astype("<f4")): i
         for i, v in enumerate(values.tolist())
     }
-    assert len(shown) == POSITIONS, "positions cannot be told apart by their points"
-    return values, shown
+    assert len(numbers) == POSITIONS, "positions cannot be told apart by their points"
+    return values, numbers
 
 
 @dataclass(frozen=True)
-class Found:
+class TabTimes:
     """Latencies in s, processor time of a picture in s, its bytes, stale tabs, memory in MB."""
 
     median_s: float
@@ -71,33 +71,33 @@ async def drag(tab: Tab, values: np.ndarray, seconds: float, rate: float) -> lis
     return sent
 
 
-def latencies(sent: list[tuple], seen: list[tuple], shown: dict[str, int]) -> list[float]:
-    """Give the time until each position sent, or a later one, was answered, s."""
-    found, done = [], 0
-    for at, points in seen:
-        index = shown.get(points)
+def latencies(sent: list[tuple], received: list[tuple], numbers: dict[str, int]) -> list[float]:
+    """Compute the time until each position sent, or a later one, was answered, s."""
+    delays, answered = [], 0
+    for at, points in received:
+        index = numbers.get(points)
         # the latest position sent before with these points
         newest = next(
             (
                 i
-                for i in range(len(sent) - 1, done - 1, -1)
+                for i in range(len(sent) - 1, answered - 1, -1)
                 if sent[i][0] < at and sent[i][1] == index
             ),
             None,
         )
         if newest is None:
             continue
-        found += [at - sent[i][0] for i in range(done, newest + 1)]
-        done = newest + 1
-    return found
+        delays += [at - sent[i][0] for i in range(answered, newest + 1)]
+        answered = newest + 1
+    return delays
 
 
-async def drag_all(app: App, tabs: int, idle: int) -> Found:
+async def drag_all(app: App, tabs: int, idle: int) -> TabTimes:
     """Have some tabs drag beside some idle ones."""
-    values, shown = expected()
-    every = [Tab(app) for _ in range(tabs + idle)]
-    dragging = every[:tabs]
-    for tab in every:
+    values, numbers = expected()
+    all_tabs = [Tab(app) for _ in range(tabs + idle)]
+    dragging = all_tabs[:tabs]
+    for tab in all_tabs:
         await tab.open()
     await asyncio.sleep(OPENED_S)
     for tab in dragging:
@@ -110,19 +110,21 @@ async def drag_all(app: App, tabs: int, idle: int) -> Found:
     while True:
         await asyncio.sleep(0.1)
         pairs = zip(dragging, sent, strict=True)
-        stale = sum(shown.get(tab.points) != out[-1][1] for tab, out in pairs)
+        stale = sum(numbers.get(tab.points) != out[-1][1] for tab, out in pairs)
         if not stale or time.perf_counter() - end > FINAL_S:
             break
     memory = app.memory_mb
     pictures = sum(len(tab.seen) for tab in dragging)
     times = [
-        t for tab, out in zip(dragging, sent, strict=True) for t in latencies(out, tab.seen, shown)
+        latency
+        for tab, out in zip(dragging, sent, strict=True)
+        for latency in latencies(out, tab.seen, numbers)
     ]
     size = sum(tab.bytes for tab in dragging) / max(pictures, 1)
-    for tab in every:
+    for tab in all_tabs:
         await tab.close()
     p50, p95 = np.quantile(times, (0.5, 0.95))
-    return Found(p50, p95, used / max(pictures, 1), size, stale, memory)
+    return TabTimes(p50, p95, used / max(pictures, 1), size, stale, memory)
 
 
 def measure() -> Section:
@@ -131,34 +133,34 @@ def measure() -> Section:
         bare = app.memory_mb
         grown = [asyncio.run(drag_all(app, tabs, 0)) for tabs in GROWING]
     with running_app() as app:
-        found = asyncio.run(drag_all(app, TABS, IDLE))
+        times = asyncio.run(drag_all(app, TABS, IDLE))
     live, state = LiveModel(), start_state(load_scene("dvf5000_first"))
     live.evaluate(state)
     moves = iter(np.linspace(-80.0, 80.0, 1000))
     model = best(lambda: live.evaluate(state.with_amplitude(KEY, float(next(moves)))), 50)
-    words = f"{TABS} tabs at {RATE:g} positions a second beside {IDLE} idle ones"
+    load_text = f"{TABS} tabs at {RATE:g} positions a second beside {IDLE} idle ones"
     tick = 1.0 / RATE
-    one = grown[0]
+    first_growth = grown[0]
     rows = [
-        Row(f"latency, median, wall: {words}", found.median_s, "between two positions", tick),
+        Row(f"latency, median, wall: {load_text}", times.median_s, "between two positions", tick),
         Row(
-            f"latency, P95, wall: {words}",
-            found.p95_s,
+            f"latency, P95, wall: {load_text}",
+            times.p95_s,
             "between two positions",
             tick,
-            most_ratio=1.0,
+            max_ratio=1.0,
         ),
-        Row("processor time of a picture of one tab", found.picture_s, "the model alone", model),
+        Row("processor time of a picture of one tab", times.picture_s, "the model alone", model),
         Row(
             "bytes of a picture",
-            found.size / 1e3,
+            times.size / 1e3,
             "one tab alone",
-            one.size / 1e3,
+            first_growth.size / 1e3,
             "kB",
-            most=60.0,
+            max_value=60.0,
         ),
-        Row("stale final values, + 1", found.stale + 1.0, "none, + 1", 1.0, "", most_ratio=1.0),
-        Row(f"memory with {TABS + IDLE} tabs", found.memory_mb, "with none", bare, "MB"),
+        Row("stale final values, + 1", times.stale + 1.0, "none, + 1", 1.0, "", max_ratio=1.0),
+        Row(f"memory with {TABS + IDLE} tabs", times.memory_mb, "with none", bare, "MB"),
     ]
     counts = [*map(float, GROWING)]
     growth = [

@@ -38,7 +38,7 @@ BENCHMARKS = (
 APART = ("bench_cluster", "bench_machines")
 """Programs of their own, with pages or output of their own."""
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
-SHOWN = ("warpspace", "numpy", "scipy", "viser", "pyvista", "vtk", "pyarrow")
+PACKAGES = ("warpspace", "numpy", "scipy", "viser", "pyvista", "vtk", "pyarrow")
 PEERS = ("pytransform3d", "pin")
 HEAD = """# Performance
 
@@ -66,22 +66,22 @@ def machine_words() -> str:
 
 def version_words() -> str:
     """List what was measured with."""
-    found = [f"{name} {metadata.version(name)}" for name in (*SHOWN, *PEERS)]
-    return f"Python {platform.python_version()}, " + ", ".join(found)
+    versions = [f"{name} {metadata.version(name)}" for name in (*PACKAGES, *PEERS)]
+    return f"Python {platform.python_version()}, " + ", ".join(versions)
 
 
 def load_words(before: float, after: float) -> str:
-    """Say what else the machine was doing."""
+    """Describe the other load of the machine."""
     cores = os.cpu_count() or 1
-    words = f"{before:.1f} before, {after:.1f} at the end (mean of a minute, {cores} cores)"
+    load_text = f"{before:.1f} before, {after:.1f} at the end (mean of a minute, {cores} cores)"
     if max(before, after) > cores:
-        words += "; other programs were running: compare ratios, not times"
-    return words
+        load_text += "; other programs were running: compare ratios, not times"
+    return load_text
 
 
 def page_text(sections: list[Section], load: str, left_out: Sequence[str] = ()) -> str:
     """Spell the page, with the benchmarks that were left out."""
-    missed = [row.what for section in sections for row in section.rows if not row.is_met]
+    missed = [row.label for section in sections for row in section.rows if not row.is_met]
     head = HEAD.format(
         command="make bench",
         date=datetime.now(UTC).strftime("%Y-%m-%d"),
@@ -100,20 +100,20 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help=f"of {', '.join(BENCHMARKS)}")
     parser.add_argument("-o", "--output", type=Path)
     options = parser.parse_args()
-    chosen = [n if n.startswith("bench_") else f"bench_{n}" for n in options.names] or BENCHMARKS
-    unknown = [name for name in chosen if name not in BENCHMARKS]
+    names = [n if n.startswith("bench_") else f"bench_{n}" for n in options.names] or BENCHMARKS
+    unknown = [name for name in names if name not in BENCHMARKS]
     if unknown:
         parser.error(f"no benchmark {unknown[0]!r}; expected {', '.join(BENCHMARKS)}")
     before = os.getloadavg()[0]
     sections = []
-    for name in chosen:
+    for name in names:
         print(f"{name} …", file=sys.stderr, flush=True)
         sections.append(import_module(name).measure())
         print(section_text(sections[-1]), flush=True)
     output = options.output or (None if options.names else PAGE)
     if output is not None:
         load = load_words(before, os.getloadavg()[0])
-        left_out = [name for name in BENCHMARKS if name not in chosen]
+        left_out = [name for name in BENCHMARKS if name not in names]
         output.write_text(page_text(sections, load, left_out), encoding="utf-8")
     missed = [row.what for section in sections for row in section.rows if not row.is_met]
     if missed:

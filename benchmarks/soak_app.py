@@ -45,7 +45,7 @@ ALLOCATOR = {
     "PYTHONMALLOC": "malloc",
 }
 """Of the soaked server only, so that what is free leaves the process."""
-SAYS = "memory after collection, MB: "
+MEMORY_LINE = "memory after collection, MB: "
 
 
 def serve() -> None:
@@ -60,7 +60,7 @@ def serve() -> None:
             time.sleep(READING_S)
             gc.collect()
             libc.malloc_trim(0)
-            print(f"{SAYS}{myself.memory_info().rss / 1e6:.3f}", flush=True)
+            print(f"{MEMORY_LINE}{myself.memory_info().rss / 1e6:.3f}", flush=True)
 
     threading.Thread(target=tell, daemon=True).start()
     del sys.argv[1]
@@ -70,8 +70,8 @@ def serve() -> None:
 def next_reading(server: psutil.Popen) -> float:
     """Wait for the server's next reading; give it, MB."""
     for line in server.stdout:
-        if line.startswith(SAYS):
-            return float(line.removeprefix(SAYS))
+        if line.startswith(MEMORY_LINE):
+            return float(line.removeprefix(MEMORY_LINE))
     raise EOFError("the server has ended")
 
 
@@ -105,7 +105,7 @@ async def visit(
 
 
 async def check_return(app: App) -> bool:
-    """Tell whether a tab that comes back finds its state."""
+    """Check that a tab that comes back finds its state."""
     tab = Tab(app)
     await tab.open()
     await tab.drag("EAX", 7.5)
@@ -113,16 +113,16 @@ async def check_return(app: App) -> bool:
     numbers = tab.pieces["error.EAX"]
     await tab.close()
     await asyncio.sleep(0.5)
-    back = Tab(app, tab.token)
-    await back.open()
+    returned = Tab(app, tab.token)
+    await returned.open()
     await asyncio.sleep(1.0)
-    found = back.pieces["error.EAX"] == numbers
-    await back.close()
-    return found
+    is_same = returned.pieces["error.EAX"] == numbers
+    await returned.close()
+    return is_same
 
 
 def growth(memory: list[tuple[float, float]]) -> tuple[np.ndarray, float, float]:
-    """Give the median of each part, MB, and the slope with the half of its 2σ interval, MB/h."""
+    """Compute the median of each part, MB, and the slope with the half of its 2σ interval, MB/h."""
     parts = np.array_split(np.array(memory), min(PARTS, len(memory)))
     hours, sizes = np.array([np.median(part, axis=0) for part in parts]).T
     line = theilslopes(sizes, hours / 3600.0, alpha=0.9545)
@@ -131,7 +131,7 @@ def growth(memory: list[tuple[float, float]]) -> tuple[np.ndarray, float, float]
 
 
 async def run(app: App, options: argparse.Namespace) -> bool:
-    """Soak and print; give whether nothing grew."""
+    """Soak and print; return True if nothing grew."""
     seconds, process = 60.0 * options.minutes, app.process
     until = time.monotonic() + seconds
     counts = {"connections": 0, "moves": 0, "open": 0}
@@ -160,7 +160,7 @@ async def run(app: App, options: argparse.Namespace) -> bool:
     await asyncio.gather(*visitors)
     spent_s = sum(process.cpu_times()[:2]) - sum(cpu_s[:2])
     await asyncio.sleep(3.0)
-    found = await check_return(app)
+    is_restored = await check_return(app)
     await asyncio.sleep(2.0)
     sizes, slope, error = growth([m for m in memory if m[0] > min(WARM_S, seconds / 3.0)])
     print(
@@ -175,12 +175,12 @@ async def run(app: App, options: argparse.Namespace) -> bool:
         f" growth {slope:+.1f} ± {error:.1f} MB per hour (at most {slope + error:+.1f})"
     )
     print(f"left open: {process.num_threads()} threads, {process.num_fds()} files")
-    print(f"a tab that comes back finds its state: {'yes' if found else 'NO'}")
-    return found and is_flat(slope, error, options.minutes / 60.0)
+    print(f"a tab that comes back finds its state: {'yes' if is_restored else 'NO'}")
+    return is_restored and is_flat(slope, error, options.minutes / 60.0)
 
 
 def is_flat(slope: float, error: float, hours: float) -> bool:
-    """Tell whether growth is known well enough and small; a short run only fails if it is not."""
+    """Check that growth is small and known well enough; a short run fails only on growth."""
     if hours < 1.0:
         return (slope - error) * hours <= MAX_MB_PER_HOUR
     return error <= MAX_MB_PER_HOUR and slope <= MAX_MB_PER_HOUR
@@ -195,8 +195,8 @@ def main() -> None:
     parser.add_argument("--pause", type=float, default=1.0, help="seconds between two drags, about")
     parser.add_argument("--readings", help="CSV file for every reading")
     options = parser.parse_args()
-    how = {"env": {**os.environ, **ALLOCATOR}, "text": True}
-    with running_app(launcher=(__file__, "serve"), stdout=subprocess.PIPE, **how) as app:
+    process = {"env": {**os.environ, **ALLOCATOR}, "text": True}
+    with running_app(launcher=(__file__, "serve"), stdout=subprocess.PIPE, **process) as app:
         fine = asyncio.run(run(app, options))
     sys.exit(0 if fine else 1)
 

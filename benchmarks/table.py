@@ -12,49 +12,49 @@ FITTED = 3
 
 @dataclass(frozen=True)
 class Row:
-    """A figure beside a floor or a peer that was measured in the same run.
+    """A figure and its baseline, a floor or a peer, measured in the same run.
 
     Attributes
     ----------
-    what : str
+    label : str
     value : float
         Seconds, or what `unit` says.
-    beside : str
-        What stands beside it: the least that is possible (a floor), or another program (a peer).
-    beside_value : float
+    baseline : str
+        The least that is possible (a floor), or another program (a peer).
+    baseline_value : float
     unit : str, optional
-    most : float, optional
-        Largest value that is fine.
-    most_ratio : float, optional
-        Largest ratio that is fine.
+    max_value : float, optional
+        Largest value accepted.
+    max_ratio : float, optional
+        Largest ratio accepted.
     """
 
-    what: str
+    label: str
     value: float
-    beside: str
-    beside_value: float
+    baseline: str
+    baseline_value: float
     unit: str = "s"
-    most: float = math.inf
-    most_ratio: float = math.inf
+    max_value: float = math.inf
+    max_ratio: float = math.inf
 
     @property
     def ratio(self) -> float:
         """Figure by floor."""
-        return self.value / self.beside_value
+        return self.value / self.baseline_value
 
     @property
     def is_met(self) -> bool:
-        """Whether no target is missed."""
-        return self.value <= self.most and self.ratio <= self.most_ratio
+        """True if the figure meets its targets."""
+        return self.value <= self.max_value and self.ratio <= self.max_ratio
 
     @property
     def target(self) -> str:
         """The target in words."""
         parts = []
-        if self.most < math.inf:
-            parts.append(f"≤ {spell(self.most, self.unit)}")
-        if self.most_ratio < math.inf:
-            parts.append(f"≤ {self.most_ratio:g} ×")
+        if self.max_value < math.inf:
+            parts.append(f"≤ {spell(self.max_value, self.unit)}")
+        if self.max_ratio < math.inf:
+            parts.append(f"≤ {self.max_ratio:g} ×")
         return ", ".join(parts) + ("" if self.is_met else " (missed)")
 
 
@@ -64,16 +64,16 @@ class Growth:
 
     Attributes
     ----------
-    what : str
-    over : str
-        What is counted.
+    label : str
+    size_name : str
+        Quantity of the sizes.
     sizes, costs : sequence of float
     unit : str, optional
         Of the costs.
     """
 
-    what: str
-    over: str
+    label: str
+    size_name: str
     sizes: Sequence[float]
     costs: Sequence[float]
     unit: str = "s"
@@ -87,13 +87,13 @@ class Growth:
 
 @dataclass(frozen=True)
 class Section:
-    """What one benchmark found.
+    """The figures of one benchmark.
 
     Attributes
     ----------
     title : str
     text : str
-        What was measured and how.
+        The method of measurement.
     rows : sequence of Row
     growth : sequence of Growth, optional
     """
@@ -130,15 +130,16 @@ def section_text(section: Section) -> str:
             "|---|--:|---|--:|--:|---|",
         ]
         lines += [
-            f"| {row.what} | {spell(row.value, row.unit)} | {row.beside} |"
-            f" {spell(row.beside_value, row.unit)} | {_three(row.ratio)} | {row.target} |"
+            f"| {row.label} | {spell(row.value, row.unit)} | {row.baseline} |"
+            f" {spell(row.baseline_value, row.unit)} | {_three(row.ratio)} | {row.target} |"
             for row in section.rows
         ]
         lines.append("")
     if section.growth:
         lines += ["| growth | over | sizes | costs | exponent |", "|---|---|---|---|--:|"]
         lines += [
-            f"| {curve.what} | {curve.over} | {', '.join(f'{size:,.0f}' for size in curve.sizes)} |"
+            f"| {curve.label} | {curve.size_name} |"
+            f" {', '.join(f'{size:,.0f}' for size in curve.sizes)} |"
             f" {', '.join(spell(cost, curve.unit) for cost in curve.costs)} |"
             f" {curve.exponent:.2f} |"
             for curve in section.growth

@@ -1,4 +1,4 @@
-"""How long things take: processor time, in turns with what stands beside them.
+"""Measurement of processor time, in turns with a baseline.
 
 Processor time does not count what else a machine is busy with, and taking turns lets what is left
 of it (caches, clock) meet both sides. The shortest of several runs is the one disturbed least.
@@ -33,7 +33,7 @@ finally:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a command took: processor time in s, wall time in s, memory at most in MB."""
+    """Cost of a command: processor time in s, wall time in s, peak memory in MB."""
 
     processor_s: float
     wall_s: float
@@ -53,11 +53,11 @@ def best(run: Run, repeats: int = 5) -> float:
     return min(processor_s(run) for _ in range(repeats))
 
 
-def in_turns(ours: Run, beside: Run, repeats: int = 5) -> tuple[float, float]:
+def in_turns(ours: Run, baseline: Run, repeats: int = 5) -> tuple[float, float]:
     """Shortest processor times of two things that are run in turns, s."""
     ours()
-    beside()
-    pairs = [(processor_s(ours), processor_s(beside)) for _ in range(repeats)]
+    baseline()
+    pairs = [(processor_s(ours), processor_s(baseline)) for _ in range(repeats)]
     return min(pair[0] for pair in pairs), min(pair[1] for pair in pairs)
 
 
@@ -70,12 +70,12 @@ def python(*arguments: object) -> Cost:
         stderr=subprocess.PIPE,
         env=_environment(),
     ) as process:
-        said = process.stderr.read().decode() if process.stderr else ""
+        errors = process.stderr.read().decode() if process.stderr else ""
         _, status, used = wait4(process.pid, 0)
         process.returncode = status
     if status:
-        raise RuntimeError(f"{' '.join(map(str, arguments))}: {said}")
-    peak = [line.split()[1] for line in said.splitlines() if line.startswith("peak ")]
+        raise RuntimeError(f"{' '.join(map(str, arguments))}: {errors}")
+    peak = [line.split()[1] for line in errors.splitlines() if line.startswith("peak ")]
     wall = time.perf_counter() - start
     return Cost(used.ru_utime + used.ru_stime, wall, float(peak[0]) / 1024.0 if peak else 0.0)
 
@@ -87,16 +87,16 @@ def warpspace(*arguments: object) -> Cost:
 
 @cache
 def _environment() -> dict[str, str]:
-    kept = tempfile.mkdtemp(prefix="benchmarks-")
-    atexit.register(shutil.rmtree, kept, ignore_errors=True)
-    return {**os.environ, "PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": kept}
+    folder = tempfile.mkdtemp(prefix="benchmarks-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return {**os.environ, "PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": folder}
 
 
-def commands_in_turns(ours: Command, beside: Command, repeats: int = 3) -> tuple[Cost, Cost]:
+def commands_in_turns(ours: Command, baseline: Command, repeats: int = 3) -> tuple[Cost, Cost]:
     """Run two commands in turns, after a run of each that warms up; give the cheapest of each."""
     python(*ours)
-    python(*beside)
-    pairs = [(python(*ours), python(*beside)) for _ in range(repeats)]
+    python(*baseline)
+    pairs = [(python(*ours), python(*baseline)) for _ in range(repeats)]
     first, second = (
         min(costs, key=lambda cost: cost.processor_s) for costs in zip(*pairs, strict=True)
     )
@@ -104,5 +104,5 @@ def commands_in_turns(ours: Command, beside: Command, repeats: int = 3) -> tuple
 
 
 def cheapest(run: Callable[[], Cost], repeats: int = 3) -> Cost:
-    """Give the run of several that took the least processor time."""
+    """Return the run with the least processor time."""
     return min((run() for _ in range(repeats)), key=lambda cost: cost.processor_s)

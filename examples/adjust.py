@@ -1,10 +1,10 @@
 """
-What to adjust
-==============
+Best adjustment
+===============
 
 Before and after the best adjustments, and what each error does to the volume.
 
-Run ``python examples/repair.py [FILE]``; FILE ends in .png, .svg or .pdf.
+Run ``python examples/adjust.py [FILE]``; FILE ends in .png, .svg or .pdf.
 """
 
 import sys

@@ -55,8 +55,8 @@ for run in range(1, 6):
         rows += [
             f"{run},{sign},{at:g},{value:.3f}" for at, value in zip(targets, noisy, strict=True)
         ]
-with tempfile.TemporaryDirectory() as where:
-    data = Path(where) / "positioning.csv"
+with tempfile.TemporaryDirectory() as folder_name:
+    data = Path(folder_name) / "positioning.csv"
     data.write_text("\n".join(rows), encoding="utf-8")
     result = run_test(bent, Positioning(axis="X"), data)
 write_chart(bench_chart(result), folder / "test_positioning.png")

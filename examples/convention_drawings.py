@@ -57,9 +57,9 @@ def arrow(axes: Axes, start: Place, end: Place, colour: str = INK, width: float 
     )
 
 
-def text(axes: Axes, x: float, y: float, words: str, colour: str = INK) -> None:
+def text(axes: Axes, x: float, y: float, label: str, colour: str = INK) -> None:
     """Write words."""
-    axes.text(x, y, words, color=colour, fontsize=FONT, ha="center", va="center")
+    axes.text(x, y, label, color=colour, fontsize=FONT, ha="center", va="center")
 
 
 def body(axes: Axes, centre: Place, turn: float, colour: str, size: Place = (1.1, 0.6)) -> None:
@@ -80,8 +80,8 @@ def order() -> Figure:
             circle = np.linspace(0.0, 2.0 * np.pi, 100)
             panel.plot(np.cos(circle), np.sin(circle), color=MUTED, lw=1.5)
             panel.plot([0.0, np.cos(start)], [0.0, np.sin(start)], color=INK, lw=2, alpha=alpha)
-            way = start if rides else 0.0
-            tip = 0.55 * np.array([np.cos(way), np.sin(way)])
+            shift = start if rides else 0.0
+            tip = 0.55 * np.array([np.cos(shift), np.sin(shift)])
             side = np.array([0.0, -0.08 if start == 0.0 else 0.08])
             if rides:
                 side = np.array([np.sin(start), -np.cos(start)]) * 0.12
@@ -102,7 +102,7 @@ def squareness() -> Figure:
         ("EC0Y > 0: angle over 90°", "X", "Y", 0.2, "out of the page: Z"),
         ("EB0Z > 0: angle under 90°", "X", "Z", -0.2, "into the page: Y"),
     )
-    for panel, (title, first, second, turn, seen) in zip(panels, cases, strict=True):
+    for panel, (title, first, second, turn, view) in zip(panels, cases, strict=True):
         arrow(panel, (0, 0), (1.6, 0))
         panel.plot([0, 0], [0, 1.5], color=MUTED, lw=1.5, ls="--")
         tip = 1.5 * np.array([-np.sin(turn), np.cos(turn)])
@@ -113,7 +113,7 @@ def squareness() -> Figure:
         text(panel, 1.75, 0.0, first)
         text(panel, float(tip[0]) + 0.16 * np.sign(-turn), float(tip[1]), second, ACTUAL)
         text(panel, 0.6, 1.85, title)
-        text(panel, 0.6, -0.3, seen, MUTED)
+        text(panel, 0.6, -0.3, view, MUTED)
         panel.set_xlim(-0.9, 2.2)
         panel.set_ylim(-0.5, 2.05)
     return figure
@@ -130,12 +130,12 @@ def measuring_line() -> Figure:
     panel.plot([0], [0], "o", color=INK)
     text(panel, -0.05, -0.62, "origin of the axis")
     lever = np.array([0.0, 1.7])
-    seen = 1.7 * np.array([np.sin(turn), np.cos(turn)])
+    direction = 1.7 * np.array([np.sin(turn), np.cos(turn)])
     panel.plot([0, lever[0]], [0, lever[1]], color=MUTED, lw=1.5, ls="--")
-    panel.plot([0, seen[0]], [0, seen[1]], color=ACTUAL, lw=2)
+    panel.plot([0, direction[0]], [0, direction[1]], color=ACTUAL, lw=2)
     panel.plot([-2.6, 3.4], [1.7, 1.7], color=SECOND, lw=1.8, ls="-.")
     text(panel, -1.75, 1.95, "measuring line", SECOND)
-    arrow(panel, (0, 1.7), (seen[0] + 0.02, 1.7), ACTUAL, 2.4)
+    arrow(panel, (0, 1.7), (direction[0] + 0.02, 1.7), ACTUAL, 2.4)
     text(panel, 1.55, 2.0, "seen: EXX + EBX · p", ACTUAL)
     text(panel, -0.35, 1.05, "arm p", MUTED)
     text(panel, 0.75, 0.75, "pitch EBX", ACTUAL)
@@ -156,18 +156,18 @@ def reference_line() -> Figure:
     for panel, line, title in zip(panels, ReferenceLine, titles, strict=True):
         offset, slope = fit_line(POSITION, STRAIGHT, line)
         along = offset + slope * POSITION
-        rest = STRAIGHT - along
+        residual = STRAIGHT - along
         panel.plot(POSITION, STRAIGHT, "o-", color=ACTUAL, lw=1.8, ms=5)
         panel.plot(POSITION, along, color=SECOND, lw=2)
         panel.fill_between(
-            POSITION, along + rest.min(), along + rest.max(), color=SECOND, alpha=0.15
+            POSITION, along + residual.min(), along + residual.max(), color=SECOND, alpha=0.15
         )
         panel.set_title(title, fontsize=FONT, color=INK)
         panel.set_xlabel("Y  [mm]", fontsize=FONT - 1)
         panel.tick_params(labelsize=FONT - 2)
         panel.set_ylim(-2.0, 7.0)
         panel.text(
-            390, -1.5, f"tilt {1e3 * slope:.1f} µrad\nband {np.ptp(rest):.2f} µm",
+            390, -1.5, f"tilt {1e3 * slope:.1f} µrad\nband {np.ptp(residual):.2f} µm",
             fontsize=FONT - 2, ha="right", va="bottom", color=SECOND,
         )  # fmt: skip
         for side in ("top", "right"):
@@ -183,14 +183,14 @@ def zero() -> Figure:
     panels = [figure.add_subplot(1, 2, number + 1) for number in range(2)]
     at = np.linspace(0.0, 400.0, 200)
     value = 4.0 + 3.0 * np.sin(at / 110.0)
-    there = 4.0 + 3.0 * np.sin(150.0 / 110.0)
+    offset = 4.0 + 3.0 * np.sin(150.0 / 110.0)
     for panel, shift, title in zip(
-        panels, (0.0, there), ("as measured", "zero at Y 150"), strict=True
+        panels, (0.0, offset), ("as measured", "zero at Y 150"), strict=True
     ):
         panel.axhline(0.0, color=MUTED, lw=1)
         panel.axvline(150.0, color=MUTED, lw=1, ls="--")
         panel.plot(at, value - shift, color=ACTUAL, lw=2.2)
-        panel.plot([150.0], [there - shift], "o", color=SECOND)
+        panel.plot([150.0], [offset - shift], "o", color=SECOND)
         panel.set_title(title, fontsize=FONT, color=INK)
         panel.set_xlabel("Y  [mm]", fontsize=FONT - 1)
         panel.tick_params(labelsize=FONT - 2)
@@ -199,7 +199,12 @@ def zero() -> Figure:
             panel.spines[side].set_visible(False)
     panels[0].set_ylabel("EYY  [µm]", fontsize=FONT - 1)
     panels[1].text(
-        395, 5.6, f"EY0Y = {there:.2f} µm\nmakes up for it", fontsize=FONT, ha="right", color=SECOND
+        395,
+        5.6,
+        f"EY0Y = {offset:.2f} µm\nmakes up for it",
+        fontsize=FONT,
+        ha="right",
+        color=SECOND,
     )
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.17, top=0.9, wspace=0.18)
     return figure
@@ -208,13 +213,13 @@ def zero() -> Figure:
 def held_point() -> Figure:
     """Absolute errors, and those with one point held still."""
     figure, panels = sheet()
-    for panel, title, held in zip(
+    for panel, title, fixed_point in zip(
         panels, ("absolute", "a reference point held still"), (False, True), strict=True
     ):
         grid = np.stack(np.meshgrid(np.linspace(0, 2, 5), np.linspace(0, 1.4, 4)), -1)
         error = np.stack([0.25 + 0.0 * grid[..., 0], 0.12 + 0.1 * grid[..., 0]], -1)
         error[..., 0] -= 0.16 * grid[..., 1]
-        moved = grid + error - (error[1, 2] if held else 0.0)
+        moved = grid + error - (error[1, 2] if fixed_point else 0.0)
         for points, colour, width in ((grid, MUTED, 1.0), (moved, ACTUAL, 1.8)):
             for rows in (points, points.transpose(1, 0, 2)):
                 for row in rows:

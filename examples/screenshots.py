@@ -64,7 +64,7 @@ COLOURS, WIDE = 256, 2000  # of a picture; pixels from which on steps of colours
 
 @dataclass(frozen=True)
 class Visit:
-    """What is in a picture.
+    """Content of a picture.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Visit:
 
 
 def uncertain() -> Scene:
-    """Give a measured machine that states how sure its errors are, and where it was measured."""
+    """Build a measured machine with uncertainties and the measured range."""
     variances = np.diag(np.square(list(UNCERTAIN.values())))
     rows = tuple(map(tuple, variances.tolist()))
     covariance = Covariance(tuple(UNCERTAIN), rows, measured_range={"Z": (-400.0, -80.0)})
@@ -94,8 +94,8 @@ def uncertain() -> Scene:
 def unsure(page: Page) -> None:
     """Colour only what is significant, with ellipsoids at the corners."""
     page.locator("[data-key=menu-surface] > summary").click()
-    for words in ("Significant only", "Uncertainty at the corners"):
-        page.locator("label.ws-switch", has_text=words).click()
+    for label in ("Significant only", "Uncertainty at the corners"):
+        page.locator("label.ws-switch", has_text=label).click()
         page.wait_for_timeout(PAUSE_MS)
     page.keyboard.press("Escape")
 
@@ -138,7 +138,7 @@ def compared(page: Page) -> None:
     page.locator("[data-piece=compared] button", has_text="B − A").click()
 
 
-def asked(page: Page) -> None:
+def ask_question(page: Page) -> None:
     """Show the lever of the largest contribution of the worst point."""
     unfold(page, "Details")
     page.locator("[data-do='worst:lever'][data-value='EA0Z']").click()
@@ -193,8 +193,8 @@ def noted(page: Page) -> None:
     page.locator("[data-do='notes:open']").first.click()
 
 
-def told(page: Page) -> None:
-    """Tell the story up to its second step, which shows the lever of an error."""
+def open_story(page: Page) -> None:
+    """Play the story up to its second step, which shows the lever arm of an error."""
     noted(page)
     press(page, "Tell the story")
     page.locator("[data-do='story:on']").click()
@@ -239,7 +239,7 @@ VISITS = {
     "app_phone": Visit(as_opened, size=(390, 844)),
     "app_wide": Visit(as_opened, size=(2560, 1440)),
     "app_compare": Visit(compared),
-    "task_understand": Visit(asked),
+    "task_understand": Visit(ask_question),
     "task_measure": Visit(tested),
     "task_improve": Visit(improved),
     "task_design": Visit(designed),
@@ -247,7 +247,7 @@ VISITS = {
     "task_import": Visit(imported),
     "window_report": Visit(reported),
     "review_notes": Visit(noted, "review_dvf5000"),
-    "review_story": Visit(told, "review_dvf5000"),
+    "review_story": Visit(open_story, "review_dvf5000"),
     "review_distance": Visit(measured),
     "part_box": Visit(clamped, "part_on_dvf5000"),
     "part_program": Visit(programmed, "part_on_dvf5000"),
@@ -269,8 +269,8 @@ def take(browser: Browser, viewer: Viewer, visit: Visit) -> Image.Image:
     page.evaluate("document.activeElement?.blur()")
     page.mouse.move(width / 2, height - 5)
     page.wait_for_timeout(SETTLED_MS)
-    found = page.locator(visit.part) if visit.part else page
-    shot = Image.open(io.BytesIO(found.screenshot())).convert("RGB")
+    target = page.locator(visit.part) if visit.part else page
+    shot = Image.open(io.BytesIO(target.screenshot())).convert("RGB")
     page.context.close()
     return shot
 
@@ -307,8 +307,8 @@ def main() -> None:
                 viewers[visit.scene] = open_apps.enter_context(viewer)
             target = options.to / f"{name}.png"
             shot = take(browser, viewers[visit.scene], visit)
-            few = with_few_colours(shot)
-            few.save(target, optimize=True)
+            reduced = with_few_colours(shot)
+            reduced.save(target, optimize=True)
             print(target)
         browser.close()
 

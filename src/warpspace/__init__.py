@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from warpspace.analysis.commands.montecarlo import MonteCarloResult, sweep
     from warpspace.analysis.registry import Verb
     from warpspace.analysis.tolerance_check import measured
+    from warpspace.app.documents.notebook import show
     from warpspace.bench.base import run_test
     from warpspace.bench.kinds.circular import ballbar
     from warpspace.calibration.calibrate import calibrate
@@ -40,6 +41,7 @@ _HOME = {
     "calibrate": "warpspace.calibration.calibrate",
     "measured": "warpspace.analysis.tolerance_check",
     "run_test": "warpspace.bench.base",
+    "show": "warpspace.app.documents.notebook",
     "sweep": "warpspace.analysis.commands.montecarlo",
     "thesis": "warpspace.thesis_example.rows",
     "to_pyvista": "warpspace.outputs.exports.meshes",
@@ -65,6 +67,7 @@ __all__ = [
     "montecarlo",
     "run_test",
     "scene_names",
+    "show",
     "sweep",
     "thesis",
     "to_pyvista",

@@ -165,7 +165,7 @@ def test_ellipsoids_reach_along_each_direction_as_far_as_u95():
 
 def test_what_was_never_measured_is_said_and_dotted():
     picture = LIVE.evaluate(state_of())
-    assert "never measured: Z below −50" in subject_words(picture)
+    assert "outside the measured range: Z below −50" in subject_words(picture)
     dotted = around(picture)["/uncertainty/unmeasured"].follows["points"]
     assert len(dotted) == 25  # the nodes at Z −100; those at −50 were reached
     off = LIVE.evaluate(state_of(look__unmeasured="0"))

@@ -97,7 +97,7 @@ def test_all_pictures_of_a_gif_share_one_palette():
 def test_nothing_to_turn(tmp_path):
     path = tmp_path / "three.toml"
     path.write_text('title = "three"\n[machine]\nchain = "wFXYZt"\n')
-    with pytest.raises(OptionError, match="nothing turns"):
+    with pytest.raises(OptionError, match="no trace to animate"):
         one_round(load_scene(path))
 
 

@@ -104,7 +104,7 @@ def test_findings_are_in_page_and_paper_escaped(renderer):
     story = [note(hostile, step=2), note("First.", step=1, view=view_of(START, ABOVE))]
     scene = noted(*story, note(hostile, kind="question", replies=(Reply(hostile, hostile, WHEN),)))
     shares: list[float] = []
-    report = build_report([scene], FAST, tell=tell_story, watch=shares.append)
+    report = build_report([scene], FAST, story_steps=tell_story, watch=shares.append)
     assert shares == sorted(shares)
     assert len(shares) > 2 * len(story)
     assert [part.heading for part in report.sections[:2]] == ["", "Findings and decisions"]

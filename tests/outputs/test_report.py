@@ -5,6 +5,8 @@ import shutil
 import subprocess
 from dataclasses import astuple, replace
 from functools import partial
+from importlib.resources import files
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -21,6 +23,7 @@ from warpspace.exceptions import NoRendererError, RenderError
 from warpspace.outputs.report import ReportSettings, build_report, sections, write_report
 from warpspace.outputs.report.review import build_review, first_page
 from warpspace.outputs.report.templating import (
+    Block,
     Embedded,
     Items,
     Table,
@@ -42,37 +45,39 @@ def page_one(*scenes, **changes):
     review = build_review(scenes, replace(FAST, **changes))
     blocks = first_page(review, Text("the map", "body"))
     words = [str(astuple(block)) for block in blocks]
-    return plain(" | ".join(words)).replace("\\xa0", " "), [one.within for one in review.scenes]
+    return plain(" | ".join(words)).replace("\\xa0", " "), [
+        one.share_within for one in review.scenes
+    ]
 
 
 def test_verdict_on_a_limit_that_is_exceeded():
     scene = load_scene("dvf5000_first")
     text, (within,) = page_one(scene, grid=11, spec_um=40.0, author="me", questions=("Why?",))
-    assert "Limit of 40 µm: fail. 90.6 % of the working volume of 550 × 450 × 400" in text
+    assert "Fail: 90.6 % of the working volume of 550 × 450 × 400 mm is within the limit" in text
     assert "the largest error is 51.7 µm at X 275 Y −225 Z −480." in text
     assert within == share_below(evaluate(scene, grid=11), 40.0)
     for number in ("30.9 µm", "41.3 µm", "'within the limit', '90.6 %'"):
         assert number in text
     assert "Adjust EA0Z (squareness of Z to Y) from +33.9 to +30.0 µrad" in text
-    assert "falls from 51.7 to 46.1 µm, and 94.7 % of the volume is within the limit" in text
+    assert "falls from 51.7 to 46.1 µm; 94.7 % of the volume is within the limit" in text
     assert "Why?" in text
 
 
 def test_the_limit_is_that_of_the_scene_unless_another_is_given():
     scene = replace(load_scene("dvf5000_first"), limit_um=60.0)
     text, shares = page_one(scene, spec_um=None)
-    assert "Limit of 60 µm: pass. The largest error in the working volume" in text
-    assert "Nothing to adjust: all errors are within the limit." in text
+    assert "within the limit of 60 µm." in text
+    assert "No adjustment required: the error is within the limit." in text
     assert shares == [1.0]
-    assert "Limit of 50 µm: fail." in page_one(scene)[0]
+    assert "is within the limit of 50 µm; the largest error is" in page_one(scene)[0]
 
 
 @pytest.mark.parametrize(
     ("limit", "said"),
     [
-        (4.0, "Limit of 4 µm: fail."),
-        (4.9, "Limit of 4.9 µm: undecided."),
-        (6.0, "Limit of 6 µm: pass."),
+        (4.0, "Fail: 0"),
+        (4.9, "Undecided: the largest error in the working volume"),
+        (6.0, "Pass: the largest error in the working volume"),
     ],
 )
 def test_a_verdict_is_given_where_it_holds_with_95_percent(limit, said):
@@ -92,32 +97,32 @@ def test_verdict_without_a_limit_and_on_a_perfect_machine():
     assert "falls from 51.7 to 46.1 µm." in text
     text, _ = page_one(load_scene("dvf5000_nominal"))
     assert "The error is zero" in text
-    assert "Nothing to adjust" in text
+    assert "No adjustment required" in text
     assert "nan" not in text
 
 
 def test_verdicts_on_two_stand_in_one_table():
     text, shares = page_one(load_scene("dvf5000_first"), load_scene("dvf5000_second"), grid=11)
-    assert "A, limit of 50 µm: fail; B, limit of 50 µm: pass." in text
+    assert "A: fail, limit 50 µm. B: pass, limit 50 µm." in text
     assert "mean error of B is 14.6 µm: 53 % less than A's 30.9 µm" in text
-    assert "B: Nothing to adjust" in text
+    assert "B: No adjustment required" in text
     assert shares[0] < shares[1] == 1.0
 
 
 def test_rows_of_zeros_are_counted_and_errors_that_are_zero():
     columns = (Column("key"), *number_columns(("x", "y")))
     rows = [("a", 0.0, 0.001), ("b", 0.0, 0.2), ("c", None, None)]
-    table, none = sections.said(
+    table, none = sections.report_blocks(
         [Table(columns, rows, "Of errors.", marks=("", "worse", "key")), Table(columns, rows[:1])]
     )
     assert [row[0] for row in table.rows] == ["b", "c"]
     assert table.marks == ["worse", "key"]
-    assert none == Text("Rows of zeros left out: 1.", "note")
-    assert table.title == "Of errors. Rows of zeros left out: 1."
+    assert none == Text("Rows of zeros omitted: 1.", "note")
+    assert table.title == "Of errors. Rows of zeros omitted: 1."
     reviewed = build_review((load_scene("dvf5000_first"),), FAST).scenes[0]
     found = sections.parameters(reviewed)
     assert len(found.rows) == 7
-    assert found.title.endswith("Errors that are zero left out: 34.")
+    assert found.title.endswith("Errors equal to zero omitted: 34.")
     assert {
         row[0] for row, mark in zip(found.rows, found.marks, strict=True) if mark == "worse"
     } == {"EAY", "EAZ", "EA0Z"}
@@ -165,7 +170,8 @@ def test_every_part_is_there(both):
 
 @pytest.mark.render
 def test_concepts_have_the_numbers_of_the_command(both):
-    section = next(part for part in both.sections if part.heading.endswith("Concepts side by side"))
+    heading = "Comparison of concepts"
+    section = next(part for part in both.sections if part.heading.endswith(heading))
     table = next(block for block in section.blocks if isinstance(block, Table))
     scenes = [
         load_scene(name) for name in ("dvf5000_first", "dvf5000_second", "machine_printer_3d")
@@ -176,6 +182,15 @@ def test_concepts_have_the_numbers_of_the_command(both):
         assert float(row[3]) == pytest.approx(concept.sampled.mean_um, rel=5e-3)
         assert float(row[4]) == pytest.approx(concept.sampled.p95_um, rel=5e-3)
         assert row[6] == f"{100 * concept.sampled.probability.probability:.2f}"
+
+
+@pytest.mark.parametrize("template", ["report.html.j2", "report.typ"])
+def test_templates_draw_every_kind_of_block(template):
+    folder = files("warpspace.outputs.report") / "templates"
+    text = (folder / template).read_text("utf-8")
+    printed = set(get_args(Block)) - ({Embedded} if template.endswith(".typ") else set())
+    missing = [kind for kind in printed if f'kind == "{kind.__name__.lower()}"' not in text]
+    assert missing == []
 
 
 @pytest.mark.render
@@ -213,7 +228,7 @@ def test_pdf_repeats_and_says_everything(renderer, tmp_path, monkeypatch):
     flat = re.sub(r"\s+", " ", text)
     for words in (
         "Error budget at the worst point",
-        "no advice",
+        "Recommended adjustment",
         "exact chain",
         "SHA-256",
         'machine = "dvf',

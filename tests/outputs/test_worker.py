@@ -64,7 +64,7 @@ def test_concurrent_requests_queue():
 def test_a_figure_that_takes_too_long_is_given_up():
     with FigureWorker(timeout_s=0.05) as worker:
         started = time.monotonic()
-        with pytest.raises(RenderError, match="given up"):
+        with pytest.raises(RenderError, match="was stopped"):
             worker.begin("error-map", [load_scene("dvf5000_first")], LARGE)()
         assert time.monotonic() - started < 20.0
 

@@ -230,7 +230,7 @@ def write_report(
     with _turn(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
         written = write(
-            scenes, target, settings, embed=embed_view, tell=tell_story, results=results
+            scenes, target, settings, embed=embed_view, story_steps=tell_story, results=results
         )
         return target.read_bytes(), written.missing
 

@@ -1,1 +1,1 @@
-"""What leaves the program: figures and files."""
+"""Files and figures: export, drawing, charts, reports; renderers of pictures."""

@@ -23,7 +23,7 @@ from warpspace.outputs.drawing.settings import SAVE_RC, SIZES, FigureSettings, e
 from warpspace.outputs.drawing.sheet import Drawing, map_legend, scene_facts, start_sheet
 from warpspace.outputs.figure_files import figure_bytes
 from warpspace.outputs.figures.machine_figures import draw_bodies
-from warpspace.outputs.figures.maps import isoline_words, say_statistics
+from warpspace.outputs.figures.maps import draw_statistics, isoline_words
 from warpspace.outputs.file_output import check_target, write_atomically
 from warpspace.outputs.processes import ProcessPool
 from warpspace.picture.model import choose_exaggeration, choose_scale, evaluate_picture
@@ -73,7 +73,7 @@ def draw_frame(scene: Scene, settings: AnimationSettings, number: int) -> Drawin
 
 
 def sweep_factor(top: float, phase: float) -> float:
-    """Give the display factor at a phase of the sweep: 1 at its ends, the top in its middle."""
+    """Compute the display factor at a phase of the sweep: 1 at its ends, the top in its middle."""
     share = (1.0 - np.cos(2.0 * np.pi * phase)) / 2.0
     return float(f"{1.0 + (top - 1.0) * share:.3g}")
 
@@ -89,7 +89,7 @@ def _exaggeration_frame(scene: Scene, figure: FigureSettings, phase: float) -> D
     sheet = start_sheet("exaggeration", figure, title, facts, [scene], legend, exact=True)
     camera = fit_map(sheet.canvas, [picture, largest], sheet.content, figure.view)
     drawn = draw_map(sheet.canvas, picture, sheet.content, figure.view, projection=camera)
-    say_statistics(sheet, picture, camera.px_per_mm)
+    draw_statistics(sheet, picture, camera.px_per_mm)
     return sheet.finish(factor, [drawn])
 
 
@@ -97,18 +97,19 @@ def one_round(scene: Scene) -> tuple[str, Array, list[TraceLine]]:
     groups = evaluate_traces(scene, 1.0, _TRACE_SAMPLES)
     if not groups:
         raise OptionError(
-            f"{scene.name}: nothing turns; expected a rotary axis, and points in [points_mm] traces"
+            f"{scene.name}: no trace to animate; expected a rotary axis, and points in [points_mm]"
+            " traces"
         )
     positions, group = scene.workspace.positions, groups[0].group
     side = "workpiece" if group.loop is Loop.WORKPIECE else "tool"
     axis = [axis.name for axis in scene.machine.branch(side) if not axis.is_linear][-1]
-    chosen = {
+    lines = {
         number: line
         for number, line in enumerate(groups[0].each())
         if line.trace.axis == axis
         and all(positions.get(name, 0.0) == at for name, at in line.trace.at.items())
     }
-    return axis, group.coordinates[axis][next(iter(chosen))], list(chosen.values())
+    return axis, group.coordinates[axis][next(iter(lines))], list(lines.values())
 
 
 def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawing:
@@ -130,26 +131,26 @@ def _rotation_frame(scene: Scene, figure: FigureSettings, phase: float) -> Drawi
     canvas = sheet.canvas
     carried = [axis.name for axis in scene.machine.branch("workpiece")]
     placed = place_bodies(turned, picture.view, factor, [*carried, "w"])
-    left, bottom, right, top = sheet.content
-    side = 0.03 * (right - left)
+    x_left, bottom, right, top = sheet.content
+    side = 0.03 * (right - x_left)
     reach = [nominal.reshape(-1, 3), actual.reshape(-1, 3), *map(_swept, placed)]
     camera = fit_projection(
-        figure.view, np.concatenate(reach), (left + side, bottom + side, right - side, top - side)
+        figure.view, np.concatenate(reach), (x_left + side, bottom + side, right - side, top - side)
     )
     draw_bodies(canvas, placed, camera)
-    for still, moved, length in zip(nominal, actual, size, strict=True):
-        ghost, spots = camera.project(still), camera.project(moved)
+    for nominal_mm, actual_mm, length in zip(nominal, actual, size, strict=True):
+        ghost, spots = camera.project(nominal_mm), camera.project(actual_mm)
         canvas.lines([ghost], width=SIZES.line, colour=canvas.theme.ghost, dashes=(8.0, 5.0))
         canvas.lines([spots], width=SIZES.hair, colour=canvas.theme.muted, alpha=0.6)
-        done = [spots[step : step + 2] for step in range(at)]
+        swept = [spots[step : step + 2] for step in range(at)]
         colours = scale.colours(length[:at]) / 255.0
-        canvas.lines(done, width=3.4, colour=colours, zorder=3.0)
+        canvas.lines(swept, width=3.4, colour=colours, zorder=3.0)
         canvas.disc(ghost[at], 4.0, canvas.theme.ghost)
         canvas.disc(spots[at], 5.0, canvas.theme.accent)
     rows = [(axis, f"{spell_short(round(angle, 1))}°")]
     for point, length in zip(scene.trace_points_mm, size, strict=False):
-        words = ", ".join(map(spell_short, point))
-        rows.append((f"|E| of ({words})", f"{spell(float(length[at]))} µm"))
+        coordinates = ", ".join(map(spell_short, point))
+        rows.append((f"|E| of ({coordinates})", f"{spell(float(length[at]))} µm"))
     marks = [("max", float(size.max())), ("mean", float(size.mean()))]
     sheet.draw_panel(scale, "|E|  [µm]", marks, rows, (camera.px_per_mm, factor))
     return sheet.finish(factor)
@@ -206,7 +207,7 @@ def _pictures(
                 progress(1)
     except WorkersLostError:
         if pool.ended:
-            raise RenderError("the animation was given up: its renderers were ended") from None
+            raise RenderError("the animation was stopped: its renderers were ended") from None
         raise RenderError("the animation could not be drawn: the renderer crashed") from None
     finally:
         pool.kill()
@@ -258,7 +259,7 @@ def _find_encoder() -> str:
         return imageio_ffmpeg.get_ffmpeg_exe()
     except (ImportError, RuntimeError):
         raise OutputError(
-            f"MP4 needs the package imageio-ffmpeg: {VIDEO_EXTRA}; GIF and WebP need nothing more"
+            f"MP4 needs the package imageio-ffmpeg: {VIDEO_EXTRA}; GIF and WebP need no package"
         ) from None
 
 
@@ -267,18 +268,18 @@ def _write_video(
 ) -> None:
     width, height = (side // 2 * 2 for side in pictures[0].size)
     raw = b"".join(picture.crop((0, 0, width, height)).tobytes() for picture in pictures)
-    given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
-    given += ["-r", f"{settings.fps:g}", "-i", "-"]
-    wanted = ["-an", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p"]
-    wanted += ["-movflags", "+faststart", "-metadata", f"comment={about}"]
-    wanted += ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "mp4"]
-    done = subprocess.run(
-        [encoder, "-y", "-loglevel", "error", *given, *wanted, str(path)],
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}"]
+    source += ["-r", f"{settings.fps:g}", "-i", "-"]
+    encoding = ["-an", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p"]
+    encoding += ["-movflags", "+faststart", "-metadata", f"comment={about}"]
+    encoding += ["-fflags", "+bitexact", "-flags:v", "+bitexact", "-f", "mp4"]
+    process = subprocess.run(
+        [encoder, "-y", "-loglevel", "error", *source, *encoding, str(path)],
         input=raw,
         capture_output=True,
         check=False,
     )
-    if done.returncode != 0:
-        lines = done.stderr.decode(errors="replace").strip().splitlines()
-        reason = lines[-1] if lines else f"the encoder ended with {done.returncode}"
+    if process.returncode != 0:
+        lines = process.stderr.decode(errors="replace").strip().splitlines()
+        reason = lines[-1] if lines else f"the encoder ended with {process.returncode}"
         raise OutputError(f"the video cannot be written: {reason}")

@@ -23,20 +23,20 @@ from warpspace.scene.model import Scene
 def figure_bytes(drawing: Drawing, form: str) -> bytes:
     facts = drawing.facts
     about = f"{facts['settings']}; scene={facts['scene']}"
-    said = {"Title": drawing.title}
+    tags = {"Title": drawing.title}
     if form == "png":
-        said |= {
+        tags |= {
             "Software": facts["version"],
             "Description": about,
             "Exaggeration": facts["exaggeration"],
             "Scene": facts["scene"],
         }
     elif form == "svg":
-        said |= {"Creator": facts["version"], "Description": about}
+        tags |= {"Creator": facts["version"], "Description": about}
     else:
         keywords = f"scene={facts['scene']}, exaggeration={facts['exaggeration']}"
-        said |= {"Creator": facts["version"], "Subject": about, "Keywords": keywords}
-    return encode_figure(drawing.figure, form, said)
+        tags |= {"Creator": facts["version"], "Subject": about, "Keywords": keywords}
+    return encode_figure(drawing.figure, form, tags)
 
 
 def render_figure(
@@ -76,7 +76,7 @@ _UNDATED: Final[dict[str, dict[str, str | None]]] = {
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
-"""What matplotlib would write of its own accord: dates and versions, which differ between runs."""
+"""Metadata that matplotlib would add by default: dates and versions, which differ between runs."""
 
 
 def encode_figure(figure: Figure, form: str, facts: Mapping[str, str] | None = None) -> bytes:

@@ -1,6 +1,6 @@
-"""Writing files: nothing half-written is ever left behind, and nothing is replaced unasked.
+"""Atomic writing of files: no partial files, no replacement without consent.
 
-The name of a temporary file says which machine and which process it belongs to:
+The name of a temporary file contains the machine and the process that it belongs to:
 ``.warpspace-<machine>-<process>-<random><ending>``.
 """
 
@@ -30,7 +30,7 @@ def check_target(
     overwrite: bool = True,
     inputs: Iterable[Path] = (),
 ) -> Path:
-    """Refuse a target that cannot or must not be written, before any work is done for it."""
+    """Check that a target can and may be written, before any work is done for it."""
     target = Path(path)
     try:
         exists = _exists(target)
@@ -42,13 +42,13 @@ def check_target(
             raise OutputError(f"{target}: is no regular file; expected the name of a file")
         ending = target.suffix.lower()
         if endings and ending not in endings:
-            given = f"unknown ending {ending!r}" if ending else "no ending"
-            raise OutputError(f"{target}: {given}; expected one of {', '.join(endings)}")
+            ending_problem = f"unknown ending {ending!r}" if ending else "no ending"
+            raise OutputError(f"{target}: {ending_problem}; expected one of {', '.join(endings)}")
         if exists:
             for source in inputs:
                 if _is_same(target, source):
                     raise OutputError(
-                        f"{target}: is read for what it would be replaced with"
+                        f"{target}: is an input of its own output"
                         f"{'' if source == target else f' ({source})'}; expected another name"
                     )
             if not overwrite:
@@ -63,7 +63,7 @@ def check_target(
 def write_atomically(
     path: str | Path, *, overwrite: bool = True, original: bytes | None = None
 ) -> Generator[Path]:
-    """Provide a temporary file beside the target; rename it onto the target when all went well."""
+    """Provide a temporary file beside the target; rename it onto the target on success."""
     with write_together([path], overwrite=overwrite, original=original) as (temporary,):
         yield temporary
 
@@ -74,11 +74,11 @@ def write_together(
 ) -> Generator[list[Path]]:
     """Provide temporary files beside targets; replace all targets in their order, or none.
 
-    `original` is what was read of the first target, where its new content is derived from that: a
-    target that has changed since is refused.
+    `original` is the content of the first target from which its new content was derived: a target
+    that has changed since then is refused.
     """
     targets = [check_target(path, overwrite=overwrite) for path in paths]
-    # named before they are there: a signal that comes right then leaves nothing behind
+    # named before they are created: a signal in between leaves no file behind
     temporaries, backups = (
         [_temporary(target) for target in targets], [_temporary(target) for target in targets]
     )  # fmt: skip
@@ -148,7 +148,7 @@ def _mode(target: Path) -> int:
 
 
 def _flush(path: Path) -> None:
-    """Wait until a file or folder is on the disk, so that a power cut cannot empty it."""
+    """Flush a file or folder to the disk, so that a power cut cannot empty it."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -158,19 +158,19 @@ def _flush(path: Path) -> None:
 
 _NAME = re.compile(r"\.warpspace-([0-9a-f]{8})-(\d{1,10})-")
 _OLD_S = 24 * 3600.0
-"""Nothing is written for so long: older files of other machines are left over."""
+"""No write takes this long: older temporary files of other machines are leftovers."""
 
 
 def temporary_prefix() -> str:
-    """Give what the names of this process's temporary files begin with."""
+    """Return the prefix of this process's temporary files."""
     return f".warpspace-{_machine()}-{os.getpid()}-"
 
 
 def clear_leftovers(folder: Path) -> None:
     """Remove the temporary files in a folder whose process has ended."""
     with suppress(OSError), os.scandir(folder) as entries:
-        found = [Path(entry.path) for entry in entries if _NAME.match(entry.name)]
-        for path in found:
+        temporaries = [Path(entry.path) for entry in entries if _NAME.match(entry.name)]
+        for path in temporaries:
             with suppress(OSError):
                 if _is_left_over(path):
                     if stat.S_ISDIR(path.lstat().st_mode):
@@ -181,7 +181,7 @@ def clear_leftovers(folder: Path) -> None:
 
 @contextmanager
 def temporary_folder() -> Generator[Path]:
-    """Give a folder of the system's for temporary files, gone afterwards."""
+    """Provide a temporary folder of the system, removed afterwards."""
     clear_leftovers(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=temporary_prefix()) as name:
         yield Path(name)
@@ -191,7 +191,7 @@ def _is_left_over(path: Path) -> bool:
     name, about = _NAME.match(path.name), path.lstat()
     if name is None or (hasattr(os, "geteuid") and about.st_uid != os.geteuid()):
         return False
-    if name[1] == _machine() and sys.platform != "win32":  # whatever the clock says
+    if name[1] == _machine() and sys.platform != "win32":  # regardless of its age
         return not _runs(int(name[2]))
     return time.time() - about.st_mtime > _OLD_S
 
@@ -228,7 +228,7 @@ def write_with_meshes(
     *,
     overwrite: bool,
 ) -> None:
-    """Write a file and the meshes it names, or nothing."""
+    """Write a file and its meshes, all or none."""
     with write_together([*files.values(), target], overwrite=overwrite) as temporaries:
         for temporary, frame in zip(temporaries, files, strict=False):
             meshes[frame].export(temporary, file_type="stl")

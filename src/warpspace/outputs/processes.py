@@ -2,8 +2,8 @@
 
 A crash of the renderer loses the figure in its process only.
 
-Each has a pipe of its own. The processes of `concurrent.futures` share one: if one of them is
-killed while it writes a large result, the rest of that result is waited for without end.
+Each has its own pipe. The processes of `concurrent.futures` share one: if one of them is killed
+while it writes a large result, the reader waits for the remaining bytes forever.
 """
 
 import gc
@@ -33,22 +33,22 @@ if TYPE_CHECKING:
     from warpspace.outputs.drawing.settings import FigureSettings
     from warpspace.scene.model import Scene
 
-END_S = 5.0  # how long a process that has nothing more to do may take to end by itself
+END_S = 5.0  # time for an idle process to end by itself
 
 _spawn = get_context("spawn")
-_pools: "set[ProcessPool]" = set()  # the pools that are in use
-_ending = threading.Event()  # set once this program has been told to end
+_pools: "set[ProcessPool]" = set()  # pools in use
+_ending = threading.Event()  # set when this program is ending
 _Task = tuple[Callable[..., Any], tuple[Any, ...], Mapping[str, Any]]
 
 
 class ProcessPool(Executor):
-    """Does tasks in processes, each of which does one task after the other."""
+    """A pool of processes, each of which runs one task after the other."""
 
     def __init__(
         self, processes: int, *, tasks_per_process: int | None = None, losses: int = 0
     ) -> None:
         if _ending.is_set():
-            raise RenderError("nothing more is begun: the program ends")
+            raise RenderError("the program is ending: no process is started")
         self.ended = False
         self._tasks_per_process = tasks_per_process
         self._may_lose = losses
@@ -61,11 +61,11 @@ class ProcessPool(Executor):
         _pools.add(self)
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> "Future[Any]":
-        """Give a task to the pool: a function of a module's own level and its arguments."""
+        """Submit a task to the pool: a module-level function and its arguments."""
         return self._threads.submit(self._do, (fn, args, kwargs))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when they have done their tasks; whether or not that is waited for."""
+        """End the processes after their tasks; `wait` blocks until then."""
         self._threads.shutdown(wait=wait, cancel_futures=cancel_futures)
         if not wait:
             return
@@ -75,12 +75,12 @@ class ProcessPool(Executor):
             self._retire(self._idle.pop())
 
     def kill(self) -> None:
-        """Kill the processes in the midst of their tasks; what has not begun is dropped."""
+        """Kill the processes during their tasks; tasks not started are dropped."""
         self.kill_processes()
         self.shutdown(cancel_futures=True)
 
     def kill_processes(self) -> None:
-        """Kill the processes, and start none from now on; safe in a signal handler."""
+        """Kill the processes and start no others; safe in a signal handler."""
         self.ended = True
         for worker in list(self._workers):
             worker.process.kill()
@@ -110,7 +110,7 @@ class ProcessPool(Executor):
                     return self._idle.pop()
                 worker = _Worker()
                 self._workers.add(worker)
-                if self.ended:  # in this very moment
+                if self.ended:  # in the meantime
                     worker.process.kill()
                 return worker
         if self.ended:
@@ -125,15 +125,15 @@ class ProcessPool(Executor):
 
 
 class _Worker:
-    """A process, and this end of its pipe."""
+    """A process and the parent's end of its pipe."""
 
     def __init__(self) -> None:
-        self._pipe, theirs = _spawn.Pipe()
-        self.process = _spawn.Process(target=_work, args=(theirs,), daemon=True)
+        self._pipe, child_pipe = _spawn.Pipe()
+        self.process = _spawn.Process(target=_work, args=(child_pipe,), daemon=True)
         self.done = 0
         with _interrupts_held_back():
             self.process.start()
-        theirs.close()  # so that the pipe ends when the process does
+        child_pipe.close()  # so that the pipe ends with the process
 
     def do(self, task: _Task) -> tuple[Any, BaseException | None]:
         try:
@@ -153,7 +153,7 @@ class _Worker:
 
 
 def kill_pools() -> None:
-    """Kill the processes of all pools, and start none from now on; safe in a signal handler."""
+    """Kill the processes of all pools and start no others; safe in a signal handler."""
     _ending.set()
     while _pools:
         _pools.pop().kill_processes()
@@ -161,14 +161,14 @@ def kill_pools() -> None:
 
 @contextmanager
 def _interrupts_held_back() -> Generator[None]:
-    """Keep Ctrl-C away from processes that this thread starts, until they ignore it themselves.
+    """Block Ctrl-C for processes that this thread starts, until they ignore it themselves.
 
-    A terminal sends it to all processes of a command. Only the first one is to answer it.
+    A terminal sends it to all processes of a command. Only the first one responds.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    # starting the tracker lifts the block, so that it must be running before
+    # starting the tracker lifts the block: it must be running before
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -182,19 +182,19 @@ def _work(pipe: "Connection[Any, Any]") -> None:
     while True:
         try:
             task = pipe.recv()
-        except (EOFError, OSError):  # nobody is there any more
+        except (EOFError, OSError):  # the parent has ended
             os._exit(0)  # at once: Python takes 0.3 s to take a renderer down
         except Exception as error:  # noqa: BLE001 - something that cannot be read
-            found = None, error
+            outcome = None, error
         else:
-            found = _outcome(*task)
+            outcome = _outcome(*task)
         try:
-            pipe.send(found)
+            pipe.send(outcome)
         except OSError:
             return
         except Exception as error:  # noqa: BLE001 - something that cannot be sent
             pipe.send((None, error))
-        del found
+        del outcome
 
 
 def _outcome(
@@ -202,7 +202,7 @@ def _outcome(
 ) -> tuple[Any, BaseException | None]:
     try:
         return fn(*args, **kwargs), None
-    except Exception as error:  # noqa: BLE001 - raised again by whoever waits for it
+    except Exception as error:  # noqa: BLE001 - raised again in the parent
         error.add_note("in a worker process:\n" + traceback.format_exc())
         return None, error
 
@@ -210,7 +210,7 @@ def _outcome(
 def _follow_parent() -> None:
     """Prepare a process of a pool: it ignores Ctrl-C, and ends as soon as its parent has ended.
 
-    It prints nothing, nor do libraries in C: results and errors go through its pipe.
+    Neither it nor C libraries print anything: results and errors go through its pipe.
     A thread waits for the end of the parent on every system. Linux could send a signal by itself
     (PR_SET_PDEATHSIG), but it does so already when the *thread* that started the process ends.
     """
@@ -230,20 +230,20 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-PICTURES_PER_PROCESS = 100  # A process is replaced after so many figures
+PICTURES_PER_PROCESS = 100  # after which a process is replaced
 TIMEOUT_S = 300.0
-LEAST_MB = 1600  # address space that the renderer takes for a picture
+LEAST_MB = 1600  # address space of the renderer for a picture
 
 
 def _draw(name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", form: str) -> bytes:
     from warpspace.outputs.figure_files import render_figure
 
     gc.collect()
-    gc.freeze()  # what stays is not searched for garbage before every figure
+    gc.freeze()  # permanent objects are not searched for garbage before every figure
     try:
         return render_figure(name, scenes, settings, form)
     except (SceneError, UnknownNameError) as error:
-        # these two do not travel between processes
+        # these two cannot be pickled
         raise OptionError(str(error)) from None
 
 
@@ -254,9 +254,9 @@ def _draw_chart(draw: str, form: str, *arguments: Any) -> bytes:
 
 
 class FigureWorker:
-    """One renderer in a process of its own; requests from any thread queue up.
+    """One renderer in a separate process; requests from any thread are queued.
 
-    What begins to draw gives a function that waits for the bytes of the figure.
+    The methods that begin a drawing return a function that waits for the bytes of the figure.
     """
 
     def __init__(self, timeout_s: float = TIMEOUT_S) -> None:
@@ -272,11 +272,11 @@ class FigureWorker:
         return self.call(name, _draw, name, tuple(scenes), settings, form)
 
     def begin_chart(self, name: str, draw: str, form: str, *arguments: Any) -> Callable[[], bytes]:
-        """Begin to draw the chart that "module:function" gives; the module is imported there."""
+        """Begin to draw a chart with "module:function", imported in the process."""
         return self.call(name, _draw_chart, draw, form, *arguments)
 
     def call(self, name: str, draw: Callable[..., bytes], *arguments: Any) -> Callable[[], bytes]:
-        """Begin to draw with a function of a module's own level."""
+        """Begin to draw with a module-level function."""
         with self._lock:
             if self._pool is None:
                 self._pool = ProcessPool(1, tasks_per_process=PICTURES_PER_PROCESS)
@@ -289,19 +289,19 @@ class FigureWorker:
             return future.result(self._timeout_s)
         except (WorkersLostError, CancelledError):
             if pool.ended:
-                raise RenderError(f"figure {name!r} was given up: its renderer was ended") from None
-            self._give_up(pool)
+                raise RenderError(f"figure {name!r} was stopped: its renderer was ended") from None
+            self._abandon(pool)
             raise RenderError(
                 f"figure {name!r} could not be drawn: the renderer crashed; other figures are not"
                 " affected"
             ) from None
         except TimeoutError:
-            self._give_up(pool)
+            self._abandon(pool)
             raise RenderError(
-                f"figure {name!r} was given up after {self._timeout_s:g} s; try a smaller one"
+                f"figure {name!r} was stopped after {self._timeout_s:g} s; expected a smaller one"
             ) from None
 
-    def _give_up(self, pool: ProcessPool) -> None:
+    def _abandon(self, pool: ProcessPool) -> None:
         with self._lock:
             if self._pool is pool:
                 self._pool = None
@@ -321,5 +321,5 @@ class FigureWorker:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        """End the process; after a failure without waiting for what it draws."""
+        """End the process; after a failure without waiting for its drawing."""
         self.close(wait=kind is None)

@@ -1,4 +1,4 @@
-"""What a page has drawn, as a figure: its pixels with heading, colours, scale bars and words."""
+"""The drawing of a page as a figure: its pixels with heading, colour bar, scale bars and labels."""
 
 from collections.abc import Mapping, Sequence
 
@@ -19,7 +19,7 @@ from warpspace.outputs.figure_files import encode_figure
 from warpspace.resources import __version__
 from warpspace.units import Array
 
-HEAD, PANEL = 190.0, 330.0  # room above and beside the pixels, px of a 1600 × 1200 figure
+HEAD, PANEL = 190.0, 330.0  # space above and beside the pixels, px of a 1600 × 1200 figure
 
 
 def draw_view(
@@ -30,10 +30,10 @@ def draw_view(
     marks: Mapping[str, float],
     rows: Sequence[Row],
     bars: tuple[float, float] | None,  # px of a millimetre, display factor; None for no scale bars
-    words: Sequence[tuple[str, Array]],  # each beside a point, [2], px from the left bottom
+    labels: Sequence[tuple[str, Array]],  # text and point, [2], px from the left bottom
     dark: bool,
 ) -> bytes:
-    """Draw it as a PNG."""
+    """Draw the figure as a PNG."""
     height, width = pixels.shape[:2]
     unit = factor(width, height)
     canvas = Canvas(
@@ -46,12 +46,13 @@ def draw_view(
               float(height))  # fmt: skip
     sheet = Sheet("view", canvas, title, drawn, column, (), FigureSettings(dark=dark))
     sheet.draw_panel(scale, f"{scale.label} [{scale.unit}]", list(marks.items()), rows, bars)
-    taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    occupancy = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
     if pixels.shape[2] == 4:
-        taken.add_mask(pixels[..., 3] > 127, drawn)
-    for text, spot in words:
-        placed = write_label(canvas, text, [spot], drawn, taken)
+        occupancy.add_mask(pixels[..., 3] > 127, drawn)
+    for text, point_px in labels:
+        placed = write_label(canvas, text, [point_px], drawn, occupancy)
         if placed is not None and placed.distance > canvas.px(LEADER_FROM):
             draw_leader(canvas, placed, canvas.theme.ink)
-    said = {"Title": title, "Software": f"warpspace {__version__}", "Description": "; ".join(facts)}
-    return encode_figure(canvas.figure, "png", said)
+    program, description = f"warpspace {__version__}", "; ".join(facts)
+    tags = {"Title": title, "Software": program, "Description": description}
+    return encode_figure(canvas.figure, "png", tags)

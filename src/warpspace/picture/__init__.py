@@ -1,1 +1,1 @@
-"""One picture in numbers: what every renderer, export and page draws. numpy only."""
+"""A picture as numbers, the input of every renderer, export and page. numpy only."""

@@ -1,4 +1,4 @@
-"""Two scenes over one working volume: what they share, and the change from A to B."""
+"""Two scenes over one working volume: common settings, and the change from A to B."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics
 from warpspace.exceptions import OptionError
 from warpspace.machine.errors import ErrorSet
-from warpspace.picture.formatting import own_axes, spell_at, spell_point
+from warpspace.picture.formatting import point_axes, spell_at, spell_point
 from warpspace.picture.model import (
     DIFFERENCE_LENGTH,
     Exaggeration,
@@ -41,7 +41,7 @@ class DifferencePicture(ScenePicture):
 
     @cached_property
     def settings(self) -> dict[str, Any]:
-        """How both were looked at; where they differ, a list of two."""
+        """Settings of both pictures; where they differ, a list of two."""
         pairs = {name: (value, self.b.settings[name]) for name, value in self.a.settings.items()}
         return {
             **{name: a if a == b else [a, b] for name, (a, b) in pairs.items()},
@@ -51,14 +51,14 @@ class DifferencePicture(ScenePicture):
 
     @property
     def remarks(self) -> dict[str, str]:
-        """What a table says of every row, of both scenes where they differ."""
+        """Columns that are the same in all rows of a table, of both scenes where they differ."""
         pairs = zip(self.a.remarks.items(), self.b.remarks.values(), strict=True)
-        found = {name: a if a == b else f"{b} − {a}" for (name, a), b in pairs}
-        return {**found, "scene": self.scene.name, "conditions": "; ".join(self.conditions)}
+        merged = {name: a if a == b else f"{b} − {a}" for (name, a), b in pairs}
+        return {**merged, "scene": self.scene.name, "conditions": "; ".join(self.conditions)}
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
-        """Program, settings and statistics of the difference, and all of both scenes."""
+        """Program, settings and statistics of the difference, and the provenance of both scenes."""
         return {
             "program": self.a.provenance["program"],
             "scene": self.scene.name,
@@ -78,39 +78,37 @@ def statistics_change(a: Statistics, b: Statistics) -> dict[str, float]:
 
 
 def statistics_blocks(
-    scene: Scene, names: Sequence[str], found: Sequence[Statistics]
+    scene: Scene, names: Sequence[str], fields: Sequence[Statistics]
 ) -> Iterator[Block]:
-    """Say the statistics of fields over one volume, and where each is largest."""
+    """Tabulate the statistics of fields over one volume, with the location of each maximum."""
     columns = [Column("|E|" if len(names) > 1 else "", leads=True)]
     columns += number_columns(names, unit="µm")
-    change = statistics_change(*found[:2]) if len(names) == 2 else {}
+    change = statistics_change(*fields[:2]) if len(names) == 2 else {}
     if change:
         columns.append(Column(CHANGE, "+.2f", "µm", joins=True))
-    if len(found) > len(names):
+    if len(fields) > len(names):
         columns.append(Column(DIFFERENCE_LENGTH, ".2f", "µm", joins=True))
     rows = [
         (
-            name, *(getattr(one, key) for one in found[: len(names)]),
+            name, *(getattr(summary, key) for summary in fields[: len(names)]),
             *([change[key]] if change else []),
-            *(getattr(one, key) for one in found[len(names) :]),
+            *(getattr(summary, key) for summary in fields[len(names) :]),
         )
         for name, key in STATISTICS.items()
     ]  # fmt: skip
     yield Table(tuple(columns), rows)
-    for name, part in zip((*names, DIFFERENCE_LENGTH), found, strict=False):
+    for name, part in zip((*names, DIFFERENCE_LENGTH), fields, strict=False):
         if part.max_um > 0.0:
-            worst = own_axes(scene, part.max_at_axes)
+            worst = point_axes(scene, part.max_at_axes)
             yield f"  max of {name} at {spell_point(worst, part.max_at_mm)} mm"
             yield f"  --at {spell_at(worst)}"
 
 
 def conditions_of_both(a: Sequence[str], b: Sequence[str]) -> tuple[str, ...]:
-    """Say the conditions of two pictures: those of one with its letter, common ones once."""
-    own = [
-        *(f"A {words}" for words in a if words not in b),
-        *(f"B {words}" for words in b if words not in a),
-    ]
-    return (*own, *(words for words in a if words in b))
+    """List the conditions of two pictures: those of one with its letter, common ones once."""
+    only_a = [f"A {condition}" for condition in a if condition not in b]
+    only_b = [f"B {condition}" for condition in b if condition not in a]
+    return (*only_a, *only_b, *(condition for condition in a if condition in b))
 
 
 def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
@@ -142,13 +140,13 @@ def scene_change(a: ScenePicture, b: ScenePicture) -> DifferencePicture:
 
 
 def share_exaggeration(
-    pictures: Sequence[ScenePicture], wanted: Exaggeration
+    pictures: Sequence[ScenePicture], exaggeration: Exaggeration
 ) -> tuple[ScenePicture, ...]:
-    """Give pictures one display factor: what is asked for, the first scene's, or a round one."""
+    """Apply one display factor to pictures: as requested, the first scene's, or a round one."""
     factor = choose_exaggeration(
-        wanted,
+        exaggeration,
         pictures[0].scene.exaggeration,
         max(picture.statistics.max_um for picture in pictures),
         max(picture.size_mm for picture in pictures),
     )
-    return tuple(replace(one, exaggeration=factor) for one in pictures)
+    return tuple(replace(picture, exaggeration=factor) for picture in pictures)

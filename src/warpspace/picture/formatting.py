@@ -1,4 +1,4 @@
-"""Numbers, places, factors and conventions as pictures, pages and files spell them."""
+"""Formatting of numbers, positions, factors and conventions for pictures, pages and files."""
 
 from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
@@ -11,9 +11,7 @@ from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.model import Scene
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 
-# Positions of the axes, and the point of R they lead to.
-
-IN_R = "in R"  # what a point of the machine frame is introduced by
+IN_R = "in R"  # prefix of a point in the machine frame
 SEPARATOR = " · "
 _DIGITS = 6  # decimals of a position in a command: a nanometre
 
@@ -24,13 +22,13 @@ def spell_coordinate(value: SupportsFloat) -> str:
 
 
 def list_axes(at: Mapping[str, SupportsFloat]) -> str:
-    """Spell positions of all axes that are given: ``X 275 Y −225 Z −480 B 0°``, mm and degrees."""
+    """Spell positions of axes: ``X 275 Y −225 Z −480 B 0°``, mm and degrees."""
     units = {name: "" if is_linear(name) else "°" for name in at}
     return " ".join(f"{name} {spell_coordinate(q)}{units[name]}" for name, q in at.items())
 
 
-def own_axes(scene: Scene, at: Mapping[str, float]) -> dict[str, float]:
-    """Choose the axes that name a point: the linear ones, and those not at their scene's place."""
+def point_axes(scene: Scene, at: Mapping[str, float]) -> dict[str, float]:
+    """Select the axes that identify a point: linear ones, and others off their scene position."""
     placed = scene.workspace.positions
     return {
         name: value
@@ -68,32 +66,29 @@ def _plain(value: float) -> str:
     return f"{round(value, _DIGITS) + 0.0:.{_DIGITS}f}".rstrip("0").rstrip(".")
 
 
-# How sure a number is.
-
-
 def u95_behind(u95: float | None) -> str:
-    """Say U95 behind a number, `` ± 1.2``; None is not known: `` ± ?``."""
+    """Format U95 to follow a number, `` ± 1.2``; unknown (None): `` ± ?``."""
     return f" {plus_minus(u95, '.2g' if u95 and u95 < 0.95 else '.1f')}"
 
 
-def length_words(found: FieldUncertainty | None, point: int = 0) -> str:
-    """Say U95 of |E| at a point of a field, by its flat number; empty where none is stated."""
-    return u95_behind(found.u95_at(point)) if found else ""
+def length_words(uncertainty: FieldUncertainty | None, point: int = 0) -> str:
+    """Format U95 of |E| at a point of a field, by its flat index; empty where none is stated."""
+    return u95_behind(uncertainty.u95_at(point)) if uncertainty else ""
 
 
 def beyond_words(scene: Scene, loop: Loop) -> str:
-    """Say where axes of a loop stood at no time while a scene was measured: ``Z below −300``."""
-    reach = scene.covariance.measured_range if scene.covariance else {}
+    """List positions of a loop's axes outside the measured range of a scene: ``Z below −300``."""
+    measured_range = scene.covariance.measured_range if scene.covariance else {}
     axes = loop_axes(scene.model, loop)
-    said: list[str] = []
-    for axis, (low, high) in reach.items():
+    ranges: list[str] = []
+    for axis, (low, high) in measured_range.items():
         first, last = scene.workspace.ranges[axis]
         if axis in axes and first == last and not low <= first <= high:
-            said.append(f"{axis} at {spell_coordinate(first)}")
+            ranges.append(f"{axis} at {spell_coordinate(first)}")
         elif axis in axes:
-            said += [f"{axis} below {spell_coordinate(low)}"] if first < low else []
-            said += [f"{axis} above {spell_coordinate(high)}"] if last > high else []
-    return f"never measured: {', '.join(said)}" if said else ""
+            ranges += [f"{axis} below {spell_coordinate(low)}"] if first < low else []
+            ranges += [f"{axis} above {spell_coordinate(high)}"] if last > high else []
+    return f"outside the measured range: {', '.join(ranges)}" if ranges else ""
 
 
 TIMES = "\N{MULTIPLICATION SIGN}"
@@ -136,19 +131,17 @@ def reference_words(scene: Scene) -> str:
 
 
 def range_words(low: float, high: float, unit: str) -> str:
-    """Say that colours end where somebody chose: ``range fixed 0–50 µm``."""
+    """Format a colour range set by the user: ``range fixed 0–50 µm``."""
     between = "–" if low >= 0.0 else " to "
     return f"range fixed {spell_short(low)}{between}{spell_short(high)} {unit}"
 
 
 def convention_groups(model: Model) -> tuple[tuple[Convention, tuple[str, ...]], ...]:
-    """Give the conventions that axes of a machine have, each with its axes."""
-    axes = model.machine.axes
-    return tuple(
-        (model.convention(own[0]), own)
-        for name in model.convention_names
-        if (own := tuple(axis for axis in axes if model.convention(axis).name == name))
-    )
+    """Group the axes of a machine by their convention."""
+    groups: dict[str, list[str]] = {}
+    for axis in model.machine.axes:
+        groups.setdefault(model.convention(axis).name, []).append(axis)
+    return tuple((model.convention(axes[0]), tuple(axes)) for axes in groups.values())
 
 
 def convention_words(scene: Scene) -> str:
@@ -160,14 +153,14 @@ def convention_words(scene: Scene) -> str:
 
 
 def direction_words(scene: Scene) -> tuple[str, ...]:
-    """Say for which direction of travel errors are drawn; nothing where none depends on it."""
+    """Format the direction of travel of the errors; empty where no error depends on it."""
     if not scene.errors.has_directions and scene.model.direction == TravelDirection.MEAN:
         return ()
     return (DIRECTION_WORDS[TravelDirection(scene.model.direction)],)
 
 
 def convention_sentences(scene: Scene) -> tuple[str, ...]:
-    """Say what the conventions of a scene mean, one sentence each."""
+    """Describe the conventions of a scene, one sentence each."""
     groups = convention_groups(scene.model)
     if len(groups) == 1:
         return (groups[0][0].sentence,)

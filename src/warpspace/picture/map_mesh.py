@@ -25,11 +25,11 @@ Pieces = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class MapMesh:
-    """What is drawn of a map, mm in R."""
+    """Mesh of a map, mm in R."""
 
     vertices_mm: Array  # [M, 3]
     triangles: NDArray[np.intp]  # [T, 3] or [S, 2]
-    values: Array  # [M]; what is coloured, in the unit of the picture's scale
+    values: Array  # [M]; in the unit of the picture's scale
     faded: NDArray[np.bool_] | None  # [M]; where colours fade; None for nowhere
 
 
@@ -41,38 +41,39 @@ class MapPatch:
     values: Array
     drawn_of: Topology
     lifts: tuple[float, ...]
-    ways: Array  # direction of each axis of the grid, +1 or −1: an axis may run against its name
+    directions: Array  # of the axes of the grid, +1 or −1: an axis may run against its name
     faded: NDArray[np.bool_] | None = None
 
     def pieces(self, segments: Index, outwards: Pieces, times: float) -> list[Pieces]:
-        """Give pieces of line off the surface, on each side that is seen, [S, 2, 3] each, mm."""
+        """Lift pieces of line off the surface, on each visible side, [S, 2, 3] each, mm."""
         ends = self.drawn_mm.reshape(-1, 3).take(segments, axis=0).astype(np.float32)
         return [
-            ends + (outwards * (lift * times * self.ways)).astype(np.float32) for lift in self.lifts
+            ends + (outwards * (lift * times * self.directions)).astype(np.float32)
+            for lift in self.lifts
         ]
 
 
 def map_parts(picture: Picture) -> list[MapPatch]:
-    """List the grids that the map of a picture consists of; a slice is seen from both sides."""
+    """List the grids of a map: the volume, or its slices, which are visible from both sides."""
     lift = LIFT * picture.size_mm
     lifts = (lift, -lift) if picture.slices else (lift,)
     parts: list[MapPatch] = []
-    for one in picture.slices or (picture,):
-        drawn_mm, values = thick_nodes(one, one.drawn_mm), spread(one.values)
-        faded = None if one.faded is None else spread(one.faded)
-        drawn_of = topology(values.shape, cut=one.cut)
-        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, one.grid.ways, faded))
+    for section in picture.slices or (picture,):
+        drawn_mm, values = thick_nodes(section, section.drawn_mm), spread(section.values)
+        faded = None if section.faded is None else spread(section.faded)
+        drawn_of = topology(values.shape, cut=section.cut)
+        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, section.grid.ways, faded))
     return parts
 
 
 def thick_nodes(picture: Picture, nodes_mm: Array) -> Array:
-    """Give nodes of a picture's grid as they are drawn, [mx, my, mz, 3], mm: a line as a bar."""
+    """Return the nodes of a grid for drawing, [mx, my, mz, 3], mm: a line becomes a bar."""
     thin = is_thin(picture.shape)
     return thicken(nodes_mm, THICKNESS * picture.size_mm) if thin else nodes_mm
 
 
 def solid_map(picture: Picture) -> tuple[Array, Index, Index]:
-    """Give what a ray can meet of a map: points, triangles, and the grid node of each point."""
+    """Build the surface that a ray can hit: points, triangles, and the grid node of each point."""
     thick = thick_nodes(picture, picture.drawn_mm)
     surface = topology(thick.shape[:3], cut=picture.cut).surface
     nodes = spread_nodes(picture.shape)[surface.nodes]
@@ -80,10 +81,10 @@ def solid_map(picture: Picture) -> tuple[Array, Index, Index]:
 
 
 def outline_pieces(picture: Picture, nodes_mm: Array) -> Pieces:
-    """Look up the edges of a picture's grid with its nodes elsewhere, [S, 2, 3], mm."""
+    """Collect the edges of a picture's grid with its nodes at other points, [S, 2, 3], mm."""
     thick = thick_nodes(picture, nodes_mm)
-    of = topology(thick.shape[:3], cut=picture.cut)
-    return thick.reshape(-1, 3)[of.edge_segments].astype(np.float32)
+    edges = topology(thick.shape[:3], cut=picture.cut).edge_segments
+    return thick.reshape(-1, 3)[edges].astype(np.float32)
 
 
 def map_mesh(picture: Picture) -> MapMesh:
@@ -92,35 +93,35 @@ def map_mesh(picture: Picture) -> MapMesh:
 
 
 def line_mesh(picture: Picture, *, grid: bool = True) -> MapMesh:
-    """Give the lines of a map alone: those of its grid too, or only its edges."""
-    found: list[tuple[MapPatch, Index, Index]] = []
+    """Build the lines of a map without its surface: grid and edges, or the edges only."""
+    patches: list[tuple[MapPatch, Index, Index]] = []
     for part in map_parts(picture):
         segments = part.drawn_of.edge_segments
         if grid:
             segments = np.concatenate([part.drawn_of.grid_segments, segments])
         used, numbered = np.unique(segments, return_inverse=True)
-        found.append((part, used, numbered.reshape(-1, 2)))
-    return _collect(found)
+        patches.append((part, used, numbered.reshape(-1, 2)))
+    return _collect(patches)
 
 
-def _collect(found: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
-    vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in found]
-    values = [part.values.reshape(-1).take(used) for part, used, _ in found]
-    faded = [part.faded.reshape(-1)[at] for part, at, _ in found if part.faded is not None]
-    where = np.concatenate(faded) if faded else None  # all parts have it, or none
-    if len(found) == 1:
-        return MapMesh(vertices[0], found[0][2], values[0], where)
+def _collect(patches: list[tuple[MapPatch, Index, Index]]) -> MapMesh:
+    vertices = [part.drawn_mm.reshape(-1, 3).take(used, axis=0) for part, used, _ in patches]
+    values = [part.values.reshape(-1).take(used) for part, used, _ in patches]
+    faded = [part.faded.reshape(-1)[at] for part, at, _ in patches if part.faded is not None]
+    fading = np.concatenate(faded) if faded else None  # all patches have it, or none
+    if len(patches) == 1:
+        return MapMesh(vertices[0], patches[0][2], values[0], fading)
     first = np.cumsum([0, *map(len, vertices)])
-    cells = [cells + at for (_, _, cells), at in zip(found, first, strict=False)]
-    return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values), where)
+    cells = [cells + at for (_, _, cells), at in zip(patches, first, strict=False)]
+    return MapMesh(np.concatenate(vertices), np.concatenate(cells), np.concatenate(values), fading)
 
 
 def grid_pieces(picture: Picture) -> Pieces:
     """Collect the grid lines on a map, [S, 2, 3], mm."""
-    found: list[Pieces] = []
+    lines: list[Pieces] = []
     for part in map_parts(picture):
-        found += part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
-    return _joined(found)
+        lines += part.pieces(part.drawn_of.grid_segments, part.drawn_of.grid_outwards, 1.0)
+    return _joined(lines)
 
 
 def edge_pieces(picture: Picture) -> Pieces:
@@ -136,31 +137,29 @@ def edge_pieces(picture: Picture) -> Pieces:
 def isoline_pieces(picture: Picture) -> Pieces:
     """Collect the lines of equal value on a map, at the ticks of its scale, [S, 2, 3], mm."""
     levels = isoline_levels(picture.scale)
-    found: list[Pieces] = []
+    lines: list[Pieces] = []
     for part in map_parts(picture):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
-        normals = part.drawn_of.normals * part.ways
-        found += [
+        normals = part.drawn_of.normals * part.directions
+        lines += [
             (np.stack([line[:-1], line[1:]], axis=1) + off).astype(np.float32)
             for lift in part.lifts
             for face, off in zip(part.drawn_of.faces, ISOLINE_LIFT * lift * normals, strict=True)
             for _, line in isolines(face, nodes, values, levels)
         ]
-    return _joined(found)
+    return _joined(lines)
 
 
 def _joined(parts: list[Pieces]) -> Pieces:
-    kept = [part for part in parts if len(part)]
-    if not kept:
+    nonempty = [part for part in parts if len(part)]
+    if not nonempty:
         return np.zeros((1, 2, 3), np.float32)
-    return kept[0] if len(kept) == 1 else np.concatenate(kept)
+    return nonempty[0] if len(nonempty) == 1 else np.concatenate(nonempty)
 
-
-# Where they stand, so that few of them say what each line means.
 
 LEAST_LENGTH = 0.2  # shortest line that carries its value, as a part of the longest edge
 ALONG_SLICE = 0.3
-"""Where along its line the value stands on a slice: in the middle another slice crosses it."""
+"""Position of the value along its line on a slice: in the middle another slice crosses it."""
 MOST_LABELS = 60
 
 
@@ -170,27 +169,27 @@ class IsolineLabel:
 
     value: float  # in the unit of the picture's scale
     at_mm: Array  # [3]; on the line, where it is drawn
-    outward: Array  # [3]; direction that the face with the line looks to; of a slice one of the two
+    outward: Array  # [3]; normal of the face with the line; of a slice one of the two
     length_mm: float  # of the line
 
 
 def isoline_labels(picture: Picture) -> list[IsolineLabel]:
-    """Choose where the lines of equal value carry their value: one on each face or slice."""
+    """Place the values of isolines: one for each level on each face or slice."""
     levels = isoline_levels(picture.scale)
-    found: list[IsolineLabel] = []
+    lines: list[IsolineLabel] = []
     for part in map_parts(picture):
         nodes, values = part.drawn_mm.reshape(-1, 3), part.values.reshape(-1)
-        normals = part.drawn_of.normals * part.ways
+        normals = part.drawn_of.normals * part.directions
         for face, normal in zip(part.drawn_of.faces, normals, strict=True):
             longest: dict[float, IsolineLabel] = {}
             for value, line in isolines(face, nodes, values, levels):
                 at, length = _part_way(line, ALONG_SLICE if picture.slices else 0.5)
                 if length > (longest[value].length_mm if value in longest else 0.0):
                     longest[value] = IsolineLabel(value, at, normal, length)
-            found += longest.values()
+            lines += longest.values()
     least = LEAST_LENGTH * picture.size_mm
-    kept = [label for label in found if label.length_mm >= least]
-    return sorted(kept, key=lambda label: -label.length_mm)[:MOST_LABELS]
+    long_enough = [label for label in lines if label.length_mm >= least]
+    return sorted(long_enough, key=lambda label: -label.length_mm)[:MOST_LABELS]
 
 
 def _part_way(line: Array, share: float) -> tuple[Array, float]:

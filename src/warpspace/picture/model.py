@@ -29,12 +29,10 @@ from warpspace.scene.model import Scene, choose_view, evaluate, second_order
 from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.units import Array
 
-# Whole surface, or without an octant.
-
 Floats = NDArray[np.float32]
 
 CUT_CORNER = (1, 0, 1)
-"""The octant that is cut away: the one nearest to the operator, right in front and above."""
+"""The octant that is cut away: the one nearest to the operator, right, front and top."""
 
 
 def map_faces(shape: surfaces.Shape, *, cut: bool = False) -> list[surfaces.Index]:
@@ -44,7 +42,7 @@ def map_faces(shape: surfaces.Shape, *, cut: bool = False) -> list[surfaces.Inde
 
 @dataclass(frozen=True, slots=True)
 class Topology:
-    """Indices of what is drawn of a grid; they do not change when it is bent."""
+    """Indices of the surface and lines of a grid; independent of its deformation."""
 
     surface: surfaces.Surface
     grid_segments: surfaces.Index  # [S, 2]; flat node indices of the ends of each piece of line
@@ -94,48 +92,46 @@ QUANTITIES = {
     "orientation": "tool-orientation error",
     "uncertainty": "uncertainty of the position error",
 }
-"""What can be coloured."""
-NOT_STATED = "the scene does not state how sure its errors are; expected [uncertainty]"
+"""Quantities that colours can show."""
+NOT_STATED = "the scene states no uncertainty of its errors; expected [uncertainty]"
 DIFFERENCE_LENGTH = "|E_B − E_A|"
-"""What the statistics of a change are of: the length of the change of the error vector."""
+"""Quantity of the statistics of a difference: the length of the change of the error vector."""
 SAME_PLACE_MM = 1e-6  # nodes nearer to each other than this are the same
 
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """What every renderer, export and page draws of a gridded volume, a slice included."""
+    """Evaluated grid with display settings, the input of every renderer, export and page."""
 
-    view: View  # loop, frame and reference the errors are seen in
+    view: View  # loop, frame and reference of the errors
     grid: Grid
     field: ErrorField  # errors of all nodes of the grid
     exaggeration: float  # display factor of displacements; 1 is true scale
-    component: str = "norm"  # what is coloured: "norm", "x", "y" or "z" ..
+    component: str = "norm"  # coloured component: "norm", "x", "y" or "z" ..
     # ... of the "position" error, µm, of the "orientation" error of the tool axis, µrad, or of the
     # "uncertainty" of the position error, its U95, µm.
     quantity: str = "position"
-    uncertainty: FieldUncertainty | None = None  # of its errors; None where nothing is stated
+    uncertainty: FieldUncertainty | None = None  # of its errors; None if not stated
     significant: bool = False  # whether colours fade where an error is not above its U95
-    # of |E| that colours show; they fade where the verdict is undecided
+    # limit of |E|; colours fade where the verdict is undecided
     limit_um: float | None = None
-    # the colours where they are given, for instance shared with other pictures; None for round ends
-    # that hold all values
+    # colour scale, for instance shared with other pictures; None for round ends around all values
     colours: ColourScale | None = None
     cut: bool = False  # whether the octant towards the operator is cut away
-    # slices that are drawn in place of the surface, where there are any
+    # slices drawn in place of the surface, if any
     slices: "tuple[Picture, ...]" = ()
-    # what a reader must know who takes the picture for all of its scene: which errors are excluded,
-    # and colours that end where somebody chose. Every output says them.
+    # restrictions that every output states: excluded errors, a colour range set by the user
     conditions: tuple[str, ...] = ()
     is_difference: bool = False  # whether it is the change from one picture to another, B − A
 
     @property
     def length_words(self) -> str:
-        """What the statistics are of."""
+        """Quantity of the statistics."""
         return DIFFERENCE_LENGTH if self.is_difference else "|E|"
 
     @property
     def tilts(self) -> bool:
-        """Whether the orientation error of the tool axis is coloured, not the position error."""
+        """True if the colours show the orientation error of the tool axis."""
         return self.quantity == "orientation"
 
     @property
@@ -148,7 +144,7 @@ class Picture:
 
     @cached_property
     def size_mm(self) -> float:
-        """Length that marks are sized by, mm: the longest edge of the volume."""
+        """Reference length for the size of marks, mm: the longest edge of the volume."""
         return self.grid.longest_edge_mm
 
     @cached_property
@@ -158,30 +154,30 @@ class Picture:
 
     @cached_property
     def values(self) -> Array:
-        """What is coloured at each node, [nx, ny, nz], in the unit of the scale."""
+        """Coloured values at the nodes, [nx, ny, nz], in the unit of the scale."""
         if self.quantity == "uncertainty" and self.u95_um is not None:
             return self.u95_um
         return coloured_values(self.field, self.component, self.quantity)
 
     @cached_property
     def u95_um(self) -> Array | None:
-        """U95 of the component of position errors, [nx, ny, nz]; None where it is not known."""
-        found = self.uncertainty
-        if found is None or not found.errors.is_known:
+        """U95 of the component of position errors, [nx, ny, nz]; None if unknown."""
+        uncertainty = self.uncertainty
+        if uncertainty is None or not uncertainty.errors.is_known:
             return None
         if self.component == "norm":
-            return found.u95_norm_um
-        return component_values(found.u95_um, self.component)
+            return uncertainty.u95_norm_um
+        return component_values(uncertainty.u95_um, self.component)
 
     @cached_property
     def faded(self) -> NDArray[np.bool_] | None:
-        """Where colours fade: nothing is sure there, [nx, ny, nz]; None if they do not."""
-        found = self.uncertainty
-        if found is None or self.u95_um is None or self.tilts:
+        """Nodes with faded colours: undecided or not significant, [nx, ny, nz]; None if none."""
+        uncertainty = self.uncertainty
+        if uncertainty is None or self.u95_um is None or self.tilts:
             return None
         if self.limit_um is not None:
-            kept = found.keeps(self.limit_um)
-            return (kept > 1.0 - VERDICT_PROBABILITY) & (kept < VERDICT_PROBABILITY)
+            probability = uncertainty.keeps(self.limit_um)
+            return (probability > 1.0 - VERDICT_PROBABILITY) & (probability < VERDICT_PROBABILITY)
         if not self.significant:
             return None
         return np.abs(coloured_values(self.field, self.component)) <= self.u95_um
@@ -195,7 +191,7 @@ class Picture:
 
     @cached_property
     def drawn_mm(self) -> Array:
-        """Where the nodes are drawn, [nx, ny, nz, 3], mm."""
+        """Displaced nodes, [nx, ny, nz, 3], mm."""
         return surfaces.deform(self.grid.nominal_mm, self.field.error_um, self.exaggeration)
 
 
@@ -203,7 +199,7 @@ P = TypeVar("P", bound=Picture)
 
 
 def coloured_error(field: ErrorField, quantity: str) -> Array:
-    """Give the vectors that are coloured, [..., 3], µm or µrad."""
+    """Return the position or orientation errors, [..., 3], µm or µrad."""
     return field.orientation_urad if quantity == "orientation" else field.error_um
 
 
@@ -229,29 +225,29 @@ def choose_scale(
     return build_scale(largest, component, quantity=symbol, unit=unit, end=end, change=change)
 
 
-def same_nodes(one_mm: Array, other_mm: Array) -> bool:
-    """Tell whether two sets of nominal points, [..., 3], mm, coincide."""
-    return one_mm.shape == other_mm.shape and bool(
-        np.allclose(one_mm, other_mm, rtol=0.0, atol=SAME_PLACE_MM)
+def same_nodes(first_mm: Array, second_mm: Array) -> bool:
+    """Check that two sets of nominal points, [..., 3], mm, coincide."""
+    return first_mm.shape == second_mm.shape and bool(
+        np.allclose(first_mm, second_mm, rtol=0.0, atol=SAME_PLACE_MM)
     )
 
 
-def subtract_pictures(one: P, other: Picture) -> P:
-    if not same_nodes(one.grid.nominal_mm, other.grid.nominal_mm):
-        raise OptionError("the working volumes are not the same: there is no difference")
-    quantity = "position" if one.quantity == "uncertainty" else one.quantity
+def subtract_pictures(minuend: P, subtrahend: Picture) -> P:
+    if not same_nodes(minuend.grid.nominal_mm, subtrahend.grid.nominal_mm):
+        raise OptionError("the working volumes differ: no difference can be formed")
+    quantity = "position" if minuend.quantity == "uncertainty" else minuend.quantity
     return replace(
-        one, field=one.field - other.field, quantity=quantity, uncertainty=None, colours=None,
-        is_difference=True,
+        minuend, field=minuend.field - subtrahend.field, quantity=quantity, uncertainty=None,
+        colours=None, is_difference=True,
     )  # fmt: skip
 
 
 def subtract_traces(
-    one: Sequence[TraceLines], other: Sequence[TraceLines]
+    minuends: Sequence[TraceLines], subtrahends: Sequence[TraceLines]
 ) -> tuple[TraceLines, ...]:
     return tuple(
         replace(first, error_um=first.error_um - second.error_um)
-        for first, second in zip(one, other, strict=False)
+        for first, second in zip(minuends, subtrahends, strict=False)
         if same_nodes(first.nominal_mm, second.nominal_mm)
     )
 
@@ -260,8 +256,8 @@ def subtract_traces(
 class Slice(Picture):
     """A picture of one plane of the working volume."""
 
-    axis: str  # the axis that stands still: the grid has one node along it
-    position_mm: float  # where it stands
+    axis: str  # the fixed axis: the grid has one node along it
+    position_mm: float  # of that axis
 
 
 Direction = tuple[float, float, float]
@@ -272,9 +268,9 @@ VIEWS: Mapping[str, Direction] = {
     "right": (1.0, 0.0, 0.0),
     "top": (0.0, 0.0, 1.0),
 }
-"""Direction from what is looked at towards the viewer, in R; the operator stands on the −Y side."""
+"""Direction towards the viewer, in R; the operator stands on the −Y side."""
 UPWARDS: Mapping[str, Direction] = {"top": (0.0, 1.0, 0.0)}
-"""What points upwards in a view, in R, where it is not z."""
+"""Upward direction of a view, in R, where it is not z."""
 VIEW_WORDS = {
     "front": "front view, from the operator",
     "right": "view from the right",
@@ -283,7 +279,7 @@ VIEW_WORDS = {
 
 
 def view_words(view: str, shape: surfaces.Shape) -> str:
-    """Say where the volume is looked at from, and what of it is cut away."""
+    """Describe the direction of view and the part of the volume that is cut away."""
     if view == "iso":
         return (
             "octant towards the viewer cut away"
@@ -293,30 +289,28 @@ def view_words(view: str, shape: surfaces.Shape) -> str:
     return VIEW_WORDS[view]
 
 
-# What is asked for, the scene's, or a round one.
-
 Exaggeration = float | Literal["auto"] | None
-"""A display factor, "auto" for a round one that suits the errors, None for what the scene says."""
+"""Display factor, "auto" for a round one that suits the errors, None for the scene's."""
 
 
-def given_exaggeration(wanted: Exaggeration, own: float | None) -> float | None:
-    """Give the factor that is asked for, else the scene's own; None where one is to be chosen."""
-    factor = own if wanted is None else wanted
+def fixed_exaggeration(requested: Exaggeration, scene_factor: float | None) -> float | None:
+    """Return the requested factor, else the scene's; None where one is to be chosen."""
+    factor = scene_factor if requested is None else requested
     if factor is None or factor == "auto":
         return None
     low, high = EXAGGERATION
     if not low <= factor <= high:  # nor is NaN
-        found = f"exaggeration {factor:g}; expected auto or a number above 0"
-        raise OptionError(f"{found}, from {low:g} to {high:,.0f}")
+        problem = f"exaggeration {factor:g}; expected auto or a number above 0"
+        raise OptionError(f"{problem}, from {low:g} to {high:,.0f}")
     return float(factor)
 
 
 def choose_exaggeration(
-    wanted: Exaggeration, own: float | None, largest_um: float, size_mm: float
+    requested: Exaggeration, scene_factor: float | None, largest_um: float, size_mm: float
 ) -> float:
     """Choose the display factor of a picture, or of several that share one."""
-    given = given_exaggeration(wanted, own)
-    return surfaces.auto_exaggeration(largest_um, size_mm) if given is None else given
+    fixed = fixed_exaggeration(requested, scene_factor)
+    return surfaces.auto_exaggeration(largest_um, size_mm) if fixed is None else fixed
 
 
 LEAST_SIZE_MM = 100.0  # of a single point without traces, on a machine without linear axes
@@ -342,7 +336,7 @@ class ScenePicture(Picture):
 
     @cached_property
     def size_mm(self) -> float:
-        """Length that marks are sized by, mm, for a single point too."""
+        """Reference length for the size of marks, mm; defined for a single point too."""
         return picture_size_mm(self.scene, self.grid)
 
     @cached_property
@@ -366,10 +360,10 @@ class ScenePicture(Picture):
 
     @property
     def remarks(self) -> dict[str, str]:
-        """What a table says of every row: scene, loop, reference, convention and the like."""
-        found = field_remarks(self.scene, self.view)
-        program = found.pop("program")
-        return {**found, "conditions": "; ".join(self.conditions), "program": program}
+        """Columns that are the same in all rows of a table: scene, loop, reference, convention."""
+        columns = field_remarks(self.scene, self.view)
+        program = columns.pop("program")
+        return {**columns, "conditions": "; ".join(self.conditions), "program": program}
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
@@ -393,15 +387,15 @@ class ScenePicture(Picture):
 
 
 def field_remarks(scene: Scene, view: View, *, exact: bool = False) -> dict[str, str]:
-    held = view.reference
+    reference = view.reference
     placement = {} if view.placed_over is None else {"placement": "fitted out"}
     return {
         "scene": scene.name,
         "loop": str(view.loop),
         **placement,
         "reference": "absolute"
-        if held is None
-        else " ".join(f"{axis}={at:g}" for axis, at in held.items()),
+        if reference is None
+        else " ".join(f"{axis}={at:g}" for axis, at in reference.items()),
         "component_errors": _one_text(scene.model.convention_value),
         "model": "exact chain" if exact else "first order",
         "program": f"warpspace {__version__}",
@@ -428,7 +422,7 @@ def evaluate_picture(
     view = choose_view(scene, loop)
     nodes = build_grid(scene.model, scene.workspace, grid)
     field = evaluate(scene, grid=grid, loop=loop)
-    coloured_values(field, component, quantity)  # refuses a component that does not exist
+    coloured_values(field, component, quantity)  # raises for an unknown component
     largest, uncertainty = float(field.norm_um.max()), None
     if quantity == "uncertainty":
         uncertainty = field_uncertainty(
@@ -459,7 +453,7 @@ def evaluate_picture(
 
 
 def picture_concept(concept: Concept, nodes: int) -> ScenePicture:
-    """Give the nominal volume in the colours of the RMS of |E| of machines within tolerance."""
+    """Build a picture of the nominal volume, coloured by the RMS of |E| within tolerance."""
     scene = concept.scene
     grid = build_grid(scene.model, scene.workspace, nodes)
     expected, zero = expected_um(concept, grid), np.zeros(grid.nominal_mm.shape)

@@ -1,4 +1,4 @@
-"""The traces of the rotary axes as they are drawn, and the error motion along one of them."""
+"""Traces of the rotary axes for drawing, and the error motion along one of them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,25 +24,25 @@ FULL_TURN_DEG = 360.0
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What one trace is: which point is turned by which axis, and where the other axes stand."""
+    """One trace: a point rotated by an axis, with the positions of the other rotary axes."""
 
     axis: str  # the axis that turns
     point_mm: Vector  # the point in the workpiece (or tool) frame
     at: dict[str, float]  # degrees; positions of the other rotary axes of the branch
-    closed: bool  # whether it is a full circle
+    closed: bool  # True for a full circle
 
     @property
     def label(self) -> str:
         """Name for legends, for instance ``C 0…360° at B −30°``."""
-        held = ", ".join(f"{name} {value:g}°" for name, value in self.at.items())
-        return f"over {self.axis}" + (f" at {held}" if held else "")
+        positions = ", ".join(f"{name} {value:g}°" for name, value in self.at.items())
+        return f"over {self.axis}" + (f" at {positions}" if positions else "")
 
 
 @dataclass(frozen=True, slots=True)
 class TraceGroup:
-    """All traces of one branch, ready to be evaluated in one go."""
+    """All traces of one branch, evaluated together."""
 
-    loop: Loop  # loop whose error displaces the traces
+    loop: Loop  # whose error displaces the traces
     traces: tuple[Trace, ...]  # (T,)
     # mm or degrees; axis positions, [T, n] for the rotary axes of the branch, scalar for the others
     coordinates: dict[str, Array]
@@ -54,20 +54,20 @@ def build_traces(
     points_mm: Sequence[Vector],
     positions: Mapping[str, float],
     samples: int = SAMPLES,
-    held: Mapping[str, Sequence[float]] | None = None,
+    fixed: Mapping[str, Sequence[float]] | None = None,
 ) -> tuple[TraceGroup, ...]:
-    """Lay the traces of points over every rotary axis of a machine."""
+    """Build the traces of points over every rotary axis of a machine."""
     groups: list[TraceGroup] = []
     axes, sweep = model.machine.axes, np.linspace(0.0, 1.0, samples)
     for side, loop in (("workpiece", Loop.WORKPIECE), ("tool", Loop.TOOL)):
         rotary = [axis.name for axis in model.machine.branch(side) if not axis.is_linear]
         if not rotary or not points_mm:
             continue
-        found = [
+        traces = [
             trace
             for point in points_mm
             for axis in rotary
-            for trace in _traces_of(model, axis, rotary, point, positions, held or {})
+            for trace in _traces_of(model, axis, rotary, point, positions, fixed or {})
         ]
         coordinates = {name: np.asarray(positions.get(name, 0.0), dtype=float) for name in axes}
         for name in rotary:
@@ -76,12 +76,12 @@ def build_traces(
             coordinates[name] = np.stack(
                 [
                     turn if trace.axis == name else np.full(samples, trace.at[name])
-                    for trace in found
+                    for trace in traces
                 ]
             )
-        points = np.array([trace.point_mm for trace in found])[:, None, :]
+        points = np.array([trace.point_mm for trace in traces])[:, None, :]
         nominal = transforms.apply(branch_pose(model, side, coordinates), points)
-        groups.append(TraceGroup(loop, tuple(found), coordinates, nominal))
+        groups.append(TraceGroup(loop, tuple(traces), coordinates, nominal))
     return tuple(groups)
 
 
@@ -91,35 +91,34 @@ def _traces_of(
     rotary: Sequence[str],
     point: Vector,
     positions: Mapping[str, float],
-    chosen: Mapping[str, Sequence[float]],
+    fixed: Mapping[str, Sequence[float]],
 ) -> list[Trace]:
     low, high = model.machine.axes[axis].travel
     closed = high - low >= FULL_TURN_DEG
-    held = {name: positions.get(name, 0.0) for name in rotary if name != axis}
+    standing = {name: positions.get(name, 0.0) for name in rotary if name != axis}
     before, after = rotary[: rotary.index(axis)], rotary[rotary.index(axis) + 1 :]
     neighbour = before[-1] if before else (after[0] if after else "")
-    if chosen.get(neighbour):
-        return [Trace(axis, point, {**held, neighbour: at}, closed) for at in chosen[neighbour]]
+    if fixed.get(neighbour):
+        return [Trace(axis, point, {**standing, neighbour: at}, closed) for at in fixed[neighbour]]
     if not before:
-        return [Trace(axis, point, held, closed)]
+        return [Trace(axis, point, standing, closed)]
     tilting = before[-1]
     first, last = model.machine.axes[tilting].travel
-    here = positions.get(tilting, 0.0)
-    tilts = sorted(
-        {here, *(at for at in (here - TILT_STEP_DEG, here + TILT_STEP_DEG) if first <= at <= last)}
-    )
-    return [Trace(axis, point, {**held, tilting: tilt}, closed) for tilt in tilts]
+    centre = positions.get(tilting, 0.0)
+    neighbours = (centre - TILT_STEP_DEG, centre + TILT_STEP_DEG)
+    tilts = sorted({centre, *(at for at in neighbours if first <= at <= last)})
+    return [Trace(axis, point, {**standing, tilting: tilt}, closed) for tilt in tilts]
 
 
 @dataclass(frozen=True)
 class TraceLine:
     """One trace."""
 
-    trace: Trace  # which point is turned by which axis
-    loop: Loop  # loop whose error displaces it
+    trace: Trace
+    loop: Loop  # whose error displaces it
     nominal_mm: Array  # [n, 3]
     error_um: Array  # [n, 3]
-    actual_mm: Array  # [n, 3]; where it is drawn
+    actual_mm: Array  # [n, 3]; displaced with the exaggeration
 
     @property
     def largest_um(self) -> float:
@@ -138,7 +137,7 @@ class TraceLines:
 
     @cached_property
     def actual_mm(self) -> Array:
-        """Where they are drawn, [T, n, 3], mm."""
+        """Displaced points, [T, n, 3], mm."""
         return deform(self.nominal_mm, self.error_um, self.exaggeration)
 
     def each(self) -> Iterator[TraceLine]:
@@ -178,7 +177,7 @@ def trace_lines(groups: Sequence[TraceLines]) -> tuple[TraceLine, ...]:
 
 
 LEAST_RADIUS_MM = 1e-3  # A point nearer to the axis is on it and has no direction from it
-LEAST_UM = 1e-6  # traces with smaller errors are moved by none
+LEAST_UM = 1e-6  # traces with smaller errors count as not displaced
 MOTION_SAMPLES = 181  # places of a turn: every two degrees
 
 
@@ -188,23 +187,23 @@ def is_moved(line: TraceLine) -> bool:
 
 def name_trace(trace: Trace) -> str:
     """Name a trace: ``C at B −30°, point (275, 0, 0) mm``."""
-    held = ", ".join(f"{axis} {spell_short(value)}°" for axis, value in trace.at.items())
+    positions = ", ".join(f"{axis} {spell_short(value)}°" for axis, value in trace.at.items())
     point = ", ".join(map(spell_short, trace.point_mm))
-    return f"{trace.axis}{f' at {held}' if held else ''}, point ({point}) mm"
+    return f"{trace.axis}{f' at {positions}' if positions else ''}, point ({point}) mm"
 
 
 def evaluate_axis_motion(
     scene: Scene, line: TraceLine, evaluate: Callable[..., ErrorField] = evaluate_first_order
 ) -> AxisMotion | None:
     trace = line.trace
-    found = build_traces(
+    groups = build_traces(
         scene.model,
         (trace.point_mm,),
         {**scene.workspace.positions, **trace.at},
         MOTION_SAMPLES,
         {name: (at,) for name, at in trace.at.items()},
     )
-    group = next((g for g in found if g.loop is line.loop and trace in g.traces), None)
+    group = next((g for g in groups if g.loop is line.loop and trace in g.traces), None)
     if group is None:
         return None
     number = group.traces.index(trace)
@@ -222,7 +221,7 @@ def evaluate_axis_motion(
     return axis_motion(nominal, coordinates[trace.axis], on_axis, above, closed=trace.closed)
 
 
-WORDS = {1: "once a turn", 2: "twice a turn"}
+PERIODS = {1: "once a turn", 2: "twice a turn"}
 POSITIVE = {
     "radial": "towards the point",
     "axial": "along the axis",
@@ -232,7 +231,7 @@ POSITIVE = {
 
 
 def motion_lines(name: str, motion: AxisMotion, part: ErrorMotion) -> Lines:
-    """Give one deviation as a polar chart around the position of its axis."""
+    """Build the polar chart of one deviation over the position of its axis."""
     turns = turn_words(part.times_a_turn) if motion.closed else "an arc"
     values = (
         f"peak to valley {part.peak_to_valley:.2f} {part.unit}, {turns};"
@@ -253,5 +252,5 @@ def motion_lines(name: str, motion: AxisMotion, part: ErrorMotion) -> Lines:
 
 
 def turn_words(times: int | None) -> str:
-    """Say how often a deviation comes back: ``twice a turn``; a dash where it does not vary."""
-    return "–" if times is None else WORDS.get(times, f"{times} times a turn")
+    """Format the period of a deviation: ``twice a turn``; a dash where it does not vary."""
+    return "–" if times is None else PERIODS.get(times, f"{times} times a turn")

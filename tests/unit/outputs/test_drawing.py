@@ -122,5 +122,5 @@ def test_one_point_is_drawn_in_the_middle():
 
 
 def test_a_result_without_charts_is_refused_by_its_title():
-    with pytest.raises(OptionError, match="Nothing moves: there is no chart"):
+    with pytest.raises(OptionError, match="Nothing moves: no chart is defined"):
         result_chart(SimpleNamespace(blocks=lambda: ["Nothing moves"]))

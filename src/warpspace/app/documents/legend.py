@@ -152,7 +152,7 @@ def place_words(picture: LivePicture) -> str:
         name: float(np.broadcast_to(values, grid.shape).flat[node])
         for name, values in grid.coordinates.items()
     }
-    axes = formatting.own_axes(picture.drawn_state.scene, at)
+    axes = formatting.point_axes(picture.drawn_state.scene, at)
     return f"at {formatting.list_axes(axes)}" if axes else ""
 
 

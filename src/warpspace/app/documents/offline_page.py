@@ -7,17 +7,17 @@ their colours and cameras, and bends the drawing by them (`browser/mesh.js`).
 """
 
 import contextlib
-import io
 import json
 import zlib
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from string import Template
 from typing import Any
 
 import numpy as np
+import rich
 import viser
 from markupsafe import Markup, escape
 
@@ -133,8 +133,19 @@ def _usual_camera(picture: LivePicture) -> CameraMemory:
     return fit_camera(drawn, ASPECT)
 
 
+@contextlib.contextmanager
+def _quiet_console() -> Generator[None]:
+    """Suppress the banner of the server, in a terminal and in a notebook."""
+    console = rich.get_console()
+    quiet, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = quiet
+
+
 def _export(step: PageStep, shapes: Shapes) -> str:
-    with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
+    with _quiet_console():
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)

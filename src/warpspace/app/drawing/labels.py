@@ -21,7 +21,7 @@ from warpspace.machine.axes import is_linear, parameter
 from warpspace.picture.formatting import (
     length_words,
     list_axes,
-    own_axes,
+    point_axes,
     spell_coordinate,
     spell_factor,
     u95_behind,
@@ -167,7 +167,7 @@ def _asked(picture: LivePicture) -> Iterator[Label]:
         return
     found = answer(state, picked, picture.exaggeration)
     length = float(np.linalg.norm(found.drawn_um))
-    where = list_axes(own_axes(state.scene, found.at))
+    where = list_axes(point_axes(state.scene, found.at))
     words = f"{length:.1f}{length_words(found.uncertainty)} µm at {where}"
     yield Label(words, found.drawn_mm, "asked")
     for part in found.explanation.contributions:

@@ -393,7 +393,7 @@ def report(
             output,
             settings,
             embed=embed_view,
-            tell=tell_story,
+            story_steps=tell_story,
             concepts=beside,
             results={
                 f"{heading}: {scene.title}": analysis.run(scene, ignore_progress)

@@ -77,7 +77,7 @@ def field(
         volume_uncertainty,
     )
     from warpspace.field.evaluate import placed_words
-    from warpspace.picture.formatting import direction_words, own_axes, spell_at, spell_point
+    from warpspace.picture.formatting import direction_words, point_axes, spell_at, spell_point
     from warpspace.scene.model import choose_view, second_order
 
     if points and grid is not None:
@@ -147,7 +147,7 @@ def field(
         print_text(said)
     if nodes is not None:
         print_text(f"  each node counted once: mean {even.mean_um:.2f} µm")
-    worst = own_axes(loaded, summary.max_at_axes)
+    worst = point_axes(loaded, summary.max_at_axes)
     print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
     print_text(f"  --at {spell_at(worst)}")
     for path in files:

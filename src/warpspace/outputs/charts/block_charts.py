@@ -22,7 +22,7 @@ from warpspace.outputs.drawing.settings import FONT, LIGHT, SAVE_RC, Theme
 
 DPI = 160.0
 TITLE, SUBTITLE, TEXT, SMALL = 13.0, 9.5, 9.5, 8.5
-LEAST_SHARE = 0.6  # of its size, what a title is drawn with at the least
+LEAST_SHARE = 0.6  # smallest size of a title, as a share of its regular size
 _THEME: ContextVar[Theme] = ContextVar("theme of the charts", default=LIGHT)
 
 
@@ -69,13 +69,14 @@ def sheet(
     width: float, height: float, title: str, subtitle: str, top_in: float
 ) -> tuple[Figure, float]:
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor=ground().paper)
-    left = 0.3 / width
-    for words, size, down, weight, colour in (
+    x_left = 0.3 / width
+    for heading, size, down, weight, colour in (
         (title, TITLE, 0.2, "bold", ground().ink),
         (subtitle, SUBTITLE, 0.5, "normal", ground().muted),
     ):
-        text = figure.text(left, 1.0 - down / height, words, size=size, weight=weight, color=colour)
-        text.set(va="top", parse_math=False)  # a $ in what a user calls a scene is a dollar
+        y = 1.0 - down / height
+        text = figure.text(x_left, y, heading, size=size, weight=weight, color=colour)
+        text.set(va="top", parse_math=False)  # a $ in the title of a scene is a dollar
         wide = text.get_window_extent().width / figure.dpi
         if wide > width - 0.5:  # smaller, so that it does not run off the sheet
             text.set_fontsize(size * max((width - 0.5) / wide, LEAST_SHARE))
@@ -93,11 +94,11 @@ def quiet(axes: Axes, grid: str = "x") -> None:
 CHART_IN, ROW_IN, GAP_IN = 4.9, 4.6, 0.25
 """Width, height and distance of charts that stand side by side."""
 WIDTH_IN, PRINTED_IN = 11.0, 7.4
-"""Width of bars; of what a report has, without a heading and printed as wide as its page."""
+"""Width of bar charts; in a report, without a heading and printed as wide as its page."""
 HEAD_IN = 0.65
 BAR_IN = 0.235  # height of one bar; rows of two are wider
-FEW = 8  # rows below which bars beside other charts grow no wider
-ROOM = 1.14  # of the longest bar: room for the number beside it
+FEW_ROWS = 8  # below this number of rows, bars beside other charts stay as wide
+NUMBER_MARGIN = 1.14  # of the longest bar: space for the number beside it
 LEGEND_IN = 0.19
 DASHES: dict[str, Any] = {"line": "-", "dashed": (0, (4, 3)), "thin": "-", "dots": "none"}
 Box = tuple[float, float, float, float]
@@ -105,7 +106,7 @@ Box = tuple[float, float, float, float]
 
 
 def chart_figure(chart: Bars | Lines | Histogram) -> Figure:
-    """Draw one chart for a report, which says its heading."""
+    """Draw one chart for a report, without its heading."""
     if isinstance(chart, Lines):
         return charts_sheet([replace(chart, title="")], "", "")
     if isinstance(chart, Bars):
@@ -122,7 +123,7 @@ def charts_sheet(
     beside_in: float = 0.0,
     below_in: float = 0.0,
 ) -> Figure:
-    """Draw charts side by side on a sheet, so many in a row; there is room left for more."""
+    """Draw charts side by side on a sheet, with free space beside or below them on request."""
     columns = columns or len(charts)
     rows = -(-len(charts) // columns)
     width = columns * CHART_IN + beside_in
@@ -143,26 +144,26 @@ def charts_sheet(
 
 def draw_beside(figure: Figure, bars: Bars, box: Box, size: float = SMALL) -> None:
     width, height = figure.get_size_inches() * SMALL / size
-    left, bottom, wide, high = box
+    x_left, bottom, wide, high = box
     longest = max((len(words) for words in bars.rows), default=0)
     names = min((0.35 + 0.075 * longest) / width, 0.41 * wide)
     step = (wide - names - 0.25 / width) / len(bars.panels)
     under, tall = 0.5 / height, max(high - 0.85 / height, 0.1 * high)
     axes = [
-        figure.add_axes((left + names + at * step, bottom + under, 0.92 * step, tall))
+        figure.add_axes((x_left + names + at * step, bottom + under, 0.92 * step, tall))
         for at in range(len(bars.panels))
     ]
     for axis in axes[1:]:
         axis.tick_params(labelleft=False)
     draw_bars(axes, bars, size)
     for axis in axes:
-        axis.set_ylim(max(len(bars.rows), FEW) - 0.4, -0.6)
+        axis.set_ylim(max(len(bars.rows), FEW_ROWS) - 0.4, -0.6)
 
 
 def bars_chart(bars: Bars) -> Figure:
     with style():
-        beside = max((_beside(panel) for panel in bars.panels), default=1)
-        row = BAR_IN * (1.0 + 0.55 * (beside - 1))
+        bars_per_row = max((_bars_per_row(panel) for panel in bars.panels), default=1)
+        row = BAR_IN * (1.0 + 0.55 * (bars_per_row - 1))
         width, above = (WIDTH_IN, 0.5 + HEAD_IN) if bars.title else (PRINTED_IN, 0.5)
         height = above + 0.6 + row * max(len(bars.rows), 3)
         figure, top = sheet(width, height, bars.title, bars.subtitle, above)
@@ -171,15 +172,15 @@ def bars_chart(bars: Bars) -> Figure:
             width_ratios=[panel.width for panel in bars.panels],
         )[0]  # fmt: skip
         longest = max((len(words) for words in bars.rows), default=0)
-        left = min(max(1.2, 0.3 + 0.066 * longest), 3.6)
+        x_left = min(max(1.2, 0.3 + 0.066 * longest), 3.6)
         figure.subplots_adjust(
-            left=left / width, right=0.98, top=top, bottom=0.62 / height, wspace=0.09
+            left=x_left / width, right=0.98, top=top, bottom=0.62 / height, wspace=0.09
         )
         draw_bars(list(axes), bars)
         if bars.legend:
             figure.legend(
                 handles=legend_handles(bars), loc="lower left",
-                bbox_to_anchor=(left / width, top + 0.16 / height), ncols=4, frameon=False,
+                bbox_to_anchor=(x_left / width, top + 0.16 / height), ncols=4, frameon=False,
                 fontsize=SMALL, borderpad=0.0, handlelength=1.0, handleheight=0.8,
             )  # fmt: skip
         return figure
@@ -201,7 +202,7 @@ def legend_handles(bars: Bars) -> list[Patch | Line2D]:
     ]
 
 
-def _beside(panel: Panel) -> int:
+def _bars_per_row(panel: Panel) -> int:
     bars = [one for one in panel.series if not one.as_mark]
     rows = max((len(one.values) for one in bars), default=0)
     counts = [sum(one.values[row] is not None for one in bars) for row in range(rows)]
@@ -227,9 +228,9 @@ def _draw_panel(axis: Axes, panel: Panel, bars: Bars, size: float, *, first: boo
     alike = [one for one in bars.panels if one.signed] if panel.signed else [panel]
     longest = max(map(_longest, alike)) or 1.0
     drawn = [one for one in panel.series if not one.as_mark]
-    room = (ROOM if any(one.form for one in panel.series) else 1.05) * longest
+    end = (NUMBER_MARGIN if any(one.form for one in panel.series) else 1.05) * longest
     for series in panel.series:
-        _draw_series(axis, series, drawn, bars.keys, room, size)
+        _draw_series(axis, series, drawn, bars.keys, end, size)
     if panel.before is not None:
         axis.axvline(panel.before, color=ground().ink, linewidth=1.0, linestyle=(0, (4, 3)))
     quiet(axis)
@@ -237,7 +238,7 @@ def _draw_panel(axis: Axes, panel: Panel, bars: Bars, size: float, *, first: boo
     axis.axvline(0.0, color=ground().muted, linewidth=0.8)
     axis.tick_params(axis="y", length=0)
     axis.tick_params(axis="x", labelsize=size)
-    axis.set_xlim(-1.05 * longest if panel.signed else 0.0, room)
+    axis.set_xlim(-1.05 * longest if panel.signed else 0.0, end)
     axis.set_xlabel(panel.unit if first or panel.unit != bars.panels[0].unit else "", size=size)
     axis.set_title(
         panel.title, size=TEXT * size / SMALL, weight="bold", loc="left" if first else "center"
@@ -258,36 +259,36 @@ def _draw_series(
         if series.as_mark:
             axis.plot([value], [row], "|", color=ground().ink, markersize=size)
             continue
-        there = [one for one in drawn if one.values[row] is not None]
-        index = next(i for i, one in enumerate(there) if one is series)
-        place = row + 0.7 * ((index + 0.5) / len(there) - 0.5)
+        row_series = [one for one in drawn if one.values[row] is not None]
+        index = next(i for i, one in enumerate(row_series) if one is series)
+        place = row + 0.7 * ((index + 0.5) / len(row_series) - 0.5)
         stands_out = series.role == "plain" and bool(keys) and keys[row]
         axis.barh(
-            place, value, height=0.7 / len(there),
+            place, value, height=0.7 / len(row_series),
             color=_bar_colour("key" if stands_out else series.role),
             error_kw={"elinewidth": 0.9, "ecolor": ground().muted},
             xerr=series.spread[row] if series.spread else None,
         )  # fmt: skip
         if series.form:
-            words = f"{value:{series.form}}"
-            text = axis.text(value + 0.012 * end, place, words, va="center", size=0.9 * size)
+            number = f"{value:{series.form}}"
+            text = axis.text(value + 0.012 * end, place, number, va="center", size=0.9 * size)
             text.set_path_effects([Stroke(linewidth=2.5, foreground=ground().paper), Normal()])
 
 
 def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> None:
     width, height = figure.get_size_inches() * SMALL / size
-    left, bottom, wide, high = box
+    x_left, bottom, wide, high = box
     names = sum(bool(curve.name) for curve in chart.curves) + len(chart.bands)
     lines = -(-names // 2)
     legend = LEGEND_IN * lines / height
     note = 0.2 / height if chart.note else 0.0
-    figure.text(left + 0.3 / width, bottom + high - 0.05 / height, chart.title,
+    figure.text(x_left + 0.3 / width, bottom + high - 0.05 / height, chart.title,
                 size=TEXT * size / SMALL, weight="bold", va="top")  # fmt: skip
     inner = 0.75 if chart.kind != "polar" else 0.15
     under = 0.5 if chart.kind != "polar" else 0.1
     axes = figure.add_axes(
         (
-            left + inner / width,
+            x_left + inner / width,
             bottom + under / height + legend + note,
             max(wide - (inner + 0.2) / width, 0.2 * wide),
             max(high - (under + 0.35) / height - legend - note, 0.1 * high),
@@ -299,11 +300,11 @@ def draw_lines(figure: Figure, chart: Lines, box: Box, size: float = SMALL) -> N
         _lines(axes, chart, size)
     figure.legend(
         handles=_handles(chart), loc="lower left",
-        bbox_to_anchor=(left + 0.2 / width, bottom + note), ncols=2, frameon=False,
+        bbox_to_anchor=(x_left + 0.2 / width, bottom + note), ncols=2, frameon=False,
         fontsize=size - 0.5, handlelength=1.8, columnspacing=1.2, labelspacing=0.2,
         borderaxespad=0.0,
     )  # fmt: skip
-    figure.text(left + 0.3 / width, bottom + 0.05 / height, chart.note, size=size - 0.5,
+    figure.text(x_left + 0.3 / width, bottom + 0.05 / height, chart.note, size=size - 0.5,
                 color=ground().muted)  # fmt: skip
 
 
@@ -338,7 +339,7 @@ def _lines(axes: Axes, chart: Lines, size: float) -> None:
         axes.set_aspect("equal", adjustable="datalim")
     else:
         values = np.concatenate([curve.y for curve in chart.curves])
-        if np.ptp(values) < LEAST and not chart.bands:  # nothing but rounding: no chart of noise
+        if np.ptp(values) < LEAST and not chart.bands:  # rounding only: no chart of noise
             middle = float(np.round(values.mean(), 6))
             axes.set_ylim(middle - 1.0, middle + 1.0)
     if chart.log:
@@ -395,13 +396,13 @@ HISTOGRAM_IN = 9.0, 5.4
 LABEL_ROWS = 4  # rows of labels above the bars, at most
 
 
-def histogram_chart(found: Histogram) -> Figure:
+def histogram_chart(histogram: Histogram) -> Figure:
     with style():
-        width, height = HISTOGRAM_IN if found.title else (PRINTED_IN, HISTOGRAM_IN[1] - HEAD_IN)
-        above = 0.85 + (HEAD_IN if found.title else 0.0)
-        figure, top = sheet(width, height, found.title, found.subtitle, above)
+        width, height = HISTOGRAM_IN if histogram.title else (PRINTED_IN, HISTOGRAM_IN[1] - HEAD_IN)
+        above = 0.85 + (HEAD_IN if histogram.title else 0.0)
+        figure, top = sheet(width, height, histogram.title, histogram.subtitle, above)
         axes = figure.add_axes((0.085, 0.115, 0.885, top - 0.115))
-        edges, heights, limit = found.edges, found.heights, found.limit
+        edges, heights, limit = histogram.edges, histogram.heights, histogram.limit
         beyond = [limit is not None and low >= limit for low in edges[:-1]]
         within, outside = ("#a9c4de", "#e3c3c6") if ground() is LIGHT else ("#3f6a92", "#7a4a52")
         axes.bar(
@@ -409,22 +410,23 @@ def histogram_chart(found: Histogram) -> Figure:
             color=[outside if one else within for one in beyond], linewidth=0.5,
         )  # fmt: skip
         quiet(axes, "y")
-        axes.set_xlabel(found.x_label)
-        axes.set_ylabel(found.y_label)
+        axes.set_xlabel(histogram.x_label)
+        axes.set_ylabel(histogram.y_label)
         last = float(edges[1:][np.cumsum(heights) >= 0.9995 * heights.sum()][0])
-        printed = dict(found.marks).get("thesis", 0.0)
+        printed = dict(histogram.marks).get("thesis", 0.0)
         axes.set_xlim(0.0, max(last, 1.05 * (limit or 0.0), 1.05 * printed))
         axes.set_ylim(0.0, 1.06 * float(heights.max()))
-        looks = {
+        styles = {
             "mean": (key_colour(), "-"), "P95": (ground().muted, "-"),
             "thesis": (ground().series[4], "--"), "limit": (ground().accent, "-"),
         }  # fmt: skip
-        marks = [*found.marks, *([] if limit is None else [("limit", limit)])]
-        _mark(axes, [(name, at, *looks.get(name, (ground().ink, "-"))) for name, at in marks])
-        told = ((0.95, TEXT + 2.0, "bold", ground().ink), (0.83, SMALL, "normal", ground().muted))
-        for words, (height, size, weight, colour) in zip(found.told, told, strict=False):
+        marks = [*histogram.marks, *([] if limit is None else [("limit", limit)])]
+        _mark(axes, [(name, at, *styles.get(name, (ground().ink, "-"))) for name, at in marks])
+        large = 0.95, TEXT + 2.0, "bold", ground().ink
+        styled = zip(histogram.told, (large, (0.83, SMALL, "normal", ground().muted)), strict=False)
+        for line, (height, size, weight, colour) in styled:
             axes.text(
-                0.985, height, words, transform=axes.transAxes, ha="right", va="top", size=size,
+                0.985, height, line, transform=axes.transAxes, ha="right", va="top", size=size,
                 weight=weight, color=colour, bbox=_paper(),
             )  # fmt: skip
         return figure
@@ -434,7 +436,7 @@ def _mark(axes: Axes, marks: Sequence[tuple[str, float, str, str]]) -> None:
     low, high = axes.get_xlim()
     gap = 0.006 * (high - low)
     renderer = FigureCanvasAgg(cast("Figure", axes.figure)).get_renderer()
-    taken: list[Bbox] = []
+    occupied: list[Bbox] = []
     for name, value, colour, dash in sorted(marks, key=lambda mark: mark[1]):
         label = axes.text(
             value + gap, 0.0, f"{name} {value:.1f} µm", color=colour, size=TEXT, weight="bold",
@@ -448,9 +450,9 @@ def _mark(axes: Axes, marks: Sequence[tuple[str, float, str, str]]) -> None:
             label.set_y(1.02 + 0.058 * row)
             # with the gap to its own line, and as much on the other side
             box = label.get_window_extent(renderer).padded(0.006 * axes.bbox.width, 1.0)
-            if not box.count_overlaps(taken):
+            if not box.count_overlaps(occupied):
                 break
-        taken.append(box)
+        occupied.append(box)
         axes.plot(
             [value, value], [0.0, label.get_position()[1] + 0.04], color=colour, linestyle=dash,
             linewidth=1.4, transform=axes.get_xaxis_transform(), clip_on=False, zorder=4,

@@ -1,4 +1,4 @@
-"""The chart of a result: its charts side by side; of a test its numbers; of a compensation maps."""
+"""Chart of a result: its charts side by side, the numbers of a test, maps of a compensation."""
 
 from collections.abc import Sequence
 from textwrap import fill
@@ -39,18 +39,18 @@ if TYPE_CHECKING:
     from warpspace.formats.compensation.compensate import Compensation
 
 
-def result_chart(found: Result) -> Figure:
-    """Draw the only bars of a result, or all its charts under what it says first."""
-    blocks = list(found.blocks())
+def result_chart(result: Result) -> Figure:
+    """Draw the only bar chart of a result, or all its charts under its first lines."""
+    blocks = list(result.blocks())
     charts = [block for block in blocks if isinstance(block, (Bars, Lines))]
     if len(charts) == 1 and isinstance(charts[0], Bars):
         return bars_chart(charts[0])
     for histogram in (block for block in blocks if isinstance(block, Histogram)):
         return histogram_chart(histogram)
-    said = [block.strip() for block in blocks if isinstance(block, str)]
-    title, subtitle = [*said, ""][:2]
+    texts = [block.strip() for block in blocks if isinstance(block, str)]
+    title, subtitle = [*texts, ""][:2]
     if not charts:
-        raise OptionError(f"{title}: there is no chart of it")
+        raise OptionError(f"{title}: no chart is defined")
     return charts_sheet(charts, title, subtitle, 2 if len(charts) == 4 else min(len(charts), 3))
 
 
@@ -60,13 +60,14 @@ MOST_NUMBERS = 16
 
 
 def bench_chart(result: "BenchResult", title: str | None = None) -> Figure:
-    """Draw the customary figure of a test, its numbers where there is room."""
+    """Draw the customary figure of a test, with its numbers in the free space."""
     charts = result.charts
     columns = 1 if len(charts) == 1 else 2
     rows = -(-len(charts) // columns)
     numbers = NUMBERS_IN + VALUE_IN * (len(result.runs) - 1)
-    found = {one.key: (one.name, one.unit) for run in result.runs for one in run.outcome.quantities}
-    names = dict(list(found.items())[:MOST_NUMBERS])
+    quantities = (quantity for run in result.runs for quantity in run.outcome.quantities)
+    units = {quantity.key: (quantity.name, quantity.unit) for quantity in quantities}
+    names = dict(list(units.items())[:MOST_NUMBERS])
     # beside one chart, in the place of the fourth one, or below all
     below = 0.2 + LINE_IN * (len(names) + 1) + NOTE_IN * len(result.notes)
     below = 0.0 if len(charts) % 2 else below
@@ -78,9 +79,9 @@ def bench_chart(result: "BenchResult", title: str | None = None) -> Figure:
             below_in=below + 0.1,
         )  # fmt: skip
         width, height = figure.get_size_inches()
-        left = (0.3 if below else CHART_IN + 0.3) / width
+        x_left = (0.3 if below else CHART_IN + 0.3) / width
         top = 1.0 - (0.85 + (rows if below else rows - 1) * (ROW_IN + GAP_IN)) / height
-        _numbers(figure, result, names, left, left + (numbers - 0.45) / width, top)
+        _numbers(figure, result, names, x_left, x_left + (numbers - 0.45) / width, top)
         return figure
 
 
@@ -88,7 +89,7 @@ def _numbers(
     figure: Figure,
     result: "BenchResult",
     names: dict[str, tuple[str, str]],
-    left: float,
+    x_left: float,
     right: float,
     top: float,
 ) -> None:
@@ -100,9 +101,10 @@ def _numbers(
         figure.text(place, y, run.who, size=SMALL, color=ground().muted, ha="right")
     for key, (name, unit) in names.items():
         rule = y - 0.07 / height
-        figure.add_artist(Line2D([left, right], [rule, rule], color=ground().faint, linewidth=0.6))
+        line = Line2D([x_left, right], [rule, rule], color=ground().faint, linewidth=0.6)
+        figure.add_artist(line)
         y -= LINE_IN / height
-        figure.text(left, y, f"{name} [{unit}]", size=SMALL, color=ground().muted,
+        figure.text(x_left, y, f"{name} [{unit}]", size=SMALL, color=ground().muted,
                     parse_math=False)  # fmt: skip
         for run, place in zip(runs, places, strict=True):
             values = {one.key: round(one.value, 2) + 0.0 for one in run.outcome.quantities}
@@ -110,22 +112,23 @@ def _numbers(
             figure.text(place, y, text, size=TEXT, weight="bold", ha="right")
     y -= LINE_IN / height
     for text in result.notes:
-        figure.text(left, y, fill(text, 46), size=SMALL - 1.0, color=ground().accent, va="top")
+        figure.text(x_left, y, fill(text, 46), size=SMALL - 1.0, color=ground().accent, va="top")
         y -= NOTE_IN / height
 
 
 PLANE_IN = 3.2
 COLUMN_IN = 4.3, 5.0  # of the maps in a column of the app
-WORDS = 9.0
-LEAST_UM = 0.005  # upper end of a colour scale where nothing but the rounding of a file is left
+COLUMN_TEXT = 9.0
+LEAST_UM = 0.005  # upper end of a colour scale where only rounding remains
 PLANES = ((0, 1), (0, 2), (1, 2))  # axes across and up of each slice
 
 
-def compensation_chart(found: "Compensation") -> Figure:
-    """Draw |E| before, after on the same colours, and what is left on its own, in slices."""
-    title = f"Compensation · {found.controller.scene.title}"
-    subtitle = f"{found.format.title} · loop {found.loop} · {found.points_words}"
-    planes, fields = _planes(found), _fields(found)
+def compensation_chart(compensation: "Compensation") -> Figure:
+    """Draw slices of |E| before and after in one colour scale, and of the residual in its own."""
+    title = f"Compensation · {compensation.controller.scene.title}"
+    table = f"{compensation.format.title} · loop {compensation.loop}"
+    subtitle = f"{table} · {compensation.points_words}"
+    planes, fields = _planes(compensation), _fields(compensation)
     with style():
         height = 1.3 + PLANE_IN * max(len(planes), 1)
         figure, top = sheet(WIDTH_IN, height, title, subtitle, top_in=1.0)
@@ -135,99 +138,104 @@ def compensation_chart(found: "Compensation") -> Figure:
             hspace=0.34,
         )  # fmt: skip
         for row, plane in zip(axes, planes, strict=False):
-            for column, (words, field, largest) in zip(row, fields, strict=True):
-                mesh = _draw_slice(column, found, field, plane, largest)
+            for column, (heading, field, largest) in zip(row, fields, strict=True):
+                mesh = _draw_slice(column, compensation, field, plane, largest)
                 bar = figure.colorbar(mesh, ax=column, fraction=0.05, pad=0.03)
                 bar.ax.tick_params(labelsize=SMALL - 1.5)
                 bar.set_label("|E| [µm]", fontsize=SMALL - 1.0)
                 if plane is planes[0]:
-                    column.set_title(words, fontsize=SMALL, color=ground().ink, loc="left")
+                    column.set_title(heading, fontsize=SMALL, color=ground().ink, loc="left")
         return figure
 
 
-def compensation_column(found: "Compensation") -> Figure:
-    planes = _planes(found)
+def compensation_column(compensation: "Compensation") -> Figure:
+    planes = _planes(compensation)
     with style():
         figure = Figure(figsize=COLUMN_IN, dpi=DPI, facecolor=ground().paper)
         axes = figure.subplots(3, max(len(planes), 1), squeeze=False)
         figure.subplots_adjust(
             left=0.095, right=0.85, top=0.93, bottom=0.085, wspace=0.42, hspace=0.66
         )
-        for row, (words, field, largest) in zip(axes, _fields(found), strict=True):
+        for row, (heading, field, largest) in zip(axes, _fields(compensation), strict=True):
             place = row[0].get_position()
-            figure.text(place.x0, place.y1 + 0.022, words, size=WORDS, color=ground().ink)
+            y = place.y1 + 0.022
+            figure.text(place.x0, y, heading, size=COLUMN_TEXT, color=ground().ink)
             if not planes:
                 row[0].set_axis_off()
                 continue
             for column, plane in zip(row, planes, strict=True):
-                mesh = _draw_slice(column, found, field, plane, largest)
+                mesh = _draw_slice(column, compensation, field, plane, largest)
                 across, up = column.get_xlabel(), column.get_ylabel()
-                over = f"{up.replace(' [', ' over ' + across.partition(' [')[0] + ' [')}"
-                column.set_xlabel(over, fontsize=WORDS - 1.0)
+                label = f"{up.replace(' [', ' over ' + across.partition(' [')[0] + ' [')}"
+                column.set_xlabel(label, fontsize=COLUMN_TEXT - 1.0)
                 column.set_ylabel("")
-                column.tick_params(labelsize=WORDS - 2.0)
+                column.tick_params(labelsize=COLUMN_TEXT - 2.0)
                 column.locator_params(nbins=3)
                 if plane is planes[0]:
-                    beside = figure.add_axes((0.875, place.y0, 0.024, place.height))
-                    bar = figure.colorbar(mesh, cax=beside)
-                    bar.ax.tick_params(labelsize=WORDS - 2.0)
-                    bar.ax.set_title("|E| [µm]", fontsize=WORDS - 1.5, pad=6.0)
+                    colour_axes = figure.add_axes((0.875, place.y0, 0.024, place.height))
+                    bar = figure.colorbar(mesh, cax=colour_axes)
+                    bar.ax.tick_params(labelsize=COLUMN_TEXT - 2.0)
+                    bar.ax.set_title("|E| [µm]", fontsize=COLUMN_TEXT - 1.5, pad=6.0)
         return figure
 
 
-def compensation_maps(found: "Compensation", dark: bool, narrow: bool) -> Figure:
+def compensation_maps(compensation: "Compensation", dark: bool, narrow: bool) -> Figure:
     with on_ground(DARK if dark else LIGHT):
-        return (compensation_column if narrow else compensation_chart)(found)
+        return (compensation_column if narrow else compensation_chart)(compensation)
 
 
-def _planes(found: "Compensation") -> list[tuple[int, int]]:
-    return [plane for plane in PLANES if all(found.grid.shape[i] > 1 for i in plane)]
+def _planes(compensation: "Compensation") -> list[tuple[int, int]]:
+    return [plane for plane in PLANES if all(compensation.grid.shape[i] > 1 for i in plane)]
 
 
-def _fields(found: "Compensation") -> Sequence[tuple[str, "ErrorField", float]]:
-    before, after = (
-        max(float(field.norm_um.max()), LEAST_UM) for field in (found.before, found.after)
-    )
-    was, is_now = (
-        f"mean {one.mean_um:.2f}, max {one.max_um:.2f} µm"
-        for one in (found.before_statistics, found.after_statistics)
+def _fields(compensation: "Compensation") -> Sequence[tuple[str, "ErrorField", float]]:
+    before, after = compensation.before, compensation.after
+    largest, residual = (max(float(field.norm_um.max()), LEAST_UM) for field in (before, after))
+    before_text, after_text = (
+        f"mean {summary.mean_um:.2f}, max {summary.max_um:.2f} µm"
+        for summary in (compensation.before_statistics, compensation.after_statistics)
     )
     return (
-        (f"before: {was}", found.before, before),
-        (f"after, same colours: {is_now}", found.after, before),
-        ("what is left, colours of its own", found.after, after),
+        (f"before: {before_text}", before, largest),
+        (f"after, same colours: {after_text}", after, largest),
+        ("residual error, own colour scale", after, residual),
     )
 
 
 def _draw_slice(
-    axes: Axes, found: "Compensation", field: "ErrorField", plane: tuple[int, int], largest: float
+    axes: Axes,
+    compensation: "Compensation",
+    field: "ErrorField",
+    plane: tuple[int, int],
+    largest: float,
 ) -> AxesImage:
-    worst = np.unravel_index(int(np.argmax(found.after.norm_um)), found.grid.shape)
+    grid = compensation.grid
+    worst = np.unravel_index(int(np.argmax(compensation.after.norm_um)), grid.shape)
     across, up = plane
-    rest = 3 - across - up
-    values = np.take(field.norm_um, worst[rest], axis=rest)
-    names = found.grid.axes
+    normal = 3 - across - up
+    values = np.take(field.norm_um, worst[normal], axis=normal)
+    names = grid.axes
 
     def along(index: int) -> Array:
         name = names[index]
-        return np.ravel(found.grid.coordinates[name]) if name else np.zeros(1)
+        return np.ravel(grid.coordinates[name]) if name else np.zeros(1)
 
     lines = [along(index) for index in plane]
-    (left, right, half), (low, high, tall) = (
+    (x_left, right, half), (low, high, tall) = (
         (line[0], line[-1], (line[-1] - line[0]) / (len(line) - 1) / 2.0) for line in lines
     )
     mesh = axes.imshow(
-        values.T, origin="lower", extent=(left - half, right + half, low - tall, high + tall),
+        values.T, origin="lower", extent=(x_left - half, right + half, low - tall, high + tall),
         aspect="auto", interpolation="bilinear", cmap="viridis", vmin=0.0, vmax=largest,
     )  # fmt: skip
-    axes.set_xlim(left, right)
+    axes.set_xlim(x_left, right)
     axes.set_ylim(low, high)
     labels = [f"{names[i]} [{'mm' if names[i][:1] in 'XYZUVW' else '°'}]" for i in plane]
     axes.set_xlabel(labels[0], fontsize=SMALL)
     axes.set_ylabel(labels[1], fontsize=SMALL)
-    still = f"{names[rest]} {along(rest)[worst[rest]]:.4g}" if names[rest] else ""
+    position = f"{names[normal]} {along(normal)[worst[normal]]:.4g}" if names[normal] else ""
     axes.text(
-        0.02, 0.97, still.replace("-", "−"), transform=axes.transAxes, va="top",
+        0.02, 0.97, position.replace("-", "−"), transform=axes.transAxes, va="top",
         fontsize=SMALL - 1.0, color="white",
         path_effects=[withStroke(linewidth=1.8, foreground="#222222")],
     )  # fmt: skip

@@ -1,1 +1,1 @@
-"""What figures are drawn with: canvas, projection, off-screen bodies, labels."""
+"""Drawing tools of the figures: canvas, projection, off-screen bodies, labels."""

@@ -2,9 +2,9 @@
 
 matplotlib draws text and lines, at any size and in any format.
 
-Labels are measured before they are drawn, at sizes still to be chosen, and placed by the box of
-their ink: matplotlib's text paths give both, while `Text.get_window_extent` measures only drawn
-text and gives the height of a whole line, up to 8 px more.
+Labels are measured before they are drawn, at sizes not chosen yet, and placed by the box of their
+ink: matplotlib's text paths provide both, while `Text.get_window_extent` measures only drawn text
+and returns the height of a full line, up to 8 px more.
 """
 
 import math
@@ -87,19 +87,19 @@ class Canvas:
         return width * self.px(size), height * self.px(size)
 
     def fit(
-        self, text: str, room: float, size: float = SIZES.text, weight: str = "normal"
+        self, text: str, max_width: float, size: float = SIZES.text, weight: str = "normal"
     ) -> tuple[str, float]:
         text = clean(text)
-        room *= 0.98  # what is drawn may be a little wider than what was measured
+        max_width *= 0.98  # drawn text may be slightly wider than measured
         width = self.text_size(text, size, weight)[0]
-        if width <= room:
+        if width <= max_width:
             return text, size
-        smaller = max(min(SIZES.small / size, 1.0) if self.printed else 0.7, room / width)
+        smaller = max(min(SIZES.small / size, 1.0) if self.printed else 0.7, max_width / width)
         size *= smaller
-        if width * smaller <= room * 1.0001:
+        if width * smaller <= max_width * 1.0001:
             return text, size
         keep = len(text)
-        while keep > 1 and self.text_size(text[:keep] + _ELLIPSIS, size, weight)[0] > room:
+        while keep > 1 and self.text_size(text[:keep] + _ELLIPSIS, size, weight)[0] > max_width:
             keep -= 1
         return text[:keep].rstrip(" ·,") + _ELLIPSIS, size
 
@@ -117,9 +117,9 @@ class Canvas:
         rotation: float = 0.0,
         halo: str | None = None,
         zorder: float = 6.0,
-        room: float = math.inf,
+        max_width: float = math.inf,
     ) -> Rect:
-        text, size = self.fit(text, room, size, weight)
+        text, size = self.fit(text, max_width, size, weight)
         drawn = self.axes.text(
             x, y, text, ha=ha, va=va, rotation=rotation, zorder=zorder, parse_math=False,
             color=colour or self.theme.ink, fontsize=self.px(size) * POINTS_PER_PX,
@@ -199,15 +199,15 @@ class Canvas:
             )  # fmt: skip
 
     def rectangle(
-        self, left: float, bottom: float, width: float, height: float, **patch: Any
+        self, x_left: float, bottom: float, width: float, height: float, **patch: Any
     ) -> None:
-        self.axes.add_patch(Rectangle((left, bottom), width, height, clip_on=False, **patch))
+        self.axes.add_patch(Rectangle((x_left, bottom), width, height, clip_on=False, **patch))
 
     def image(self, rgba: np.ndarray[Any, Any], rect: Rect, zorder: float = 1.0) -> None:
         """Place an image (first row at the top) into a box: left, bottom, right, top, px."""
-        left, bottom, right, top = rect
+        x_left, bottom, right, top = rect
         self.axes.imshow(
-            rgba, extent=(left, right, bottom, top), origin="upper", interpolation="nearest",
+            rgba, extent=(x_left, right, bottom, top), origin="upper", interpolation="nearest",
             aspect="auto", zorder=zorder, clip_on=False,
         )  # fmt: skip
         self.axes.set_xlim(0.0, self.width)
@@ -253,10 +253,10 @@ def _text_rect(
     x: float, y: float, extent: tuple[float, float], ha: str, va: str, rotation: float
 ) -> Rect:
     width, height = extent
-    left = {"left": 0.0, "center": -width / 2, "right": -width}[ha]
+    x_left = {"left": 0.0, "center": -width / 2, "right": -width}[ha]
     low = {"baseline": 0.0, "bottom": 0.0, "top": -height}.get(va, -height / 2)
     c, s = math.cos(math.radians(rotation)), math.sin(math.radians(rotation))
-    ends = [(a, b) for a in (left, left + width) for b in (low, low + height)]
+    ends = [(a, b) for a in (x_left, x_left + width) for b in (low, low + height)]
     xs = [x + a * c - b * s for a, b in ends]
     ys = [y + a * s + b * c for a, b in ends]
     return min(xs), min(ys), max(xs), max(ys)
@@ -265,12 +265,12 @@ def _text_rect(
 _ANGLES = tuple(2.0 * math.pi * turn / 24 for turn in range(24))
 _DISTANCES = (8.0, 14.0, 22.0, 34.0, 50.0, 70.0, 100.0, 140.0)
 LEADER_FROM = 20.0
-"""Labels farther than this from what they name, px of a 1600 × 1200 figure, get a leader."""
+"""Labels farther than this from their point, px of a 1600 × 1200 figure, get a leader."""
 TEXT_COST, LINE_COST, BODY_COST = 40.0, 6.0, 1.2
 
 
 class Occupancy:
-    """A coarse picture of what is drawn already."""
+    """A coarse grid of the areas that are drawn on already."""
 
     def __init__(self, width: float, height: float, cell: float) -> None:
         self.cell = max(cell, 1.0)
@@ -278,9 +278,9 @@ class Occupancy:
         self.cost = np.zeros(shape)
 
     def _window(self, rect: Rect) -> tuple[slice, slice]:
-        left, bottom, right, top = (value / self.cell for value in rect)
+        x_left, bottom, right, top = (value / self.cell for value in rect)
         rows = slice(max(0, math.floor(bottom)), max(0, math.ceil(top)))
-        return rows, slice(max(0, math.floor(left)), max(0, math.ceil(right)))
+        return rows, slice(max(0, math.floor(x_left)), max(0, math.ceil(right)))
 
     def add_rects(self, rects: Iterable[Rect], weight: float = TEXT_COST) -> None:
         for rect in rects:
@@ -325,16 +325,16 @@ class PlacedLabel:
 
     centre: tuple[float, float]  # px
     rect: Rect  # px
-    anchor: tuple[float, float]  # px; the point it names
+    anchor: tuple[float, float]  # px; the labelled point
     distance: float  # px; from the anchor to the nearest point of the box
-    cost: float  # what it covers; 0 where it covers nothing
+    cost: float  # of the area it covers; 0 for a free area
 
 
 def place_label(
     anchors: Points,
     size: tuple[float, float],
     frame: Rect,
-    taken: Occupancy,
+    occupancy: Occupancy,
     unit: float,
 ) -> PlacedLabel | None:
     best: PlacedLabel | None = None
@@ -357,15 +357,15 @@ def place_label(
                 outside = rect[0] < frame[0] or rect[1] < frame[1]
                 if outside or rect[2] > frame[2] or rect[3] > frame[3]:
                     continue
-                cost = taken.at(rect)
+                cost = occupancy.at(rect)
                 score = cost + 0.012 * distance
                 if score < best_score and distance > LEADER_FROM:
-                    score += taken.between(anchor, (x - c * reach, y - s * reach))
+                    score += occupancy.between(anchor, (x - c * reach, y - s * reach))
                 if score < best_score:
                     best_score = score
                     best = PlacedLabel((x, y), rect, anchor, distance * unit, cost)
     if best is not None:
-        taken.add_rects([best.rect])
+        occupancy.add_rects([best.rect])
     return best
 
 
@@ -374,15 +374,15 @@ def write_label(
     text: str,
     anchors: Points,
     frame: Rect,
-    taken: Occupancy,
+    occupancy: Occupancy,
     *,
     size: float = SIZES.text,
     weight: str = "normal",
     colour: str | None = None,
 ) -> PlacedLabel | None:
-    """Write a label where there is room beside one of several points; none where there is none."""
+    """Write a label in free space beside one of several points; None where no space is free."""
     extent = canvas.text_size(text, size, weight)
-    placed = place_label(anchors, extent, frame, taken, canvas.factor)
+    placed = place_label(anchors, extent, frame, occupancy, canvas.factor)
     if placed is not None:
         canvas.text(
             *placed.centre, text, size=size, weight=weight, colour=colour, ha="center",

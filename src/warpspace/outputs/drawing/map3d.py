@@ -40,12 +40,12 @@ class Stage:
     canvas: Canvas
     picture: Picture
     projection: Projection
-    raster: Raster | None  # the drawn body; None where there is no surface
-    taken: Occupancy
-    frame: Rect | None  # that labels stay in; None where nothing is labelled
+    raster: Raster | None  # the drawn body; None without a surface
+    occupancy: Occupancy
+    frame: Rect | None  # limits of the labels; None without labels
 
     def split(self, lines_mm: Iterable[Array]) -> tuple[list[Array], list[Array]]:
-        """Split polylines into what can be seen and what the body hides, px."""
+        """Split polylines into visible parts and parts hidden by the body, px."""
         return split_visible(lines_mm, self.projection, self.raster)
 
     def label(self, text: str, anchors: Points) -> None:
@@ -53,7 +53,7 @@ class Stage:
             return
         canvas, colour = self.canvas, self.canvas.theme.accent
         placed = write_label(
-            canvas, text, anchors, self.frame, self.taken, weight="bold", colour=colour
+            canvas, text, anchors, self.frame, self.occupancy, weight="bold", colour=colour
         )
         if placed and placed.distance > canvas.px(LEADER_FROM) and len(anchors) > 1:
             draw_leader(canvas, placed, colour, 3.9)
@@ -68,34 +68,36 @@ def label_isolines(
     stage: Stage, by_level: Mapping[float, Sequence[Array]], colour: str, halo: str
 ) -> None:
     """Write each level once, along a long visible piece of its line."""
-    canvas, taken = stage.canvas, stage.taken
+    canvas, occupancy = stage.canvas, stage.occupancy
     for level, lines in by_level.items():
         text = spell_short(level)
         size = canvas.text_size(text, SIZES.small)
-        found: tuple[float, float, float, float] | None = None
+        best: tuple[float, float, float, float] | None = None
         for line in sorted(lines, key=_length, reverse=True)[:_CANDIDATE_LINES]:
             if _length(line) < 4.0 * size[0]:
                 continue
             for share in _SHARES:
-                x, y, angle = _beside(line, share, size)
+                x, y, angle = _label_position(line, share, size)
                 box = (x - size[0] / 2, y - size[1] / 2, x + size[0] / 2, y + size[1] / 2)
-                cost = taken.at(box)
-                if found is None or cost < found[0] - 0.05:
-                    found = (cost, x, y, angle)
-        if found is None:
+                cost = occupancy.at(box)
+                if best is None or cost < best[0] - 0.05:
+                    best = (cost, x, y, angle)
+        if best is None:
             continue
         rect = canvas.text(
-            found[1], found[2], text, size=SIZES.small, colour=colour, halo=halo, ha="center",
-            va="center_baseline", rotation=found[3], zorder=3.1,
+            best[1], best[2], text, size=SIZES.small, colour=colour, halo=halo, ha="center",
+            va="center_baseline", rotation=best[3], zorder=3.1,
         )  # fmt: skip
-        taken.add_rects([rect])
+        occupancy.add_rects([rect])
 
 
 def _length(line: Array) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
-def _beside(line: Array, share: float, size: tuple[float, float]) -> tuple[float, float, float]:
+def _label_position(
+    line: Array, share: float, size: tuple[float, float]
+) -> tuple[float, float, float]:
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     spots = share * along[-1] + np.array([-0.5, 0.0, 0.5]) * size[0]
     x, y = (np.interp(spots, along, line[:, axis]) for axis in range(2))
@@ -110,11 +112,11 @@ def draw_corners(stage: Stage) -> None:
     nominal, drawn = picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)
     length = np.linalg.norm(picture.field.error_um.reshape(-1, 3), axis=-1)
     worst = int(np.argmax(length))
-    found = surfaces.corners(picture.shape).tolist()
-    depth = projection.depth_mm(nominal[found])
+    corners = surfaces.corners(picture.shape).tolist()
+    depth = projection.depth_mm(nominal[corners])
     front = float(depth.min()) + 0.02 * float(np.ptp(depth)) + 1.0
-    wanted: list[tuple[str, Array, Array]] = []
-    for corner, deep in zip(found, depth, strict=True):
+    labels: list[tuple[str, Array, Array]] = []
+    for corner, deep in zip(corners, depth, strict=True):
         tail, tip = projection.project(nominal[corner]), projection.project(drawn[corner])
         ends = np.stack([nominal[corner], drawn[corner]])
         near = bool(deep <= front) or _is_seen(stage, ends)
@@ -122,14 +124,14 @@ def draw_corners(stage: Stage) -> None:
         canvas.arrow(tail, tip, alpha=opacity, zorder=4.0 if near else 3.4)
         if np.hypot(*(tip - tail)) > 0.1:
             canvas.disc(tail, 4.0, canvas.theme.accent, alpha=opacity)
-            stage.taken.add_lines([np.stack([tail, tip])], ARROW_COST)
+            stage.occupancy.add_lines([np.stack([tail, tip])], ARROW_COST)
         if near:
-            wanted.append((_amount(length[corner], largest=corner == worst), tail, tip))
-    if worst not in found and _is_seen(stage, drawn[worst][None]):
+            labels.append((_amount(length[corner], largest=corner == worst), tail, tip))
+    if worst not in corners and _is_seen(stage, drawn[worst][None]):
         spot = projection.project(drawn[worst])
         canvas.ring(spot, 7.0)
-        wanted.append((_amount(length[worst], largest=True), spot, spot))
-    for text, tail, tip in wanted:
+        labels.append((_amount(length[worst], largest=True), spot, spot))
+    for text, tail, tip in labels:
         stage.label(text, [tip, tail, (tip + tail) / 2.0])
 
 
@@ -150,7 +152,7 @@ INSETS = (112.0, 92.0, 84.0, 46.0)
 """Room for axes and labels around the body: left, bottom, right, top."""
 SMALL_INSETS = (70.0, 74.0, 40.0, 40.0)
 GHOST_DASHES = (11.0, 7.0)
-LONE_LINE_COST = 8.0  # labels keep off the line that is all there is of a volume
+LONE_LINE_COST = 8.0  # of labels on the line that represents a volume without area
 Annotate = Callable[[Stage], None]
 
 
@@ -169,24 +171,24 @@ def draw_map(
     faces = map_faces(picture.shape, cut=view == "iso")
     raster = render_bodies(surface_bodies(picture, faces), projection)
     start = len(canvas.rects)
-    taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
-    stage = Stage(canvas, picture, projection, raster, taken, rect if labels else None)
+    occupancy = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    stage = Stage(canvas, picture, projection, raster, occupancy, rect if labels else None)
     if raster is not None:
         draw_raster(canvas, raster)
-        taken.add_mask(raster.rgba[..., 3] > 0, raster.rect)
+        occupancy.add_mask(raster.rgba[..., 3] > 0, raster.rect)
     _draw_surface_lines(stage, faces)
-    draw_lone_line(canvas, picture, projection, taken)
+    draw_lone_line(canvas, picture, projection, occupancy)
     if ghost:
         _draw_ghost(stage)
     _draw_axes(stage)
-    taken.add_rects(canvas.rects[start:])
+    occupancy.add_rects(canvas.rects[start:])
     if annotate is not None:
         annotate(stage)
     return DrawnMap(projection, picture, raster)
 
 
 def surface_bodies(picture: Picture, faces: list[surfaces.Index]) -> list[RenderedBody]:
-    """Give the coloured surface where it is drawn; nothing where a volume has none."""
+    """Build the coloured surface of the displaced volume; empty for a volume without one."""
     surface = surfaces.triangulate(faces)
     if not len(surface.triangles):
         return []
@@ -212,14 +214,14 @@ def fit_map(
     labels: bool = True,
     beside_mm: Array | None = None,
 ) -> Projection:
-    """Choose the projection in which several maps, drawn alike, fill a box."""
+    """Fit one projection in which each of several maps fills a box."""
     insets = [canvas.px(inset) for inset in (INSETS if labels else SMALL_INSETS)]
     width, height = rect[2] - rect[0], rect[3] - rect[1]
     insets = [
         min(inset, 0.24 * side) for inset, side in zip(insets, (width, height) * 2, strict=True)
     ]
     inner = (rect[0] + insets[0], rect[1] + insets[1], rect[2] - insets[2], rect[3] - insets[3])
-    points = [map_room_mm(picture) for picture in pictures]
+    points = [map_points_mm(picture) for picture in pictures]
     points += [] if beside_mm is None else [beside_mm]
     return fit_projection(view, np.concatenate(points), inner)
 
@@ -235,33 +237,33 @@ def draw_maps_alike(
     rooms = [(left, bottom, right, top - head) for left, bottom, right, top in cells]
     shared = fit_map(canvas, pictures, rooms[0], view)
     maps: list[DrawnMap] = []
-    for picture, name, room in zip(pictures, names, rooms, strict=True):
-        projection = shared.moved(np.array(room[:2]) - np.array(rooms[0][:2]))
-        maps.append(draw_map(canvas, picture, room, view, projection=projection))
+    for picture, name, area in zip(pictures, names, rooms, strict=True):
+        projection = shared.moved(np.array(area[:2]) - np.array(rooms[0][:2]))
+        maps.append(draw_map(canvas, picture, area, view, projection=projection))
         canvas.text(
-            room[0] + head, room[3] + head - canvas.px(4.0), name, size=SIZES.heading,
-            weight="bold", va="top", room=room[2] - room[0] - 2.0 * head,
+            area[0] + head, area[3] + head - canvas.px(4.0), name, size=SIZES.heading,
+            weight="bold", va="top", max_width=area[2] - area[0] - 2.0 * head,
         )  # fmt: skip
     return tuple(maps)
 
 
-def map_room_mm(picture: Picture) -> Array:
-    """Give what of a volume is to be seen, [n, 3], mm: where it is, where it is drawn."""
+def map_points_mm(picture: Picture) -> Array:
+    """Collect the points that a drawing of a volume contains, [n, 3], mm: nominal and displaced."""
     points = [picture.grid.nominal_mm.reshape(-1, 3), picture.drawn_mm.reshape(-1, 3)]
     if any(axis and not is_linear(axis) for axis in picture.grid.axes):
         nodes = np.concatenate(points)
         x, y, z = np.stack([nodes.min(axis=0), nodes.max(axis=0)], -1)
         points.append(np.stack(np.meshgrid(x, y, z), -1).reshape(-1, 3))
     if not picture.grid.longest_edge_mm > 0.0:
-        around = 0.5 * picture.size_mm * np.array([[-1.0], [1.0]])
-        points.append(picture.grid.bounds_mm + around)
+        margin = 0.5 * picture.size_mm * np.array([[-1.0], [1.0]])
+        points.append(picture.grid.bounds_mm + margin)
     return np.concatenate(points)
 
 
 def _draw_surface_lines(stage: Stage, faces: list[surfaces.Index]) -> None:
     if not faces:
         return
-    canvas, picture, taken = stage.canvas, stage.picture, stage.taken
+    canvas, picture, occupancy = stage.canvas, stage.picture, stage.occupancy
     theme, shape = canvas.theme, picture.shape
     nodes, values = picture.drawn_mm.reshape(-1, 3), picture.values.reshape(-1)
 
@@ -272,7 +274,7 @@ def _draw_surface_lines(stage: Stage, faces: list[surfaces.Index]) -> None:
     canvas.lines(grid, width=SIZES.hair, colour=theme.grid, alpha=0.42, zorder=2.0)
     creases = visible(surfaces.crease_lines(faces, shape))
     canvas.lines(creases, width=SIZES.line, colour=theme.grid, zorder=3.0)
-    taken.add_lines(creases, LINE_COST)
+    occupancy.add_lines(creases, LINE_COST)
     diverging = picture.scale.diverging
     levels = surfaces.isoline_levels(picture.scale)
     by_level: dict[float, list[Array]] = {}
@@ -283,12 +285,12 @@ def _draw_surface_lines(stage: Stage, faces: list[surfaces.Index]) -> None:
     for level, lines in by_level.items():
         width = SIZES.line if diverging and level == 0.0 else SIZES.thin
         canvas.lines(lines, width=width, colour=colour, alpha=0.95, zorder=2.5)
-    taken.add_lines([line for lines in by_level.values() for line in lines], 0.5)
+    occupancy.add_lines([line for lines in by_level.values() for line in lines], 0.5)
     label_isolines(stage, by_level, colour, theme.isoline if diverging else theme.grid)
 
 
 def draw_lone_line(
-    canvas: Canvas, picture: Picture, projection: Projection, taken: Occupancy | None = None
+    canvas: Canvas, picture: Picture, projection: Projection, occupancy: Occupancy | None = None
 ) -> None:
     """Draw a volume without area (one axis, or none that is linear) as a coloured line or point."""
     if not surfaces.is_thin(picture.shape):
@@ -302,27 +304,27 @@ def draw_lone_line(
     pieces = [spots[i : i + 2] for i in range(len(spots) - 1)]
     middle = picture.scale.colours((values[1:] + values[:-1]) / 2.0) / 255.0
     canvas.lines(pieces, width=7.0, colour=middle, zorder=2.0)
-    if taken is not None:
-        taken.add_lines([spots], LONE_LINE_COST)
+    if occupancy is not None:
+        occupancy.add_lines([spots], LONE_LINE_COST)
     for spot, colour in zip(spots, colours, strict=True):
         canvas.disc(spot, 4.5, colour)
 
 
 def _draw_ghost(stage: Stage) -> None:
-    canvas, taken, theme = stage.canvas, stage.taken, stage.canvas.theme
+    canvas, occupancy, theme = stage.canvas, stage.occupancy, stage.canvas.theme
     nodes = stage.picture.grid.nominal_mm.reshape(-1, 3)
-    seen, hidden = stage.split(nodes[edge] for edge in surfaces.box_edges(stage.picture.shape))
+    visible, hidden = stage.split(nodes[edge] for edge in surfaces.box_edges(stage.picture.shape))
     canvas.lines(
         hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.6, dashes=GHOST_DASHES, zorder=3.2
     )
-    canvas.lines(seen, width=SIZES.line, colour=theme.ghost, dashes=GHOST_DASHES, zorder=3.3)
-    taken.add_lines(seen, LINE_COST)
-    taken.add_lines(hidden, 0.5 * LINE_COST)
+    canvas.lines(visible, width=SIZES.line, colour=theme.ghost, dashes=GHOST_DASHES, zorder=3.3)
+    occupancy.add_lines(visible, LINE_COST)
+    occupancy.add_lines(hidden, 0.5 * LINE_COST)
 
 
 GAP = 16.0  # between the body and an axis line
 TICK = 7.0
-SHORTEST = 40.0  # axes seen nearly end-on, shorter than this in the picture, are left out
+SHORTEST = 40.0  # axes that appear shorter, nearly end-on, are omitted
 
 
 def _draw_axes(stage: Stage) -> None:
@@ -342,12 +344,12 @@ def _draw_axes(stage: Stage) -> None:
 def _silhouette_edge(axis: int, low: Array, high: Array, projection: Projection) -> Array | None:
     if high[axis] - low[axis] <= 0.0:
         return None
-    rest = [other for other in range(3) if other != axis]
+    plane_axes = [other for other in range(3) if other != axis]
     edges: list[Array] = []
-    for first in (low[rest[0]], high[rest[0]]):
-        for second in (low[rest[1]], high[rest[1]]):
+    for first in (low[plane_axes[0]], high[plane_axes[0]]):
+        for second in (low[plane_axes[1]], high[plane_axes[1]]):
             ends = np.stack([low, high])
-            ends[:, rest[0]], ends[:, rest[1]] = first, second
+            ends[:, plane_axes[0]], ends[:, plane_axes[1]] = first, second
             edges.append(ends)
     spots = projection.project(np.array(edges))
     centre = projection.project((low + high) / 2.0)
@@ -371,15 +373,15 @@ def _draw_axis(stage: Stage, axis: int, ends_mm: Array, spots: Array) -> None:
     upright = abs(along[1]) > 2.0 * abs(along[0])
     if (normal[0] > 0.0) if upright else (normal[1] > 0.0):
         normal = -normal
-    # clear of what sticks out beyond the nominal edge, beside the length of the axis
-    beside = (spots - start) @ along
-    near = spots[(beside > 0.0) & (beside < np.hypot(*(end - start)))]
+    # clear of nodes displaced beyond the nominal edge along the axis
+    positions = (spots - start) @ along
+    near = spots[(positions > 0.0) & (positions < np.hypot(*(end - start)))]
     sticking = float(((near - start) @ normal).max(initial=0.0))
     base = normal * (max(sticking, 0.0) + canvas.px(GAP))
     theme = canvas.theme
     line = np.stack([start + base, end + base])
     canvas.line(line, width=SIZES.thin, colour=theme.muted, zorder=2.0)
-    stage.taken.add_lines([line], LINE_COST)
+    stage.occupancy.add_lines([line], LINE_COST)
     low, high = float(ends_mm[0, axis]), float(ends_mm[1, axis])
     reach = 0.0
     for value in tick_values(low, high, float(np.hypot(*(end - start))) / canvas.px(78.0)):

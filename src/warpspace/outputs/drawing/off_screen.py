@@ -63,16 +63,16 @@ def view_axes(view: str) -> tuple[Array, Array, Array]:
 def fit_projection(
     view: str, points_mm: Array, rect: Rect, px_per_mm: float | None = None
 ) -> Projection:
-    """Choose the projection that makes points fill a box of the figure, or puts them amid it."""
+    """Fit the projection in which points fill a box of the figure, or are centred in it."""
     right, up, towards = view_axes(view)
     flat = points_mm.reshape(-1, 3)
     centre = (flat.min(axis=0) + flat.max(axis=0)) / 2.0
     plane = np.stack([(flat - centre) @ right, (flat - centre) @ up], -1)
     low, high = plane.min(axis=0), plane.max(axis=0)
-    room = np.array([rect[2] - rect[0], rect[3] - rect[1]])
+    size_px = np.array([rect[2] - rect[0], rect[3] - rect[1]])
     spans = np.maximum(high - low, 1e-9)
     if px_per_mm is None:
-        px_per_mm = float(np.min(room / spans)) if (high - low).max() > 1e-9 else 1.0
+        px_per_mm = float(np.min(size_px / spans)) if (high - low).max() > 1e-9 else 1.0
     middle = np.array([(rect[0] + rect[2]) / 2.0, (rect[1] + rect[3]) / 2.0])
     return Projection(
         right, up, towards, px_per_mm, centre, middle - px_per_mm * (low + high) / 2.0
@@ -101,12 +101,12 @@ class RenderedBody:
 
     vertices_mm: Array  # [M, 3]; where they are drawn
     triangles: NDArray[np.intp]  # [T, 3]
-    # [M]; what the colour shows; interpolated over each triangle before it becomes a colour
+    # [M]; coloured values; interpolated over each triangle before they become colours
     values: Array | None = None
     scale: ColourScale | None = None  # colours of the values
     # one colour (sRGB, 0 to 1) for a body without values
     colour: tuple[float, float, float] = (0.7, 0.7, 0.7)
-    shaded: bool = False  # whether light falls on it: for machine bodies, never for coloured errors
+    shaded: bool = False  # lit: machine bodies, never coloured errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,7 @@ class Raster:
     """Drawn bodies."""
 
     rgba: Bytes  # [h, w, 4]; first row at the top
-    depth_mm: NDArray[np.float32]  # [h, w]; as `Projection.depth_mm`; infinite where nothing is
+    depth_mm: NDArray[np.float32]  # [h, w]; as `Projection.depth_mm`; infinite for the background
     # [h, w]; the largest depth within a pixel of the figure around each
     farthest_mm: NDArray[np.float32]
     rect: Rect  # px; box of the figure it covers
@@ -135,9 +135,9 @@ class Raster:
         return np.asarray(image.convert("RGBA"))
 
     def depth_at(self, points_px: Array, *, spread: bool = False) -> Array:
-        left, _, _, top = self.rect
+        x_left, _, _, top = self.rect
         i = np.floor((top - points_px[..., 1]) * self.sampling).astype(np.intp)
-        j = np.floor((points_px[..., 0] - left) * self.sampling).astype(np.intp)
+        j = np.floor((points_px[..., 0] - x_left) * self.sampling).astype(np.intp)
         height, width = self.depth_mm.shape
         inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
         depth = self.farthest_mm if spread else self.depth_mm
@@ -145,23 +145,23 @@ class Raster:
 
 
 def render_bodies(bodies: Sequence[RenderedBody], projection: Projection) -> Raster | None:
-    """Draw bodies; none where there are none."""
+    """Draw bodies; None without bodies."""
     if not bodies:
         return None
     from scipy.ndimage import maximum_filter
 
     points = np.concatenate([body.vertices_mm for body in bodies])
     spots = projection.project(points)
-    left, bottom = (np.floor(spots.min(axis=0)) - MARGIN_PX).astype(int)
+    x_left, bottom = (np.floor(spots.min(axis=0)) - MARGIN_PX).astype(int)
     right, top = (np.ceil(spots.max(axis=0)) + MARGIN_PX).astype(int)
-    width, height = int(right - left), int(top - bottom)
+    width, height = int(right - x_left), int(top - bottom)
     small = max(width, height) * SUPERSAMPLING <= _LARGEST_SIDE_PX
     small = small and width * height * SUPERSAMPLING**2 <= _LARGEST_AREA_PX
     step = SUPERSAMPLING if small else 1
-    middle = np.array([(left + right) / 2.0, (bottom + top) / 2.0])
+    middle = np.array([(x_left + right) / 2.0, (bottom + top) / 2.0])
     rgba, depth = _draw(bodies, projection, middle, (width * step, height * step), step)
     farthest = np.asarray(maximum_filter(depth, 2 * step + 1, mode="nearest"), np.float32)
-    return Raster(rgba, depth, farthest, (float(left), float(bottom), float(right), float(top)))
+    return Raster(rgba, depth, farthest, (float(x_left), float(bottom), float(right), float(top)))
 
 
 def _draw(
@@ -177,10 +177,10 @@ def _draw(
     offset = (middle_px - projection.centre_px) / projection.px_per_mm
     focus = projection.centre_mm + offset[0] * projection.right + offset[1] * projection.up
     depths = np.concatenate([projection.depth_mm(body.vertices_mm) for body in bodies])
-    room = 1.0 + 0.02 * float(np.ptp(depths))
-    near, far = float(depths.min()) - room, float(depths.max()) + room
+    margin = 1.0 + 0.02 * float(np.ptp(depths))
+    near, far = float(depths.min()) - margin, float(depths.max()) + margin
 
-    # a theme of its own: what users set for their plotters does not reach the figures
+    # a separate theme: settings of users for their plotters do not affect the figures
     theme = pv.themes.Theme()
     theme.background = "black"
     plotter = pv.Plotter(off_screen=True, window_size=list(size), lighting="none", theme=theme)
@@ -189,8 +189,8 @@ def _draw(
         for body in bodies:
             _add_body(plotter, body)
         if any(body.shaded for body in bodies):
-            way = projection.towards + 1.1 * projection.up - 0.7 * projection.right
-            plotter.add_light(pv.Light(position=tuple(way), focal_point=(0.0, 0.0, 0.0)))
+            light = projection.towards + 1.1 * projection.up - 0.7 * projection.right
+            plotter.add_light(pv.Light(position=tuple(light), focal_point=(0.0, 0.0, 0.0)))
         camera = plotter.camera
         camera.parallel_projection = True
         camera.position = focus + (1.0 - near) * projection.towards
@@ -199,30 +199,30 @@ def _draw(
         camera.parallel_scale = size[1] / step / 2.0 / projection.px_per_mm
         camera.clipping_range = (1.0, 1.0 + far - near)
         rgba = plotter.screenshot(transparent_background=True, return_img=True)
-        behind = plotter.get_image_depth(fill_value=-np.inf, reset_camera_clipping_range=False)
+        depth_image = plotter.get_image_depth(fill_value=-np.inf, reset_camera_clipping_range=False)
     except (ValueError, AttributeError, RuntimeError) as error:
         raise RenderError(
-            f"the picture could not be drawn: VTK gave no pixels ({error})"
+            f"the picture could not be drawn: VTK returned no pixels ({error})"
         ) from error
     finally:
         plotter.close()
-    depth = (near - 1.0) - np.asarray(behind)
+    depth = (near - 1.0) - np.asarray(depth_image)
     return np.array(rgba), depth.astype(np.float32)
 
 
 @cache
 def check_renderer() -> None:
-    """Refuse to draw where VTK finds no OpenGL, since drawing there would end the program."""
+    """Check that VTK has OpenGL: without it, drawing would end the program."""
     if sys.platform == "linux":
         os.environ.setdefault(WINDOW_VARIABLE, "vtkEGLRenderWindow")
     from vtkmodules.vtkCommonCore import vtkLogger
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
-    import_module("vtkmodules.vtkRenderingOpenGL2")  # registers the windows there are
+    import_module("vtkmodules.vtkRenderingOpenGL2")  # registers the available windows
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    found = vtkRenderWindow().GetClassName()
+    window = vtkRenderWindow().GetClassName()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_INFO)
-    if found == FALLBACK != os.environ.get(WINDOW_VARIABLE):
+    if window == FALLBACK != os.environ.get(WINDOW_VARIABLE):
         raise NoRendererError(f"VTK cannot draw off screen here. {_advice()}")
 
 
@@ -266,12 +266,12 @@ def split_visible(
     lines_mm: Iterable[Array], projection: Projection, raster: Raster | None
 ) -> tuple[list[Array], list[Array]]:
     """Split polylines into their visible and their hidden parts, px."""
-    seen: list[Array] = []
-    hidden: list[Array] = []
+    visible_parts: list[Array] = []
+    hidden_parts: list[Array] = []
     for line_mm in lines_mm:
         spots = projection.project(line_mm)
         if raster is None:
-            seen.append(spots)
+            visible_parts.append(spots)
             continue
         deep = np.column_stack([spots, projection.depth_mm(line_mm)])
         fine_px, fine_depth = np.split(resample(deep, STEP_PX), [2], axis=1)
@@ -280,18 +280,18 @@ def split_visible(
         for start, end in pairwise(_bounds(visible)):
             part = fine_px[start : min(end + 1, len(visible))]
             if len(part) > 1:
-                (seen if visible[start] else hidden).append(_thin(part))
-    return seen, hidden
+                (visible_parts if visible[start] else hidden_parts).append(_thin(part))
+    return visible_parts, hidden_parts
 
 
 def resample(line: Array, step: float) -> Array:
-    """Put points into a polyline, so far apart at most in its first two columns, [n, 2 or more]."""
+    """Insert points into a polyline up to a maximum distance in its first two columns, [n, ≥ 2]."""
     lengths = np.hypot(*np.diff(line[:, :2], axis=0).T)
     pieces = np.maximum(1, np.ceil(lengths / step)).astype(int)
     # position along the polyline, in numbers of its points
     along = np.concatenate([[0.0], np.cumsum(np.repeat(1.0 / pieces, pieces))])
-    known = np.arange(len(line))
-    return np.stack([np.interp(along, known, values) for values in line.T], -1)
+    numbers = np.arange(len(line))
+    return np.stack([np.interp(along, numbers, values) for values in line.T], -1)
 
 
 def _thin(spots: Array) -> Array:
@@ -304,12 +304,12 @@ def _thin(spots: Array) -> Array:
 
 
 def _steady(visible: np.ndarray, shortest: int) -> np.ndarray:
-    result = visible.copy()
+    steady = visible.copy()
     for start, end in pairwise(_bounds(visible)):
         inner = start > 0 and end < len(visible)
         if inner and end - start < shortest:
-            result[start:end] = not visible[start]
-    return result
+            steady[start:end] = not visible[start]
+    return steady
 
 
 def _bounds(visible: np.ndarray) -> list[int]:

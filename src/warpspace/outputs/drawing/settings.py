@@ -1,6 +1,6 @@
-"""What a figure is asked for, and the one look of all: colours of paper and ink, sizes of text.
+"""Options of a figure, and the common style: colours of paper and ink, sizes of text.
 
-Colour on a body means error and comes from `warpspace.geometry.colour`; everything here is quiet.
+Colours of errors come from `warpspace.geometry.colour`; the colours here are muted.
 Sizes are pixels of a 1600 × 1200 figure; a figure of another size multiplies them by its factor.
 """
 
@@ -27,7 +27,7 @@ FIGURE_ENDINGS: Final = (".png", ".svg", ".pdf")
 SMALLEST_FACTOR: Final = 0.5
 """Text never gets smaller than this share of its size in a 1600 × 1200 figure."""
 PRINT: Final = 1.3
-"""What sizes are multiplied by, so that text can be read where a figure is printed 17 cm wide."""
+"""Factor on sizes, so that text is legible in a figure printed 17 cm wide."""
 PRINTED_PX: Final = 685  # width of a figure in a report: 174 mm
 PRINTED_FACTOR: Final = 0.7  # factor on text and lines there: small text has 7 pt
 
@@ -83,7 +83,7 @@ SAVE_RC: Any = {
     "path.simplify": False,
     "agg.path.chunksize": 0,
 }
-"""Settings of matplotlib under which figures are drawn and saved: the same bytes every time."""
+"""Settings of matplotlib for drawing and saving figures reproducibly, byte by byte."""
 
 
 def factor(width: int, height: int) -> float:
@@ -106,16 +106,16 @@ class FigureSettings:
     dark: bool = False  # light ink on a dark ground
     loop: str = "tool"  # "tool", "workpiece" or "relative"
     grid: int = 21  # nodes per axis of the working volume
-    # µm or µrad; where the colours end (a signed component's begin at its negative); None for a
-    # round value that holds all of the map
+    # µm or µrad; end of the colour range (of a signed component also its negative start); None for
+    # a round value above the whole map
     range_top: float | None = None
-    range_fixed: bool = False  # whether somebody chose that end: the figure then says so
-    # what the figure must say beside its scenes, for instance "excluded: EA0Z"
+    range_fixed: bool = False  # that end was set by the user; stated in the figure
+    # restrictions to state in the figure, for instance "excluded: EA0Z"
     conditions: tuple[str, ...] = ()
-    # how machines are sampled that are set side by side
+    # sampling of machines that are compared side by side
     concepts: Concepts = field(default_factory=Concepts)
-    # whether a report says what heading, footer and statistics would: the figure is without them,
-    # as large as it is printed
+    # for a report, which has heading, footer and statistics itself: the figure omits them and has
+    # its printed size
     printed: bool = False
 
     def __post_init__(self) -> None:
@@ -124,11 +124,11 @@ class FigureSettings:
             raise OptionError(f"component {self.component!r}; expected one of {expected}")
         if self.view not in model.VIEWS:
             raise OptionError(f"view {self.view!r}; expected one of {', '.join(model.VIEWS)}")
-        model.given_exaggeration(self.exaggeration, None)
+        model.fixed_exaggeration(self.exaggeration, None)
         low, high = RANGE_TOP
         if self.range_top is not None and not low <= self.range_top <= high:
-            found = f"range_top {self.range_top:g}; expected a number above 0"
-            raise OptionError(f"{found}, from {low:g} to {high:,.0f}")
+            problem = f"range_top {self.range_top:g}; expected a number above 0"
+            raise OptionError(f"{problem}, from {low:g} to {high:,.0f}")
         check_size(self.size)
 
     @property
@@ -169,7 +169,7 @@ def evaluate_for(
 def share_colours(
     settings: FigureSettings, pictures: Sequence[model.ScenePicture]
 ) -> list[model.ScenePicture]:
-    """Give pictures the colours of one bar."""
+    """Apply one colour scale to pictures."""
     scale = model.choose_scale(
         [picture.values for picture in pictures],
         settings.component,

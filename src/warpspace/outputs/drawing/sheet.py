@@ -1,7 +1,7 @@
-"""What every figure carries around its content: heading, facts, legend, panel, provenance.
+"""The frame of every figure: heading, facts, legend, panel, provenance.
 
-The symbols of the legend are drawn with the strokes of the picture itself, and entries for which
-there is no room are left out; matplotlib's legend does neither.
+The symbols of the legend are drawn with the strokes of the picture itself, and entries that do not
+fit are omitted; matplotlib's legend does neither.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -31,11 +31,11 @@ from warpspace.units import MM_PER_UM, spell_short
 
 @dataclass(frozen=True, slots=True)
 class DrawnMap:
-    """A map as it stands in a figure: enough to read it back."""
+    """A map in a figure, with its projection and raster."""
 
     projection: Projection
     picture: Picture
-    raster: Raster | None  # the drawn body; None where there is no surface
+    raster: Raster | None  # the drawn body; None without a surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Drawing:
 
     figure: Figure
     title: str
-    facts: Mapping[str, str]  # scene, version, settings: what the file carries as metadata
+    facts: Mapping[str, str]  # metadata of the file: scene, version, settings
     maps: tuple[DrawnMap, ...] = ()
     rects: tuple[Rect, ...] = ()  # (n, 4), px; boxes of all text
 
@@ -77,10 +77,10 @@ def line_entry(
 
 
 def draw_legend(
-    canvas: Canvas, legend: Sequence[LegendEntry], x: float, y: float, room: float
+    canvas: Canvas, legend: Sequence[LegendEntry], x: float, y: float, max_width: float
 ) -> None:
     swatch, gap = canvas.px(36.0), canvas.px(10.0)
-    end = x + room
+    end = x + max_width
     for entry in legend:
         width = swatch + gap + canvas.text_size(entry.text, SIZES.small)[0]
         if x + width > end:
@@ -94,7 +94,7 @@ def draw_legend(
 
 
 def isoline_entries(text: str, *, diverging: bool = False) -> list[LegendEntry]:
-    """Give the entry of isolines, a white line or a dark one on a coloured ground, if any."""
+    """Build the entry of isolines, a white or dark line on a coloured ground; none without text."""
 
     def symbol(canvas: Canvas, x: float, y: float, width: float) -> None:
         height, theme = canvas.px(14.0), canvas.theme
@@ -113,26 +113,26 @@ def draw_colour_bar(
     canvas: Canvas, rect: Rect, scale: ColourScale, marks: Sequence[tuple[str, float]] = ()
 ) -> None:
     """Draw a colour bar with numbers on its right and marked values on its left."""
-    left, low, right, high = rect
+    x_left, low, right, high = rect
     theme = canvas.theme
     colours = scale.colours(np.linspace(scale.high, scale.low, LEVELS))[:, None, :]
-    canvas.image(colours, (left, low, right, high), zorder=2.0)
+    canvas.image(colours, (x_left, low, right, high), zorder=2.0)
     canvas.rectangle(
-        left, low, right - left, high - low, fill=False, edgecolor=theme.muted,
+        x_left, low, right - x_left, high - low, fill=False, edgecolor=theme.muted,
         linewidth=canvas.px(1.0) * 0.72, zorder=2.6,
     )  # fmt: skip
     span = scale.high - scale.low
     height = canvas.text_size("0", SIZES.text)[1]
-    every = 1
-    while (high - low) / max(1, (len(scale.ticks) - 1) / every) < 1.6 * height:
-        every += 1
+    tick_step = 1
+    while (high - low) / max(1, (len(scale.ticks) - 1) / tick_step) < 1.6 * height:
+        tick_step += 1
     zero = min(range(len(scale.ticks)), key=lambda i: abs(scale.ticks[i]))
     for index, tick in enumerate(scale.ticks):
         y = low + (tick - scale.low) / span * (high - low)
         if scale.low < tick < scale.high:
             colour = theme.grid if scale.diverging else theme.isoline
-            canvas.line([(left, y), (right, y)], width=SIZES.thin, colour=colour, zorder=2.5)
-        if (index - zero) % every:
+            canvas.line([(x_left, y), (right, y)], width=SIZES.thin, colour=colour, zorder=2.5)
+        if (index - zero) % tick_step:
             continue
         canvas.line([(right, y), (right + canvas.px(7.0), y)], width=SIZES.thin, colour=theme.muted)
         canvas.text(right + canvas.px(13.0), y, spell_short(tick), va="center_baseline")
@@ -142,21 +142,21 @@ def draw_colour_bar(
 def _draw_marks(
     canvas: Canvas, rect: Rect, scale: ColourScale, marks: Sequence[tuple[str, float]]
 ) -> None:
-    left, low, _, high = rect
+    x_left, low, _, high = rect
     distance = canvas.px(19.0)
     ordered = sorted(marks, key=lambda mark: mark[1])
     spots = [low + float(scale.fraction(np.asarray(value))) * (high - low) for _, value in ordered]
     heights = list(spots)
     for index in range(1, len(heights)):
         heights[index] = max(heights[index], heights[index - 1] + distance)
-    over = heights[-1] - (high + canvas.px(6.0)) if heights else 0.0
-    if over > 0.0:
-        heights[-1] -= over
+    overflow = heights[-1] - (high + canvas.px(6.0)) if heights else 0.0
+    if overflow > 0.0:
+        heights[-1] -= overflow
         for index in range(len(heights) - 2, -1, -1):
             heights[index] = min(heights[index], heights[index + 1] - distance)
     for (name, value), spot, height in zip(ordered, spots, heights, strict=True):
         beyond = " ↑" if value > scale.high else " ↓" if value < scale.low else ""
-        tip = left - canvas.px(2.0)
+        tip = x_left - canvas.px(2.0)
         side = canvas.px(5.0)
         base = tip - canvas.px(9.0)
         canvas.polygon(
@@ -174,19 +174,19 @@ def draw_scale_bars(
     canvas: Canvas, rect: Rect, px_per_mm: float, exaggeration: float | None
 ) -> float:
     """Draw one bar for lengths and one for displacements, both as seen in the picture plane."""
-    left, y, right, _ = rect
-    room = min(right - left, canvas.px(190.0))
+    x_left, y, right, _ = rect
+    max_width = min(right - x_left, canvas.px(190.0))
     theme = canvas.theme
     y += canvas.px(6.0)
     if exaggeration is not None:
         px_per_um = px_per_mm * MM_PER_UM * exaggeration
-        length = round_down(room / px_per_um)
+        length = round_down(max_width / px_per_um)
         name = f"{spell_short(length)} µm displacement ({spell_factor(exaggeration)})"
-        _draw_bar(canvas, left, y, length * px_per_um, theme.accent, name, right)
+        _draw_bar(canvas, x_left, y, length * px_per_um, theme.accent, name, right)
         y += canvas.px(52.0)
-    length = round_down(room / px_per_mm)
+    length = round_down(max_width / px_per_mm)
     name = f"{spell_short(length)} mm geometry"
-    _draw_bar(canvas, left, y, length * px_per_mm, theme.ink, name, right)
+    _draw_bar(canvas, x_left, y, length * px_per_mm, theme.ink, name, right)
     return y + canvas.px(34.0)
 
 
@@ -197,22 +197,23 @@ def _draw_bar(
     points = [(x, y - foot), (x, y), (x + length, y), (x + length, y - foot)]
     canvas.line(points, colour=colour, cap="butt")
     y += canvas.px(13.0)
-    canvas.text(x, y, name, size=SIZES.small, colour=colour, room=end - x)
+    canvas.text(x, y, name, size=SIZES.small, colour=colour, max_width=end - x)
 
 
 HINTED = 0.92
-"""Share of a room that measured text may take beside other text: small letters are drawn wider."""
+"""Share of the width for measured text beside other text: hinting widens small letters."""
 
 
 def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     margin = canvas.margin
-    room = canvas.width - 2.0 * margin
+    max_width = canvas.width - 2.0 * margin
     y = canvas.height - canvas.px(54.0)
-    canvas.text(margin, y, title, size=SIZES.title, weight="bold", room=room)
+    canvas.text(margin, y, title, size=SIZES.title, weight="bold", max_width=max_width)
     y -= canvas.px(14.0)
-    for line in _wrap(canvas, facts, room):
+    for line in _wrap(canvas, facts, max_width):
         y -= canvas.px(24.0)
-        canvas.text(margin, y, line, size=SIZES.subtitle, colour=canvas.theme.muted, room=room)
+        colour = canvas.theme.muted
+        canvas.text(margin, y, line, size=SIZES.subtitle, colour=colour, max_width=max_width)
     y -= canvas.px(18.0)
     canvas.line(
         [(margin, y), (canvas.width - margin, y)], width=SIZES.hair, colour=canvas.theme.faint
@@ -220,11 +221,11 @@ def draw_heading(canvas: Canvas, title: str, facts: Sequence[str]) -> float:
     return y
 
 
-def _wrap(canvas: Canvas, facts: Sequence[str], room: float) -> list[str]:
+def _wrap(canvas: Canvas, facts: Sequence[str], max_width: float) -> list[str]:
     rows: list[str] = []
     for fact in facts:
         joined = f"{rows[-1]} · {fact}" if rows else fact
-        fits = canvas.text_size(joined, SIZES.subtitle)[0] <= room
+        fits = canvas.text_size(joined, SIZES.subtitle)[0] <= max_width
         if rows and (fits or len(rows) == 2):
             rows[-1] = joined
         else:
@@ -233,7 +234,7 @@ def _wrap(canvas: Canvas, facts: Sequence[str], room: float) -> list[str]:
 
 
 def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
-    """List what a reader must know of a picture: machine, volume, loop, reference, factor."""
+    """List the conditions of a picture: machine, volume, loop, reference, factor."""
     scene, grid = picture.scene, picture.grid
     title = scene.machine.title
     facts = [f"{title}, chain {scene.machine.chain}"]
@@ -243,13 +244,13 @@ def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
         nodes = f" {TIMES} ".join(str(count) for count in grid.shape if count > 1)
         facts.append(f"working volume {size} mm")
         facts.append(f"{nodes} nodes")
-    still = [
+    positions = [
         f"{axis} {spell_short(position)}{scene.machine.axes[axis].unit}"
         for axis, position in scene.workspace.positions.items()
         if axis in scene.machine.axes and not scene.machine.axes[axis].is_linear
     ]
-    if still:
-        facts.append(" ".join(still))
+    if positions:
+        facts.append(" ".join(positions))
     facts += [LOOP_WORDS[picture.view.loop], reference_words(scene), *picture.conditions]
     if exaggeration is not None:
         facts += [f"displacement drawn {spell_factor(exaggeration)}", "orthographic"]
@@ -258,7 +259,7 @@ def scene_facts(picture: ScenePicture, exaggeration: float | None) -> list[str]:
 
 def parameter_words(scene: Scene) -> list[str]:
     """Spell the parameters that are not zero, the largest first, µrad before µm."""
-    found: list[tuple[bool, float, str]] = []
+    ranked: list[tuple[bool, float, str]] = []
     for key in scene.errors:
         value = scene.errors.amplitude(key)
         if value == 0.0 or parameter(key).axis not in scene.machine.axes:
@@ -266,10 +267,10 @@ def parameter_words(scene: Scene) -> list[str]:
         kind = scene.errors.functions[key].name
         tail = "" if kind == "constant" else f" {kind}"
         row = parameter(key)
-        found.append(
+        ranked.append(
             (not row.is_rotation, -abs(value), f"{key} {spell_short(value)} {row.unit}{tail}")
         )
-    return [text for _, _, text in sorted(found)]
+    return [text for _, _, text in sorted(ranked)]
 
 
 def draw_footer(
@@ -281,39 +282,36 @@ def draw_footer(
 ) -> float:
     """Draw legend, parameters (where `errors` is true), convention and provenance at the bottom."""
     margin = canvas.margin
-    room = canvas.width - 2.0 * margin
+    max_width = canvas.width - 2.0 * margin
     theme = canvas.theme
     y = canvas.px(26.0)
     source = f"warpspace {__version__} · scene {' · '.join(scene.name for scene in scenes)}"
-    taken = canvas.text(
+    source_rect = canvas.text(
         canvas.width - margin, y, source, size=SIZES.small, colour=theme.muted, ha="right",
-        room=0.45 * room,
+        max_width=0.45 * max_width,
     )  # fmt: skip
-    left = HINTED * (room - (taken[2] - taken[0])) - canvas.px(24.0)
-    words = [
-        " / ".join(dict.fromkeys(map(convention_words, scenes))),
-        "error = actual − nominal",
-        "coordinates in the machine frame R",
-    ]
-    canvas.text(margin, y, " · ".join(words), size=SIZES.small, colour=theme.muted, room=left)
+    text_width = HINTED * (max_width - (source_rect[2] - source_rect[0])) - canvas.px(24.0)
+    conventions = " / ".join(dict.fromkeys(map(convention_words, scenes)))
+    text = f"{conventions} · error = actual − nominal · coordinates in the machine frame R"
+    canvas.text(margin, y, text, size=SIZES.small, colour=theme.muted, max_width=text_width)
     for scene in reversed(scenes if errors else ()):
         y += canvas.px(25.0)
         head = "errors: " if len(scenes) == 1 else f"errors of {scene.name}: "
-        words = _as_many(canvas, head, parameter_words(scene), room)
-        canvas.text(margin, y, words, size=SIZES.small, colour=theme.muted, room=room)
+        text = _fitting_text(canvas, head, parameter_words(scene), max_width)
+        canvas.text(margin, y, text, size=SIZES.small, colour=theme.muted, max_width=max_width)
     if legend:
         y += canvas.px(36.0)
-        draw_legend(canvas, legend, margin, y, room)
+        draw_legend(canvas, legend, margin, y, max_width)
     return y + canvas.px(30.0)
 
 
-def _as_many(canvas: Canvas, head: str, items: Sequence[str], room: float) -> str:
+def _fitting_text(canvas: Canvas, head: str, items: Sequence[str], max_width: float) -> str:
     if not items:
         return head + "all zero"
     for count in range(len(items), 0, -1):
-        rest = len(items) - count
-        text = head + " · ".join(items[:count]) + (f" · and {rest} more" if rest else "")
-        if canvas.text_size(text, SIZES.small)[0] <= room:
+        omitted = len(items) - count
+        text = head + " · ".join(items[:count]) + (f" · and {omitted} more" if omitted else "")
+        if canvas.text_size(text, SIZES.small)[0] <= max_width:
             return text
     return head + items[0]
 
@@ -321,7 +319,7 @@ def _as_many(canvas: Canvas, head: str, items: Sequence[str], room: float) -> st
 def map_legend(
     isolines: str, *, surface: str = "deformed grid", diverging: bool = False
 ) -> list[LegendEntry]:
-    """Build the legend of a map; `isolines` is empty where there are none."""
+    """Build the legend of a map; an empty `isolines` has no entry."""
     return [
         line_entry("nominal volume", lambda theme: theme.ghost, dashes=(11.0, 7.0)),
         line_entry(surface, lambda theme: theme.ink),
@@ -337,7 +335,7 @@ def metadata(
     title: str, scenes: Sequence[Scene], settings: FigureSettings, exaggeration: float, figure: str
 ) -> dict[str, str]:
     top, factor = settings.range_top, f"{exaggeration:.10g}"
-    chosen = {
+    options = {
         "component": settings.component,
         "view": settings.view,
         "loop": settings.loop,
@@ -353,18 +351,18 @@ def metadata(
         "scene": ", ".join(scene.name for scene in scenes),
         "version": f"warpspace {__version__}",
         "exaggeration": factor,
-        "settings": ", ".join(f"{key}={value}" for key, value in chosen.items()),
+        "settings": ", ".join(f"{key}={value}" for key, value in options.items()),
     }
 
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """A figure with heading and footer, waiting for its content."""
+    """A figure with heading and footer, before its content is drawn."""
 
     name: str  # of the figure
     canvas: Canvas
     title: str
-    content: Rect  # px; room for the content and for the column beside it
+    content: Rect  # px; area of the content; `panel` is the column beside it
     panel: Rect
     scenes: Sequence[Scene]
     settings: FigureSettings
@@ -378,26 +376,23 @@ class Sheet:
         bars: tuple[float, float | None] | None,
     ) -> None:
         canvas, rect = self.canvas, self.panel
-        left, _, right, top = rect
+        x_left, _, right, top = rect
         y = (rect[1] if bars is None else draw_scale_bars(canvas, rect, *bars)) + canvas.px(24.0)
         step = canvas.px(27.0)
-        room = top - y - canvas.px(150.0)
-        shown = rows[: max(1, int(room / step))]
-        for index, (name, value) in enumerate(reversed(shown)):
-            weight = "bold" if index == len(shown) - 1 else "normal"
-            height = y + index * step
-            room = 0.8 * (right - left)
-            start = canvas.text(right, height, value, weight=weight, ha="right", room=room)[0]
-            room = start - left - canvas.px(8.0)
-            canvas.text(left, height, name, colour=canvas.theme.muted, room=room)
-        y += len(shown) * step + canvas.px(26.0)
-        canvas.text(
-            left, top, heading, size=SIZES.heading, weight="bold", va="top", room=right - left
-        )
+        visible_rows = rows[: max(1, int((top - y - canvas.px(150.0)) / step))]
+        for index, (name, value) in enumerate(reversed(visible_rows)):
+            weight = "bold" if index == len(visible_rows) - 1 else "normal"
+            height, width = y + index * step, 0.8 * (right - x_left)
+            start = canvas.text(right, height, value, weight=weight, ha="right", max_width=width)[0]
+            width = start - x_left - canvas.px(8.0)
+            canvas.text(x_left, height, name, colour=canvas.theme.muted, max_width=width)
+        y += len(visible_rows) * step + canvas.px(26.0)
+        width, size = right - x_left, SIZES.heading
+        canvas.text(x_left, top, heading, size=size, weight="bold", va="top", max_width=width)
         high = top - canvas.px(40.0)
         low = max(y, high - canvas.px(560.0))
         draw_colour_bar(
-            canvas, (left + canvas.px(64.0), low, left + canvas.px(94.0), high), scale, marks
+            canvas, (x_left + canvas.px(64.0), low, x_left + canvas.px(94.0), high), scale, marks
         )
 
     def finish(self, factor: float, maps: Sequence[DrawnMap] = ()) -> Drawing:
@@ -424,8 +419,8 @@ def start_sheet(
         draw_legend(canvas, legend, margin, canvas.px(14.0), canvas.width)
         top, bottom = float(canvas.height), canvas.px(40.0 if legend else 0.0)
     else:
-        said = " · ".join(facts)
-        facts = [*facts, *(words for words in settings.conditions if words not in said)]
+        facts_text = " · ".join(facts)
+        facts = [*facts, *(words for words in settings.conditions if words not in facts_text)]
         top = draw_heading(canvas, title, facts)
         bottom = draw_footer(canvas, scenes, legend, errors=errors)
     right, width = canvas.width - margin, canvas.px(SIZES.panel)

@@ -23,20 +23,20 @@ from warpspace.units import MICROMETRE, MICRORADIAN, MM_PER_UM, Array
 if TYPE_CHECKING:
     import pyvista as pv
 
-ABOUT = "about_json"  # name under which NPZ and VTS files say what they hold
+ABOUT = "about_json"  # name of the description in NPZ and VTS files
 DECIMALS = 9  # of numbers in text: a billionth of a micrometre
 _UNITS = {"mm": "mm", "deg": "°", "um": MICROMETRE, "urad": MICRORADIAN}
 
 
 @dataclass(frozen=True)
 class FieldRecord:
-    """An error field and what it belongs to."""
+    """An error field with its axis positions and provenance."""
 
     axes: Mapping[str, Array]  # mm or degrees; axis positions, shaped to broadcast to the points
     field: ErrorField  # of points in a batch of any shape; of a grid for a VTS file
     # scene, loop, reference, convention, program
     about: Mapping[str, str] = attribute(default_factory=dict[str, str])
-    # U95 of each point, by name; empty where it is not known
+    # U95 of each point, by name; empty if unknown
     u95: Mapping[str, Array] = attribute(default_factory=dict[str, Array])
 
     @property
@@ -51,23 +51,24 @@ class FieldRecord:
         error += "_placed" if "placement" in self.about else ""
         error += "_referenced" if self.about.get("reference", "absolute") != "absolute" else ""
         error += f"_{frame}"
-        found = {
+        axes = {
             f"axis_{name}_{'mm' if is_linear(name) else 'deg'}": values
             for name, values in self.axes.items()
         }
         vectors = {"R_{}_mm": self.field.nominal_mm, error + "_{}_um": self.field.error_um}
         tilts = {f"orientation_{frame}_" + "{}_urad": self.field.orientation_urad}
-        found |= _by_component(vectors) | {"norm_um": self.field.norm_um} | _by_component(tilts)
+        norm = {"norm_um": self.field.norm_um}
+        table = {**axes, **_by_component(vectors), **norm, **_by_component(tilts)}
         for name, values in self.u95.items():
             of, _, unit = name.rpartition("_")
-            more = {name: values}
+            u95_columns = {name: values}
             if values.ndim > len(self.shape):
-                more = _by_component({f"{of}_{frame}_{{}}_{unit}": values})
-            found |= more
-        return found
+                u95_columns = _by_component({f"{of}_{frame}_{{}}_{unit}": values})
+            table |= u95_columns
+        return table
 
     def blocks(self) -> Iterator[dict[str, Array]]:
-        """Give the table some ten thousand rows at a time, the last direction running fastest."""
+        """Yield the table some ten thousand rows at a time, the last direction running fastest."""
         columns = self.columns
         for piece in pieces(self.shape):
             nodes = cut(self.field.norm_um, piece).shape
@@ -86,12 +87,12 @@ def _by_component(vectors: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def column_unit(name: str) -> str:
-    """Give the unit that the name of a column ends in."""
+    """Return the unit at the end of a column's name."""
     return _UNITS[name.rpartition("_")[2]]
 
 
 def write_field(record: FieldRecord, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write a field in the format that the ending of a path names."""
+    """Write a field in the format of the ending of a path."""
     target = check_target(path, FIELD_ENDINGS, overwrite=overwrite)
     ending = target.suffix.lower()
     if ending in GRID_ENDINGS and len(record.shape) != DIMENSIONS:
@@ -104,7 +105,7 @@ def write_field(record: FieldRecord, path: str | Path, *, overwrite: bool = True
 def write_numbers_csv(
     record: FieldRecord, path: Path, remarks: Mapping[str, str] | None = None
 ) -> None:
-    """Write the table into a file of its own; remarks are texts that stand in every row."""
+    """Write the table into a CSV file; remarks are columns with the same text in every row."""
     import pyarrow as pa
     from pyarrow import csv
 
@@ -132,12 +133,12 @@ def _write_parquet(record: FieldRecord, path: Path) -> None:
 
 
 def _arrays(record: FieldRecord) -> dict[str, Array]:
-    found = record.field
+    field = record.field
     return {
-        "nominal_mm": found.nominal_mm,
-        "error_um": found.error_um,
-        "norm_um": found.norm_um,
-        "orientation_urad": found.orientation_urad,
+        "nominal_mm": field.nominal_mm,
+        "error_um": field.error_um,
+        "norm_um": field.norm_um,
+        "orientation_urad": field.orientation_urad,
         **record.u95,
     }
 
@@ -237,9 +238,9 @@ def build_vts(picture: ScenePicture) -> bytes:
     return str(writer.GetOutputString()).encode()
 
 
-Kind: TypeAlias = str  # what a column holds: "text", "integer" or "number"
+Kind: TypeAlias = str  # of a column: "text", "integer" or "number"
 Columns: TypeAlias = Mapping[str, Sequence[Any] | Any]
-"""Values by column, all of one length; arrays are taken as they are."""
+"""Values by column, all of one length; arrays are not copied."""
 Append: TypeAlias = Callable[[Columns], None]
 
 
@@ -247,7 +248,7 @@ Append: TypeAlias = Callable[[Columns], None]
 def write_rows(
     path: str | Path, kinds: Mapping[str, Kind], *, overwrite: bool = True
 ) -> Generator[Append]:
-    """Open a table; the file is there once the block has ended well."""
+    """Open a table; the file appears when the block has succeeded."""
     write = _parquet if Path(path).suffix.lower() == ".parquet" else _csv
     with (
         write_atomically(path, overwrite=overwrite) as temporary,
@@ -260,7 +261,7 @@ def write_rows(
 def _parquet(
     path: Path, kinds: Mapping[str, Kind], about: str = __version__, *, of_points: bool = False
 ) -> Generator[Append]:
-    """Open a table; the columns of points say their unit, and of them only positions repeat."""
+    """Open a table; columns of points have their unit as metadata, and only positions repeat."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -1,4 +1,4 @@
-"""The formats there are for exports: one entry here, and one module that writes it."""
+"""Registry of the export formats; each is written by a module of this package."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from warpspace.plugins import Registry, load_plugins
 if TYPE_CHECKING:
     from warpspace.picture.model import ScenePicture
 
-Write = Callable[..., None]  # takes a picture, a path and the keyword `overwrite`
+Write = Callable[..., None]  # of a picture, a path and the keyword `overwrite`
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,30 +20,30 @@ class ExportFormat:
     """A format of exports."""
 
     ending: str  # of its files, for instance ".glb"
-    about: str  # what it is for, a few words: help of the command line, buttons of the app
+    about: str  # its purpose, a few words: help of the command line, buttons of the app
     write: str | Write  # "module:function", imported when it is written, or the function itself
-    in_app: bool = True  # whether the app offers it
-    left_out: str = ""  # what of a scene has no place in it; said when it is written
+    in_app: bool = True  # offered by the app
+    left_out: str = ""  # parts of a scene that it cannot hold; stated when it is written
 
     def load(self) -> Write:
         return resolve_name(self.write) if isinstance(self.write, str) else self.write
 
 
-_HERE = "warpspace.outputs.exports"
+_PACKAGE = "warpspace.outputs.exports"
 _FORMATS: Registry[ExportFormat] = Registry("export format", {}, key="ending")
 export_formats, register_format = _FORMATS.every, _FORMATS.register
 unregister_format = _FORMATS.unregister
 for _form in (
-    ExportFormat(".glb", "3-D viewers, CAD", f"{_HERE}.meshes:write_glb"),
-    ExportFormat(".vts", "ParaView", f"{_HERE}.fields:write_vts"),
-    ExportFormat(".csv", "the field", f"{_HERE}.fields:write_csv"),
+    ExportFormat(".glb", "3-D viewers, CAD", f"{_PACKAGE}.meshes:write_glb"),
+    ExportFormat(".vts", "ParaView", f"{_PACKAGE}.fields:write_vts"),
+    ExportFormat(".csv", "the field", f"{_PACKAGE}.fields:write_csv"),
     ExportFormat(
         ".urdf",
         "robot simulators: joints, limits, meshes",
-        f"{_HERE}.urdf_export:write_urdf",
+        f"{_PACKAGE}.urdf_export:write_urdf",
         in_app=False,
-        left_out="errors, tolerances, conventions, gantries, working volume, functional points and"
-        " view have no place in a URDF file: the machine is nominal",
+        left_out="a URDF file holds the nominal machine only: no errors, tolerances, conventions,"
+        " gantries, working volume, functional points or view",
     ),
 ):
     register_format(_form)

@@ -64,12 +64,14 @@ def _bent(
     error_um: Array,
     indices: surfaces.Index,
     material: Material,
-    **more: Any,
+    **options: Any,
 ) -> GltfNode:
-    """Build a part that is drawn displaced; its target leads back to where it nominally is."""
+    """Build a displaced node; its morph target leads back to the nominal points."""
     drawn_mm = surfaces.deform(nominal_mm, error_um, picture.exaggeration)
-    back = to_gltf(error_um * (-picture.exaggeration * MM_PER_UM))
-    return GltfNode(name, to_gltf(drawn_mm), indices, material, targets={"nominal": back}, **more)
+    to_nominal = to_gltf(error_um * (-picture.exaggeration * MM_PER_UM))
+    return GltfNode(
+        name, to_gltf(drawn_mm), indices, material, targets={"nominal": to_nominal}, **options
+    )
 
 
 def _surface(picture: ScenePicture) -> GltfNode:
@@ -114,11 +116,13 @@ def _named_traces(picture: ScenePicture) -> Iterator[tuple[str, TraceLine]]:
 def _traces(picture: ScenePicture) -> Iterator[GltfNode]:
     nominal, actual = Material("trace nominal", NOMINAL), Material("trace actual", TRACE)
     for label, drawn in _named_traces(picture):
-        still, count = drawn.nominal_mm, len(drawn.nominal_mm)
+        nominal_mm, count = drawn.nominal_mm, len(drawn.nominal_mm)
         pairs = np.stack([np.arange(count - 1), np.arange(1, count)], -1)
-        yield GltfNode(f"trace nominal {label}", to_gltf(still), pairs, nominal, group="traces")
+        yield GltfNode(
+            f"trace nominal {label}", to_gltf(nominal_mm), pairs, nominal, group="traces"
+        )
         name = f"trace actual {label}"
-        yield _bent(picture, name, still, drawn.error_um, pairs, actual, group="traces")
+        yield _bent(picture, name, nominal_mm, drawn.error_um, pairs, actual, group="traces")
 
 
 def _bodies(picture: ScenePicture) -> list[GltfNode]:
@@ -143,7 +147,7 @@ def to_pyvista(
     exaggeration: Exaggeration = "auto",
     parts: bool = False,
 ) -> "pv.MultiBlock":
-    """Give an evaluated scene as PyVista meshes.
+    """Build PyVista meshes of an evaluated scene.
 
     Parameters
     ----------
@@ -153,10 +157,10 @@ def to_pyvista(
     loop : Loop or str, optional
         "tool", "workpiece" or "relative".
     exaggeration : float, "auto" or None, optional
-        Display factor of what is drawn displaced: a number, "auto" for a round one that suits the
-        scene, None for what the scene says.
+        Display factor of displacements: a number, "auto" for a round one that suits the scene, None
+        for the scene's own.
     parts : bool, optional
-        Whether the part of each parameter in the error is wanted too.
+        Whether the contribution of each parameter to the error is added.
 
     Returns
     -------
@@ -200,8 +204,8 @@ def to_pyvista(
     if parts:
         basis = grid_basis(scene, picture.grid, picture.view)
         for key, response in zip(basis.keys, basis.position, strict=True):
-            if amplitude := scene.errors.amplitude(key):
-                arrays[f"part_{key}_um"] = amplitude * response
+            if scene.errors.amplitude(key):
+                arrays[f"part_{key}_um"] = scene.errors.amplitude(key) * response
     traces, bodies = pv.MultiBlock(), pv.MultiBlock()
     for label, drawn in _named_traces(picture):
         actual = pv.MultipleLines(drawn.actual_mm)

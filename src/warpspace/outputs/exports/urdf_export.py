@@ -6,30 +6,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import trimesh
 
 from warpspace.bodies.placed import load_bodies
 from warpspace.kinematics.transforms import placed
 from warpspace.machine.axes import direction_index
 from warpspace.machine.definition import Axis, Machine
-from warpspace.outputs.file_output import (
-    mesh_files,
-    write_with_meshes,
-)
+from warpspace.outputs.file_output import mesh_files, write_with_meshes
 from warpspace.picture.model import ScenePicture
 from warpspace.scene.urdf import not_installed
 from warpspace.units import Array
 
+try:
+    from yourdfpy import URDF, urdf
+except ImportError:
+    raise not_installed() from None
+
 ROOT, LINKS = "frame", {"S": "spindle", "t": "tool", "w": "workpiece"}
 MM_PER_M = 1000.0
-EFFORT, VELOCITY = 1000.0, 1.0  # of every joint: URDF asks for them, machines do not say
+EFFORT, VELOCITY = 1000.0, 1.0  # of every joint: required by URDF, not part of a machine
 
 
 def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = True) -> None:
-    """Write the machine of a scene, nominal, with a mesh beside it for each frame with bodies."""
-    try:
-        from yourdfpy import URDF
-    except ImportError:
-        raise not_installed() from None
+    """Write the nominal machine of a scene, with one mesh file for each frame with bodies."""
     target, machine = Path(path), picture.scene.machine
     meshes = _meshes(picture)
     read = [Path(source.path) for source in machine.bodies.values() if source.path]
@@ -42,18 +41,14 @@ def write_urdf(picture: ScenePicture, path: str | Path, *, overwrite: bool = Tru
 
 
 def _meshes(picture: ScenePicture) -> dict[str, Any]:
-    import trimesh
-
     parts: dict[str, list[Any]] = {}
     for body in load_bodies(picture.scene.machine):
         mesh = trimesh.Trimesh(body.vertices_mm, body.triangles, process=False)
         parts.setdefault(body.frame, []).append(mesh)
-    return {frame: trimesh.util.concatenate(own) for frame, own in parts.items()}
+    return {frame: trimesh.util.concatenate(bodies) for frame, bodies in parts.items()}
 
 
 def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:
-    from yourdfpy import urdf
-
     links = [_link(ROOT, "R", meshes)]
     joints: list[Any] = []
     for side in ("tool", "workpiece"):
@@ -66,7 +61,7 @@ def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:
         for frame, offset, turn in machine.end_frames(side):
             child = LINKS[frame]
             links.append(_link(child, frame, meshes))
-            origin = _metres(placed(offset, turn))
+            origin = _in_metres(placed(offset, turn))
             joints.append(urdf.Joint(f"{child}_fixed", "fixed", parent, child, origin))
             parent = child
     name = re.sub(r"[^\w.-]+", "_", machine.name) or "machine"
@@ -74,8 +69,6 @@ def build_robot(machine: Machine, meshes: dict[str, str]) -> Any:
 
 
 def _link(name: str, frame: str, meshes: dict[str, str]) -> Any:
-    from yourdfpy import urdf
-
     visuals: list[Any] = []
     if frame in meshes:
         scale = np.full(3, 1.0 / MM_PER_M)
@@ -85,8 +78,6 @@ def _link(name: str, frame: str, meshes: dict[str, str]) -> Any:
 
 
 def _moving(axis: Axis, parent: str, child: str) -> Any:
-    from yourdfpy import urdf
-
     direction = np.zeros(3)
     direction[direction_index(axis.name)] = float(axis.direction)
     low, high = axis.travel if axis.is_linear else np.deg2rad(axis.travel).tolist()
@@ -97,13 +88,13 @@ def _moving(axis: Axis, parent: str, child: str) -> Any:
         "prismatic" if axis.is_linear else "revolute",
         parent,
         child,
-        _metres(placed(axis.offset_mm, axis.rotation_deg)),
+        _in_metres(placed(axis.offset_mm, axis.rotation_deg)),
         direction,
         limit=urdf.Limit(EFFORT, VELOCITY, float(low), float(high)),
     )
 
 
-def _metres(pose: Array) -> Array:
-    found = np.array(pose, dtype=float)
-    found[:3, 3] /= MM_PER_M
-    return found
+def _in_metres(pose: Array) -> Array:
+    scaled = np.array(pose, dtype=float)
+    scaled[:3, 3] /= MM_PER_M
+    return scaled

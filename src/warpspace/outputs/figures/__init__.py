@@ -1,1 +1,1 @@
-"""One module a figure; `warpspace.outputs.figures.registry` lists them."""
+"""The figures; `warpspace.outputs.figures.registry` lists them."""

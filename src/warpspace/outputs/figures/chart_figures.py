@@ -6,6 +6,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from warpspace.analysis.blocks import Lines
 from warpspace.analysis.commands.gains import Gains
 from warpspace.analysis.commands.montecarlo import MonteCarlo, sampled_histogram
 from warpspace.analysis.description import ignore_progress
@@ -35,64 +36,61 @@ def draw_gains(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool
     scene = scenes[0]
     bars = Gains(loop=Loop(settings.loop), over_travel=True).run(scene, ignore_progress).bars()
     title = f"Error gains: {scene.machine.title}"
-    where = f"{_loop(scene, settings)} · largest absolute gains over the travel"
-    chart = replace(bars, title=title, subtitle=where)
+    subtitle = f"{_loop(scene, settings)} · largest absolute gains over the travel"
+    chart = replace(bars, title=title, subtitle=subtitle)
     return _draw("gains", title, scene, settings, bars_chart, chart)
 
 
 def draw_montecarlo(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    found = montecarlo(MonteCarlo(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
+    sampled = montecarlo(MonteCarlo(loop=Loop(settings.loop)).case(scene, SamplingPlan()))
     title = f"Machines within tolerance: {scene.title}"
-    loop = " · ".join((_loop(scene, settings), *placed_words(found.view)))
-    what = (
-        f"{loop} · {spell_count(found.plan.samples)} machines, one random point each ·"
-        f" {found.draws.distribution} over the tolerances · seed {found.plan.seed}"
+    loop = " · ".join((_loop(scene, settings), *placed_words(sampled.view)))
+    subtitle = (
+        f"{loop} · {spell_count(sampled.plan.samples)} machines, one random point each ·"
+        f" {sampled.draws.distribution} over the tolerances · seed {sampled.plan.seed}"
     )
-    histogram = sampled_histogram(found, title, what)
+    histogram = sampled_histogram(sampled, title, subtitle)
     return _draw("montecarlo", title, scene, settings, histogram_chart, histogram)
 
 
 def draw_ballbar(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    found = run_test(scene, Circular(plane="XY", radius_mm=150.0))
+    test = run_test(scene, Circular(plane="XY", radius_mm=150.0))
     title = f"Circular test: {scene.title}"
-    return _draw("ballbar", title, scene, settings, bench_chart, found, title)
+    return _draw("ballbar", title, scene, settings, bench_chart, test, title)
 
 
 def draw_rotary(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:  # noqa: ARG001
     scene = scenes[0]
-    chosen = first_lines(scene)
-    if not chosen:
+    lines = first_lines(scene)
+    if not lines:
         raise OptionError(
             f"figure 'rotary': {scene.name} has no traces; expected a machine with a rotary axis"
             " and points in [points_mm] traces"
         )
-    charts = [
-        traces.motion_lines(traces.name_trace(line.trace), motion, part)
-        for line in chosen
-        if (motion := traces.evaluate_axis_motion(scene, line)) is not None
-        for part in motion.motions
-    ]
     title = f"Error motions of the rotary axes: {scene.title}"
-    what = (
+    subtitle = (
         "ISO 230-7 · over the position of the axis, at the height of the point and in its"
         " direction, which turns with it"
     )
-    for name in (traces.name_trace(line.trace) for line in chosen):
-        if not any(chart.title.startswith(name) for chart in charts):
-            what += f" · {name}: the point lies on the axis"
-    return _draw("rotary", title, scene, settings, charts_sheet, charts, title, what, 3)
+    charts: list[Lines] = []
+    for line in lines:
+        name, motion = traces.name_trace(line.trace), traces.evaluate_axis_motion(scene, line)
+        if motion is None:
+            subtitle += f" · {name}: the point lies on the axis"
+        else:
+            charts += [traces.motion_lines(name, motion, part) for part in motion.motions]
+    return _draw("rotary", title, scene, settings, charts_sheet, charts, title, subtitle, 3)
 
 
 def first_lines(scene: Scene) -> list[traces.TraceLine]:
-    stands = scene.workspace.positions
-    found: dict[str, traces.TraceLine] = {}
+    positions = scene.workspace.positions
+    lines: dict[str, traces.TraceLine] = {}
     for line in traces.trace_lines(traces.evaluate_traces(scene, 1.0)):
-        here = all(stands.get(axis, 0.0) == at for axis, at in line.trace.at.items())
-        if here:
-            found.setdefault(line.trace.axis, line)
-    return list(found.values())
+        if all(positions.get(axis, 0.0) == at for axis, at in line.trace.at.items()):
+            lines.setdefault(line.trace.axis, line)
+    return list(lines.values())
 
 
 def _loop(scene: Scene, settings: FigureSettings) -> str:
@@ -105,10 +103,10 @@ def _draw(
     scene: Scene,
     settings: FigureSettings,
     draw: Callable[..., Figure],
-    *shown: Any,
+    *arguments: Any,
 ) -> Drawing:
     with on_ground(settings.theme):
-        figure = draw(*shown)
+        figure = draw(*arguments)
     width, height = figure.get_size_inches()
     dpi = settings.size[0] / width
     figure.set_size_inches(round(width * dpi) / dpi, round(height * dpi) / dpi)

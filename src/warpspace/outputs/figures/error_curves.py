@@ -17,9 +17,9 @@ from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, Array
 
 SAMPLES = 361
-FEW_READINGS = 5000  # readings that are drawn at most, evenly picked from all
+FEW_READINGS = 5000  # largest number of readings drawn, evenly selected
 BAND = 5
-"""Colour of a tolerance that several errors of a chart share; one of its own has its error's."""
+"""Colour of a tolerance that several errors of a chart share; otherwise that of its error."""
 KINDS = (("XYZ", MICROMETRE, "translation"), ("ABC", MICRORADIAN, "rotation"))
 Errors = tuple[Axis, str, str, str]
 """An axis, the letters of the errors of one kind, their unit and the kind."""
@@ -27,13 +27,13 @@ Errors = tuple[Axis, str, str, str]
 
 def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
-    shown = _shown(scene)
+    charts = _drawn_errors(scene)
     facts = [
         f"{scene.machine.title}, chain {scene.machine.chain}",
         "component errors over the range of each axis, constant errors at the right",
         "strokes: tolerance of a constant error" if scene.tolerances else "",
         reference_words(scene) if scene.reference else "",
-        _left_out_words(scene, shown),
+        _left_out_words(scene, charts),
     ]
     title = f"Errors along the axes: {scene.title}"
     sheet = start_sheet(
@@ -41,28 +41,28 @@ def draw_curves(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
         exact=exact, panel=False,
     )  # fmt: skip
     canvas = sheet.canvas
-    left, bottom, right, top = sheet.content
+    x_left, bottom, right, top = sheet.content
     bars = _constants(scene)
-    split = left + (0.68 if bars else 1.0) * (right - left)
-    columns = 1 if len(shown) < 3 else 2
-    row = (top - bottom) / max(math.ceil(len(shown) / columns), 1)
-    column = (split - left) / columns
+    split = x_left + (0.68 if bars else 1.0) * (right - x_left)
+    columns = 1 if len(charts) < 3 else 2
+    row = (top - bottom) / max(math.ceil(len(charts) / columns), 1)
+    column = (split - x_left) / columns
     text = SIZES.text if settings.printed else SIZES.small
     size = canvas.px(text) * POINTS_PER_PX
     width, height = canvas.width, canvas.height
     with on_ground(settings.theme), style():
-        for number, errors in enumerate(shown):
+        for number, errors in enumerate(charts):
             line, side = divmod(number, columns)
             low = top - (line + 1) * row
-            box = ((left + side * column) / width, low / height, column / width, row / height)
+            box = ((x_left + side * column) / width, low / height, column / width, row / height)
             draw_lines(canvas.figure, _chart(scene, *errors), box, size)
         if bars:
             box = (split / width, bottom / height, (right - split) / width, (top - bottom) / height)
             draw_beside(canvas.figure, bars, box, size)
-    if not shown:
-        words = "No component error: every one is zero along its axis."
-        text, small = canvas.fit(words, split - left, SIZES.heading)
-        canvas.text((left + split) / 2.0, (bottom + top) / 2.0, text, size=small, ha="center")
+    if not charts:
+        message = "All component errors are zero."
+        text, small = canvas.fit(message, split - x_left, SIZES.heading)
+        canvas.text((x_left + split) / 2.0, (bottom + top) / 2.0, text, size=small, ha="center")
     return sheet.finish(1.0)
 
 
@@ -70,17 +70,17 @@ def _keys(axis: Axis, letters: str) -> list[str]:
     return [f"E{letter}{axis.name}" for letter in letters]
 
 
-def _shown(scene: Scene) -> list[Errors]:
-    every = [(axis, *kind) for axis in scene.machine.axes.values() for kind in KINDS]
+def _drawn_errors(scene: Scene) -> list[Errors]:
+    candidates = [(axis, *kind) for axis in scene.machine.axes.values() for kind in KINDS]
 
     def is_given(key: str) -> bool:
-        own = key in scene.errors and scene.errors.amplitude(key) != 0.0
-        return own or key in scene.measured
+        is_set = key in scene.errors and scene.errors.amplitude(key) != 0.0
+        return is_set or key in scene.measured
 
-    given = [one for one in every if any(map(is_given, _keys(*one[:2])))]
-    return given or [
+    nonzero = [one for one in candidates if any(map(is_given, _keys(*one[:2])))]
+    return nonzero or [
         one
-        for one in every
+        for one in candidates
         if any(_has_width(scene.tolerances.get(key)) for key in _keys(*one[:2]))
     ]
 
@@ -89,14 +89,14 @@ def _has_width(tolerance: Tolerance | None) -> bool:
     return tolerance is not None and tolerance.half_width > 0.0
 
 
-def _left_out_words(scene: Scene, shown: Sequence[Errors]) -> str:
-    drawn = {(axis.name, kind) for axis, _, _, kind in shown}
+def _left_out_words(scene: Scene, charts: Sequence[Errors]) -> str:
+    drawn = {(axis.name, kind) for axis, _, _, kind in charts}
     missing = [
         f"{kind}s of {', '.join(names)}"
         for _, _, kind in KINDS
         if (names := [name for name in scene.machine.axes if (name, kind) not in drawn])
     ]
-    return f"zero: {'; '.join(missing)}" if missing and shown else ""
+    return f"zero: {'; '.join(missing)}" if missing and charts else ""
 
 
 def _chart(scene: Scene, axis: Axis, letters: str, unit: str, kind: str) -> Lines:
@@ -111,17 +111,19 @@ def _chart(scene: Scene, axis: Axis, letters: str, unit: str, kind: str) -> Line
         curves += _curves(scene, key, at, colour)
         if key in scene.uncertainty:
             middle, half = scene.errors.evaluate(key, at), scene.uncertainty[key].evaluate(at)
-            words = f"{key} ± standard uncertainty"
-            bands.append(Band(words, at, middle - half, middle + half, colour))
+            label = f"{key} ± standard uncertainty"
+            bands.append(Band(label, at, middle - half, middle + half, colour))
         if (tolerance := scene.tolerances.get(key)) is not None:
             shared.setdefault(tolerance, []).append(colour)
     for tolerance, colours in shared.items():
         ends = np.array([low, high])
-        least, most = (
+        lowest, highest = (
             np.full(2, tolerance.centre + sign * tolerance.half_width) for sign in (-1.0, 1.0)
         )
-        own = colours[0] if len(colours) == 1 else BAND
-        bands.append(Band(f"± {tolerance.half_width:g} {unit} tolerance", ends, least, most, own))
+        band_colour = colours[0] if len(colours) == 1 else BAND
+        bands.append(
+            Band(f"± {tolerance.half_width:g} {unit} tolerance", ends, lowest, highest, band_colour)
+        )
     title = f"{kind} of {axis.name}  [{unit}]"
     return Lines("lines", title, f"{axis.name} [{axis.unit}]", "", tuple(curves), tuple(bands))
 
@@ -129,21 +131,21 @@ def _chart(scene: Scene, axis: Axis, letters: str, unit: str, kind: str) -> Line
 def _curves(scene: Scene, key: str, at: Array, colour: int) -> list[Curve]:
     function = scene.errors.functions.get(key)
     if function is None or scene.errors.amplitude(key) == 0.0:
-        found = [Curve(f"{key}: zero", at, np.zeros_like(at), colour, "thin")]
+        curves = [Curve(f"{key}: zero", at, np.zeros_like(at), colour, "thin")]
     else:
-        found = [Curve(key, at, scene.errors.evaluate(key, at), colour)]
+        curves = [Curve(key, at, scene.errors.evaluate(key, at), colour)]
         if len(function.lines) > 1:
-            found = []
-            for number, (words, line) in enumerate(function.lines):
-                first = words.startswith("forward") or not (number or words.startswith("back"))
+            curves = []
+            for number, (label, line) in enumerate(function.lines):
+                first = label.startswith("forward") or not (number or label.startswith("back"))
                 kind: Style = "line" if first else "dashed"
-                found.append(Curve(f"{key} {words}", at, line.evaluate(at), colour, kind))
+                curves.append(Curve(f"{key} {label}", at, line.evaluate(at), colour, kind))
     if key in scene.measured:
-        for way, points in scene.measured[key].scatter.items():
+        for travel, points in scene.measured[key].scatter.items():
             step = max(1, -(-len(points) // FEW_READINGS))
-            words = f"{key} read {'backward' if way == BACKWARD else ''}".strip()
-            found.append(Curve(words, points[::step, 0], points[::step, 1], colour, "dots"))
-    return found
+            label = f"{key} read {'backward' if travel == BACKWARD else ''}".strip()
+            curves.append(Curve(label, points[::step, 0], points[::step, 1], colour, "dots"))
+    return curves
 
 
 def _constants(scene: Scene) -> Bars | None:

@@ -1,4 +1,4 @@
-"""Figures with the machine: its bent bodies around the bent volume, and the traces of its table."""
+"""Figures with the machine: displaced bodies around the deformed volume; traces of the table."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -23,7 +23,7 @@ from warpspace.outputs.drawing.sheet import (
     scene_facts,
     start_sheet,
 )
-from warpspace.outputs.figures.maps import say_statistics
+from warpspace.outputs.figures.maps import draw_statistics
 from warpspace.picture.formatting import quantity_words, spell_vector
 from warpspace.picture.model import (
     ScenePicture,
@@ -36,7 +36,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MINUS, Array, spell
 
 VOLUME_ALPHA, BEHIND_ALPHA = 0.72, 0.22
-"""Opacity of the coloured volume before bodies, and behind them."""
+"""Opacity of the coloured volume in front of bodies, and behind them."""
 DARKER = 0.62
 
 
@@ -63,11 +63,11 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
         line_entry("nominal bodies", lambda theme: theme.ghost, SIZES.thin, alpha=0.6),
     ]
     sheet = start_sheet("machine", settings, title, facts, scenes, legend, exact=exact)
-    canvas, (left, bottom, right, top) = sheet.canvas, sheet.content
-    points = [map3d.map_room_mm(picture), *(part.vertices_mm for part in placed)]
+    canvas, (x_left, bottom, right, top) = sheet.canvas, sheet.content
+    points = [map3d.map_points_mm(picture), *(part.vertices_mm for part in placed)]
     side = canvas.px(20.0)
-    room = (left + side, bottom + side, right - canvas.px(150.0), top - side)
-    projection = off_screen.fit_projection(settings.view, np.concatenate(points), room)
+    area = (x_left + side, bottom + side, right - canvas.px(150.0), top - side)
+    projection = off_screen.fit_projection(settings.view, np.concatenate(points), area)
     machine = draw_bodies(canvas, placed, projection)
     volume = off_screen.render_bodies(
         map3d.surface_bodies(picture, surfaces.outer_faces(picture.shape)), projection
@@ -78,7 +78,7 @@ def draw_machine(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bo
     map3d.draw_lone_line(canvas, picture, projection)
     if machine is not None:
         _label_bodies(canvas, placed, projection, machine, right)
-    say_statistics(sheet, picture, projection.px_per_mm)
+    draw_statistics(sheet, picture, projection.px_per_mm)
     return sheet.finish(picture.exaggeration, [DrawnMap(projection, picture, volume)])
 
 
@@ -98,13 +98,15 @@ def draw_bodies(
     map3d.draw_raster(canvas, raster, opacity, zorder)
 
     def draw(edges: Iterable[Array], colour: str, alpha: float, height: float) -> None:
-        seen, _ = off_screen.split_visible(edges, projection, raster)
-        canvas.lines(seen, width=SIZES.hair, colour=colour, alpha=alpha, zorder=zorder + height)
+        visible, _ = off_screen.split_visible(edges, projection, raster)
+        canvas.lines(visible, width=SIZES.hair, colour=colour, alpha=alpha, zorder=zorder + height)
 
     draw((edge for part in placed for edge in part.edges_mm), theme.grid, 0.75, 0.1)
     if nominal:
-        still = [replace(part, exaggeration=0.0) for part in placed if part.body.frame != BASE]
-        draw((edge for part in still for edge in part.edges_mm), theme.ghost, 0.8, 0.05)
+        nominal_bodies = [
+            replace(part, exaggeration=0.0) for part in placed if part.body.frame != BASE
+        ]
+        draw((edge for part in nominal_bodies for edge in part.edges_mm), theme.ghost, 0.8, 0.05)
     return raster
 
 
@@ -112,10 +114,10 @@ def _overlay(canvas: Canvas, volume: off_screen.Raster, machine: off_screen.Rast
     rgba = volume.rgba.copy()
     before = np.ones(rgba.shape[:2], dtype=bool)
     if machine is not None:
-        left, _, _, top = volume.rect
+        x_left, _, _, top = volume.rect
         step = volume.sampling
         rows, columns = np.indices(rgba.shape[:2])
-        spots = np.stack([left + (columns + 0.5) / step, top - (rows + 0.5) / step], -1)
+        spots = np.stack([x_left + (columns + 0.5) / step, top - (rows + 0.5) / step], -1)
         before = volume.depth_mm <= machine.depth_at(spots)
     share = np.where(before, VOLUME_ALPHA, BEHIND_ALPHA)
     rgba[..., 3] = (rgba[..., 3] * share).astype(np.uint8)
@@ -137,8 +139,8 @@ def _draw_volume_lines(
         (surfaces.face_lines(faces, shape, (nx, ny, nz)), SIZES.hair, 0.35),
         (surfaces.crease_lines(faces, shape) or surfaces.box_edges(shape), SIZES.line, 0.95),
     ):
-        seen, _ = off_screen.split_visible((nodes[line] for line in lines), projection, volume)
-        canvas.lines(seen, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
+        visible, _ = off_screen.split_visible((nodes[line] for line in lines), projection, volume)
+        canvas.lines(visible, width=width, colour=theme.grid, alpha=alpha, zorder=2.0)
     parts = off_screen.split_visible(
         (nominal[edge] for edge in surfaces.box_edges(shape)), projection, machine
     )
@@ -156,10 +158,10 @@ def _label_bodies(
     right: float,
 ) -> None:
     spots = [(_visible_spot(part, projection, raster), part.label) for part in placed]
-    wanted = sorted((spot[1], name, spot) for spot, name in spots if spot is not None)
+    labels = sorted((spot[1], name, spot) for spot, name in spots if spot is not None)
     column = right - canvas.px(120.0)
     y = -np.inf
-    for spot_y, name, spot in wanted:
+    for spot_y, name, spot in labels:
         y = max(spot_y, y + canvas.px(30.0))
         canvas.line(
             [spot, (column - canvas.px(26.0), y), (column - canvas.px(8.0), y)],
@@ -177,10 +179,10 @@ def _visible_spot(
     weights = rng.dirichlet([1.0, 1.0, 1.0], size=(24, len(corners)))
     points = np.einsum("ktc,tcx->ktx", weights, corners).reshape(-1, 3)
     spots = projection.project(points)
-    seen = projection.depth_mm(points) <= raster.depth_at(spots) + 1.5 / projection.px_per_mm
-    if not seen.any():
+    is_visible = projection.depth_mm(points) <= raster.depth_at(spots) + 1.5 / projection.px_per_mm
+    if not is_visible.any():
         return None
-    visible = spots[seen]
+    visible = spots[is_visible]
     middle = np.median(visible, axis=0)
     best = visible[np.argmin(np.hypot(*(visible - middle).T))]
     return float(best[0]), float(best[1])
@@ -202,7 +204,7 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     largest = max(line.largest_um for line in lines)
     nominal = np.concatenate([line.nominal_mm for line in lines])
     reach = float(np.ptp(nominal, axis=0).max())
-    # twice: traces are seen edge-on, a tenth of their reach is plenty
+    # twice: traces are often seen edge-on, where a tenth of their extent suffices
     factor = choose_exaggeration(settings.exaggeration, scene.exaggeration, 2.0 * largest, reach)
     traces = trace_lines([replace(group, exaggeration=factor) for group in groups])
     coloured = [component_values(line.error_um, settings.component) for line in traces]
@@ -210,14 +212,14 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     scale = choose_scale([values], settings.component, end=settings.range_top)
     picture = evaluate_picture(scene, grid=2, loop="workpiece", exaggeration=factor)
     turning = [axis.name for axis in scene.machine.axes.values() if not axis.is_linear]
-    # others would hide the traces
+    # other bodies would hide the traces
     placed = place_bodies(scene, picture.view, factor, (*turning, "w"))
     title = f"Traces of the rotary axes: {scene.title}"
     facts = [
         fact for fact in scene_facts(picture, factor) if not fact.startswith(("working", "2 "))
     ]
     if largest == 0.0:
-        facts.append("nothing moves these points: no error of a rotary axis")
+        facts.append("these points are not displaced: no error of a rotary axis")
     legend = [
         line_entry("nominal trace", lambda theme: theme.muted, SIZES.thin, TRACE_DASHES),
         LegendEntry(_trace_symbol, "actual trace, exaggerated, coloured by its error"),
@@ -227,9 +229,9 @@ def draw_traces(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     points = [nominal, *(line.actual_mm for line in traces)]
     points += [part.vertices_mm for part in placed]
     inset = canvas.px(70.0)
-    left, bottom, right, top = sheet.content
-    room = (left + inset, bottom + inset / 2, right - inset, top - inset / 2)
-    projection = off_screen.fit_projection(settings.view, np.concatenate(points), room)
+    x_left, bottom, right, top = sheet.content
+    area = (x_left + inset, bottom + inset / 2, right - inset, top - inset / 2)
+    projection = off_screen.fit_projection(settings.view, np.concatenate(points), area)
     raster = draw_bodies(canvas, placed, projection, opacity=FADED)
     _draw_lines(canvas, traces, coloured, scale, projection, raster)
     _label_traces(canvas, traces, projection, sheet.content)
@@ -260,22 +262,24 @@ def _draw_lines(
         canvas.lines(
             lines, width=width, colour=theme.muted, alpha=alpha, dashes=TRACE_DASHES, zorder=3.0
         )
-    seen: list[Array] = []
+    visible: list[Array] = []
     hidden: list[Array] = []
-    seen_colours: list[Array] = []
+    visible_colours: list[Array] = []
     hidden_colours: list[Array] = []
     for trace, values in zip(traces, coloured, strict=True):
         for start in range(0, len(values) - 1, PIECE):
             piece = slice(start, start + PIECE + 1)
             colour = scale.colours(values[piece].mean()) / 255.0
-            before, behind = off_screen.split_visible([trace.actual_mm[piece]], projection, raster)
-            seen += before
+            in_front, behind = off_screen.split_visible(
+                [trace.actual_mm[piece]], projection, raster
+            )
+            visible += in_front
             hidden += behind
-            seen_colours += [colour] * len(before)
+            visible_colours += [colour] * len(in_front)
             hidden_colours += [colour] * len(behind)
     canvas.lines(hidden, width=3.4, colour=np.array(hidden_colours), alpha=0.45, zorder=3.3)
-    canvas.lines(seen, width=4.6, colour=theme.ink, zorder=3.4)
-    canvas.lines(seen, width=3.4, colour=np.array(seen_colours), zorder=3.5)
+    canvas.lines(visible, width=4.6, colour=theme.ink, zorder=3.4)
+    canvas.lines(visible, width=3.4, colour=np.array(visible_colours), zorder=3.5)
 
 
 def _label_traces(
@@ -284,11 +288,11 @@ def _label_traces(
     projection: off_screen.Projection,
     frame: off_screen.Rect,
 ) -> None:
-    taken = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
-    taken.add_rects(canvas.rects)
+    occupancy = Occupancy(canvas.width, canvas.height, 2.0 * canvas.factor)
+    occupancy.add_rects(canvas.rects)
     spots = [projection.project(trace.actual_mm) for trace in traces]
-    taken.add_lines(spots)
-    taken.add_lines([projection.project(trace.nominal_mm) for trace in traces])
+    occupancy.add_lines(spots)
+    occupancy.add_lines([projection.project(trace.nominal_mm) for trace in traces])
     middle = np.concatenate(spots).mean(axis=0)
     names = _points(traces)
     for trace, line in zip(traces, spots, strict=True):
@@ -296,7 +300,7 @@ def _label_traces(
         name = f"{names[trace.trace.point_mm]} " if len(names) > 1 else ""
         text = f"{name}{trace.trace.label}: {spell(trace.largest_um)} {MICROMETRE}"
         text = text.replace("-", MINUS)
-        placed = write_label(canvas, text, line[away[:24:4]], frame, taken, size=SIZES.small)
+        placed = write_label(canvas, text, line[away[:24:4]], frame, occupancy, size=SIZES.small)
         if placed is not None:
             draw_leader(canvas, placed, canvas.theme.muted)
 

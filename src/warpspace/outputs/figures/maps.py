@@ -35,41 +35,41 @@ from warpspace.picture.model import Picture, ScenePicture, Slice, map_faces, vie
 from warpspace.scene.model import Scene
 from warpspace.units import MICRORADIAN, RAD_PER_URAD, Array, spell, spell_short
 
-EVERY = "isolines every "
+ISOLINE_STEP = "isolines every "
 
 
 def draw_error_map(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     picture = evaluate_for(settings, scenes[0])
     component = settings.component
-    what = "Volumetric error map" if component == "norm" else f"Error map, {component} component"
-    title = f"{what}: {picture.scene.title}"
+    subject = "Volumetric error map" if component == "norm" else f"Error map, {component} component"
+    title = f"{subject}: {picture.scene.title}"
     facts = [*scene_facts(picture, picture.exaggeration), view_words(settings.view, picture.shape)]
-    words = isoline_words(picture.scale, picture.values)
-    legend = map_legend(words, diverging=picture.scale.diverging)
+    isolines = isoline_words(picture.scale, picture.values)
+    legend = map_legend(isolines, diverging=picture.scale.diverging)
     sheet = start_sheet("error-map", settings, title, facts, scenes, legend, exact=exact)
     drawn = map3d.draw_map(sheet.canvas, picture, sheet.content, settings.view)
-    say_statistics(sheet, picture, drawn.projection.px_per_mm)
+    draw_statistics(sheet, picture, drawn.projection.px_per_mm)
     return sheet.finish(picture.exaggeration, [drawn])
 
 
-def say_statistics(
+def draw_statistics(
     sheet: Sheet, picture: Picture, px_per_mm: float, *, above: Sequence[Row] = ()
 ) -> None:
-    found, values = picture.statistics, picture.values
+    summary, values = picture.statistics, picture.values
     rows: list[Row] = [
-        ("max |E|", f"{spell(found.max_um)} µm"),
-        ("mean |E|", f"{spell(found.mean_um)} µm"),
-        ("P95", f"{spell(found.p95_um)} µm"),
-        ("RMS", f"{spell(found.rms_um)} µm"),
-        *(_place_rows(found.max_at_axes, found.max_at_mm) if found.max_um > 0.0 else ()),
+        ("max |E|", f"{spell(summary.max_um)} µm"),
+        ("mean |E|", f"{spell(summary.mean_um)} µm"),
+        ("P95", f"{spell(summary.p95_um)} µm"),
+        ("RMS", f"{spell(summary.rms_um)} µm"),
+        *(_place_rows(summary.max_at_axes, summary.max_at_mm) if summary.max_um > 0.0 else ()),
     ]
-    marks = [("mean", found.mean_um), ("P95", found.p95_um), ("max", found.max_um)]
+    marks = [("mean", summary.mean_um), ("P95", summary.p95_um), ("max", summary.max_um)]
     if isinstance(picture, ScenePicture) and picture.scene.limit_um is not None:
         marks.append(("limit", picture.scene.limit_um))
     if picture.component != "norm":
         low, high = float(values.min()), float(values.max())
-        words = f"{spell(low)} … {spell(high)} µm"
-        rows.insert(0, (f"{picture.component} component", words))
+        span = f"{spell(low)} … {spell(high)} µm"
+        rows.insert(0, (f"{picture.component} component", span))
         marks = [("min", low), ("mean", float(values.mean())), ("max", high)]
     heading, bars = quantity_words(picture.component), (px_per_mm, picture.exaggeration)
     rows = [] if sheet.settings.printed else [*above, *rows]
@@ -77,7 +77,7 @@ def say_statistics(
 
 
 def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
-    """Say how far apart isolines are; empty where there are none among the values."""
+    """Format the distance of isolines; empty if none lies within the values."""
     levels = surfaces.isoline_levels(scale)
     if values is not None:
         volume = sum(count > 1 for count in values.shape) > 1
@@ -86,7 +86,7 @@ def isoline_words(scale: ColourScale, values: Array | None = None) -> str:
     if not levels:
         return ""
     step = scale.ticks[1] - scale.ticks[0]
-    return f"{EVERY}{spell_short(step)} {scale.unit}"
+    return f"{ISOLINE_STEP}{spell_short(step)} {scale.unit}"
 
 
 def _place_rows(at: Mapping[str, float], point_mm: Sequence[float]) -> list[Row]:
@@ -106,8 +106,8 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     exaggeration, scale = picture.exaggeration, picture.scale
     slices = _evaluate_slices(picture, settings.grid)
     title = f"Slices through the working volume: {picture.scene.title}"
-    words = isoline_words(scale, picture.values)
-    legend = map_legend(words, surface="deformed slice", diverging=scale.diverging)
+    isolines = isoline_words(scale, picture.values)
+    legend = map_legend(isolines, surface="deformed slice", diverging=scale.diverging)
     facts = scene_facts(picture, exaggeration)
     sheet = start_sheet("slices", settings, title, facts, scenes, legend, exact=exact)
     canvas = sheet.canvas
@@ -117,18 +117,18 @@ def draw_slices(scenes: Sequence[Scene], settings: FigureSettings, *, exact: boo
     ]
     px_per_mm = min(one.px_per_mm for one in fitted)
     maps: list[DrawnMap] = []
-    for part, own in zip(slices, fitted, strict=True):
+    for part, fit in zip(slices, fitted, strict=True):
         cell, view = cells[part.axis], VIEW_OF[part.axis]
         middle = np.array([cell[0] + cell[2], cell[1] + cell[3]]) / 2.0
         nominal = part.grid.nominal_mm.reshape(-1, 3)
         centre = (nominal.min(axis=0) + nominal.max(axis=0)) / 2.0
-        projection = replace(own, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
+        projection = replace(fit, px_per_mm=px_per_mm, centre_mm=centre, centre_px=middle)
         maps.append(map3d.draw_map(canvas, part, cell, view, projection=projection))
         name = f"{PLANES[part.axis]} plane at axis {part.axis} = {spell_short(part.position_mm)} mm"
         high = cell[3] - canvas.px(12.0)
         canvas.text(middle[0], high, name, weight="bold", ha="center", va="top")
     _draw_key(canvas, picture, slices, cells["key"])
-    say_statistics(sheet, picture, px_per_mm, above=[("whole volume", "")])
+    draw_statistics(sheet, picture, px_per_mm, above=[("whole volume", "")])
     return sheet.finish(exaggeration, maps)
 
 
@@ -140,12 +140,12 @@ def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
             f"figure 'slices': the working volume of {scene.name} does not extend along X, Y and Z;"
             " draw the error-map"
         )
-    found: list[Slice] = []
+    slices: list[Slice] = []
     for axis in ("Z", "Y", "X"):
         low, high = ranges[axis]
         at = (low + high) / 2.0
         grid = build_slice(scene.model, scene.workspace, axis, at, nodes)
-        found.append(
+        slices.append(
             Slice(
                 view=picture.view,
                 grid=grid,
@@ -159,7 +159,7 @@ def _evaluate_slices(picture: ScenePicture, nodes: int) -> list[Slice]:
                 position_mm=at,
             )
         )
-    return found
+    return slices
 
 
 def _cells(
@@ -167,14 +167,14 @@ def _cells(
 ) -> dict[str, off_screen.Rect]:
     spans = {part.axis: np.ptp(part.grid.nominal_mm.reshape(-1, 3), axis=0) for part in slices}
     x, y, z = float(spans["Z"][0]), float(spans["Z"][1]), float(spans["Y"][2])
-    left, bottom, right, top = rect
-    # axes and labels take the same room in every cell, the rest follows the lengths
-    fixed = min(canvas.px(230.0), 0.3 * (right - left), 0.3 * (top - bottom))
-    column = left + fixed + (right - left - 2.0 * fixed) * x / (x + y)
+    x_left, bottom, right, top = rect
+    # axes and labels take the same space in every cell; the remainder follows the lengths
+    fixed = min(canvas.px(230.0), 0.3 * (right - x_left), 0.3 * (top - bottom))
+    column = x_left + fixed + (right - x_left - 2.0 * fixed) * x / (x + y)
     row = bottom + fixed + (top - bottom - 2.0 * fixed) * z / (z + y)
     return {
-        "Z": (left, row, column, top),
-        "Y": (left, bottom, column, row),
+        "Z": (x_left, row, column, top),
+        "Y": (x_left, bottom, column, row),
         "X": (column, bottom, right, row),
         "key": (column, row, right, top),
     }
@@ -184,9 +184,9 @@ def _draw_key(
     canvas: Canvas, picture: ScenePicture, slices: Sequence[Slice], rect: off_screen.Rect
 ) -> None:
     inset = canvas.px(46.0)
-    room = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
+    area = (rect[0] + inset, rect[1] + inset, rect[2] - inset, rect[3] - inset)
     nodes = picture.grid.nominal_mm.reshape(-1, 3)
-    projection = off_screen.fit_projection("iso", nodes, room)
+    projection = off_screen.fit_projection("iso", nodes, area)
     bodies: list[off_screen.RenderedBody] = []
     creases: list[Array] = []
     for part in slices:
@@ -198,16 +198,15 @@ def _draw_key(
     if raster is not None:
         map3d.draw_raster(canvas, raster)
     theme = canvas.theme
-    seen, _ = off_screen.split_visible(creases, projection, raster)
-    canvas.lines(seen, width=SIZES.thin, colour=theme.grid, zorder=2.0)
+    visible, _ = off_screen.split_visible(creases, projection, raster)
+    canvas.lines(visible, width=SIZES.thin, colour=theme.grid, zorder=2.0)
     edges = (nodes[edge] for edge in surfaces.box_edges(picture.grid.shape))
-    seen, hidden = off_screen.split_visible(edges, projection, raster)
-    canvas.lines(seen, width=SIZES.thin, colour=theme.ghost, dashes=map3d.GHOST_DASHES)
+    visible, hidden = off_screen.split_visible(edges, projection, raster)
+    canvas.lines(visible, width=SIZES.thin, colour=theme.ghost, dashes=map3d.GHOST_DASHES)
     canvas.lines(hidden, width=SIZES.hair, colour=theme.ghost, alpha=0.5, dashes=map3d.GHOST_DASHES)
-    canvas.text(
-        (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0), "where they lie (not exaggerated)",
-        weight="bold", ha="center", va="top",
-    )  # fmt: skip
+    x, y = (rect[0] + rect[2]) / 2.0, rect[3] - canvas.px(12.0)
+    heading = "positions of the slices (not exaggerated)"
+    canvas.text(x, y, heading, weight="bold", ha="center", va="top")
 
 
 LEAN_RAD = 0.45  # largest lean on screen that the factor aims at
@@ -224,10 +223,10 @@ class Needles:
     lean: Array  # [N, 3]; exaggerated lean of its end, per length of the needle
     length_mm: float
     tilt_urad: Array  # [N]
-    feet: surfaces.Index  # [n]; nodes where they stand
+    feet: surfaces.Index  # [n]; nodes of their lower ends
 
     def ends_mm(self, nodes_mm: Array, at: surfaces.Index) -> tuple[Array, Array]:
-        """Give nominal and drawn ends of needles, [n, 2, 3] each, mm."""
+        """Compute nominal and drawn ends of needles, [n, 2, 3] each, mm."""
         foot = nodes_mm[at]
         nominal = np.stack([foot, foot + self.length_mm * self.axis[at]], 1)
         drawn = np.stack([foot, foot + self.length_mm * (self.axis[at] + self.lean[at])], 1)
@@ -238,9 +237,9 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
     picture = evaluate_for(settings, scenes[0], quantity="orientation")
     values, scale, view = picture.values, picture.scale, settings.view
     drawn = replace(picture.field.tilts, nominal_mm=picture.grid.nominal_mm)
-    found = statistics(drawn, picture.grid.coordinates)
-    given, nodes = settings.exaggeration, picture.grid.nominal_mm.reshape(-1, 3)
-    factor = _lean_factor(found.max_um) if given is None or given == "auto" else given
+    summary = statistics(drawn, picture.grid.coordinates)
+    requested, nodes = settings.exaggeration, picture.grid.nominal_mm.reshape(-1, 3)
+    factor = _lean_factor(summary.max_um) if requested is None or requested == "auto" else requested
     title = f"Orientation error of the tool axis: {picture.scene.title}"
     facts = [
         *scene_facts(picture, None),
@@ -264,13 +263,13 @@ def draw_orientation(scenes: Sequence[Scene], settings: FigureSettings, *, exact
         annotate=partial(_draw_needles, needles), ghost=False,
     )  # fmt: skip
     heading = "tilt" if settings.component == "norm" else f"rotation about {settings.component}"
-    shown = math.radians(1.0) / RAD_PER_URAD / factor
+    per_degree = math.radians(1.0) / RAD_PER_URAD / factor
     rows = [
-        ("max tilt", f"{spell(found.max_um)} {MICRORADIAN}"),
-        ("mean tilt", f"{spell(found.mean_um)} {MICRORADIAN}"),
-        ("P95", f"{spell(found.p95_um)} {MICRORADIAN}"),
-        *_place_rows(found.max_at_axes, found.max_at_mm),
-        ("1° of lean shown", f"{spell(shown)} {MICRORADIAN}"),
+        ("max tilt", f"{spell(summary.max_um)} {MICRORADIAN}"),
+        ("mean tilt", f"{spell(summary.mean_um)} {MICRORADIAN}"),
+        ("P95", f"{spell(summary.p95_um)} {MICRORADIAN}"),
+        *_place_rows(summary.max_at_axes, summary.max_at_mm),
+        ("1° of drawn lean", f"{spell(per_degree)} {MICRORADIAN}"),
     ]
     marks = [("mean", float(values.mean())), ("max", float(values.max()))]
     if settings.component != "norm":
@@ -305,9 +304,9 @@ def _draw_needles(needles: Needles, stage: map3d.Stage) -> None:
     ):
         lines, _ = stage.split(ends)
         stage.canvas.lines(lines, width=width, colour=colour, dashes=dashes, zorder=4.0)
-        stage.taken.add_lines(lines)
-    found = surfaces.corners(stage.picture.shape)
-    for corner, ends in zip(found, needles.ends_mm(nodes, found)[1], strict=True):
+        stage.occupancy.add_lines(lines)
+    corners = surfaces.corners(stage.picture.shape)
+    for corner, ends in zip(corners, needles.ends_mm(nodes, corners)[1], strict=True):
         if stage.split([ends])[0]:
             text = f"{spell(float(needles.tilt_urad[corner]))} {MICRORADIAN}"
             stage.label(text, [stage.projection.project(ends[1])])
@@ -319,7 +318,7 @@ def _feet(content: Picture, view: str) -> surfaces.Index:
     surface = surface if len(surface) else np.arange(np.prod(shape))
     at = np.stack(np.unravel_index(surface, shape), -1)
     step = [max(1, (count - 1) // (NEEDLES - 1)) for count in shape]
-    chosen = np.ones(len(surface), dtype=bool)
+    selected = np.ones(len(surface), dtype=bool)
     for axis in range(3):
-        chosen &= (at[:, axis] % step[axis] == 0) | (at[:, axis] == shape[axis] - 1)
-    return surface[chosen]
+        selected &= (at[:, axis] % step[axis] == 0) | (at[:, axis] == shape[axis] - 1)
+    return surface[selected]

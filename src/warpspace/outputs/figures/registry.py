@@ -1,4 +1,4 @@
-"""The figures there are: one entry in catalogue.toml, and one module that draws it."""
+"""Registry of the figures: one entry in catalogue.toml, and one function that draws it."""
 
 import tomllib
 from collections.abc import Callable, Sequence
@@ -16,20 +16,20 @@ if TYPE_CHECKING:
     from warpspace.outputs.drawing.sheet import Drawing
     from warpspace.scene.model import Scene
 
-Draw = Callable[..., "Drawing"]  # takes scenes, settings and the keyword `exact`; gives the drawing
+Draw = Callable[..., "Drawing"]  # of scenes, settings and the keyword `exact`
 
 
 @dataclass(frozen=True, slots=True)
 class FigureKind:
     """A kind of figure."""
 
-    name: str  # as it is asked for
-    caption: str  # what it shows, one sentence: help of the command line, list of the app, report
-    draw: str | Draw  # "module:function", imported when it is drawn, or the function itself
-    scenes: int = 1  # how many scenes it is drawn from ...
-    evidence: bool = False  # whether a report shows it after the error map of a scene
-    most_scenes: int | None = None  # ... or at most, where that may differ
-    command: str = ""  # that draws it where `draw` does not
+    name: str
+    caption: str  # one sentence: help of the command line, list of the app, report
+    draw: str | Draw  # "module:function", imported for drawing, or the function
+    scenes: int = 1  # number of scenes ...
+    evidence: bool = False  # shown in a report after the error map of a scene
+    most_scenes: int | None = None  # ... or the largest number, where it varies
+    command: str = ""  # that draws it instead of `draw`
 
     def load(self) -> Draw:
         return resolve_name(self.draw) if isinstance(self.draw, str) else self.draw
@@ -63,9 +63,10 @@ def draw_figure(
     from warpspace.outputs.drawing.settings import FigureSettings
 
     kind = _KINDS.find(name)
-    most = kind.most_scenes or kind.scenes
-    if not kind.scenes <= len(scenes) <= most:
-        words = "one scene" if kind.scenes == 1 else "two scenes"
-        words = words if most == kind.scenes else f"{kind.scenes} to {most} scenes"
-        raise OptionError(f"figure {name!r} is drawn from {words}; given {len(scenes)}")
+    max_scenes = kind.most_scenes or kind.scenes
+    if not kind.scenes <= len(scenes) <= max_scenes:
+        expected = f"{kind.scenes} to {max_scenes} scenes"
+        if max_scenes == kind.scenes:
+            expected = "one scene" if kind.scenes == 1 else "two scenes"
+        raise OptionError(f"figure {name!r} is drawn from {expected}; given {len(scenes)}")
     return kind.load()(scenes, settings or FigureSettings(), exact=exact)

@@ -28,7 +28,7 @@ from warpspace.outputs.drawing.sheet import (
     start_sheet,
 )
 from warpspace.outputs.figures.machine_figures import draw_bodies
-from warpspace.outputs.figures.maps import EVERY, isoline_words
+from warpspace.outputs.figures.maps import ISOLINE_STEP, isoline_words
 from warpspace.picture.comparison import (
     CHANGE,
     DIFFERENCE_LENGTH,
@@ -53,7 +53,7 @@ def _draw_pair(
     title: str,
     scenes: Sequence[Scene],
     settings: FigureSettings,
-    said: Sequence[str],
+    remarks: Sequence[str],
     *,
     exact: bool,
 ) -> Drawing:
@@ -63,19 +63,23 @@ def _draw_pair(
     change = scene_change(first, second)
     if settings.range_fixed:
         change = replace(change, colours=replace(change.scale, low=scale.low, high=scale.high))
-    facts = [*scene_facts(first, exaggeration), view_words(settings.view, first.grid.shape), *said]
-    words = [isoline_words(one.scale, one.values) for one in (first, change)]
-    if all(words) and words[0] != words[1]:
-        words = [f"{words[0]}, of {CHANGE} {words[1].removeprefix(EVERY)}"]
-    legend = map_legend(next(filter(None, words), ""), diverging=scale.diverging)
+    facts = [
+        *scene_facts(first, exaggeration),
+        view_words(settings.view, first.grid.shape),
+        *remarks,
+    ]
+    isolines = [isoline_words(one.scale, one.values) for one in (first, change)]
+    if all(isolines) and isolines[0] != isolines[1]:
+        isolines = [f"{isolines[0]}, of {CHANGE} {isolines[1].removeprefix(ISOLINE_STEP)}"]
+    legend = map_legend(next(filter(None, isolines), ""), diverging=scale.diverging)
     sheet = start_sheet(name, settings, title, facts, scenes, legend, exact=exact, panel=False)
     canvas = sheet.canvas
-    left, bottom, right, top = sheet.content
-    middle = ((left + right) / 2.0, (bottom + top) / 2.0)
+    x_left, bottom, right, top = sheet.content
+    middle = ((x_left + right) / 2.0, (bottom + top) / 2.0)
     cells = [
-        (left, middle[1], middle[0], top),
+        (x_left, middle[1], middle[0], top),
         (middle[0], middle[1], right, top),
-        (left, bottom, middle[0], middle[1]),
+        (x_left, bottom, middle[0], middle[1]),
     ]
     changed = DIFFERENCE_LENGTH if component == "norm" else f"change of the {component} component"
     names = [f"A  {scenes[0].title}", f"B  {scenes[1].title}", f"{CHANGE}:  {changed}"]
@@ -86,18 +90,20 @@ def _draw_pair(
 
 
 def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
-    left, bottom, right, top = rect
+    x_left, bottom, right, top = rect
     bar, step = canvas.px(28.0), canvas.px(112.0)
     for name, drawn in (("A and B", maps[0]), (CHANGE, maps[2])):
-        room, scale = 0.9 * step, drawn.picture.scale
-        canvas.text(left, top, name, size=SIZES.heading, weight="bold", va="top", room=room)
+        max_width, scale = 0.9 * step, drawn.picture.scale
+        canvas.text(
+            x_left, top, name, size=SIZES.heading, weight="bold", va="top", max_width=max_width
+        )
         label = "" if canvas.printed else f"{scale.label}  "
-        what, high = f"{label}[{scale.unit}]", top - canvas.px(26.0)
-        canvas.text(left, high, what, size=SIZES.small, va="top", room=room)
-        box = (left, bottom + canvas.px(20.0), left + bar, top - canvas.px(62.0))
+        quantity, high = f"{label}[{scale.unit}]", top - canvas.px(26.0)
+        canvas.text(x_left, high, quantity, size=SIZES.small, va="top", max_width=max_width)
+        box = (x_left, bottom + canvas.px(20.0), x_left + bar, top - canvas.px(62.0))
         draw_colour_bar(canvas, box, scale)
-        left += step
-    start, drawn = left + canvas.px(6.0), maps[0]
+        x_left += step
+    start, drawn = x_left + canvas.px(6.0), maps[0]
     box = (start, bottom + canvas.px(10.0), right, top)
     draw_scale_bars(canvas, box, drawn.projection.px_per_mm, drawn.picture.exaggeration)
     if canvas.printed:
@@ -107,12 +113,12 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
     canvas.text(start, y, "µm", colour=canvas.theme.muted)
     for x, name in zip(columns, ("A", "B", CHANGE, DIFFERENCE_LENGTH), strict=True):
         canvas.text(x, y, name, weight="bold", ha="right")
-    found = [drawn.picture.statistics for drawn in maps]
-    change = statistics_change(found[0], found[1])
+    summaries = [drawn.picture.statistics for drawn in maps]
+    change = statistics_change(summaries[0], summaries[1])
     for name, key in STATISTICS.items():
         y -= canvas.px(28.0)
         canvas.text(start, y, name, colour=canvas.theme.muted)
-        a, b, difference = (getattr(part, key) for part in found)
+        a, b, difference = (getattr(part, key) for part in summaries)
         texts = (spell(a), spell(b), spell_signed(change[key]), spell(difference))
         for x, text in zip(columns, texts, strict=True):
             canvas.text(x, y, text, ha="right")
@@ -120,29 +126,31 @@ def _draw_corner(canvas: Canvas, rect: Rect, maps: Sequence[DrawnMap]) -> None:
 
 def draw_adjustment(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
     scene = scenes[0]
-    found = Adjust(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(scene)
-    after = found.changes()[-1].scene if found.adjustments else scene
+    adjustment = Adjust(loop=Loop(settings.loop), grid=min(settings.grid, REPAIR_NODES[1])).run(
+        scene
+    )
+    after = adjustment.changes()[-1].scene if adjustment.adjustments else scene
     pair = (
         replace(scene, title="before"),
-        replace(after, title="after", name=f"{scene.name}_repaired"),
+        replace(after, title="after", name=f"{scene.name}_adjusted"),
     )
-    title = f"Repair: {scene.title}"
-    return _draw_pair("adjust", title, pair, settings, [_adjusted(found)], exact=exact)
+    title = f"Adjustment: {scene.title}"
+    return _draw_pair("adjust", title, pair, settings, [_adjusted(adjustment)], exact=exact)
 
 
-def _adjusted(found: AdjustResult) -> str:
-    if not found.adjustments:
-        return "nothing to adjust"
+def _adjusted(adjustment: AdjustResult) -> str:
+    if not adjustment.adjustments:
+        return "no adjustment required"
     parts = ", ".join(
-        f"{key} {found.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
-        for key, value in found.adjustments[-1].adjust.items()
+        f"{key} {adjustment.present[key]:.3g} → {value:.3g} {parameter(key).unit}"
+        for key, value in adjustment.adjustments[-1].adjust.items()
     )
-    return f"adjusted for the smallest {found.objective.upper()}: {parts}"
+    return f"adjusted for the smallest {adjustment.objective.upper()}: {parts}"
 
 
 BODY_ALPHA = 0.55
 CELL_HEAD, CELL_FOOT, AXIS_LABELS = 30.0, 74.0, 50.0
-"""Room in px above a picture for its title, below it for its numbers, and for labels of axes."""
+"""Space in px above a picture for its title, below it for its numbers, and for labels of axes."""
 
 
 def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: bool) -> Drawing:
@@ -171,10 +179,10 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
     )
     canvas = sheet.canvas
     cells = _cells(sheet.content, len(concepts))
-    rooms = [_room(canvas, cell) for cell in cells]
-    maps, px_per_mm = _draw_machines(canvas, pictures, rooms, settings)
+    areas = [_picture_area(canvas, cell) for cell in cells]
+    maps, px_per_mm = _draw_machines(canvas, pictures, areas, settings)
     for letter, cell, concept in zip(LETTERS, cells, concepts, strict=False):
-        _draw_words(canvas, cell, letter, concept)
+        _draw_labels(canvas, cell, letter, concept)
     rows = [
         (f"mean {letter}", f"{spell(one.sampled.mean_um)} µm")
         for letter, one in zip(LETTERS, concepts, strict=False)
@@ -188,23 +196,23 @@ def draw_concepts(scenes: Sequence[Scene], settings: FigureSettings, *, exact: b
 def _draw_machines(
     canvas: Canvas,
     pictures: Sequence[ScenePicture],
-    rooms: Sequence[Rect],
+    areas: Sequence[Rect],
     settings: FigureSettings,
 ) -> tuple[tuple[DrawnMap, ...], float]:
     view = settings.view
     bodies = [place_bodies(one.scene, one.view, 1.0) for one in pictures]
-    seen = [_points_mm(picture, own) for picture, own in zip(pictures, bodies, strict=True)]
+    extents = [_points_mm(picture, own) for picture, own in zip(pictures, bodies, strict=True)]
     px_per_mm = min(
         fit_projection(view, points, room).px_per_mm
-        for points, room in zip(seen, rooms, strict=True)
+        for points, room in zip(extents, areas, strict=True)
     )
     maps: list[DrawnMap] = []
-    for picture, own, points, room in zip(pictures, bodies, seen, rooms, strict=True):
-        projection = fit_projection(view, points, room, px_per_mm)
-        draw_bodies(canvas, own, projection, opacity=BODY_ALPHA, nominal=False, zorder=0.8)
+    for picture, placed, points, area in zip(pictures, bodies, extents, areas, strict=True):
+        projection = fit_projection(view, points, area, px_per_mm)
+        draw_bodies(canvas, placed, projection, opacity=BODY_ALPHA, nominal=False, zorder=0.8)
         maps.append(
             draw_map(
-                canvas, picture, room, view, labels=False, projection=projection, annotate=None,
+                canvas, picture, area, view, labels=False, projection=projection, annotate=None,
                 ghost=False,
             )
         )  # fmt: skip
@@ -212,22 +220,22 @@ def _draw_machines(
 
 
 def _cells(rect: Rect, count: int) -> list[Rect]:
-    left, bottom, right, top = rect
-    columns = min(count, max(1, round(math.sqrt(count * (right - left) / (top - bottom)))))
+    x_left, bottom, right, top = rect
+    columns = min(count, max(1, round(math.sqrt(count * (right - x_left) / (top - bottom)))))
     rows = math.ceil(count / columns)
-    width, height = (right - left) / columns, (top - bottom) / rows
+    width, height = (right - x_left) / columns, (top - bottom) / rows
     return [
-        (left + c * width, top - (r + 1) * height, left + (c + 1) * width, top - r * height)
+        (x_left + c * width, top - (r + 1) * height, x_left + (c + 1) * width, top - r * height)
         for r, c in (divmod(index, columns) for index in range(count))
     ]
 
 
-def _room(canvas: Canvas, cell: Rect) -> Rect:
-    left, bottom, right, top = cell
-    side = min(canvas.px(AXIS_LABELS), 0.15 * (right - left))
+def _picture_area(canvas: Canvas, cell: Rect) -> Rect:
+    x_left, bottom, right, top = cell
+    side = min(canvas.px(AXIS_LABELS), 0.15 * (right - x_left))
     foot = min(canvas.px(CELL_FOOT + AXIS_LABELS), 0.45 * (top - bottom))
     head = min(canvas.px(CELL_HEAD), 0.15 * (top - bottom))
-    return (left + side, bottom + foot, right - side, top - head)
+    return (x_left + side, bottom + foot, right - side, top - head)
 
 
 def _points_mm(picture: ScenePicture, placed: Sequence[PlacedBody]) -> Array:
@@ -237,20 +245,20 @@ def _points_mm(picture: ScenePicture, placed: Sequence[PlacedBody]) -> Array:
     return np.concatenate(parts)
 
 
-def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> None:
-    left, bottom, right, top = cell
-    room = right - left - canvas.px(16.0)
-    x, scene, found = left + canvas.px(8.0), concept.scene, concept.sampled
+def _draw_labels(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> None:
+    x_left, bottom, right, top = cell
+    max_width = right - x_left - canvas.px(16.0)
+    x, scene, sampled = x_left + canvas.px(8.0), concept.scene, concept.sampled
     head, high = f"{letter}  {scene.title}", top - canvas.px(4.0)
-    canvas.text(x, high, head, size=SIZES.heading, weight="bold", va="top", room=room)
+    canvas.text(x, high, head, size=SIZES.heading, weight="bold", va="top", max_width=max_width)
     numbers = [
-        f"mean {spell(found.mean_um)} µm",
-        f"P95 {spell(found.p95_um)} µm",
-        f"max {spell(found.max_um)} µm",
+        f"mean {spell(sampled.mean_um)} µm",
+        f"P95 {spell(sampled.p95_um)} µm",
+        f"max {spell(sampled.max_um)} µm",
     ]
-    if found.probability is not None:
-        kept = 100.0 * found.probability.probability
-        numbers.append(f"{kept:.1f} % within {spell_short(found.probability.spec_um)} µm")
+    if sampled.probability is not None:
+        conforming = 100.0 * sampled.probability.probability
+        numbers.append(f"{conforming:.1f} % within {spell_short(sampled.probability.spec_um)} µm")
     shares = (
         f"{row.key} {100.0 * row.share:.0f} % ({parameter(row.key).name})"
         for row in concept.leading
@@ -258,4 +266,4 @@ def _draw_words(canvas: Canvas, cell: Rect, letter: str, concept: Concept) -> No
     lines = (" · ".join(shares), " · ".join(numbers), f"chain {scene.machine.chain}")
     for index, line in enumerate(lines[-1:] if canvas.printed else lines):
         y = bottom + canvas.px(10.0 + 21.0 * index)
-        canvas.text(x, y, line, size=SIZES.small, colour=canvas.theme.muted, room=room)
+        canvas.text(x, y, line, size=SIZES.small, colour=canvas.theme.muted, max_width=max_width)

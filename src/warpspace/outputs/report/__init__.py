@@ -1,4 +1,4 @@
-"""The design review of one scene or two: a page a manager reads first, the evidence after it."""
+"""The design review of one scene or two: a summary page, followed by the evidence."""
 
 from warpspace.outputs.report.review import ReportSettings
 from warpspace.outputs.report.sections import Embed, build_report, write_report

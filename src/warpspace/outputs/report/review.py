@@ -23,13 +23,13 @@ from warpspace.machine.axes import parameter
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.outputs.report.templating import Block, Cards, Items, Text
 from warpspace.picture.comparison import scene_change, share_exaggeration
-from warpspace.picture.formatting import TIMES, list_axes, own_axes, spell_in_r, u95_behind
+from warpspace.picture.formatting import TIMES, list_axes, point_axes, spell_in_r, u95_behind
 from warpspace.picture.model import Exaggeration, ScenePicture, evaluate_picture, same_nodes
 from warpspace.scene.model import Scene, second_order
 from warpspace.units import spell, spell_short, spell_signed
 
 UM, PERCENT = "\N{NO-BREAK SPACE}µm", "\N{NO-BREAK SPACE}%"
-_WORTH = 0.01  # share of the largest error that an adjustment must gain to be named
+_WORTH = 0.01  # least reduction of the largest error, as a share, by a recommended adjustment
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +45,15 @@ class ReportSettings:
     seed: int = 0
     distribution: str = "uniform"  # "uniform" or "normal"
     author: str = ""
-    questions: tuple[str, ...] = ()  # what is still open, on the first page
+    questions: tuple[str, ...] = ()  # open questions, on the first page
 
     def analyses(self, limit_um: float | None) -> dict[str, Analysis]:
         loop, seed = Loop(self.loop), self.seed
         drawn = choose_distribution(self.distribution)
 
-        def machines(over: Over) -> MonteCarlo:
+        def machines(statistic: Over) -> MonteCarlo:
             return MonteCarlo(
-                loop=loop, distribution=drawn, seed=seed, samples=self.samples, over=over,
+                loop=loop, distribution=drawn, seed=seed, samples=self.samples, over=statistic,
                 limit_um=limit_um,
             )  # fmt: skip
 
@@ -70,20 +70,20 @@ class ReportSettings:
 
 @dataclass(frozen=True, slots=True)
 class Reviewed:
-    """One scene, reviewed."""
+    """One scene of a review, with the results of its analyses."""
 
-    letter: str  # A or B in headings; nothing where it is alone
+    letter: str  # A or B in headings; empty for a single scene
     picture: ScenePicture  # evaluated scene with the display factor all scenes of the report share
     explanation: Explanation  # of the worst node
     linearisation_um: float  # largest difference between the exact chain and the first order
-    results: Mapping[str, Result | str]  # of each analysis; why there is none
-    within: float  # share of the volume within the limit; 0 where there is none
-    advice: str  # the one thing to do
-    uncertainty: FieldUncertainty | None  # how sure its errors are
+    results: Mapping[str, Result | str]  # of each analysis, or the reason for its failure
+    share_within: float  # of the volume within the limit; 0 without a limit
+    advice: str  # recommended adjustment
+    uncertainty: FieldUncertainty | None  # None where the scene states none
 
     @property
-    def keeps(self) -> bool:
-        """Whether its largest error is within its limit, where it has one."""
+    def is_within_limit(self) -> bool:
+        """True if the largest error is within the limit, or without a limit."""
         limit = self.scene.limit_um
         return limit is None or self.statistics.max_um <= limit
 
@@ -93,13 +93,13 @@ class Reviewed:
 
     @property
     def statistics(self) -> Statistics:
-        found = self.picture.statistics
-        return self.uncertainty.with_expanded_uncertainty(found) if self.uncertainty else found
+        summary = self.picture.statistics
+        return self.uncertainty.with_expanded_uncertainty(summary) if self.uncertainty else summary
 
     @property
     def largest(self) -> str:
-        found = self.statistics
-        return f"{spell(found.max_um)}{_behind(found, 'max_um')}{UM} at {self.worst_axes}"
+        summary = self.statistics
+        return f"{spell(summary.max_um)}{_format_u95(summary, 'max_um')}{UM} at {self.worst_axes}"
 
     @property
     def verdict(self) -> Verdict:
@@ -107,16 +107,18 @@ class Reviewed:
         statistics, limit = self.statistics, self.scene.limit_um
         u95 = statistics.expanded_uncertainty.get("u95_max_um")
         if self.uncertainty is None or u95 is None or limit is None:
-            return Verdict.PASS if self.keeps else Verdict.FAIL
+            return Verdict.PASS if self.is_within_limit else Verdict.FAIL
         errors, largest = self.uncertainty.errors, statistics.max_um
         probability = float(errors.probability_within(largest, u95, -np.inf, limit))
         return Verdict.from_probability(probability)
 
     @property
     def worst_axes(self) -> str:
-        """Spell where the axes stand at the worst point."""
-        found = self.statistics
-        return list_axes(own_axes(self.scene, found.max_at_axes)) or spell_in_r(found.max_at_mm)
+        """Axis positions of the worst point, formatted."""
+        summary = self.statistics
+        return list_axes(point_axes(self.scene, summary.max_at_axes)) or spell_in_r(
+            summary.max_at_mm
+        )
 
     @property
     def volume(self) -> str:
@@ -158,7 +160,7 @@ def build_review(
     settings: ReportSettings,
     pictures: Sequence[ScenePicture] | None = None,
 ) -> Review:
-    """Evaluate everything a report tells, where the volumes are not evaluated yet also those."""
+    """Evaluate the content of a report; `pictures` are the volumes where evaluated already."""
     pictures = pictures or share_pictures(scenes, settings)
     letters = ("",) if len(pictures) == 1 else ("A", "B")
     reviewed = [
@@ -169,36 +171,36 @@ def build_review(
 
 
 def _review_scene(letter: str, picture: ScenePicture, settings: ReportSettings) -> Reviewed:
-    scene, found = picture.scene, picture.statistics
+    scene, summary = picture.scene, picture.statistics
     results = {
-        name: _ask(analysis, scene) for name, analysis in settings.analyses(scene.limit_um).items()
+        name: _run_analysis(analysis, scene)
+        for name, analysis in settings.analyses(scene.limit_um).items()
     }
-    at = {name: np.asarray(value) for name, value in found.max_at_axes.items()}
-    point = np.asarray(found.max_at_mm)
+    at = {name: np.asarray(value) for name, value in summary.max_at_axes.items()}
+    point = np.asarray(summary.max_at_mm)
     return Reviewed(
         letter,
         picture,
         explain(scene.model, scene.errors, at, picture.view, point),
         second_order(scene, settings.loop).um,
         results,
-        _within(picture),
+        _share_within(picture),
         _advice(picture, results["advice"], settings),
         volume_uncertainty(scene, picture.view, settings.grid),
     )
 
 
-def _behind(found: Statistics, name: str) -> str:
-    return (
-        u95_behind(found.expanded_uncertainty[f"u95_{name}"]) if found.expanded_uncertainty else ""
-    )
+def _format_u95(summary: Statistics, name: str) -> str:
+    u95 = summary.expanded_uncertainty
+    return u95_behind(u95[f"u95_{name}"]) if u95 else ""
 
 
-def _within(picture: ScenePicture) -> float:
+def _share_within(picture: ScenePicture) -> float:
     limit = picture.scene.limit_um
     return 0.0 if limit is None else share_below(picture.field, limit)
 
 
-def _ask(analysis: Analysis, scene: Scene) -> Result | str:
+def _run_analysis(analysis: Analysis, scene: Scene) -> Result | str:
     try:
         return analysis.run(scene, ignore_progress)
     except WarpspaceError as error:
@@ -211,110 +213,117 @@ def _difference(first: ScenePicture, second: ScenePicture | None = None) -> Stat
     return scene_change(first, second).statistics
 
 
-def given(value: float) -> str:
-    """Spell a number that somebody has chosen, with its sign and without trailing zeros."""
+def spell_setting(value: float) -> str:
+    """Format a set value with its sign and without trailing zeros."""
     return ("+" if value > 0.0 else "") + spell_short(value)
 
 
 def volume_share(share: float) -> str:
-    """Spell a share of the volume, 100 % only where it is all of it."""
+    """Format a share of the volume; 100 % only for the whole volume."""
     percent = 100.0 * share
     return f"{percent if share == 1.0 else min(percent, 99.9):.3g}{PERCENT}"
 
 
 def verdict(review: Review) -> str:
-    """Say what a reader must know: of two scenes which keeps its limit, and how they differ."""
+    """Format the verdict on the limit; of two scenes also the change of the mean error."""
     if len(review.scenes) == 1:
         return _verdict_on(review.scenes[0])
-    kept = [
-        f"{one.letter}, limit of {spell_short(limit)}{UM}: {one.verdict}"
-        for one in review.scenes
-        if (limit := one.scene.limit_um) is not None
-    ]
-    a, b = (one.statistics.mean_um for one in review.scenes)
+    verdicts = [_verdict_on_limit(reviewed) for reviewed in review.scenes]
+    a, b = (reviewed.statistics.mean_um for reviewed in review.scenes)
     change = (b - a) / a if a else 0.0
-    words = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
-    words = words if abs(change) >= 0.005 else "the same as"
-    how = f"{words} A's {spell(a)}{UM}" if a else "where A has none"
-    limits = f"{'; '.join(kept)}. " if kept else ""
-    return f"{limits}The mean error of B is {spell(b)}{UM}: {how}."
+    comparison = f"{abs(100.0 * change):.0f}{PERCENT} {'less' if change < 0.0 else 'more'} than"
+    if abs(change) < 0.005:
+        comparison = "the same as"
+    comment = f"{comparison} A's {spell(a)}{UM}" if a else "that of A is zero"
+    return f"{''.join(verdicts)}The mean error of B is {spell(b)}{UM}: {comment}."
 
 
-def _verdict_on(one: Reviewed) -> str:
-    limit, largest, worst = one.scene.limit_um, one.statistics.max_um, one.largest
-    volume = f"the working volume of {one.volume}"
+def _verdict_on_limit(reviewed: Reviewed) -> str:
+    limit = reviewed.scene.limit_um
+    if limit is None:
+        return ""
+    word = reviewed.verdict
+    return f"{reviewed.letter}: {word}, limit {spell_short(limit)}{UM}. "
+
+
+def _verdict_on(reviewed: Reviewed) -> str:
+    limit, largest, worst = reviewed.scene.limit_um, reviewed.statistics.max_um, reviewed.largest
+    volume = f"the working volume of {reviewed.volume}"
     if largest == 0.0:
         return f"The error is zero in {volume}."
     if limit is None:
         return f"No limit is set. The largest error in {volume} is {worst}."
-    verdict = f"Limit of {spell_short(limit)}{UM}: {one.verdict}."
-    if one.verdict is Verdict.FAIL:
-        volume = f"{volume_share(one.within)} of {volume} is within the limit; the"
-        return f"{verdict} {volume} largest error is {worst}."
-    return f"{verdict} The largest error in {volume} is {worst}."
+    finding = f"the largest error in {volume} is {worst}"
+    limit_text = f"the limit of {spell_short(limit)}{UM}"
+    if reviewed.verdict is Verdict.UNDECIDED:
+        return f"Undecided: {finding}; {limit_text} is in the uncertainty zone."
+    if reviewed.verdict is Verdict.PASS:
+        return f"Pass: {finding}, within {limit_text}."
+    share = volume_share(reviewed.share_within)
+    return f"Fail: {share} of {volume} is within {limit_text}; the largest error is {worst}."
 
 
-def _advice(picture: ScenePicture, found: Result | str, settings: ReportSettings) -> str:
+def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSettings) -> str:
     limit, before = picture.scene.limit_um, picture.statistics.max_um
     if before == 0.0:
-        return "Nothing to adjust: the error is zero."
+        return "No adjustment required: the error is zero."
     if limit is not None and before <= limit:
-        return "Nothing to adjust: all errors are within the limit."
-    if not isinstance(found, AdjustResult) or not found.adjustments:
-        return "Nothing to adjust: no squareness or alignment acts in this loop."
-    after = evaluate_picture(found.changes()[0].scene, grid=settings.grid, loop=settings.loop)
+        return "No adjustment required: the error is within the limit."
+    if not isinstance(adjustment, AdjustResult) or not adjustment.adjustments:
+        return "No adjustment possible: no squareness or alignment error acts in this loop."
+    after = evaluate_picture(adjustment.changes()[0].scene, grid=settings.grid, loop=settings.loop)
     largest = after.statistics.max_um
     if not largest < (1.0 - _WORTH) * before:
-        return "No single adjustment lowers the largest error; several together may: see Repair."
-    ((key, value),) = found.adjustments[0].adjust.items()
+        return "No single adjustment reduces the largest error; a set may, see Adjustments."
+    ((key, value),) = adjustment.adjustments[0].adjust.items()
     row = parameter(key)
-    then = ""
-    if limit is not None:
-        share = volume_share(_within(after))
-        then = (
+    effect = f "the largest error falls from {spell(before)} to {spell(largest)}{UM}"
+    if limit is not None and largest < = limit:
+        effect + =
             ", within the limit"
-            if largest <= limit
-            else f", and {share} of the volume is within the limit"
+    elif limit is not None:
+        effect += f"; {volume_share(_share_within(after))} of the volume is within the limit"
+    present = spell_setting(adjustment.present[key]
         )
     return (
-        f"Adjust {key} ({row.name}) from {given(found.present[key])} to {spell_signed(value)}"
-        f" {row.unit}: the largest error falls from {spell(before)} to {spell(largest)}{UM}{then}."
+        f"Adjust {key} ({row.name}) from {present} to {spell_signed(value)} {row.unit}: {effect}."
     )
 
 
 def first_page(review: Review, picture: Block) -> list[Block]:
     names = ["mean |E|", "P95", "max"]
-    limited = any(one.scene.limit_um is not None for one in review.scenes)
+    limits = [reviewed.scene.limit_um for reviewed in review.scenes]
+    limited = any(limit is not None for limit in limits)
     rows: list[list[str]] = []
-    for one in review.scenes:
-        found = one.statistics
+    for reviewed, limit in zip(review.scenes, limits, strict=True):
+        summary = reviewed.statistics
         numbers = ("mean_um", "p95_um", "max_um", "rms_um")
-        rows.append([spell(getattr(found, of)) + _behind(found, of) + UM for of in numbers])
+        rows.append([spell(getattr(summary, of)) + _format_u95(summary, of) + UM for of in numbers])
         if limited:
-            rows[-1][-1] = volume_share(one.within) if one.scene.limit_um is not None else "–"
+            rows[-1][-1] = "–" if limit is None else volume_share(reviewed.share_within)
     names.append("within the limit" if limited else "RMS")
     if len(rows) == 1:
-        remarks = ("", "95 % of the volume is below it", f"at {review.scenes[0].worst_axes}")
+        remarks = ("", "not exceeded in 95 % of the volume", f"at {review.scenes[0].worst_axes}")
         cards = zip(names, rows[0], (*remarks, "of the volume" if limited else ""), strict=True)
-        said: Block = Cards(tuple(cards))
+        numbers_block: Block = Cards(tuple(cards))
     else:
         columns = (Column("scene"), *number_columns(names, "s"))
         titles = [one.titled(one.scene.title) for one in review.scenes]
-        marks: list[Mark] = ["" if one.keeps else "worse" for one in review.scenes]
+        marks: list[Mark] = ["" if one.is_within_limit else "worse" for one in review.scenes]
         numbered = [(title, *row) for title, row in zip(titles, rows, strict=True)]
-        said = Table(columns, numbered, marks=marks)
+        numbers_block = Table(columns, numbered, marks=marks)
     noted = (
         one.titled(f"{note.text} (note {number}{note.author and f', {note.author}'})")
         for one in review.scenes
         for number, note in enumerate(one.scene.review, 1)
         if (note.kind, note.status) == ("question", "open")
     )
-    asked = (*review.settings.questions, *noted)
+    questions = (*review.settings.questions, *noted)
     return [
         Text(verdict(review), "lead"),
-        said,
-        Text("What to do", "heading"),
+        numbers_block,
+        Text("Recommended adjustment", "heading"),
         *(Text(one.titled(one.advice)) for one in review.scenes),
         picture,
-        *([Text("Open questions", "heading"), Items(asked)] if asked else []),
+        *([Text("Open questions", "heading"), Items(questions)] if questions else []),
     ]

@@ -31,8 +31,8 @@ from warpspace.outputs.report.review import (
     Reviewed,
     build_review,
     first_page,
-    given,
     share_pictures,
+    spell_setting,
 )
 from warpspace.outputs.report.templating import (
     Block,
@@ -50,7 +50,7 @@ from warpspace.picture.comparison import statistics_blocks
 from warpspace.picture.formatting import (
     convention_sentences,
     list_axes,
-    own_axes,
+    point_axes,
     reference_words,
     spell_factor,
     spell_point,
@@ -69,15 +69,15 @@ CHART = "warpspace.outputs.charts.block_charts:chart_figure"
 LINES_WIDTH = 0.72  # of the page, at which curves are printed as large as they are drawn
 Chart = Bars | Lines | Histogram
 Drawn = Callable[[], Block]
-"""Waits for a figure; gives what stands in its place where it cannot be drawn."""
+"""Waits for a figure; returns a replacement where it cannot be drawn."""
 Step = tuple[str, str, Sequence[Scene], FigureSettings]
-Tell = Callable[[Scene, int], Iterable[Step]]
-"""Gives the steps of a scene's story at so many nodes per axis, what was on the screen each time:
-caption, name of a figure, what it is of, its settings. It needs the app."""
+StorySteps = Callable[[Scene, int], Iterable[Step]]
+"""Returns the steps of a scene's story for a number of nodes per axis, each as shown on the page:
+caption, name of the figure, its scenes and settings. It needs the app."""
 
 
 class ReportFigures:
-    """Draws the figures of one report; its maps are begun as soon as it is there."""
+    """The figures of one report; drawing of the maps begins at once."""
 
     def __init__(
         self,
@@ -95,24 +95,24 @@ class ReportFigures:
         scenes = [picture.scene for picture in pictures]
         drawn = f"displacement drawn {spell_factor(self._factor)}"
         compares = len(scenes) == 2
-        what = "A, B and their difference" if compares else f"Error map of {scenes[0].title}"
+        subject = "A, B and their difference" if compares else f"Error map of {scenes[0].title}"
         self.first = self.begin(
-            "comparison" if compares else "error-map", scenes, f"{what}; {drawn}."
+            "comparison" if compares else "error-map", scenes, f"{subject}; {drawn}."
         )
         self.evidence: list[list[Drawn]] = []
         for number, picture in enumerate(pictures):
             scene = picture.scene
-            own = f"Error map of {scene.title}; {drawn}; colour scale of its own."
-            # what would tell nothing: no trace displaced, the same machine again
-            still = not any(trace.error_um.any() for trace in trace_lines(picture.traces))
-            left_out = {"traces" if still else "", "machine" if number else ""}
-            wanted = [("error-map", own)] if compares else []
-            wanted += [
+            map_caption = f"Error map of {scene.title}; {drawn}; own colour scale."
+            # without information: no trace displaced, the same machine again
+            is_undisplaced = not any(trace.error_um.any() for trace in trace_lines(picture.traces))
+            left_out = {"traces" if is_undisplaced else "", "machine" if number else ""}
+            figures = [("error-map", map_caption)] if compares else []
+            figures += [
                 (kind.name, kind.caption)
                 for kind in figure_kinds()
                 if kind.evidence and kind.name not in left_out
             ]
-            self.evidence.append([self.begin(name, [scene], caption) for name, caption in wanted])
+            self.evidence.append([self.begin(name, [scene], caption) for name, caption in figures])
 
     def chart(self, chart: Chart) -> Block:
         data = self._worker.begin_chart("chart", CHART, self._form, chart)()
@@ -128,13 +128,14 @@ class ReportFigures:
         caption: str,
         settings: FigureSettings | None = None,
     ) -> Drawn:
-        """Begin a figure; it is drawn a second time where the first fails, then it is missing."""
-        # the lean of the tool axis has a factor of its own, at which it is seen
+        """Begin a figure; if drawing fails twice, the figure is missing."""
+        # the lean of the tool axis needs a factor of its own to be visible
         factor = "auto" if name == "orientation-map" else self._factor
-        chosen = settings or FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
+        if settings is None:
+            settings = FigureSettings(exaggeration=factor, loop=self._loop, grid=self._grid)
         size = PRINTED_PX, OTHER_PX.get(name, HEIGHT_PX)
-        chosen = replace(chosen, size=size, printed=True)
-        begin = partial(self._worker.begin, name, scenes, chosen, self._form)
+        settings = replace(settings, size=size, printed=True)
+        begin = partial(self._worker.begin, name, scenes, settings, self._form)
         begun = begin()
         self._begun += 1
 
@@ -159,6 +160,7 @@ class ReportFigures:
 ENDINGS = (".html", ".pdf")
 OVERLINE = "Design review · volumetric error"
 MOST_ROWS, MOST_BARS = 15, 20
+TOLERANCE_ANALYSES = ("worst", "sampled", "shares")  # names in `ReportSettings.analyses`
 LOOPS = {
     "tool": "The tool point, actual minus nominal.",
     "workpiece": "The workpiece point, actual minus nominal.",
@@ -167,7 +169,7 @@ LOOPS = {
 
 
 Embed = Callable[..., str]
-"""Builds a page of a scene, given exaggeration, nodes, loop and largest |E|; it needs a server."""
+"""Builds a page of a scene for exaggeration, nodes, loop and largest |E|; it needs a server."""
 
 
 def write_report(
@@ -179,7 +181,7 @@ def write_report(
     overwrite: bool = True,
     **parts: Any,
 ) -> Report:
-    """Write the report of one scene or two; see `build_report` for its parts."""
+    """Write the report of one scene or two; `parts` are passed to `build_report`."""
     target = check_target(path, ENDINGS, overwrite=overwrite)
     page = target.suffix.lower() == ".html"
     form, embed = ("svg", embed) if page else ("pdf", None)
@@ -196,41 +198,42 @@ def build_report(
     *,
     form: str = "svg",
     embed: Embed | None = None,
-    tell: Tell | None = None,
+    story_steps: StorySteps | None = None,
     concepts: Sequence[Scene] = (),
     results: Mapping[str, Result] | None = None,
     files: Sequence[Path] = (),
     watch: ProgressCallback = ignore_progress,
 ) -> Report:
-    """Build a report; `watch` is called with the share of its figures that are drawn."""
+    """Build a report; `watch` is called with the share of figures drawn."""
     if form not in ("svg", "pdf"):
         raise OptionError(f"figures of a report as {form!r}; expected svg or pdf")
     settings = settings or ReportSettings()
     pictures = share_pictures(scenes, settings)
     with FigureWorker() as worker:
-        painter = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
+        figures = ReportFigures(worker, pictures, settings.loop, settings.grid, form, watch)
         review = build_review(scenes, settings, pictures)
-        beside = {"Concepts side by side": concept_blocks(review, concepts, painter)}
-        found = {
-            "Where the error is": where(review, painter, embed),
+        extra = results or {}
+        side_by_side = {"Comparison of concepts": concept_blocks(review, concepts, figures)}
+        appendices = {
+            "Distribution of the error": map_blocks(review, figures, embed),
             "Error budget at the worst point": map(explanation, review.scenes),
-            "Repair": told(review, painter, "adjust"),
-            **({"What differs": differences(review)} if len(scenes) == 2 else {}),
+            "Adjustments": result_blocks(review, figures, "adjust"),
+            **({"Differences between A and B": differences(review)} if len(scenes) == 2 else {}),
             "Errors and tolerances": map(parameters, review.scenes),
-            "How errors arrive at the point": told(review, painter, "gains"),
-            "What the tolerances promise": told(review, painter, "worst", "sampled", "shares"),
-            **(beside if concepts else {}),
-            **{name: said(result.blocks(), painter) for name, result in (results or {}).items()},
+            "Error gains": result_blocks(review, figures, "gains"),
+            "Errors within the tolerances": result_blocks(review, figures, *TOLERANCE_ANALYSES),
+            **(side_by_side if concepts else {}),
+            **{name: report_blocks(result.blocks(), figures) for name, result in extra.items()},
             "Conventions": [conventions(review)],
             "Provenance": provenance(review, files),
         }
-        noted = tuple(notes(review, painter, tell))
+        noted = tuple(notes(review, figures, story_steps))
         parts = (
-            ReportSection("", tuple(first_page(review, painter.first()))),
+            ReportSection("", tuple(first_page(review, figures.first()))),
             *([ReportSection("Findings and decisions", noted)] if noted else []),
             *(
                 ReportSection(f"Appendix {_letters(number)} · {heading}", tuple(blocks))
-                for number, (heading, blocks) in enumerate(found.items(), 1)
+                for number, (heading, blocks) in enumerate(appendices.items(), 1)
             ),
         )
     machines = [one.scene.machine for one in review.scenes]
@@ -245,33 +248,35 @@ def build_report(
         f"warpspace {__version__}",
     )
     title = " and ".join(one.titled(one.scene.title) for one in review.scenes)
-    return Report(title, OVERLINE, facts, parts, tuple(painter.missing))
+    return Report(title, OVERLINE, facts, parts, tuple(figures.missing))
 
 
 def _letters(number: int) -> str:
-    rest, last = divmod(number - 1, 26)
-    return (chr(64 + rest) if rest else "") + chr(65 + last)
+    prefix, last = divmod(number - 1, 26)
+    return (chr(64 + prefix) if prefix else "") + chr(65 + last)
 
 
-def said(found: Iterable[AnyBlock], painter: ReportFigures | None = None) -> Iterator[Block]:
-    """Give what a result of any analysis says; its charts where somebody draws them."""
-    for block in found:
+def report_blocks(
+    blocks: Iterable[AnyBlock], figures: ReportFigures | None = None
+) -> Iterator[Block]:
+    """Convert the blocks of a result to blocks of the report; charts only with `figures`."""
+    for block in blocks:
         if isinstance(block, str):
             yield Text(block.strip(), "note" if block.startswith(" ") else "body")
         elif isinstance(block, Table) and block.rows:
-            kept = [i for i, row in enumerate(block.rows) if not _is_zero(block.columns, row)]
-            zero, left = len(block.rows) - len(kept), len(kept) - MOST_ROWS
+            nonzero = [i for i, row in enumerate(block.rows) if not _is_zero(block.columns, row)]
+            zero, omitted = len(block.rows) - len(nonzero), len(nonzero) - MOST_ROWS
             title = block.title.strip()
-            title += f" Rows of zeros left out: {zero}." if zero else ""
-            title += f" {left} more rows are left out." if left > 0 else ""
-            rows = [block.rows[i] for i in kept[:MOST_ROWS]]
-            marks = [block.marks[i] for i in kept[:MOST_ROWS] if block.marks]
-            shown = replace(block, title=title.strip(), rows=rows, marks=marks)
-            yield shown if rows else Text(title.strip(), "note")
+            title += f" Rows of zeros omitted: {zero}." if zero else ""
+            title += f" {omitted} more rows omitted." if omitted > 0 else ""
+            rows = [block.rows[i] for i in nonzero[:MOST_ROWS]]
+            marks = [block.marks[i] for i in nonzero[:MOST_ROWS] if block.marks]
+            shortened = replace(block, title=title.strip(), rows=rows, marks=marks)
+            yield shortened if rows else Text(title.strip(), "note")
         elif isinstance(block, Table):
             yield Text(f"{block.title} {block.empty.strip()}".strip(), "note")
-        elif painter is not None:
-            yield painter.chart(_first_bars(block) if isinstance(block, Bars) else block)
+        elif figures is not None:
+            yield figures.chart(_first_bars(block) if isinstance(block, Bars) else block)
 
 
 def _is_zero(columns: Sequence[Column], row: Sequence[object]) -> bool:
@@ -298,54 +303,55 @@ def _first_bars(bars: Bars) -> Bars:
     return replace(bars, rows=rows, keys=keys, panels=tuple(panels))
 
 
-def notes(review: Review, painter: ReportFigures, tell: Tell | None) -> Iterator[Block]:
-    """Give what people have noted of each scene, and the story that they tell; a figure a step."""
+def notes(review: Review, figures: ReportFigures, story: StorySteps | None) -> Iterator[Block]:
+    """Build the notes of each scene, and the steps of its story, one figure each."""
     for reviewed in (one for one in review.scenes if one.scene.review):
-        title = reviewed.titled("Red where the numbers of a note no longer hold.")
+        title = reviewed.titled("Red: numbers that have changed since the note was written.")
         yield notes_table(reviewed.scene, title)
-        if tell and (steps := tell(reviewed.scene, review.settings.grid)):
+        steps = story(reviewed.scene, review.settings.grid) if story else ()
+        begun = [figures.begin(name, of, caption, drawn) for caption, name, of, drawn in steps]
+        if begun:
             yield Text(reviewed.titled("The story"), "heading")
-            begun = [painter.begin(name, of, caption, one) for caption, name, of, one in steps]
-            yield from (drawn() for drawn in begun)
+            yield from (figure() for figure in begun)
 
 
-def told(review: Review, painter: ReportFigures, *names: str) -> Iterator[Block]:
-    """Give what analyses say of each scene; once where they say the same."""
+def result_blocks(review: Review, figures: ReportFigures, *names: str) -> Iterator[Block]:
+    """Build the results of analyses for each scene, identical results once."""
     for name in names:
         before = None
         for reviewed in review.scenes:
-            found = reviewed.results[name]
-            if isinstance(found, str):
-                yield Text(reviewed.titled(found), "note")
+            result = reviewed.results[name]
+            if isinstance(result, str):
+                yield Text(reviewed.titled(result), "note")
                 continue
-            if (numbers := found.as_json()) == before:
-                yield Text(reviewed.titled("the same."), "note")
+            numbers = result.as_json()
+            if numbers == before:
+                yield Text(reviewed.titled("identical results."), "note")
                 continue
             before = numbers
-            title, *blocks = found.blocks()
+            title, *blocks = result.blocks()
             yield Text(reviewed.titled(str(title)), "heading")
             if name != "adjust":
-                yield from said(blocks, painter)
+                yield from report_blocks(blocks, figures)
                 continue
-            yield from said(blocks)
-            if found.changes():
+            yield from report_blocks(blocks)
+            if result.changes():
                 caption = "Before, after the last set of the table, and their difference."
-                yield painter.begin("adjust", [reviewed.scene], reviewed.titled(caption))()
+                yield figures.begin("adjust", [reviewed.scene], reviewed.titled(caption))()
 
 
-def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterator[Block]:
-    """Give statistics, the views that are turned with the mouse, and the maps."""
+def map_blocks(review: Review, figures: ReportFigures, embed: Embed | None) -> Iterator[Block]:
+    """Build the statistics, the interactive views and the maps."""
     names = [one.letter or "|E|" for one in review.scenes]
-    found = [one.statistics for one in review.scenes]
+    summaries = [one.statistics for one in review.scenes]
     if review.difference is not None:
-        found.append(review.difference)
-    yield Text("Each node counts for its share of the volume.")
-    blocks = statistics_blocks(review.scenes[0].scene, names, found)
-    yield from said(block for block in blocks if not str(block).startswith("  --at"))
-    for one in review.scenes:
-        yield from said(
-            u95_lines(one.uncertainty and one.uncertainty.errors, {one.letter: one.statistics})
-        )
+        summaries.append(review.difference)
+    yield Text("Each node is weighted by its share of the volume.")
+    blocks = statistics_blocks(review.scenes[0].scene, names, summaries)
+    yield from report_blocks(block for block in blocks if not str(block).startswith("  --at"))
+    for reviewed in review.scenes:
+        errors = reviewed.uncertainty and reviewed.uncertainty.errors
+        yield from report_blocks(u95_lines(errors, {reviewed.letter: reviewed.statistics}))
     for number, reviewed in enumerate(review.scenes):
         if embed is not None:
             page = embed(
@@ -355,34 +361,35 @@ def where(review: Review, painter: ReportFigures, embed: Embed | None) -> Iterat
                 loop=review.settings.loop,
                 largest=max(one.statistics.max_um for one in review.scenes),
             )
-            title = reviewed.titled(f"{reviewed.scene.title}: turn it with the mouse")
+            title = reviewed.titled(f"{reviewed.scene.title}: interactive view, drag to turn")
             yield Embedded(title, page)
-        yield from (drawn() for drawn in painter.evidence[number])
+        yield from (drawn() for drawn in figures.evidence[number])
 
 
 def explanation(reviewed: Reviewed) -> Table:
-    found = reviewed.explanation
-    ranked = sorted(found.contributions, key=lambda part: -abs(part.along_um))
+    terms = reviewed.explanation
+    ranked = sorted(terms.contributions, key=lambda part: -abs(part.along_um))
     rows: list[tuple[str, ...]] = []
     for part in ranked[:MOST_ROWS]:
         row = parameter(part.key)
-        value = f"{given(part.value)} {row.unit}"
+        value = f"{spell_setting(part.value)} {row.unit}"
         numbers = map(spell_signed, (*part.error_um, part.along_um))
         rows.append((part.key, row.name, value, *numbers))
-    if rest := ranked[MOST_ROWS:]:
-        vector = np.sum([part.error_um for part in rest], axis=0)
-        along = sum(part.along_um for part in rest)
-        rows.append((f"{len(rest)} more", "", "", *map(spell_signed, (*vector, along))))
-    remainder = (spell_signed(value, 2) for value in found.remainder_um)
+    remaining = ranked[MOST_ROWS:]
+    if remaining:
+        vector = np.sum([part.error_um for part in remaining], axis=0)
+        along = sum(part.along_um for part in remaining)
+        rows.append((f"{len(remaining)} more", "", "", *map(spell_signed, (*vector, along))))
+    remainder = (spell_signed(value, 2) for value in terms.remainder_um)
     rows.append(("remainder", "second order", "", *remainder, ""))
-    rows.append(("total", "exact chain", "", *map(spell_signed, found.error_um), ""))
+    rows.append(("total", "exact chain", "", *map(spell_signed, terms.error_um), ""))
     worst = reviewed.statistics
-    place = spell_point(own_axes(reviewed.scene, worst.max_at_axes), worst.max_at_mm)
+    place = spell_point(point_axes(reviewed.scene, worst.max_at_axes), worst.max_at_mm)
     title = (
-        f"{reviewed.titled(reviewed.scene.title)}. What each error does to the worst point,"
-        f" {place} mm. The parts along E add up to the length of the first-order error."
+        f"{reviewed.titled(reviewed.scene.title)}. Contribution of each error at the worst point,"
+        f" {place} mm. The components along E add up to the length of the first-order error."
         " The largest contribution is not always the one to adjust, since it may compensate other"
-        " errors elsewhere; see Repair."
+        " errors elsewhere; see Adjustments."
     )
     columns = (
         *(Column("key"), Column("error"), Column("value there", "s")),
@@ -400,23 +407,23 @@ def parameters(reviewed: Reviewed) -> Block:
     for key in scene.parameter_keys:
         row, tolerance = parameter(key), scene.tolerances.get(key)
         value = scene.errors.amplitude(key)
-        limits, is_within = "", ""
+        limits, conforms = "", ""
         if tolerance is not None:
-            centre = "" if tolerance.centre == 0.0 else f"{given(tolerance.centre)} "
+            centre = "" if tolerance.centre == 0.0 else f"{spell_setting(tolerance.centre)} "
             limits = f"{centre}± {spell_short(tolerance.half_width)}"
-            is_within = "yes" if abs(value - tolerance.centre) <= tolerance.half_width else "no"
-        if value == 0.0 and is_within != "no":
+            conforms = "yes" if abs(value - tolerance.centre) <= tolerance.half_width else "no"
+        if value == 0.0 and conforms != "no":
             zero += 1
             continue
         function = scene.errors.functions.get(key) if value else None
         curve = "" if function is None else function.describe(row.unit, spell, spell_short)
-        number = given(value) if value else "0"
-        rows.append((key, row.symbol, row.name, number, limits, row.unit, is_within, curve))
-        marks.append("worse" if is_within == "no" else "key" if value else "")
+        number = spell_setting(value) if value else "0"
+        rows.append((key, row.symbol, row.name, number, limits, row.unit, conforms, curve))
+        marks.append("worse" if conforms == "no" else "key" if value else "")
     title = reviewed.titled(f"Errors and tolerances of {scene.title}.")
     if not rows:
-        return Text(f"{title} All errors are zero; none is out of its tolerance.", "note")
-    title += f" Errors that are zero left out: {zero}." if zero else ""
+        return Text(f"{title} All errors are zero and within tolerance.", "note")
+    title += f" Errors equal to zero omitted: {zero}." if zero else ""
     columns = (
         *(Column("key"), Column("symbol"), Column("error"), Column("value", "s")),
         *(Column("tolerance", "s"), Column("unit"), Column("within"), Column("along the axis")),
@@ -433,35 +440,36 @@ def differences(review: Review) -> Iterator[Block]:
         if shapes[0] == shapes[1] or (a == 0.0 and b == 0.0):
             continue
         row = parameter(key)
-        rows.append((key, row.name, given(a), given(b), given(b - a), row.unit))
+        rows.append((key, row.name, *map(spell_setting, (a, b, b - a)), row.unit))
     columns = (
         Column("key"), Column("error"), *number_columns(("A", "B", "B − A"), "s"), Column("unit")
     )  # fmt: skip
     title = "Errors in which A and B differ (largest values along the axis)."
-    same = Text("The error sets of A and B are the same.", "note")
-    yield Table(columns, rows, title) if rows else same
+    no_difference = Text("The error sets of A and B are the same.", "note")
+    yield Table(columns, rows, title) if rows else no_difference
     if review.difference is None:
-        yield Text("A and B have different working volumes: no difference is formed.", "note")
+        yield Text("The working volumes of A and B differ: no difference is formed.", "note")
 
 
 def concept_blocks(
-    review: Review, others: Sequence[Scene], painter: ReportFigures
+    review: Review, concepts: Sequence[Scene], figures: ReportFigures
 ) -> Iterator[Block]:
-    every, settings = (*(one.scene for one in review.scenes), *others), review.settings
-    if len(every) > MOST_CONCEPTS:
+    scenes, settings = (*(one.scene for one in review.scenes), *concepts), review.settings
+    if len(scenes) > MOST_CONCEPTS:
         raise OptionError(
-            f"{len(every)} machines side by side; expected at most {MOST_CONCEPTS}"
+            f"{len(scenes)} machines side by side; expected at most {MOST_CONCEPTS}"
             f" with the {len(review.scenes)} of the report"
         )
-    asked = Concepts(
+    analysis = Concepts(
         limit_um=settings.spec_um, samples=settings.samples, seed=settings.seed,
         distribution=choose_distribution(settings.distribution),
     )  # fmt: skip
-    found = asked.run_all(every, ignore_progress)
-    yield from said(found.blocks())
-    caption = "The machines in one scale; colours are the RMS of |E| within tolerance."
-    chosen = FigureSettings(loop=str(asked.loop), grid=settings.grid, concepts=asked)
-    yield painter.begin("concepts", [one.scene for one in found.concepts], caption, chosen)()
+    comparison = analysis.run_all(scenes, ignore_progress)
+    yield from report_blocks(comparison.blocks())
+    caption = "The machines at one scale; colours: RMS of |E| within tolerance."
+    drawn = FigureSettings(loop=str(analysis.loop), grid=settings.grid, concepts=analysis)
+    machines = [concept.scene for concept in comparison.concepts]
+    yield figures.begin("concepts", machines, caption, drawn)()
 
 
 def conventions(review: Review) -> Items:
@@ -471,7 +479,7 @@ def conventions(review: Review) -> Items:
     )
     each = [(_reference(one.scene), *convention_sentences(one.scene)) for one in review.scenes]
     differ = len(set(each)) > 1
-    own = [
+    sentences = [
         one.titled(text) if differ else text
         for one, words in zip(review.scenes, each if differ else each[:1], strict=False)
         for text in words
@@ -485,9 +493,9 @@ def conventions(review: Review) -> Items:
                 " ISO 230-1 (EAX: rotation about x of the X axis; EC0Y: squareness of Y to X)."
             ),
             f"Loop: {loop}. {LOOPS[loop]}",
-            *own,
+            *sentences,
             (
-                f"Displacement is drawn {spell_factor(review.exaggeration)} unless a picture says"
+                f"Displacement is drawn {spell_factor(review.exaggeration)} unless a figure states"
                 " otherwise; the dashed box is nominal."
             ),
             (
@@ -501,8 +509,8 @@ def conventions(review: Review) -> Items:
 
 def _reference(scene: Scene) -> str:
     if scene.reference is None:
-        return "Absolute: errors include the part that is the same everywhere."
-    return f"Relative to the reference point {list_axes(scene.reference)}, which is held still."
+        return "Absolute: errors include the part common to all points."
+    return f"Relative to the reference point {list_axes(scene.reference)}; its error is subtracted."
 
 
 def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
@@ -523,8 +531,8 @@ def provenance(review: Review, files: Sequence[Path]) -> Iterator[Block]:
         *((f"file {path.name}", read_bytes(path, MAX_CSV_BYTES)) for path in files),
     ]
     rows += [(name, f"SHA-256 {hashlib.sha256(data).hexdigest()}") for name, data in inputs]
-    yield Table((Column("what"), Column("value")), rows, "Program, settings and input.")
-    for one, text in zip(review.scenes, texts, strict=True):
-        words = f"{one.scene.name}.toml, complete: saved as a file it is the scene of this report."
-        yield Text(one.titled(words), "heading")
+    yield Table((Column("item"), Column("value")), rows, "Program, settings and input.")
+    for reviewed, text in zip(review.scenes, texts, strict=True):
+        heading = f"{reviewed.scene.name}.toml, complete; the scene of this report."
+        yield Text(reviewed.titled(heading), "heading")
         yield Text(text.decode(), "code")

@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import matplotlib as mpl
+import typst
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from warpspace.analysis.blocks import Table, table_html
@@ -23,12 +26,12 @@ POLICY = (
     " style-src 'unsafe-inline'; img-src data: blob:; font-src data: blob:;"
     " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
 )
-"""What the browser may load: what is in the file, and nothing else."""
+"""Content policy: the browser loads only what is in the file."""
 
 _PATH = re.compile(r' d="[^"]*"')
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _UNSAFE = re.compile(r"[%#]|[^\x20-\x7e]+")
-"""What the address of an image holds in code; the page's own escaping comes on top."""
+"""Characters to encode in the address of an image; the page escapes it in addition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +44,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Cards:
-    """Numbers to remember side by side: what each is, its value with unit, a remark."""
+    """Key numbers side by side: label, value with unit, remark."""
 
     cards: tuple[tuple[str, str, str], ...]
 
@@ -59,7 +62,7 @@ class ReportFigure:
 
 @dataclass(frozen=True, slots=True)
 class Embedded:
-    """A page of its own inside the page, for instance a 3-D view; left out on paper."""
+    """A page inside the page, for instance a 3-D view; omitted in print."""
 
     title: str
     html: str
@@ -77,7 +80,7 @@ Block = Text | Cards | Table | ReportFigure | Embedded | Items
 
 @dataclass(frozen=True, slots=True)
 class ReportSection:
-    """A part of the report with a heading; the first stands on the page read first."""
+    """A part of the report with a heading; the first is the first page."""
 
     heading: str
     blocks: tuple[Block, ...]
@@ -88,10 +91,10 @@ class Report:
     """A whole report."""
 
     title: str
-    overline: str  # what kind of document it is
+    overline: str  # kind of document
     facts: tuple[str, ...]  # machine, date, version: one line below the title
     sections: tuple[ReportSection, ...]
-    missing: tuple[str, ...] = ()  # figures that could not be drawn, and why
+    missing: tuple[str, ...] = ()  # figures that could not be drawn, with the reason
 
     @property
     def pictures(self) -> tuple[ReportFigure, ...]:
@@ -101,7 +104,7 @@ class Report:
 
 
 def report_time() -> datetime:
-    """Give the time of a report, UTC; ``SOURCE_DATE_EPOCH`` fixes it, so that files repeat."""
+    """Return the time of a report, UTC; ``SOURCE_DATE_EPOCH`` fixes it for reproducible files."""
     fixed = os.environ.get("SOURCE_DATE_EPOCH", "")
     if fixed.isascii() and fixed.isdigit() and len(fixed) < 12:
         return datetime.fromtimestamp(int(fixed), UTC)
@@ -113,8 +116,6 @@ def _kind(block: Block) -> str:
 
 
 def render_html(report: Report) -> str:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     templates = Environment(
         loader=PackageLoader("warpspace.outputs.report"),
         autoescape=True,
@@ -146,14 +147,11 @@ def _rounded(number: re.Match[str]) -> str:
 
 
 def _attribute_page(page: str) -> Markup:
-    """Spell a page as the value of an attribute: only these two characters would change it."""
+    """Escape a page as the value of an attribute: only these two characters would change it."""
     return Markup(page.replace("&", "&amp;").replace('"', "&quot;"))  # noqa: S704
 
 
 def render_pdf(report: Report) -> bytes:
-    import matplotlib as mpl
-    import typst
-
     try:
         with temporary_folder() as folder:
             template = files("warpspace.outputs.report") / "templates" / TEMPLATE
@@ -194,19 +192,19 @@ def _as_data(block: Block, folder: Path) -> dict[str, Any]:
     if isinstance(block, ReportFigure):
         path = folder / f"figure{len(list(folder.iterdir()))}.{block.form}"
         path.write_bytes(block.data)
-        found = {"caption": block.caption, "width": block.width, "file": path.name}
+        fields = {"caption": block.caption, "width": block.width, "file": path.name}
     elif isinstance(block, Table):
-        found = _table(block)
+        fields = _table(block)
     else:
-        found = asdict(block)
-    return {"kind": _kind(block), **found}
+        fields = asdict(block)
+    return {"kind": _kind(block), **fields}
 
 
 def _table(block: Table) -> dict[str, Any]:
     heads = [column.head.replace("\n", " ") for column in block.shown]
     rows = block.cells()
     longest = [max(map(len, cells)) for cells in zip(heads, *rows, strict=True)]
-    words = [max(map(len, head.split()), default=0) for head in heads]
+    longest_words = [max(map(len, head.split()), default=0) for head in heads]
     return {
         "caption": block.title,
         "heads": heads,
@@ -214,7 +212,7 @@ def _table(block: Table) -> dict[str, Any]:
         # shares of the page: as wide as its cells, within reason
         "widths": [
             min(max(cells if cells < 16 else 16 + 0.4 * (cells - 16), word), 32) + 2
-            for cells, word in zip(longest, words, strict=True)
+            for cells, word in zip(longest, longest_words, strict=True)
         ],
         "rows": rows,
         "marks": block.marks,
