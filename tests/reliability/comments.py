@@ -47,7 +47,7 @@ def writers() -> Mapping[str, Callable[[str], Mapping[str, str]]]:
 
 def _corrected(scene: Scene) -> Mapping[str, str]:
     text = "G0 X0 Y0 Z-100\nG1 X10 F100 (a\u2028b)\nM30\n"
-    return Program(file="p.ngc", text=text).run(scene, lambda _: None).texts()
+    return Program(file="p.ngc", text=text).run(scene, lambda _: None).output_files()
 
 
 @cache

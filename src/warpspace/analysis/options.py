@@ -3,14 +3,16 @@
 import math
 import types
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
 from typing import (
     TYPE_CHECKING,
     Annotated,
     Any,
+    Concatenate,
     Literal,
+    ParamSpec,
     TypeAlias,
     TypeVar,
     Union,
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
 T = TypeVar("T")
+P = ParamSpec("P")
 UNIT_ENDINGS = ("_mm", "_um", "_urad", "_deg")
 
 
@@ -47,26 +50,27 @@ class Grammar:
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One option of an analysis, as its field says it."""
+    """One option of an analysis; see `option`."""
 
-    name: str
     about: str
-    default: Any
-    kind: Any  # bool, int, float, str, or None with a grammar
-    choices: tuple[str, ...]
-    grammar: Grammar | None
-    enum: type[StrEnum] | None
-    unit: str
-    low: float | None
-    high: float | None
-    unset: str  # what None or nothing means
-    needs: str  # name of the switch it belongs to
-    flag: str  # on the command line
-    former: tuple[str, ...]  # flags it had before; understood, not listed
-    label: str  # on a page
-    words: Mapping[str, str]  # what choices are called on a page
-    required: bool  # whether a command line must give it
-    positional: bool  # whether it is given there without its flag, behind the scene
+    _: KW_ONLY
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    unset: str = ""  # meaning of None or of an empty value
+    needs: str = ""  # name of the switch it belongs to
+    flag: str = ""  # on the command line; by default the name without its unit
+    label: str = ""  # on a page; likewise
+    choice_labels: Mapping[str, str] = field(default_factory=dict[str, str])  # on a page
+    required: bool = False  # on the command line
+    positional: bool = False  # whether the command line takes it as an argument after the scene
+    # from the field and its annotation, by `options_of`
+    name: str = ""
+    default: Any = None
+    kind: Any = None  # bool, int, float, str, or None with a grammar
+    choices: tuple[str, ...] = ()
+    grammar: Grammar | None = None
+    enum: type[StrEnum] | None = None
 
     @property
     def help(self) -> str:
@@ -141,61 +145,49 @@ def _spell(value: float) -> str:
     return f"{value:,}" if isinstance(value, int) else f"{value:g}"
 
 
-def option(
-    default: T,
-    about: str,
-    *,
-    unit: str = "",
-    low: float | None = None,
-    high: float | None = None,
-    unset: str = "",
-    needs: str = "",
-    flag: str = "",
-    former: tuple[str, ...] = (),
-    label: str = "",
-    words: Mapping[str, str] | None = None,
-    required: bool = False,
-    positional: bool = False,
-) -> T:
-    """Give a field of an analysis that a user may set; its kind comes from its annotation.
+def _field_of(record: Callable[P, Option]) -> Callable[Concatenate[T, P], T]:
+    def option(default: T, *about: P.args, **traits: P.kwargs) -> T:
+        """Return a field of an analysis that a user may set.
 
-    See `Option` for the parameters; a flag is given where the name without its unit does not do.
-    """
-    said = {
-        "about": about, "unit": unit, "low": low, "high": high, "unset": unset, "needs": needs,
-        "flag": flag, "former": former, "label": label, "words": words or {},
-        "required": required, "positional": positional,
-    }  # fmt: skip
-    return field(default_factory=lambda: default, metadata={"option": said})
+        The type and the choices come from its annotation. See `Option` for the parameters.
+        """
+        described = record(*about, **traits)
+        return field(default_factory=lambda: default, metadata={"option": described})
+
+    return option
+
+
+option = _field_of(Option)
 
 
 @cache
 def options_of(kind: type) -> tuple[Option, ...]:
     hints = get_type_hints(kind, include_extras=True)
     return tuple(
-        _build(entry.name, entry.default_factory(), hints[entry.name], entry.metadata["option"])
+        _complete(entry.metadata["option"], entry.name, entry.default_factory(), hints[entry.name])
         for entry in fields(kind)
         if "option" in entry.metadata and callable(entry.default_factory)
     )
 
 
-def _build(name: str, default: Any, hint: Any, said: Mapping[str, Any]) -> Option:
+def _complete(described: Option, name: str, default: Any, hint: Any) -> Option:
     base, grammar = _resolve(hint)
     enum = base if isinstance(base, type) and issubclass(base, StrEnum) else None
-    choices = tuple(str(one) for one in enum) if enum else ()
-    if get_origin(base) is Literal:
-        choices = tuple(map(str, get_args(base)))
-    plain = name
+    choices = tuple(map(str, get_args(base) if get_origin(base) is Literal else enum or ()))
+    stem = name
     for ending in UNIT_ENDINGS:
-        plain = plain.removesuffix(ending)
-    called: dict[str, Any] = {
-        "flag": said["flag"] or "--" + plain.replace("_", "-"),
-        "label": said["label"] or plain.replace("_", " ").capitalize(),
-    }
-    return Option(
-        name=name, default=default, kind=base if base in (bool, int, float, str) else None,
-        choices=choices, grammar=grammar, enum=enum, **{**said, **called},
-    )  # fmt: skip
+        stem = stem.removesuffix(ending)
+    return replace(
+        described,
+        name=name,
+        default=default,
+        kind=base if base in (bool, int, float, str) else None,
+        choices=choices,
+        grammar=grammar,
+        enum=enum,
+        flag=described.flag or "--" + stem.replace("_", "-"),
+        label=described.label or stem.replace("_", " ").capitalize(),
+    )
 
 
 def _resolve(hint: Any) -> tuple[Any, Grammar | None]:

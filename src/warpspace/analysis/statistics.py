@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from warpspace.analysis.description import ExpandedUncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import Grid
@@ -25,8 +26,10 @@ class Summary:
     rms_um: float
     p95_um: float
     max_um: float
-    # U95 of these, u95_mean_um and so on, µm; None is not known, empty where nothing is stated
-    expanded_uncertainty: Numbers = attribute(default_factory=dict[str, float | None], kw_only=True)
+    # of these, u95_mean_um and so on, µm
+    expanded_uncertainty: ExpandedUncertainty[float | None] = attribute(
+        default_factory=ExpandedUncertainty[float | None], kw_only=True
+    )
 
     @property
     def three(self) -> tuple[float, float, float]:

@@ -13,9 +13,8 @@ from typing import Literal
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import ProgressCallback, Result
+from warpspace.analysis.description import ExpandedUncertainty, ProgressCallback, Result
 from warpspace.analysis.options import option
-from warpspace.analysis.statistics import Numbers
 from warpspace.analysis.uncertainty.propagation import (
     FieldUncertainty,
     plus_minus,
@@ -42,9 +41,9 @@ class Clamping:
     max_um: float
     placed_um: float  # after the best rigid fit
     outside: int  # vertices beyond the travel
-    expanded_uncertainty: Numbers = field(
-        default_factory=dict[str, float | None]
-    )  # U95, where that is stated
+    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
 
 JUDGED = attrgetter("max_um"), attrgetter("placed_um")
@@ -136,7 +135,7 @@ def _doubts(scene: Scene, mesh: PartMesh, place: Sequence[float]) -> list[FieldU
 class ClampResult(Result):
     """Places of a part, the best one, and what it gains."""
 
-    keys = ("places", "best", "present", "gain_um")
+    json_keys = ("places", "best", "present", "gain_um", "expanded_uncertainty")
     places: list[Clamping]  # by some of the vertices, best first
     best: Clamping
     present: Clamping
@@ -144,19 +143,19 @@ class ClampResult(Result):
     title: str
     placed: bool
     warnings: tuple[str, ...]  # of the mesh
-    expanded_uncertainty: Numbers = field(
-        default_factory=dict[str, float | None]
-    )  # U95 of what is gained
+    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
     def with_expanded_uncertainty(self, *each: list[FieldUncertainty]) -> "ClampResult":
         """Say U95 at present, at the best place and of the gain."""
         before, after = (found[self.placed] for found in each)
         gain = before.u95(before.gradients[-1] - after.gradients[-1])
-        told = {"u95_gain_um": gain if before.errors.is_known else None}
+        told = ExpandedUncertainty(u95_gain_um=gain if before.errors.is_known else None)
         now, best = (
             replace(
                 at,
-                expanded_uncertainty=dict(
+                expanded_uncertainty=ExpandedUncertainty(
                     zip(U95, [x.statistics()["max_um"] for x in found], strict=True)
                 ),
             )
@@ -196,7 +195,7 @@ class ClampResult(Result):
         note = f"{judged}. Geometry only: no forces, heat, wear or servo."
         yield Lines("plane", f"Where to clamp: {self.title}", "x [mm]", "y [mm]", dots, (), note)
 
-    def doubts(self) -> Iterator[str]:
+    def caveats(self) -> Iterator[str]:
         yield from (*self.warnings, *super().caveats())
         if self.present.outside:
             yield f"at present {self.present.outside:,} vertices are beyond the travel"

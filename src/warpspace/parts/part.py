@@ -155,7 +155,7 @@ def _off(
 class PartResult(Off, Result):
     """A part as it is cut."""
 
-    keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
+    json_keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
     vertices: int
     outside: int  # vertices beyond the travel
     placed: Off
@@ -166,7 +166,7 @@ class PartResult(Off, Result):
     asked: Part
     unseen_um: float  # how far errors between vertices are off, at most; 0 where that is little
 
-    def doubts(self) -> Iterator[str]:
+    def caveats(self) -> Iterator[str]:
         yield from self.part.warnings
         if self.outside:
             far = f"{self.outside:,} of {self.vertices:,} vertices"
@@ -198,7 +198,7 @@ class PartResult(Off, Result):
             yield f"  U95 along the normal, {word}: min {low}, max {high} µm"
         yield features_table(self.features)
 
-    def texts(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
+    def output_files(self, ending: str = ".stl", /) -> Mapping[str, bytes | str]:
         """Spell the part in its own frame and unit: as it is cut, or so that it is cut nominal."""
         nominal, moved = self.made.point_mm, self.made.error_um * MM_PER_UM
         for _ in range(2 * self.asked.predistorted):

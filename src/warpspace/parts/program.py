@@ -22,7 +22,13 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.contributions import budget_words, explain
-from warpspace.analysis.description import Analysis, ProgressCallback, Result, to_json
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+    to_json,
+)
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Statistics
 from warpspace.analysis.uncertainty.propagation import (
@@ -215,7 +221,7 @@ class PathPoint:
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
     budget: Mapping[str, float]  # µm of |E| by parameter, which add up to it, the largest first
-    expanded_uncertainty: Mapping[str, float | None]  # u95_um of |E|; empty where nothing is stated
+    expanded_uncertainty: ExpandedUncertainty[float | None]  # u95_um of |E|
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,9 +272,10 @@ class Program(interpreter.Setup, Analysis):
             ranked = sorted(parts, key=lambda part: -part.along_um)
             budget, um = {part.key: part.along_um for part in ranked}, float(path.norm_um[sample])
             at = int(path.line[sample]), um, axes, path.error_um[sample], budget
-            return PathPoint(
-                *at, {"u95_um": path.uncertainty.u95_at(sample)} if path.uncertainty else {}
-            )
+            u95 = ExpandedUncertainty[float | None]()
+            if path.uncertainty:
+                u95["u95_um"] = path.uncertainty.u95_at(sample)
+            return PathPoint(*at, u95)
 
         ends = np.flatnonzero(path.line == self.at_line)
         if self.at_line and not len(ends):
@@ -295,7 +302,7 @@ class Program(interpreter.Setup, Analysis):
 class ProgramResult(Result):
     """The path of a program, and its worst blocks."""
 
-    keys = ("length_mm", "outside", "deviation", "along", "across", "worst")
+    json_keys = ("length_mm", "outside", "deviation", "along", "across", "worst")
     length_mm: float  # of the nominal path
     outside: int  # samples beyond the travel
     deviation: Statistics
@@ -307,15 +314,15 @@ class ProgramResult(Result):
     path: ToolPath
     asked: Program
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         return {"": "\n".join([*map(one_line, correct_program(self.asked, self.read)), ""])}
 
-    def as_plain(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         refused = [{"line": line, "word": word} for line, word in self.read.refused.items()]
         said = {"blocks": self.read.blocks, "refused": refused, **to_json(self)}
         return said | ({"line": to_json(self.line)} if self.line else {})
 
-    def doubts(self) -> Iterator[str]:
+    def caveats(self) -> Iterator[str]:
         if refused := [f"line {line} {word}" for line, word in self.read.refused.items()]:
             yield f"refused: {', '.join(refused[:SAID])}; the path ends before the first of them"
         if unknown := [f"{word} (line {line})" for word, line in self.read.unknown.items()]:

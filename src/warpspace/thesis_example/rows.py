@@ -60,7 +60,7 @@ class Row:
 @cache
 def printed_tables() -> dict[str, Any]:
     """Read the printed numbers, and the notes on them."""
-    return tomllib.loads((files("warpspace.analysis") / "thesis.toml").read_text("utf-8"))
+    return tomllib.loads((files(__package__) / "thesis.toml").read_text("utf-8"))
 
 
 def _source(table: str) -> str:

@@ -171,7 +171,7 @@ def test_a_corrected_program_has_no_control_characters_and_no_exponents(dvf: Sce
         "G82 X5 Z-120 R-110 P2500000.5\nG80\nG93 G1 X9 F99999999\nM30\nrest\x0c\n"
     )
     outcome = Program(file="p", text=text).run(dvf, lambda _: None)
-    lines = outcome.texts()[""].removesuffix("\n").split("\n")
+    lines = outcome.output_files()[""].removesuffix("\n").split("\n")
     assert all(line.isprintable() for line in lines)
     assert any(line.endswith("; b c d [2J") for line in lines)
     assert "G4 P2500000.5" in lines

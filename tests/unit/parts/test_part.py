@@ -195,14 +195,14 @@ def test_what_waves_between_vertices_is_said_and_leaves_verdicts_in_doubt(limit,
     # 0.004 x² µm: 10 µm at the corners of a box from x −50 to 50, none amid its edges
     asked = Part(mesh=mesh_of(BOX), place=(0.0, 0.0, 0.0), tolerances=("f", KEEPS % limit))
     found = asked.run(parse_scene(WAVE, "s"), ignore_progress)
-    assert [*found.doubts()] == [
+    assert [*found.caveats()] == [
         "between its vertices errors are off by up to 10.0 µm more: expected a finer mesh"
     ]
     (one,) = [m for f in found.features for m in f.measures.values() if "verdict" in m]
     assert one["verdict"] == verdict
     fine = BOX.subdivide().subdivide().subdivide().subdivide()
     finer = replace(asked, mesh=mesh_of(fine)).run(parse_scene(WAVE, "s"), ignore_progress)
-    assert [*finer.doubts()] == []
+    assert [*finer.caveats()] == []
     (one,) = [m for f in finer.features for m in f.measures.values() if "verdict" in m]
     assert one["verdict"] == "kept"
 
@@ -210,7 +210,7 @@ def test_what_waves_between_vertices_is_said_and_leaves_verdicts_in_doubt(limit,
 def test_a_part_beyond_the_travel_is_counted_and_said():
     far = cut(BOX, (270.0, 0.0, 120.0))
     assert 0 < far.outside < far.vertices
-    assert any("beyond the travel" in said for said in far.doubts())
+    assert any("beyond the travel" in said for said in far.caveats())
     with pytest.raises(OptionError, match="expected a mesh"):
         Part().run(scene_with(), ignore_progress)
 
@@ -247,7 +247,7 @@ def test_a_bent_file_is_as_cut_and_a_predistorted_one_is_cut_nominal(ending, tmp
     file.write_bytes(data.encode() if isinstance(data, str) else data)
     ways = [Part(file=str(file), place=place, unit="mm", predistorted=way) for way in (False, True)]
     found, other = (way.run(scene, ignore_progress) for way in ways)
-    texts = [one.texts(ending)[""] for one in (found, other)]
+    texts = [one.output_files(ending)[""] for one in (found, other)]
     bent, asked = (
         load_part(f"bent{ending}", "mm", text.encode() if isinstance(text, str) else text)
         for text in texts

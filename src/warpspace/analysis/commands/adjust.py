@@ -12,12 +12,13 @@ from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table,
 from warpspace.analysis.description import (
     Analysis,
     Change,
+    ExpandedUncertainty,
     ProgressCallback,
     Result,
     ignore_progress,
 )
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
-from warpspace.analysis.statistics import Numbers, Summary, volume_statistics
+from warpspace.analysis.statistics import Summary, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
     FieldUncertainty,
     field_uncertainty,
@@ -43,7 +44,7 @@ FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
 class Best(Summary):
     """The whole volume with one error at its best value."""
 
-    keys: ClassVar[tuple[str, ...]] = ("value", *FOUR)
+    json_keys: ClassVar[tuple[str, ...]] = ("value", *FOUR, "expanded_uncertainty")
     value: float  # µm or µrad; within its limit
 
 
@@ -51,12 +52,16 @@ class Best(Summary):
 class Effect:
     """One error alone: left out, or at its best value, with all others as they are."""
 
-    keys: ClassVar[tuple[str, ...]] = ("key", "unit", "present", "left_out", "best")
+    json_keys: ClassVar[tuple[str, ...]] = (
+        "key", "unit", "present", "left_out", "best", "expanded_uncertainty",
+    )  # fmt: skip
     key: str
     present: float  # µm or µrad
     left_out: Summary
     best: Best
-    expanded_uncertainty: Numbers = attribute(default_factory=dict[str, float | None])
+    expanded_uncertainty: ExpandedUncertainty[float | None] = attribute(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
     @property
     def parameter(self) -> Parameter:
@@ -71,7 +76,7 @@ class Effect:
 class AdjustedSet(Summary):
     """The best set of so many adjustments, and the whole volume with it."""
 
-    keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact")
+    json_keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact", "expanded_uncertainty")
     adjust: Mapping[str, float]  # µm or µrad; new values by key
     # whether all sets of this size were compared; else the set was built up and improved by
     # swapping its members
@@ -101,7 +106,7 @@ class Adjust(Analysis):
     objective: Objective = option(
         Objective.RMS,
         "What is made as small as possible over the volume: RMS or largest |E|",
-        words={"rms": "RMS of the whole volume", "max": "largest |E| of the volume"},
+        choice_labels={"rms": "RMS of the whole volume", "max": "largest |E| of the volume"},
     )
     count: int = option(
         3,
@@ -158,7 +163,7 @@ class Adjust(Analysis):
         error = basis.evaluate(values, orientation=False).error_um
         at = nodes.coordinates, view, nodes.point_mm, nodes.weights
         doubt = field_uncertainty(scene, error, *at)
-        return found if doubt is None else _with_doubt(found, doubt, basis)
+        return found if doubt is None else _with_uncertainty(found, doubt, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
@@ -173,7 +178,7 @@ class Adjust(Analysis):
 class AdjustResult(Result):
     """What repairs a machine."""
 
-    keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
+    json_keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
     no_change = "there is nothing to adjust in this loop"
     asked: Adjust
     scene: Scene
@@ -367,29 +372,30 @@ def find_adjustments(
     )
 
 
-def _with_doubt(found: AdjustResult, before: FieldUncertainty, basis: ErrorBasis) -> AdjustResult:
-    def sure(adjust: Mapping[str, float]) -> Numbers:
-        values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
+def _with_uncertainty(
+    result: AdjustResult, before: FieldUncertainty, basis: ErrorBasis
+) -> AdjustResult:
+    def u95_after(adjust: Mapping[str, float]) -> ExpandedUncertainty[float | None]:
+        values = amplitudes_of(repaired(result.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
-        helps = (
-            {"probability": before.probability_of_improvement(after, f"{found.objective}_um")}
-            if adjust
-            else {}
-        )
-        return {**after.with_expanded_uncertainty(found.before).expanded_uncertainty, **helps}
+        u95 = after.with_expanded_uncertainty(result.before).expanded_uncertainty
+        if adjust:
+            objective = f"{result.objective}_um"
+            u95["probability"] = before.probability_of_improvement(after, objective)
+        return u95
 
-    def sure_effect(one: Effect) -> Effect:
-        best = replace(one.best, expanded_uncertainty=sure({one.key: one.best.value}))
-        return replace(
-            one, best=best, expanded_uncertainty={"u95_present": before.errors.u95_of(one.key)}
-        )
+    def effect_with_u95(effect: Effect) -> Effect:
+        best = replace(effect.best, expanded_uncertainty=u95_after({effect.key: effect.best.value}))
+        present = ExpandedUncertainty(u95_present=before.errors.u95_of(effect.key))
+        return replace(effect, best=best, expanded_uncertainty=present)
 
     return replace(
-        found,
-        before=replace(found.before, expanded_uncertainty=sure({})),
-        errors=tuple(map(sure_effect, found.errors)),
+        result,
+        before=replace(result.before, expanded_uncertainty=u95_after({})),
+        errors=tuple(map(effect_with_u95, result.errors)),
         adjustments=tuple(
-            replace(one, expanded_uncertainty=sure(one.adjust)) for one in found.adjustments
+            replace(step, expanded_uncertainty=u95_after(step.adjust))
+            for step in result.adjustments
         ),
     )
 

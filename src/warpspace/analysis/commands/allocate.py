@@ -70,7 +70,6 @@ class Allocate(KeptLimit):
         low=LIMIT_UM[0],
         high=LIMIT_UM[1],
         flag="--limit",
-        former=("--limit-um", "--spec-um"),
         required=True,
     )
     probability: float = option(
@@ -149,7 +148,7 @@ class AllocateResult(Result):
         """Parameters that got the largest half width there is."""
         return tuple(key for key, width in self.tolerances.items() if width >= self.widest)
 
-    def as_plain(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         asked = self.asked
         return {
             "limit_um": asked.limit_um,

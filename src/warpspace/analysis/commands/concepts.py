@@ -100,7 +100,6 @@ class Concepts(KeptLimit):
         low=LIMIT_UM[0],
         high=LIMIT_UM[1],
         flag="--limit",
-        former=("--limit-um", "--spec-um"),
     )
     own_tolerances: bool = option(
         False, "Each scene with its own tolerances instead of those of the first one by class"
@@ -123,7 +122,7 @@ class ConceptsResult(Result):
     asked: Concepts
     concepts: tuple[Concept, ...]
 
-    def as_plain(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         asked = self.asked
         default = dict(self.concepts[0].scene.tolerances.default)
         return {

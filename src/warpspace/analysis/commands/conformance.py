@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+)
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.statistics import share_below, share_within
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
@@ -61,24 +66,29 @@ class Conformance(Analysis):
                 for axis, ends, count in zip(axes, found, keeps.shape, strict=True)
                 if axis
             }
-        sure = field_uncertainty(scene, field.error_um, grid.coordinates, view, grid.point_mm)
+        uncertainty = field_uncertainty(
+            scene, field.error_um, grid.coordinates, view, grid.point_mm
+        )
 
-        def ask(error_um: Array) -> Array:
+        def shares(error_um: Array) -> Array:
             moved = replace(field, error_um=error_um)
             keeps = (share_within(moved, part) for part in SHARES)
             return np.array([100.0 * share_below(moved, self.limit_um), *keeps])
 
-        percent, *keeps_um = ask(field.error_um).tolist()
-        u95, *u95_um = sure.propagate(ask) if sure else [None] * (1 + len(SHARES))
+        percent, *keeps_um = shares(field.error_um).tolist()
+        u95, *u95_um = uncertainty.propagate(shares) if uncertainty else [None] * (1 + len(SHARES))
         names = [f"{part:.0%}" for part in SHARES]
-        told = {"u95_percent": u95, "u95_keeps_um": dict(zip(names, u95_um, strict=True))}
+        expanded = ExpandedUncertainty[Any]()
+        if uncertainty:
+            expanded["u95_percent"] = u95
+            expanded["u95_keeps_um"] = dict(zip(names, u95_um, strict=True))
         return ConformanceResult(
             limit_um=self.limit_um,
             percent=percent,
             box=box,
             keeps_um=dict(zip(names, keeps_um, strict=True)),
-            expanded_uncertainty=told if sure else {},
-            uncertainty=sure and sure.errors,
+            expanded_uncertainty=expanded,
+            uncertainty=uncertainty and uncertainty.errors,
             title=scene.title,
             ranges={axis: ranges[axis] for axis in axes if axis},
         )
@@ -88,12 +98,12 @@ class Conformance(Analysis):
 class ConformanceResult(Result):
     """The part of a volume that keeps a limit."""
 
-    keys = ("limit_um", "percent", "box", "keeps_um")
+    json_keys = ("limit_um", "percent", "box", "keeps_um", "expanded_uncertainty")
     limit_um: float
     percent: float  # of the volume
     box: Mapping[str, tuple[float, float]] | None  # axis ranges, mm or degrees
     keeps_um: Mapping[str, float]  # limit by part of the volume
-    expanded_uncertainty: Mapping[str, Any]  # U95 of percent and of these
+    expanded_uncertainty: ExpandedUncertainty[Any]  # of percent and of these
     title: str
     ranges: Mapping[str, tuple[float, float]]
 

@@ -175,7 +175,7 @@ class Contributions(Sampled):
 class ContributionsResult(Result):
     """Shares of the variance by parameter, largest first."""
 
-    keys = ("contributions", "variance_um2", "rms_um")
+    json_keys = ("contributions", "variance_um2", "rms_um")
     contributions: tuple[Share, ...]
     # µm²; trace(J Σ Jᵀ) averaged over the points: the variance of E between machines
     variance_um2: float

@@ -103,7 +103,7 @@ class Target:
 class ConvertResult(Result):
     """A scene in another convention."""
 
-    keys = ("largest_um", "largest_urad", "changed", "notes")
+    json_keys = ("largest_um", "largest_urad", "changed", "notes")
     wishes: tuple[str, ...]
     before: Scene
     scene: Scene  # equal to what a reader of the text gets
@@ -116,12 +116,12 @@ class ConvertResult(Result):
     changed: Mapping[str, tuple[float, float]]
     notes: tuple[str, ...]  # what could not be taken along
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         wishes = "; ".join(self.wishes)
         head = one_line(f"# Converted from {self.before.name} by warpspace convert: {wishes}")
         return {"": f"{head}\n{self.text}"}
 
-    def as_plain(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         return {
             "largest_um": self.largest_um,
             "largest_urad": self.largest_urad,

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.line import Between
-from warpspace.analysis.description import ProgressCallback, Result
+from warpspace.analysis.description import ExpandedUncertainty, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
@@ -48,21 +48,20 @@ class Distance(Between):
         solve = evaluate_exact if self.exact else evaluate_first_order
         field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
         watch(1.0)
-        found = self.between(scene, at, field)
-        sure = field_uncertainty(scene, field.error_um, at, scene.view(self.loop), point)
-        if sure is None:
-            return found
+        result = self.between(scene, at, field)
+        uncertainty = field_uncertainty(scene, field.error_um, at, scene.view(self.loop), point)
+        if uncertainty is None:
+            return result
 
-        def ask(error_um: Array) -> Array:
-            off = self.between(scene, at, replace(field, error_um=error_um))
-            return np.array([off.difference_um, off.deviation_urad or 0.0, *off.along_um])
+        def measure(error_um: Array) -> Array:
+            moved = self.between(scene, at, replace(field, error_um=error_um))
+            return np.array([moved.difference_um, moved.deviation_urad or 0.0, *moved.along_um])
 
-        distance, angle, *along = sure.propagate(ask)
-        told = {"u95_difference_um": distance, "u95_along_um": along}
-        return replace(
-            found,
-            expanded_uncertainty=told | ({"u95_deviation_urad": angle} if self.corner else {}),
-        )
+        distance, angle, *along = uncertainty.propagate(measure)
+        u95 = ExpandedUncertainty[Any](u95_difference_um=distance, u95_along_um=along)
+        if self.corner:
+            u95["u95_deviation_urad"] = angle
+        return replace(result, expanded_uncertainty=u95)
 
     def between(self, scene: Scene, at: Coordinates, field: ErrorField) -> "DistanceResult":
         """Measure between points, [n], of a field in R."""
@@ -98,9 +97,9 @@ def _angles_rad(first: Array, second: Array) -> Array:
 class DistanceResult(Result):
     """Distance, its parts along x, y and z, and the angle at the corner where there is one."""
 
-    keys = (
+    json_keys = (
         "at", "nominal_mm", "error_um", "distance_mm", "difference_um", "along_mm", "along_um",
-        "angle_deg", "deviation_urad", "is_squareness",
+        "angle_deg", "deviation_urad", "is_squareness", "expanded_uncertainty",
     )  # fmt: skip
     at: tuple[Mapping[str, float], ...]  # start, end and corner, mm or degrees
     nominal_mm: Array  # [n, 3], in the workpiece frame
@@ -114,9 +113,9 @@ class DistanceResult(Result):
     deviation_urad: float | None
     is_squareness: bool
     title: str
-    expanded_uncertainty: Mapping[str, Any] = attribute(
-        default_factory=dict[str, Any]
-    )  # U95 of what differs
+    expanded_uncertainty: ExpandedUncertainty[Any] = attribute(
+        default_factory=ExpandedUncertainty[Any]
+    )
 
     def words(self) -> list[str]:
         """Say it in short: the distance, its parts, and the angle where there is one."""

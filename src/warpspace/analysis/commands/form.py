@@ -8,9 +8,13 @@ from typing import ClassVar
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
-from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+)
 from warpspace.analysis.options import LOOP_HELP, option
-from warpspace.analysis.statistics import Numbers
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
@@ -26,15 +30,17 @@ PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
 class FormDeviation:
     """One form deviation of one plane or line."""
 
-    keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit")
+    json_keys: ClassVar[tuple[str, ...]] = (
+        "kind", "of", "at", "value", "unit", "expanded_uncertainty",
+    )  # fmt: skip
     kind: str  # "flatness", "straightness" or "squareness"
     of: str  # "XY", "X in y", "X to Y"
     at: str  # where the other axes stand
     value: float
     unit: str
-    expanded_uncertainty: Numbers = field(
-        default_factory=dict[str, float | None]
-    )  # u95, where that is stated
+    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +79,9 @@ class Form(Analysis):
             return np.array([one.value for one in _deviations(axes, grid.nominal_mm, error_um)])
 
         each = zip(found, sure.propagate(ask), strict=True)
-        told = tuple(replace(one, expanded_uncertainty={"u95": u95}) for one, u95 in each)
+        told = tuple(
+            replace(one, expanded_uncertainty=ExpandedUncertainty(u95=u95)) for one, u95 in each
+        )
         return FormResult(deviations=told, title=scene.title, uncertainty=sure.errors)
 
 
@@ -90,14 +98,14 @@ def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator
 class FormResult(Result):
     """Form deviations of the bent volume."""
 
-    keys = ("deviations",)
+    json_keys = ("deviations",)
     deviations: tuple[FormDeviation, ...]
     title: str
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.title} · form of the bent volume"
         columns = (
-            *(Column(name, key=name, leads=name != "at") for name in FormDeviation.keys[:3]),
+            *(Column(name, key=name, leads=name != "at") for name in ("kind", "of", "at")),
             Column("value", ".2f", key="value"),
             *([Column("U95"), Column(key="u95", shows=False)] if self.uncertainty else ()),
             Column("unit", key="unit"),

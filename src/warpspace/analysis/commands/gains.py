@@ -83,7 +83,7 @@ MAX_DEFAULT_NODES = 500_000
 class Gain:
     """Gain of one parameter."""
 
-    keys: ClassVar[tuple[str, ...]] = ("key", "symbol", "unit", "x", "y", "z", "norm")
+    json_keys: ClassVar[tuple[str, ...]] = ("key", "symbol", "unit", "x", "y", "z", "norm")
     key: str
     x: float  # µm/µm or µm/µrad; in R: signed at a point, largest absolute value over the travel
     y: float
@@ -287,7 +287,7 @@ class Gains(Analysis):
 class GainsResult(Result, Sequence[Gain]):
     """Gains of all parameters in a loop, largest first."""
 
-    keys = ("gains",)
+    json_keys = ("gains",)
     gains: tuple[Gain, ...]
     asked: Gains
     machine: Machine

@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+)
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty, u95_columns
 from warpspace.exceptions import OptionError
@@ -87,8 +92,9 @@ class Line(Between):
 class LineResult(Result):
     """Errors along a line."""
 
-    keys = (
-        "length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad"
+    json_keys = (
+        "length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad",
+        "expanded_uncertainty",
     )  # fmt: skip
     length_mm: float
     axes: Mapping[str, Array]  # [n], mm or degrees
@@ -97,7 +103,7 @@ class LineResult(Result):
     error_um: Array  # [n, 3], in R
     orientation_urad: Array  # [n, 3], in R
     title: str
-    expanded_uncertainty: Mapping[str, Array]  # U95 of these, by name; empty where it is not known
+    expanded_uncertainty: ExpandedUncertainty[Array]  # of these; empty where unknown
 
     def blocks(self) -> Iterator[Block]:
         norm = np.linalg.norm(self.error_um, axis=1)

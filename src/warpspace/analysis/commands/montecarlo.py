@@ -126,7 +126,6 @@ class MonteCarlo(SampledMachines):
         unit="µm",
         low=0.0,
         flag="--limit",
-        former=("--spec-um", "--limit-um"),
     )
     tolerance: Steps = option(
         (),
@@ -235,7 +234,7 @@ class MonteCarlo(SampledMachines):
 class MonteCarloResult(Result):
     """The distribution of |E| of the machines of one scene or several."""
 
-    keys = (
+    json_keys = (
         "samples", "seed", "distribution", "loop", "over", "mean_um", "mode_um", "median_um",
         "p95_um", "p99_um", "max_um", "histogram",
     )  # fmt: skip
@@ -249,7 +248,7 @@ class MonteCarloResult(Result):
             raise AttributeError(name)
         return getattr(self.points[0].sampled, name)
 
-    def as_plain(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         asked = self.asked
         if asked.in_rows:
             return {"tolerances": to_json(dict(asked.tolerance)), "rows": [*self.rows]}

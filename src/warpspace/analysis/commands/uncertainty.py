@@ -119,7 +119,7 @@ def _shares(found: FieldUncertainty) -> list[Mapping[str, Any]]:
 class UncertaintyResult(Result):
     """How sure a map is; None is not known, or was not asked for."""
 
-    keys = (
+    json_keys = (
         "limit_um", "statistics", "k", "unknown", "probability_worst", "probability_everywhere",
         "significant_percent", "never_measured_percent", "shares", "montecarlo",
     )  # fmt: skip

@@ -16,6 +16,7 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
+from warpspace.analysis.description import ExpandedUncertainty
 from warpspace.analysis.sampling.distribution import loop_axes
 from warpspace.analysis.statistics import P95, Summary
 from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
@@ -333,7 +334,9 @@ class FieldUncertainty:
 
     def with_expanded_uncertainty(self, numbers: S) -> S:
         """Say U95 beside statistics of the field."""
-        u95 = {f"u95_{name}": value for name, value in self.statistics().items()}
+        u95 = ExpandedUncertainty(
+            (f"u95_{name}", value) for name, value in self.statistics().items()
+        )
         return replace(numbers, expanded_uncertainty=u95)
 
     @cached_property
@@ -418,11 +421,11 @@ def _field_doubt(
 
 def u95_columns(
     scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
-) -> dict[str, Array]:
+) -> ExpandedUncertainty[Array]:
     """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
     shape, found, doubt = (
         field.norm_um.shape,
-        dict[str, Array](),
+        ExpandedUncertainty[Array](),
         scene_uncertainty(scene, view.loop),
     )
     if doubt is None or not doubt.is_known:

@@ -246,12 +246,12 @@ class AnalysisPanel(Section):
         elif word in ("preview", "apply") and (change := self._change(state, value)) is not None:
             what = self.title.lower()
             if word == "preview":
-                words = change.words if change.words.startswith("after ") else ""
-                words = words or f"after {what}: {change.words}"
+                words = change.label if change.label.startswith("after ") else ""
+                words = words or f"after {what}: {change.label}"
                 return with_proposal(state, change.scene, words)
             found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
-            done = change.words.removeprefix(f"after {what}: ")
+            done = change.label.removeprefix(f"after {what}: ")
             self.context.decided = state, f"{self.title}: {done}"
             return found
         return state
@@ -342,7 +342,7 @@ def _change_html(state: AppState, change: Change) -> Markup:
         if abs(b - a) > SAME:
             said = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
             moved.append((-abs(b - a), said))
-    steps = [said for _, said in sorted(moved)] or [change.words]
+    steps = [said for _, said in sorted(moved)] or [change.label]
     lines = [tag("div", tag("b", said)) for said in steps[:MOST_STEPS]]
     if (more := len(steps) - MOST_STEPS) > 0:
         lines.append(tag("div", f"and {more} more", class_="ws-quiet"))

@@ -227,7 +227,7 @@ class Compensation(BeforeAfter, Result):
     def bytes(self) -> int:
         return sum(len(text.encode()) for text in self.files.values())
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         return self.files
 
     def as_json(self) -> dict[str, Any]:
@@ -407,7 +407,7 @@ def _placed(
 class SweepStep:
     """One compensation of a sweep."""
 
-    keys: ClassVar[tuple[str, ...]] = (
+    json_keys: ClassVar[tuple[str, ...]] = (
         "format", "points", "pitch", "numbers", "bytes", "after", "worst_after_um",
     )  # fmt: skip
     format: str
