@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import redirect_stdout
 from functools import cache
+from importlib import import_module
 from typing import Generic, TypeVar
 
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -13,6 +14,8 @@ from warpspace.exceptions import OptionError, UnknownNameError
 T = TypeVar("T")
 logger = logging.getLogger(__name__)
 GROUP = "warpspace.plugins"
+BUNDLED = ("warpspace.thesis_example",)
+"""Modules of this package that register additions as those of other packages do."""
 
 
 @cache
@@ -25,6 +28,8 @@ def load_plugins() -> None:
     """
     from importlib.metadata import entry_points  # a sixth of the start of a short command
 
+    for module in BUNDLED:
+        import_module(module)
     for entry in entry_points(group=GROUP):
         try:
             with redirect_stdout(sys.stderr):

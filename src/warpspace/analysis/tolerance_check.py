@@ -37,11 +37,6 @@ class Check:
             return None
         return bool(abs(self.value - self.centre) <= self.half_width * (1.0 + 1e-12))
 
-    @property
-    def mark(self) -> str:
-        """O, X or a dash, as the thesis marks them in table 5-5."""
-        return "–" if self.passes is None else "O" if self.passes else "X"
-
 
 @dataclass(frozen=True, slots=True)
 class Measured:
@@ -49,7 +44,7 @@ class Measured:
 
     checks: tuple[Check, ...]  # one per error of the set
     predicted: Statistics  # |E| of the loop over the working volume
-    # the same over the nodes of the grid, each counted once, as the thesis has it
+    # the same over the nodes of the grid, each with the same weight
     predicted_nodes: Statistics
     # angle by which the volume is out of square per plane, in the sign of the squareness parameter;
     # out of a least-squares affine fit to the whole map

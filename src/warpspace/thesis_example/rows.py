@@ -1,12 +1,9 @@
-"""Every number printed in the thesis beside ours."""
+"""Comparison of every number printed in the thesis with the computed one."""
 
 import math
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max
 from warpspace.analysis.sampling.cases import Case, SamplingPlan
@@ -19,6 +16,7 @@ from warpspace.machine.axes import ErrorKind, parameter
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene
+from warpspace.thesis_example.printed import MACHINE, MEASURED_MACHINES, printed_tables
 
 
 class ThesisCase(NamedTuple):
@@ -55,12 +53,6 @@ class Row:
     unit: str = ""
     digits: int = 0  # decimals that are printed
     note: str = ""  # why not, or what there is to know; empty for most
-
-
-@cache
-def printed_tables() -> dict[str, Any]:
-    """Read the printed numbers, and the notes on them."""
-    return tomllib.loads((files(__package__) / "thesis.toml").read_text("utf-8"))
 
 
 def _source(table: str) -> str:
@@ -215,7 +207,7 @@ def table_4_8(case: ThesisCase) -> Iterator[Row]:
         yield _number("table_4_8", key, value, found.mean_um, 0, "µm", note)
 
 
-MACHINES = ("first", "second")
+MARKS = {True: "O", False: "X", None: "–"}  # of table 5-5: passes, fails, no tolerance
 
 
 def squareness_tables(case: ThesisCase) -> Iterator[Row]:
@@ -230,7 +222,7 @@ def squareness_tables(case: ThesisCase) -> Iterator[Row]:
 def table_5_5(case: ThesisCase) -> Iterator[Row]:
     """Key errors, their marks, and the volumetric error."""
     printed, notes = printed_tables()["table_5_5"], printed_tables()["notes"]
-    for which, name in enumerate(MACHINES):
+    for which, name in enumerate(MEASURED_MACHINES):
         scene: Scene = getattr(case, name)
         for key, check in _checks(case, scene).items():
             if which == 0:
@@ -242,7 +234,7 @@ def table_5_5(case: ThesisCase) -> Iterator[Row]:
                 note += notes["digit"] if value == 13.9 else ""
             said = f"{name} machine {key}"
             yield _number("table_5_5", said, value, check.value, 1, check.unit, note)
-            yield _text("table_5_5", f"{said} mark", mark, check.mark, note=note)
+            yield _text("table_5_5", f"{said} mark", mark, MARKS[check.passes], note=note)
         mean, said = measured(scene).predicted_nodes.mean_um, f"{name} machine volumetric error"
         yield _number("table_5_5", said, printed["volumetric_um"][which], mean, 0, "µm", "ramp")
 
@@ -259,7 +251,7 @@ def _tolerance_row(case: ThesisCase, table: str, check: Check) -> Row:
 
 def thesis() -> tuple[Row, ...]:
     """Set every number printed in tables 4-1 to 4-8 and 5-3 to 5-5 of the thesis beside ours."""
-    case = ThesisCase(*(load_scene(f"dvf5000_{name}") for name in ThesisCase._fields))
+    case = ThesisCase(*(load_scene(f"{MACHINE}_{name}") for name in ThesisCase._fields))
     gains = tool_gains(case.model)
     return (
         *table_4_1(case),

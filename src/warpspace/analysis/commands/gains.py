@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import AT_HELP, LOOP_HELP, Place, error_words, option, place_words
+from warpspace.analysis.publications import PUBLICATIONS
 from warpspace.analysis.sampling.distribution import loop_keys
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
@@ -316,7 +317,9 @@ class GainsResult(Result, Sequence[Gain]):
 
     def _table(self) -> Table:
         over = self.asked.over_travel
-        marked = thesis_keys(self.machine.name)
+        publications = PUBLICATIONS.every()
+        printed = [publication.key_errors(self.machine.name) for publication in publications]
+        printed_columns = [f"{publication.name}_key_error" for publication in publications]
         lever = "lever of |E| at" if over else "largest component read off the lever"
         columns = (
             Column(form=lambda key: "*" if key else "", key="key_error", leads=True),
@@ -324,9 +327,9 @@ class GainsResult(Result, Sequence[Gain]):
             Column("symbol", key="symbol"),
             *number_columns(("|E|", "x", "y", "z"), ".3f", keys=("norm", "x", "y", "z")),
             Column("unit", key="unit"),
-            Column(
-                "thesis", lambda key: "key" if key else "", key="thesis_key_error",
-                shows=bool(marked),
+            *(
+                Column(publication.name, lambda key: "key" if key else "", key=key, shows=bool(keys))
+                for publication, key, keys in zip(publications, printed_columns, printed, strict=True)
             ),
             Column("name", key="name", wraps=True),
             *(Column(key=f"lever_{x}_mm", shows=False) for x in "xyz"),
@@ -340,7 +343,7 @@ class GainsResult(Result, Sequence[Gain]):
         rows = [
             (
                 gain.is_key, gain.key, gain.symbol, gain.norm, gain.x, gain.y, gain.z, gain.unit,
-                gain.key in marked, gain.parameter.name, *gain.lever_mm,
+                *(gain.key in keys for keys in printed), gain.parameter.name, *gain.lever_mm,
                 *(gain.lever_mm if gain.parameter.is_rotation else (None, None, None)),
                 _place(gain) if over else _explain(gain), *gain.at.values(),
             )
@@ -349,7 +352,7 @@ class GainsResult(Result, Sequence[Gain]):
         levers = ("lever_x_mm", "lever_y_mm", "lever_z_mm")
         order = (
             "key", "symbol", "name", "unit", "x", "y", "z", "norm", *levers, "key_error",
-            "thesis_key_error", *(column.key for column in columns[-len(self.gains[0].at) :]),
+            *printed_columns, *(column.key for column in columns[-len(self.gains[0].at) :]),
         )  # fmt: skip
         return Table(columns, rows, csv_order=order)
 
@@ -373,15 +376,6 @@ class GainsResult(Result, Sequence[Gain]):
             keys=[gain.is_key for gain in self.gains],
             legend=((words, "key"), ("others", "plain")),
         )  # fmt: skip
-
-
-def thesis_keys(machine: str) -> tuple[str, ...]:
-    """Give the key errors of the thesis (table 4-7) for its machine, none for any other."""
-    from warpspace.thesis_example.rows import printed_tables
-
-    if machine != "dvf5000":
-        return ()
-    return tuple(key for key, row in printed_tables()["table_4_7"].items() if isinstance(row, list))
 
 
 def _explain(gain: Gain) -> str:

@@ -12,8 +12,10 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_columns
+from warpspace.analysis.commands.contributions import expected_square
 from warpspace.analysis.description import ProgressCallback, Result, count_progress, to_json
 from warpspace.analysis.options import Grammar, option
+from warpspace.analysis.publications import PUBLICATIONS, PrintedNumber
 from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Over, both_orders
 from warpspace.analysis.sampling.machine_sampling import (
     Progress,
@@ -299,8 +301,6 @@ class MonteCarloResult(Result):
             yield f"… and {left:,} {'rows' if asked.in_rows else 'scenes'} more"
 
     def _one(self, scene: Scene, found: SampleStatistics) -> Iterator[Block]:
-        from warpspace.analysis.commands.contributions import expected_square
-
         asked = self.asked
         told = self._words(found)
         yield f"{scene.title} · {told}"
@@ -308,15 +308,18 @@ class MonteCarloResult(Result):
             f"  mean {found.mean_um:.2f}, mode {found.mode_um:.1f}, median {found.median_um:.2f},"
             f" P95 {found.p95_um:.2f}, P99 {found.p99_um:.2f}, max {found.max_um:.2f} µm"
         )
-        printed = printed_um(scene, found)
+        printed: dict[str, PrintedNumber] = {}
         if asked.over is Over.SAMPLED:
+            for publication in PUBLICATIONS.every():
+                number = publication.sampled_mean(scene, asked.loop)
+                if number is not None:
+                    printed[publication.name] = number
             variance, offset = expected_square(case_of(scene, found))
             yield (
                 f"  RMS  {found.rms_um:.2f} µm sampled, {math.sqrt(variance.sum() + offset):.2f} µm"
                 " from trace(J Σ Jᵀ) without sampling"
             )
-        if printed is not None:
-            yield f"  the thesis prints {printed:g} µm (table 4-8; see `warpspace thesis`)"
+        yield from (f"  {number.quotation}" for number in printed.values())
         if (kept := found.probability) is not None:
             yield (
                 f"  |E| ≤ {kept.spec_um:g} µm {WHERE[asked.over]}: {100.0 * kept.probability:.2f} %"
@@ -330,7 +333,8 @@ class MonteCarloResult(Result):
         yield f"  {count} parameters drawn{note}"
         if not found.exact_quantiles:
             yield "  quantiles to 0.002 % of their value"
-        yield sampled_histogram(found, scene.title, told, printed)
+        marks = [(name, number.value_um) for name, number in printed.items()]
+        yield sampled_histogram(found, scene.title, told, marks)
 
     def _words(self, found: SampleStatistics) -> str:
         asked, drawn = self.asked, str(found.draws.distribution)
@@ -359,7 +363,10 @@ def _numbers(found: SampleStatistics) -> dict[str, Any]:
 
 
 def sampled_histogram(
-    found: SampleStatistics, title: str, subtitle: str, printed: float | None = None
+    found: SampleStatistics,
+    title: str,
+    subtitle: str,
+    printed: Sequence[tuple[str, float]] = (),
 ) -> Histogram:
     edges, kept = found.histogram.edges_um, found.probability
     marks = [("mode", found.mode_um), ("mean", found.mean_um), ("P95", found.p95_um)]
@@ -370,7 +377,7 @@ def sampled_histogram(
         f"machines per {edges[1] - edges[0]:g} µm, %",
         edges,
         100.0 * found.histogram.counts / found.plan.samples,
-        (*marks, *([] if printed is None else [("thesis", printed)])),
+        (*marks, *printed),
         found.plan.spec_um,
         ()
         if kept is None
@@ -379,15 +386,6 @@ def sampled_histogram(
             f"95 % interval {100.0 * kept.low:.2f} … {100.0 * kept.high:.2f} %",
         ),
     )
-
-
-def printed_um(scene: Scene, found: SampleStatistics) -> float | None:
-    from warpspace.thesis_example.rows import printed_tables
-
-    name = f"{found.view.loop}_{scene.name.removeprefix('dvf5000_')}"
-    printed = printed_tables()["table_4_8"]["predicted"].get(name)
-    here = scene.machine.name == "dvf5000" and scene.name.startswith("dvf5000_")
-    return float(printed) if printed and here and found.plan.over == Over.SAMPLED else None
 
 
 def sampled_second_order(*found: tuple[Scene, SampleStatistics]) -> SecondOrder:
