@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.sampling.cases import Case, SamplingPlan
-from warpspace.analysis.sampling.distribution import Distribution, build_draws, loop_keys
+from warpspace.analysis.sampling.distribution import Distribution, build_draws
 from warpspace.analysis.sampling.machine_sampling import SampleStatistics, montecarlo
 from warpspace.analysis.tolerance_check import Check, check_errors, measured
 from warpspace.field.evaluate import View

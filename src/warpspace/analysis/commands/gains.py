@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import AT_HELP, LOOP_HELP, Place, error_words, option, place_words
 from warpspace.analysis.publications import PUBLICATIONS
-from warpspace.analysis.sampling.distribution import loop_keys
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import JacobianColumn as Response
@@ -317,9 +317,10 @@ class GainsResult(Result, Sequence[Gain]):
 
     def _table(self) -> Table:
         over = self.asked.over_travel
-        publications = PUBLICATIONS.every()
-        printed = [publication.key_errors(self.machine.name) for publication in publications]
-        printed_columns = [f"{publication.name}_key_error" for publication in publications]
+        printed = {
+            publication.name: publication.key_errors(self.machine.name)
+            for publication in PUBLICATIONS.every()
+        }
         lever = "lever of |E| at" if over else "largest component read off the lever"
         columns = (
             Column(form=lambda key: "*" if key else "", key="key_error", leads=True),
@@ -328,8 +329,11 @@ class GainsResult(Result, Sequence[Gain]):
             *number_columns(("|E|", "x", "y", "z"), ".3f", keys=("norm", "x", "y", "z")),
             Column("unit", key="unit"),
             *(
-                Column(publication.name, lambda key: "key" if key else "", key=key, shows=bool(keys))
-                for publication, key, keys in zip(publications, printed_columns, printed, strict=True)
+                Column(
+                    name, lambda key: "key" if key else "", key=f"{name}_key_error",
+                    shows=bool(keys),
+                )
+                for name, keys in printed.items()
             ),
             Column("name", key="name", wraps=True),
             *(Column(key=f"lever_{x}_mm", shows=False) for x in "xyz"),
@@ -343,7 +347,7 @@ class GainsResult(Result, Sequence[Gain]):
         rows = [
             (
                 gain.is_key, gain.key, gain.symbol, gain.norm, gain.x, gain.y, gain.z, gain.unit,
-                *(gain.key in keys for keys in printed), gain.parameter.name, *gain.lever_mm,
+                *(gain.key in keys for keys in printed.values()), gain.parameter.name, *gain.lever_mm,
                 *(gain.lever_mm if gain.parameter.is_rotation else (None, None, None)),
                 _place(gain) if over else _explain(gain), *gain.at.values(),
             )
@@ -352,7 +356,7 @@ class GainsResult(Result, Sequence[Gain]):
         levers = ("lever_x_mm", "lever_y_mm", "lever_z_mm")
         order = (
             "key", "symbol", "name", "unit", "x", "y", "z", "norm", *levers, "key_error",
-            *printed_columns, *(column.key for column in columns[-len(self.gains[0].at) :]),
+            *(f"{name}_key_error" for name in printed), *(column.key for column in columns[-len(self.gains[0].at) :]),
         )  # fmt: skip
         return Table(columns, rows, csv_order=order)
 

@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from math import prod
+from operator import attrgetter
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
@@ -35,6 +36,9 @@ NUMBERS = {
     "mean": "mean_um", "RMS": "rms_um", "median": "median_um", "P95": "p95_um", "P99": "p99_um",
     "max": "max_um",
 }  # fmt: skip
+JSON_NUMBERS = (
+    "mean_um", "mode_um", "median_um", "p95_um", "p99_um", "max_um", "histogram",
+)  # fmt: skip
 PRINTED = 200  # rows that are printed
 WHERE = {Over.SAMPLED: "at one random point", Over.MAX: "everywhere", Over.MEAN: "in the mean"}
 WHAT = {
@@ -236,19 +240,27 @@ class MonteCarlo(SampledMachines):
 class MonteCarloResult(Result):
     """The distribution of |E| of the machines of one scene or several."""
 
-    json_keys = (
-        "samples", "seed", "distribution", "loop", "over", "mean_um", "mode_um", "median_um",
-        "p95_um", "p99_um", "max_um", "histogram",
-    )  # fmt: skip
     asked: MonteCarlo
     points: tuple[SweepPoint, ...]  # of each scene; of many rows only the first
     rows: tuple[Mapping[str, Any], ...]  # for each combination, where these were asked for
 
-    def __getattr__(self, name: str) -> Any:
-        """Give a number of the first scene, for instance `mean_um`; see `MonteCarlo`."""
-        if name.startswith("_") or name == "points":
-            raise AttributeError(name)
-        return getattr(self.points[0].sampled, name)
+    @property
+    def sampled(self) -> SampleStatistics:
+        """Statistics of the first scene."""
+        return self.points[0].sampled
+
+    mean_um = property(attrgetter("sampled.mean_um"))
+    rms_um = property(attrgetter("sampled.rms_um"))
+    mode_um = property(attrgetter("sampled.mode_um"))
+    median_um = property(attrgetter("sampled.median_um"))
+    p95_um = property(attrgetter("sampled.p95_um"))
+    p99_um = property(attrgetter("sampled.p99_um"))
+    max_um = property(attrgetter("sampled.max_um"))
+    histogram = property(attrgetter("sampled.histogram"))
+    probability = property(attrgetter("sampled.probability"))
+    plan = property(attrgetter("sampled.plan"))
+    draws = property(attrgetter("sampled.draws"))
+    view = property(attrgetter("sampled.view"))
 
     def json_fields(self) -> dict[str, Any]:
         asked = self.asked
@@ -347,8 +359,8 @@ class MonteCarloResult(Result):
 
 
 def _numbers(found: SampleStatistics) -> dict[str, Any]:
-    plan, names = found.plan, MonteCarloResult.keys[5:]
-    kept = {} if found.probability is None else {"specification": found.probability}
+    plan = found.plan
+    probability = {} if found.probability is None else {"specification": found.probability}
     return to_json(
         {
             "samples": plan.samples,
@@ -356,8 +368,8 @@ def _numbers(found: SampleStatistics) -> dict[str, Any]:
             "distribution": found.draws.distribution,
             "loop": found.view.loop,
             "over": plan.over,
-            **{name: getattr(found, name) for name in names},
-            **kept,
+            **{name: getattr(found, name) for name in JSON_NUMBERS},
+            **probability,
         }
     )
 

@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ToleranceSet
 from warpspace.units import Array
 
@@ -278,18 +276,6 @@ class Draws:
         return self.centre + self.half_width / SIGMAS * special.ndtri(
             tail + unit * (1.0 - 2.0 * tail)
         )
-
-
-def loop_axes(model: Model, loop: Loop) -> set[str]:
-    sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
-    return {axis.name for side in sides for axis in model.machine.branch(side)}
-
-
-def loop_keys(model: Model, loop: Loop, keys: Sequence[str]) -> tuple[str, ...]:
-    axes = loop_axes(model, loop)
-    if not axes:
-        raise OptionError(f"loop {loop}: the machine {model.machine.chain} has no axis in it")
-    return tuple(key for key in keys if parameter(key).axis in axes)
 
 
 def choose_distribution(word: Distribution | str) -> Distribution:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from warpspace.analysis.description import Analysis
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import LOOP_HELP, Grammar, option
 from warpspace.analysis.sampling.cases import (
     DEFAULT_NODES,
@@ -13,7 +14,7 @@ from warpspace.analysis.sampling.cases import (
     Over,
     SamplingPlan,
 )
-from warpspace.analysis.sampling.distribution import Distribution, Draws, build_draws, loop_keys
+from warpspace.analysis.sampling.distribution import Distribution, Draws, build_draws
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import LOCAL_WORKERS, SAMPLES
 from warpspace.scene.model import Scene

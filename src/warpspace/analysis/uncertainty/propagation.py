@@ -17,7 +17,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from warpspace.analysis.description import ExpandedUncertainty
-from warpspace.analysis.sampling.distribution import loop_axes
+from warpspace.analysis.loop_parameters import loop_axes
 from warpspace.analysis.statistics import P95, Summary
 from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
 from warpspace.field.grid import DEFAULT_NODES, build_grid, cut, pieces

@@ -66,7 +66,10 @@ class Import(Analysis):
         " separated by blanks",
     )
     sign: Literal["error", "correction"] | None = option(
-        None, "Whether a table holds errors or corrections", unset="as the manual says", choice_labels=SIGNS
+        None,
+        "Whether a table holds errors or corrections",
+        unset="as the manual says",
+        choice_labels=SIGNS,
     )
     variant: str | None = option(None, "Published variant of the format", unset="usual one")
     sources: tuple[Source, ...] = ()
