@@ -347,7 +347,8 @@ class GainsResult(Result, Sequence[Gain]):
         rows = [
             (
                 gain.is_key, gain.key, gain.symbol, gain.norm, gain.x, gain.y, gain.z, gain.unit,
-                *(gain.key in keys for keys in printed.values()), gain.parameter.name, *gain.lever_mm,
+                *(gain.key in keys for keys in printed.values()), gain.parameter.name,
+                *gain.lever_mm,
                 *(gain.lever_mm if gain.parameter.is_rotation else (None, None, None)),
                 _place(gain) if over else _explain(gain), *gain.at.values(),
             )
@@ -356,7 +357,8 @@ class GainsResult(Result, Sequence[Gain]):
         levers = ("lever_x_mm", "lever_y_mm", "lever_z_mm")
         order = (
             "key", "symbol", "name", "unit", "x", "y", "z", "norm", *levers, "key_error",
-            *(f"{name}_key_error" for name in printed), *(column.key for column in columns[-len(self.gains[0].at) :]),
+            *(f"{name}_key_error" for name in printed),
+            *(column.key for column in columns[-len(self.gains[0].at) :]),
         )  # fmt: skip
         return Table(columns, rows, csv_order=order)
 
