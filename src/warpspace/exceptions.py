@@ -36,12 +36,12 @@ class OptionError(WarpspaceError):
     where it is read: a flag on the command line, a label on a page.
     """
 
-    def said(self, word: Callable[[str], str]) -> str:
+    def with_names(self, word: Callable[[str], str]) -> str:
         """Give the text with the reader's word for each option it names."""
         return re.sub(r"\{([a-z_]+)\}", lambda found: word(found[1]), super().__str__())
 
     def __str__(self) -> str:
-        return self.said(lambda name: name)
+        return self.with_names(lambda name: name)
 
 
 class RenderError(WarpspaceError):

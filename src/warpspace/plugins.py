@@ -65,7 +65,7 @@ class Registry(dict[str, T], Generic[T]):
         """Take one away again."""
         del self[name]
 
-    def every(self) -> tuple[T, ...]:
+    def members(self) -> tuple[T, ...]:
         load_plugins()
         return tuple(self.values())
 

@@ -305,7 +305,7 @@ def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_
     found = Distance(
         start={"X": -200, "Y": 0}, end={"X": 200, "Y": 0}, corner={"X": -200, "Y": 200}
     ).run(FIRST, ignore_progress)
-    assert words == found.words()
+    assert words == found.lines()
     assert words[0].startswith("400.000 → ")
     assert words[1].count("Δ") == 3
     shapes = around(picture)

@@ -46,7 +46,7 @@ class Volume:
         return np.einsum("nc,nc->n", self.error_um, self.error_um)
 
     @cached_property
-    def acting(self) -> tuple[int, ...]:
+    def active_indices(self) -> tuple[int, ...]:
         """Indices of the errors that move any node at all in this loop."""
         largest = np.abs(self.response).max(axis=(1, 2), initial=0.0)
         return tuple(int(index) for index in np.flatnonzero(largest > SILENT))

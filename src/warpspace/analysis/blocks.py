@@ -75,7 +75,7 @@ class Table:
     exact: bool = False  # numbers of a file with all their digits; otherwise nine
 
     @property
-    def shown(self) -> tuple[Column, ...]:
+    def visible_columns(self) -> tuple[Column, ...]:
         """The columns of text and pages."""
         return tuple(column for column in self.columns if column.shows)
 
@@ -185,7 +185,7 @@ class Histogram:
     heights: "Array"  # [n]
     marks: tuple[tuple[str, float], ...] = ()  # word and place
     limit: float | None = None
-    told: tuple[str, ...] = ()  # in words, in the chart: the first of them large
+    captions: tuple[str, ...] = ()  # in words, in the chart: the first of them large
 
 
 Block: TypeAlias = str | Table | Bars | Lines | Histogram
@@ -214,11 +214,11 @@ def table_html(table: Table) -> str:
     title = f"<p>{escape(table.title.strip())}</p>" if table.title else ""
     if not table.rows:
         return title + (f"<p>{escape(table.empty.strip())}</p>" if table.empty else "")
-    head = "".join(_head(column) for column in table.shown)
+    head = "".join(_head(column) for column in table.visible_columns)
     marks = [*table.marks, *[""] * len(table.rows)]
     body = "".join(
         (f'<tr class="{mark}">' if mark else "<tr>")
-        + "".join(_cell(column, text) for column, text in zip(table.shown, row, strict=True))
+        + "".join(_cell(column, text) for column, text in zip(table.visible_columns, row, strict=True))
         + "</tr>"
         for row, mark in zip(table.cells()[:MOST_ROWS], marks, strict=False)
     )
@@ -229,8 +229,8 @@ def table_html(table: Table) -> str:
 
 def table_markdown(table: Table) -> str:
     """Give a table in Markdown; nothing that a user wrote acts as a mark of it."""
-    heads = [column.head for column in table.shown]
-    rule = ["---:" if column.is_number else "---" for column in table.shown]
+    heads = [column.head for column in table.visible_columns]
+    rule = ["---:" if column.is_number else "---" for column in table.visible_columns]
     rows = [rule, *([*map(_escaped, row)] for row in table.cells())]
     lines = [f"| {' | '.join(row)} |" for row in (heads, *rows)] if table.rows else [table.empty]
     return "\n".join((f"# {_escaped(table.title)}", "", *lines, ""))

@@ -164,7 +164,7 @@ class Analysis(ABC):
             If an option cannot be used with the scene; names it as ``{name}``.
         """
 
-    def written(self, stem: str | None) -> Self:  # noqa: ARG002 - for others
+    def for_output(self, stem: str | None) -> Self:  # noqa: ARG002 - for others
         """Return the analysis for an output file of this name; refuse a wrong or missing one."""
         return self
 

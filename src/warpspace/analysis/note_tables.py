@@ -62,7 +62,7 @@ def _here(scene: Scene, note: Note) -> Numbers:
     return {"here_um": round(float(evaluate(scene, at=note.at, loop=loop).norm_um), 2)}
 
 
-def said_stale(note: Note, found: Numbers) -> str:
+def stale_remark(note: Note, found: Numbers) -> str:
     """Say that the numbers of a note no longer hold: "changed: 51.7 → 46.1 µm"."""
     said = told(note.numbers, found)
     return f"changed: {said}" if said else ""
@@ -104,7 +104,7 @@ def notes_table(scene: Scene, title: str = "") -> Table:
              for one in (note, *note.versions)]  # fmt: skip
     found = note_numbers(scene, [note for _, note in heads])
     for (number, note), now in zip(heads, found, strict=True):
-        stale = said_stale(note, now)
+        stale = stale_remark(note, now)
         facts = "; ".join(filter(None, (spell_change(note), spell_numbers(note), stale)))
         kinds = (note.kind, note.status), *(("reply", "") for _ in note.replies)
         for one, (kind, status) in zip((note, *note.replies), kinds, strict=True):

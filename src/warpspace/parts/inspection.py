@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.analysis.commands.contributions import budget_words
 from warpspace.analysis.uncertainty.propagation import (
-    SURE,
+    LEAST_PROBABILITY,
     ErrorUncertainty,
     FieldUncertainty,
     plus_minus,
@@ -392,8 +392,8 @@ def _numbers(
         if doubt is not None:
             share = None if u95 is None else float(doubt.probability_within(placed, u95, *band))
             found["probability"] = share
-        verdict = "kept" if (share or 0.0) >= SURE else "missed"
-        if share is None or 1.0 - SURE < share < SURE:
+        verdict = "kept" if (share or 0.0) >= LEAST_PROBABILITY else "missed"
+        if share is None or 1.0 - LEAST_PROBABILITY < share < LEAST_PROBABILITY:
             verdict = "cannot be told"
         verdict = "in doubt" if abs(beyond) < left_out else verdict
         found |= {f"tolerance_{small}": band, f"doubt_{small}": left_out, "verdict": verdict}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpspace.analysis.commands.concepts import Concept, expected_um
 from warpspace.analysis.description import to_json
 from warpspace.analysis.statistics import Statistics, volume_statistics
-from warpspace.analysis.uncertainty.propagation import SURE, FieldUncertainty, field_uncertainty
+from warpspace.analysis.uncertainty.propagation import LEAST_PROBABILITY, FieldUncertainty, field_uncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, View, placed_words, second_order_words
 from warpspace.field.grid import DEFAULT_NODES, Grid, build_grid
@@ -179,8 +179,8 @@ class Picture:
         if found is None or self.u95_um is None or self.tilts:
             return None
         if self.limit_um is not None:
-            kept = found.keeps(self.limit_um)
-            return (kept > 1.0 - SURE) & (kept < SURE)
+            kept = found.conformance_probability(self.limit_um)
+            return (kept > 1.0 - LEAST_PROBABILITY) & (kept < LEAST_PROBABILITY)
         if not self.significant:
             return None
         return np.abs(coloured_values(self.field, self.component)) <= self.u95_um

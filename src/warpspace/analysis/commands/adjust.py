@@ -132,20 +132,20 @@ class Adjust(Analysis):
     )
 
     @property
-    def seen_loop(self) -> Loop:
+    def evaluated_loop(self) -> Loop:
         return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
 
-    def seen(self, scene: Scene) -> tuple[Scene, View]:
-        if self.placed and self.seen_loop is not Loop.RELATIVE:
+    def scene_and_view(self, scene: Scene) -> tuple[Scene, View]:
+        if self.placed and self.evaluated_loop is not Loop.RELATIVE:
             raise OptionError(
                 f"{{placed}}: the {self.loop} loop does not show where the workpiece lies;"
                 f" expected loop {Loop.RELATIVE}"
             )
         scene = replace(scene, placed=True) if self.placed else scene
-        return scene, scene.view(self.seen_loop)
+        return scene, scene.view(self.evaluated_loop)
 
     def run(self, scene: Scene, watch: ProgressCallback = ignore_progress, /) -> "AdjustResult":
-        scene, view = self.seen(scene)
+        scene, view = self.scene_and_view(scene)
         nodes = build_grid(scene.model, scene.workspace, self.grid)
         basis = grid_basis(scene, nodes, view, self.included(scene))
         values = amplitudes_of(scene.errors, basis.keys)
@@ -158,7 +158,7 @@ class Adjust(Analysis):
             replace(one, exact=Summary(*numbers.four))
             for one, numbers in zip(found.adjustments, exact, strict=True)
         ]
-        left_out = second_order(scene, self.seen_loop)
+        left_out = second_order(scene, self.evaluated_loop)
         found = replace(found, adjustments=tuple(sets), second_order=left_out)
         error = basis.evaluate(values, orientation=False).error_um
         at = nodes.coordinates, view, nodes.point_mm, nodes.weights
@@ -180,7 +180,7 @@ class AdjustResult(Result):
 
     json_keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
     no_change = "there is nothing to adjust in this loop"
-    asked: Adjust
+    analysis: Adjust
     scene: Scene
     before: Summary
     # every error that is not zero and acts in the loop; the one whose best value helps the
@@ -193,7 +193,7 @@ class AdjustResult(Result):
 
     @property
     def objective(self) -> Objective:
-        return self.asked.objective
+        return self.analysis.objective
 
     @property
     def all_sets_compared(self) -> list[bool]:
@@ -210,7 +210,7 @@ class AdjustResult(Result):
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
-        yield from u95_lines(scene_uncertainty(self.scene, self.asked.seen_loop), {"": self.before})
+        yield from u95_lines(scene_uncertainty(self.scene, self.analysis.evaluated_loop), {"": self.before})
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
@@ -238,7 +238,7 @@ class AdjustResult(Result):
 
     @property
     def _where(self) -> tuple[str, ...]:
-        loop = self.asked.seen_loop
+        loop = self.analysis.evaluated_loop
         return f"{loop} loop", *placed_words(self.scene.view(loop))
 
     @property
@@ -312,7 +312,7 @@ class AdjustResult(Result):
             f" {spell(one.best.value)} {one.unit}"
             for one in errors
         ]
-        where = (self.scene.machine.title, *self._where, f"{self.asked.grid} nodes per axis")
+        where = (self.scene.machine.title, *self._where, f"{self.analysis.grid} nodes per axis")
         return Bars(
             f"Repair · {self.scene.title}",
             " · ".join(where),
@@ -358,11 +358,11 @@ def find_adjustments(
         numbers = volume.statistics(volume.changed(found.indices, values))
         sets.append(AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=None))
         watch(len(sets) / (count + 1))
-    errors = [_effect(search, index) for index in volume.acting if amplitudes[index] != 0.0]
+    errors = [_effect(search, index) for index in volume.active_indices if amplitudes[index] != 0.0]
     wanted = f"{asked.objective}_um"
     keys = [basis.keys[index] for index in candidates]
     return AdjustResult(
-        asked=asked,
+        analysis=asked,
         scene=scene,
         before=Summary(*volume.statistics(amplitudes).four),
         errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
@@ -402,11 +402,11 @@ def _with_uncertainty(
 
 def _candidates(volume: Volume, asked: Adjust) -> tuple[int, ...]:
     keys = volume.basis.keys
-    acting = [keys[index] for index in volume.acting]
+    acting = [keys[index] for index in volume.active_indices]
     if ALL in asked.adjustable:
-        places = volume.acting
+        places = volume.active_indices
     elif not asked.adjustable:
-        places = tuple(i for i in volume.acting if parameter(keys[i]).is_constant)
+        places = tuple(i for i in volume.active_indices if parameter(keys[i]).is_constant)
     else:
         for key in asked.adjustable:
             if key not in acting:

@@ -109,7 +109,7 @@ class Exact(NamedTuple):
     probability: float
     first_order: float  # probability on the same machines
 
-    def words(self) -> str:
+    def verdict(self) -> str:
         change = f"{100.0 * (self.probability - self.first_order):+.2f}"
         beside = f"{change} % against" if float(change) else "as many as to"
         return (
@@ -122,7 +122,7 @@ class Exact(NamedTuple):
 class AllocateResult(Result):
     """Tolerances that keep a limit, and how sure that is."""
 
-    asked: Allocate
+    analysis: Allocate
     scene: Scene | None = None
     draws: Draws  # the tolerances before
     half_width: Array  # [K], µm or µrad; after, in the order of `draws.keys`
@@ -149,7 +149,7 @@ class AllocateResult(Result):
         return tuple(key for key, width in self.tolerances.items() if width >= self.widest)
 
     def json_fields(self) -> dict[str, Any]:
-        asked = self.asked
+        asked = self.analysis
         return {
             "limit_um": asked.limit_um,
             "wanted": asked.probability,
@@ -176,7 +176,7 @@ class AllocateResult(Result):
         return [Change("tolerances allocated", replace(self.scene, tolerances=tolerances))]
 
     def blocks(self) -> Iterator[Block]:
-        asked, draws = self.asked, self.draws
+        asked, draws = self.analysis, self.draws
         title = () if self.scene is None else (self.scene.title,)
         yield " · ".join(
             (*title, f"{asked.loop} loop", str(asked.drawn), f"evaluated {asked.where}")
@@ -209,14 +209,14 @@ class AllocateResult(Result):
             f" {100.0 * self.after.high:.2f} %, cost {self.cost_after:.3g}"
             f" ({self.samples:,} machines)"
         )
-        yield f"  {self.exact.words()}"
+        yield f"  {self.exact.verdict()}"
 
     def _note(self, key: str, *, zero: bool, free: bool) -> str:
         if not free:
-            return "fixed" if key in self.asked.fixed else "zero" if zero else "no effect"
+            return "fixed" if key in self.analysis.fixed else "zero" if zero else "no effect"
         if key in self.at_widest:
             return "the widest there is"
-        cost = dict(self.asked.costs).get(key)
+        cost = dict(self.analysis.costs).get(key)
         return "" if cost is None else f"cost {cost:g}"
 
 
@@ -280,7 +280,7 @@ def allocate(
         for each in orders
     )
     return AllocateResult(
-        asked=asked,
+        analysis=asked,
         draws=draws,
         half_width=half_width,
         free=task.free,

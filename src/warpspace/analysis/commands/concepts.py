@@ -47,7 +47,7 @@ class Concept:
         return self.shares.rows[:NAMED]
 
     @property
-    def said(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         sampled, kept = self.sampled, self.sampled.probability
         return {
             "scene": self.scene.name,
@@ -112,18 +112,18 @@ class Concepts(KeptLimit):
         progress = count_progress(watch, self.samples * len(scenes))
         found = compare_concepts(scenes, self, progress=progress)
         left_out = sampled_second_order(*((one.scene, one.sampled) for one in found))
-        return ConceptsResult(asked=self, concepts=found, second_order=left_out)
+        return ConceptsResult(analysis=self, concepts=found, second_order=left_out)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConceptsResult(Result):
     """Machines side by side."""
 
-    asked: Concepts
+    analysis: Concepts
     concepts: tuple[Concept, ...]
 
     def json_fields(self) -> dict[str, Any]:
-        asked = self.asked
+        asked = self.analysis
         default = dict(self.concepts[0].scene.tolerances.default)
         return {
             "loop": str(asked.loop),
@@ -134,11 +134,11 @@ class ConceptsResult(Result):
             "limit_um": asked.limit_um,
             "own_tolerances": asked.own_tolerances,
             "tolerances": None if asked.own_tolerances else default,
-            "concepts": [concept.said for concept in self.concepts],
+            "concepts": [concept.json_fields for concept in self.concepts],
         }
 
     def blocks(self) -> Iterator[Block]:
-        asked, first = self.asked, self.concepts[0].scene
+        asked, first = self.analysis, self.concepts[0].scene
         default = ", ".join(f"{name} ±{v:g}" for name, v in first.tolerances.default.items())
         tolerances = f"the tolerances of {first.name}: {default} (µm, µrad)"
         if asked.own_tolerances:
@@ -152,7 +152,7 @@ class ConceptsResult(Result):
             yield f"  {LETTERS[means.index(min(means))]} has the smallest mean, {min(means):.2f} µm"
 
     def _columns(self) -> tuple[Column, ...]:
-        limit = self.asked.limit_um
+        limit = self.analysis.limit_um
         ranks = range(1, NAMED + 1)
         named = [name for rank in ranks for name in (f"error_{rank}", f"error_{rank}_share")]
         return (

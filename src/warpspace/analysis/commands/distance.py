@@ -117,7 +117,7 @@ class DistanceResult(Result):
         default_factory=ExpandedUncertainty[Any]
     )
 
-    def words(self) -> list[str]:
+    def lines(self) -> list[str]:
         """Say it in short: the distance, its parts, and the angle where there is one."""
         nominal, actual = self.distance_mm
         parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", self.along_um, strict=True))

@@ -281,7 +281,7 @@ class Gains(Analysis):
         else:
             place = {**scene.workspace.positions, **dict(self.at)}
             found = gains_at(scene.model, self.loop, keys, place, self.share)
-        return GainsResult(gains=found, asked=self, machine=scene.machine)
+        return GainsResult(gains=found, analysis=self, machine=scene.machine)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,7 +290,7 @@ class GainsResult(Result, Sequence[Gain]):
 
     json_keys = ("gains",)
     gains: tuple[Gain, ...]
-    asked: Gains
+    analysis: Gains
     machine: Machine
 
     def __getitem__(self, index: Any) -> Any:
@@ -301,25 +301,25 @@ class GainsResult(Result, Sequence[Gain]):
 
     @property
     def where(self) -> str:
-        if self.asked.over_travel:
-            return f"{self.asked.loop} loop · largest absolute gains over the travel"
-        return f"{self.asked.loop} loop · gains at {place_words(self.gains[0].at)}"
+        if self.analysis.over_travel:
+            return f"{self.analysis.loop} loop · largest absolute gains over the travel"
+        return f"{self.analysis.loop} loop · gains at {place_words(self.gains[0].at)}"
 
     def blocks(self) -> Iterator[Block]:
         count = sum(gain.is_key for gain in self.gains)
         yield f"{self.machine.title} · {self.where}"
         yield self._table()
         yield (
-            f"  * key errors: the largest {count} make up {self.asked.share:.0%} of the sum of"
+            f"  * key errors: the largest {count} make up {self.analysis.share:.0%} of the sum of"
             " squares, one µm and one µrad counted alike"
         )
         yield self.bars()
 
     def _table(self) -> Table:
-        over = self.asked.over_travel
+        over = self.analysis.over_travel
         printed = {
             publication.name: publication.key_errors(self.machine.name)
-            for publication in PUBLICATIONS.every()
+            for publication in PUBLICATIONS.members()
         }
         lever = "lever of |E| at" if over else "largest component read off the lever"
         columns = (
@@ -363,7 +363,7 @@ class GainsResult(Result, Sequence[Gain]):
         return Table(columns, rows, csv_order=order)
 
     def bars(self) -> Bars:
-        signed = not self.asked.over_travel
+        signed = not self.analysis.over_travel
         panels = tuple(
             Panel(
                 title="|E|" if name == "norm" else name,
@@ -375,7 +375,7 @@ class GainsResult(Result, Sequence[Gain]):
             for name, form, width in (("norm", ".2f", 2.2), *((name, "", 1.0) for name in "xyz"))
         )
         count = sum(gain.is_key for gain in self.gains)
-        words = f"key errors: the largest {count}, {self.asked.share:.0%} of the sum of squares"
+        words = f"key errors: the largest {count}, {self.analysis.share:.0%} of the sum of squares"
         return Bars(
             f"Error gains · {self.machine.title}", self.where,
             [error_words(gain.key) for gain in self.gains], panels,

@@ -177,7 +177,7 @@ class MonteCarlo(SampledMachines):
             if point.sampled.max_um > widest.sampled.max_um:
                 widest = point
         return MonteCarloResult(
-            asked=self,
+            analysis=self,
             points=tuple(kept),
             rows=tuple(rows),
             second_order=sampled_second_order((widest.scene, widest.sampled)),
@@ -240,7 +240,7 @@ class MonteCarlo(SampledMachines):
 class MonteCarloResult(Result):
     """The distribution of |E| of the machines of one scene or several."""
 
-    asked: MonteCarlo
+    analysis: MonteCarlo
     points: tuple[SweepPoint, ...]  # of each scene; of many rows only the first
     rows: tuple[Mapping[str, Any], ...]  # for each combination, where these were asked for
 
@@ -263,7 +263,7 @@ class MonteCarloResult(Result):
     view = property(attrgetter("sampled.view"))
 
     def json_fields(self) -> dict[str, Any]:
-        asked = self.asked
+        asked = self.analysis
         if asked.in_rows:
             return {"tolerances": to_json(dict(asked.tolerance)), "rows": [*self.rows]}
         if len(self.points) == 1:
@@ -276,13 +276,13 @@ class MonteCarloResult(Result):
 
     def blocks(self) -> Iterator[Block]:
         first = self.points[0]
-        if self.asked.in_rows or len(self.points) > 1:
+        if self.analysis.in_rows or len(self.points) > 1:
             yield from self._several()
         else:
             yield from self._one(first.scene, first.sampled)
 
     def _several(self) -> Iterator[Block]:
-        asked, first = self.asked, self.points[0].sampled
+        asked, first = self.analysis, self.points[0].sampled
         if asked.in_rows:
             yield (
                 f"{asked.loop} loop · {asked.samples:,} machines a row, {asked.over} ·"
@@ -313,7 +313,7 @@ class MonteCarloResult(Result):
             yield f"… and {left:,} {'rows' if asked.in_rows else 'scenes'} more"
 
     def _one(self, scene: Scene, found: SampleStatistics) -> Iterator[Block]:
-        asked = self.asked
+        asked = self.analysis
         told = self._words(found)
         yield f"{scene.title} · {told}"
         yield (
@@ -322,7 +322,7 @@ class MonteCarloResult(Result):
         )
         printed: dict[str, PrintedNumber] = {}
         if asked.over is Over.SAMPLED:
-            for publication in PUBLICATIONS.every():
+            for publication in PUBLICATIONS.members():
                 number = publication.sampled_mean(scene, asked.loop)
                 if number is not None:
                     printed[publication.name] = number
@@ -349,7 +349,7 @@ class MonteCarloResult(Result):
         yield sampled_histogram(found, scene.title, told, marks)
 
     def _words(self, found: SampleStatistics) -> str:
-        asked, drawn = self.asked, str(found.draws.distribution)
+        asked, drawn = self.analysis, str(found.draws.distribution)
         if drawn == "normal":
             drawn = "normal, 3σ = half width" + (", clipped" if found.draws.clip else "")
         return (

@@ -11,7 +11,7 @@ from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, option, place_words
 from warpspace.analysis.statistics import P95, Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
-    COVERED,
+    COVERAGE,
     NAMES,
     FieldUncertainty,
     plus_minus,
@@ -100,7 +100,7 @@ def _three(norm: Array, weights: Array) -> tuple[Array, Array, Array]:
 
 
 def _spread(drawn: Array) -> Mapping[str, float]:
-    low, high = np.quantile(drawn, (0.5 - COVERED / 2.0, 0.5 + COVERED / 2.0))
+    low, high = np.quantile(drawn, (0.5 - COVERAGE / 2.0, 0.5 + COVERAGE / 2.0))
     return {"mean_um": float(drawn.mean()), "u95_um": float(high - low) / 2.0}
 
 

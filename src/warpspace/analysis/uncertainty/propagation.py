@@ -28,8 +28,8 @@ from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
 NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
-SURE = 0.95  # least probability of what is said of a limit (ISO 14253-1)
-COVERED = 0.9545  # of a normal distribution, within two standard deviations
+LEAST_PROBABILITY = 0.95  # least probability of what is said of a limit (ISO 14253-1)
+COVERAGE = 0.9545  # of a normal distribution, within two standard deviations
 NEAR = 0.01  # part of the points that tells how their 95th percentile moves
 MOST_DRAWN = 2_000_000  # |E| of machines that are held at a time
 SAMPLES = 17  # points that a mode along an axis is drawn through
@@ -44,7 +44,7 @@ def coverage_factor(freedom: float) -> float:
         return 2.0
     from scipy.stats import t
 
-    return float(t.ppf(0.5 + COVERED / 2.0, max(freedom, 1.0)))
+    return float(t.ppf(0.5 + COVERAGE / 2.0, max(freedom, 1.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class ErrorUncertainty:
 
     layers: tuple[Layer, ...]  # curves that are not sure; their amplitudes play no part
     covariance: Array  # [K, K], µm and µrad; of the amplitudes, one layer behind the other
-    freedoms: Array  # [K], degrees of freedom
+    dofs: Array  # [K], degrees of freedom
     unknown: tuple[str, ...]  # errors of which nobody says how sure they are
     undetermined: tuple[str, ...] = ()  # of the unknown: what a calibration left open
     lack_of_fit: float = 0.0  # that it saw
@@ -72,18 +72,18 @@ class ErrorUncertainty:
         return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, both))
 
     @cached_property
-    def freedom(self) -> float:
+    def dof(self) -> float:
         """Degrees of freedom that all have, else infinite; `expanded` counts each by its own."""
-        return float(self.freedoms[0]) if len({*self.freedoms.tolist()}) == 1 else np.inf
+        return float(self.dofs[0]) if len({*self.dofs.tolist()}) == 1 else np.inf
 
     @property
     def factor(self) -> float:
-        return coverage_factor(self.freedom)
+        return coverage_factor(self.dof)
 
     @cached_property
     def factors(self) -> Array:
         """U95 / u by the degrees of freedom of each, [K]."""
-        return np.array([coverage_factor(one) for one in self.freedoms.tolist()])
+        return np.array([coverage_factor(one) for one in self.dofs.tolist()])
 
     @cached_property
     def expanded(self) -> Array:
@@ -113,14 +113,14 @@ class ErrorUncertainty:
         from scipy.stats import t
 
         unit = np.maximum(u95, 1e-12) / self.factor
-        below, above = (t.cdf((end - value) / unit, self.freedom) for end in (low, high))
+        below, above = (t.cdf((end - value) / unit, self.dof) for end in (low, high))
         return above - below
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom."""
         found = rng.standard_normal((count, len(self.keys))) @ self.root.T
-        for freedom in {*self.freedoms.tolist()} - {np.inf}:
-            found[:, self.freedoms == freedom] *= np.sqrt(
+        for freedom in {*self.dofs.tolist()} - {np.inf}:
+            found[:, self.dofs == freedom] *= np.sqrt(
                 freedom / rng.chisquare(freedom, (count, 1))
             )
         return found
@@ -304,7 +304,7 @@ class FieldUncertainty:
             found[key] += part
         return dict(sorted(found.items(), key=lambda one: -abs(one[1])))
 
-    def keeps(self, limit_um: float) -> Array:
+    def conformance_probability(self, limit_um: float) -> Array:
         """Give the probability that |E| is within a limit at each point, [...].
 
         |E|² is a quadratic form; a gamma distribution of its mean and variance stands for it.

@@ -307,7 +307,7 @@ class AnalysisPanel(Section):
         words = error_words(error)
         if isinstance(error, OptionError):
             labels = {one.name: one.label for one in self.kind.options()}
-            words = error.said(lambda name: labels.get(name, name))
+            words = error.with_names(lambda name: labels.get(name, name))
         self._problem = (self._asked, words)
         self.renew()
 

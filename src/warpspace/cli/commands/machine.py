@@ -347,7 +347,7 @@ def merge(first: str, second: str, output: str, *, force: bool) -> None:
 def _measured_errors(scene: "Scene") -> list["PrintedNumber"]:
     from warpspace.analysis.publications import PUBLICATIONS
 
-    printed = (publication.measured_error(scene) for publication in PUBLICATIONS.every())
+    printed = (publication.measured_error(scene) for publication in PUBLICATIONS.members())
     return [number for number in printed if number is not None]
 
 

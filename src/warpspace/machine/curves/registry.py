@@ -20,7 +20,7 @@ _KINDS: Registry[CurveKind] = Registry(
     },
 )
 """By name, in the order of lists: simplest first."""
-curve_kinds, unregister_curve = _KINDS.every, _KINDS.unregister
+curve_kinds, unregister_curve = _KINDS.members, _KINDS.unregister
 
 
 def curve_kind(title: str) -> CurveKind:

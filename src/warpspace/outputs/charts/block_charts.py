@@ -422,7 +422,7 @@ def histogram_chart(found: Histogram) -> Figure:
         marks = [*found.marks, *([] if limit is None else [("limit", limit)])]
         _mark(axes, [(name, at, *looks.get(name, (ground().ink, "-"))) for name, at in marks])
         told = ((0.95, TEXT + 2.0, "bold", ground().ink), (0.83, SMALL, "normal", ground().muted))
-        for words, (height, size, weight, colour) in zip(found.told, told, strict=False):
+        for words, (height, size, weight, colour) in zip(found.captions, told, strict=False):
             axes.text(
                 0.985, height, words, transform=axes.transAxes, ha="right", va="top", size=size,
                 weight=weight, color=colour, bbox=_paper(),

@@ -15,7 +15,7 @@ from warpspace.analysis.description import Analysis, Result, ignore_progress
 from warpspace.analysis.sampling.cases import LIMIT_OVER, Over, SamplingPlan
 from warpspace.analysis.sampling.distribution import choose_distribution
 from warpspace.analysis.statistics import Statistics, share_below
-from warpspace.analysis.uncertainty.propagation import SURE, FieldUncertainty, volume_uncertainty
+from warpspace.analysis.uncertainty.propagation import LEAST_PROBABILITY, FieldUncertainty, volume_uncertainty
 from warpspace.exceptions import OptionError, WarpspaceError
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import parameter
@@ -108,7 +108,7 @@ class Reviewed:
         if self.uncertainty is None or u95 is None or limit is None:
             return True
         kept = float(self.uncertainty.errors.probability_within(found.max_um, u95, -np.inf, limit))
-        return not 1.0 - SURE < kept < SURE
+        return not 1.0 - LEAST_PROBABILITY < kept < LEAST_PROBABILITY
 
     @property
     def worst_axes(self) -> str:
