@@ -127,17 +127,17 @@ class Search:
         for size in range(1, min(count, len(candidates)) + 1):
             proven = comb(len(candidates), size) <= MOST_SETS[self.objective]
             if proven or before is None:
-                found = self.best(_joined(group) for group in combinations(candidates, size))
+                best = self.best(_joined(group) for group in combinations(candidates, size))
             else:
-                found = self._extended(before, candidates)
-            if found is None:
+                best = self._extended(before, candidates)
+            if best is None:
                 return
-            yield found, proven
-            before = found
+            yield best, proven
+            before = best
 
     def _extended(self, before: Solution, candidates: Sequence[int]) -> Solution | None:
-        others = [index for index in candidates if index not in before.indices]
-        best = self.best(_joined((*before.indices, index)) for index in others)
+        additions = [index for index in candidates if index not in before.indices]
+        best = self.best(_joined((*before.indices, index)) for index in additions)
         while best is not None:
             members = best.indices
             swaps = (
@@ -209,14 +209,14 @@ def least_max(
         slopes = np.einsum("knc,nc->nk", chosen[:, worst], unit)
         planes.append(np.column_stack([slopes, -np.ones(len(worst))]))
         offsets.append(-np.einsum("nc,nc->n", volume.error_um[worst], unit))
-        found = linprog(goal, np.concatenate(planes), np.concatenate(offsets), bounds=ranges)
-        if found.status != 0:
+        solution = linprog(goal, np.concatenate(planes), np.concatenate(offsets), bounds=ranges)
+        if solution.status != 0:
             break
-        if found.fun > give_up_um - CLOSE_UM:
+        if solution.fun > give_up_um - CLOSE_UM:
             return None
-        if best_um - found.fun < CLOSE_UM:
+        if best_um - solution.fun < CLOSE_UM:
             break
-        change = np.clip(found.x[:size], *bounds[list(indices)].T)
+        change = np.clip(solution.x[:size], *bounds[list(indices)].T)
     return Solution(indices, best, best_um)
 
 
@@ -224,9 +224,9 @@ def _least_max_of_one(
     volume: Volume, index: int, bounds: Array, give_up_um: float
 ) -> Solution | None:
     """Do the same along one error: the planes are lines, and two of them give the next place."""
-    way = volume.response[index]
+    response = volume.response[index]
     low, high = map(float, bounds)
-    along = (np.einsum("nc,nc->n", other, way) for other in (volume.error_um, way))
+    along = (np.einsum("nc,nc->n", other, response) for other in (volume.error_um, response))
     products = np.stack([volume.square_um2, *along])
     ends: dict[bool, tuple[float, float, float]] = {}  # place, value, slope where it falls, rises
     at, best, best_um = 0.0, 0.0, np.inf

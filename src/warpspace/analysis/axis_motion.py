@@ -85,14 +85,14 @@ def assemble_motion(
 ) -> AxisMotion:
     """Give the motions of radial, axial and tilt deviations, [n] each."""
     theta = np.deg2rad(angle_deg)
-    kept = slice(None, -1 if closed else None)  # the last place of a turn is the first one
+    distinct = slice(None, -1 if closed else None)  # the last place of a turn is the first one
     turn = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
 
     def motion(name: str, unit: str, values: Array, line: Array) -> ErrorMotion:
         strongest = times_a_turn(values) if closed else None
-        coefficients = np.linalg.lstsq(line[kept], values[kept], rcond=None)[0]
-        rest, once = values - line @ coefficients, float(np.linalg.norm(coefficients[1:]))
-        return ErrorMotion(name, f"{name} error motion", unit, values, rest, once, strongest)
+        coefficients = np.linalg.lstsq(line[distinct], values[distinct], rcond=None)[0]
+        residual, once = values - line @ coefficients, float(np.linalg.norm(coefficients[1:]))
+        return ErrorMotion(name, f"{name} error motion", unit, values, residual, once, strongest)
 
     radial, axial, tilt = deviations
     return AxisMotion(

@@ -222,9 +222,9 @@ def table_html(table: Table) -> str:
         + "</tr>"
         for row, mark in zip(table.cells()[:MOST_ROWS], marks, strict=False)
     )
-    left = len(table.rows) - MOST_ROWS
-    more = f"<p>… and {left:,} more rows</p>" if left > 0 else ""
-    return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+    n_hidden = len(table.rows) - MOST_ROWS
+    footer = f"<p>… and {n_hidden:,} more rows</p>" if n_hidden > 0 else ""
+    return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{footer}"
 
 
 def table_markdown(table: Table) -> str:

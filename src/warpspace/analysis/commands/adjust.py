@@ -149,21 +149,21 @@ class Adjust(Analysis):
         nodes = build_grid(scene.model, scene.workspace, self.grid)
         basis = grid_basis(scene, nodes, view, self.included(scene))
         values = amplitudes_of(scene.errors, basis.keys)
-        found = find_adjustments(basis, nodes, values, self, scene, watch)
+        result = find_adjustments(basis, nodes, values, self, scene, watch)
         exact = [
             volume_statistics(evaluate_grid(change.scene, nodes, view, exact=True), nodes)
-            for change in found.changes()
+            for change in result.changes()
         ]
         sets = [
             replace(one, exact=Summary(*numbers.four))
-            for one, numbers in zip(found.adjustments, exact, strict=True)
+            for one, numbers in zip(result.adjustments, exact, strict=True)
         ]
         left_out = second_order(scene, self.evaluated_loop)
-        found = replace(found, adjustments=tuple(sets), second_order=left_out)
+        result = replace(result, adjustments=tuple(sets), second_order=left_out)
         error = basis.evaluate(values, orientation=False).error_um
         at = nodes.coordinates, view, nodes.point_mm, nodes.weights
-        doubt = field_uncertainty(scene, error, *at)
-        return found if doubt is None else _with_uncertainty(found, doubt, basis)
+        uncertainty = field_uncertainty(scene, error, *at)
+        return result if uncertainty is None else _with_uncertainty(result, uncertainty, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
@@ -260,11 +260,11 @@ class AdjustResult(Result):
         rows = [(len(one.adjust), *one.four, self._adjustments(one)) for one in self.adjustments]
         yield Table(columns, rows, title="Best sets of adjustments:")
         if len(set(self.adjustable.values())) == 1:
-            said = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
+            bounds = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
         else:
             each = (f"{key} ±{limit:g}" for key, limit in self.adjustable.items())
-            said = f"by at most {', '.join(each)}"
-        yield f"  adjusted: {', '.join(self.adjustable)}; {said}"
+            bounds = f"by at most {', '.join(each)}"
+        yield f"  adjusted: {', '.join(self.adjustable)}; {bounds}"
         sizes = [str(len(one.adjust)) for one in self.adjustments if not one.proven]
         yield (
             "  all sets compared"
@@ -280,8 +280,8 @@ class AdjustResult(Result):
             for value, first in ((getattr(one.exact, name), getattr(one, name)),)
         ]
         if exact:
-            words = f"{self._objective_words} by the exact chain (exact − first order)"
-            yield f"  {words}: {', '.join(exact)}"
+            heading = f"{self._objective_words} by the exact chain (exact − first order)"
+            yield f"  {heading}: {', '.join(exact)}"
 
     def _adjustments(self, one: AdjustedSet) -> str:
         return ", ".join(
