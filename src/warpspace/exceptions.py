@@ -36,9 +36,9 @@ class OptionError(WarpspaceError):
     where it is read: a flag on the command line, a label on a page.
     """
 
-    def with_names(self, word: Callable[[str], str]) -> str:
+    def with_names(self, name_of: Callable[[str], str]) -> str:
         """Give the text with the reader's word for each option it names."""
-        return re.sub(r"\{([a-z_]+)\}", lambda found: word(found[1]), super().__str__())
+        return re.sub(r"\{([a-z_]+)\}", lambda found: name_of(found[1]), super().__str__())
 
     def __str__(self) -> str:
         return self.with_names(lambda name: name)
@@ -63,9 +63,9 @@ class WorkersLostError(WarpspaceError):
 class UnknownNameError(WarpspaceError):
     """A name that is not among the known ones."""
 
-    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, what: str, name: str, expected: Iterable[str]) -> None:
         self.name = name
-        self.known = tuple(known)
+        self.known = tuple(expected)
         super().__init__(f"unknown {what} {name!r}{near_miss(name, self.known)}")
 
 
@@ -93,8 +93,8 @@ class SceneError(WarpspaceError):
         super().__init__(text)
 
 
-def near_miss(name: str, known: Iterable[str]) -> str:
-    names = list(known)
+def near_miss(name: str, expected: Iterable[str]) -> str:
+    names = list(expected)
     folded = {candidate.casefold(): candidate for candidate in names}
     close = get_close_matches(name.casefold(), folded, n=2, cutoff=0.6)
     if close:

@@ -50,16 +50,16 @@ def _is_interrupt(error: BaseException) -> bool:
 class Registry(dict[str, T], Generic[T]):
     """Things of one kind by name: those of the house, and what plug-ins register."""
 
-    def __init__(self, what: str, own: Mapping[str, T], key: str = "name") -> None:
-        super().__init__(own)
-        self._what, self._key = what, key
+    def __init__(self, kind: str, bundled: Mapping[str, T], key: str = "name") -> None:
+        super().__init__(bundled)
+        self._what, self._key = kind, key
 
-    def register(self, one: T) -> None:
+    def register(self, member: T) -> None:
         """Add one; it then appears wherever these are listed."""
-        name = getattr(one, self._key)
+        name = getattr(member, self._key)
         if name in self:
             raise OptionError(f"{self._what} {name!r} is there already; expected another name")
-        self[name] = one
+        self[name] = member
 
     def unregister(self, name: str) -> None:
         """Take one away again."""

@@ -116,9 +116,9 @@ class Search:
         best = start
         for indices in sets:
             limit = np.inf if best is None else best.value_um
-            found = self.least(indices, limit)
-            if found is not None and (best is None or found.value_um < best.value_um - 1e-9):
-                best = found
+            solution = self.least(indices, limit)
+            if solution is not None and (best is None or solution.value_um < best.value_um - 1e-9):
+                best = solution
         return None if best is start else best
 
     def best_sets(self, candidates: Sequence[int], count: int) -> Iterator[tuple[Solution, bool]]:
@@ -201,7 +201,8 @@ def least_max(
     for _ in range(MOST_STEPS):
         error = volume.error_um + np.tensordot(change, chosen, 1)
         norm = np.sqrt(np.einsum("nc,nc->n", error, error))
-        if (largest := float(norm.max())) < best_um:
+        largest = float(norm.max())
+        if largest < best_um:
             best, best_um = change, largest
         count = min(NODES_AT_ONCE, norm.size)
         worst = np.argpartition(norm, -count)[-count:]

@@ -218,7 +218,9 @@ def table_html(table: Table) -> str:
     marks = [*table.marks, *[""] * len(table.rows)]
     body = "".join(
         (f'<tr class="{mark}">' if mark else "<tr>")
-        + "".join(_cell(column, text) for column, text in zip(table.visible_columns, row, strict=True))
+        + "".join(
+            _cell(column, text) for column, text in zip(table.visible_columns, row, strict=True)
+        )
         + "</tr>"
         for row, mark in zip(table.cells()[:MOST_ROWS], marks, strict=False)
     )
@@ -243,8 +245,8 @@ def _escaped(text: str) -> str:
 def _bars_html(bars: Bars) -> str:
     head = "".join(f"<th>{escape(panel.title)}{_unit(panel.unit)}</th>" for panel in bars.panels)
     rows = "".join(
-        f"<tr><th>{escape(words)}</th>" + "".join(_bar(panel, row) for panel in bars.panels)
-        for row, words in enumerate(bars.rows)
+        f"<tr><th>{escape(label)}</th>" + "".join(_bar(panel, row) for panel in bars.panels)
+        for row, label in enumerate(bars.rows)
     )
     return (
         f'<table class="bars"><caption>{escape(bars.title)} · {escape(bars.subtitle)}</caption>'
@@ -253,8 +255,8 @@ def _bars_html(bars: Bars) -> str:
 
 
 def _bar(panel: Panel, row: int) -> str:
-    numbers = [one.values[row] for one in panel.series]
-    everything = [abs(v) for one in panel.series for v in one.values if v is not None]
+    numbers = [series.values[row] for series in panel.series]
+    everything = [abs(v) for series in panel.series for v in series.values if v is not None]
     longest = max((*everything, panel.before or 0.0)) or 1.0
     parts = "".join(
         f'<div class="bar" style="width:{100.0 * abs(value) / longest:.1f}%">{value:.2f}</div>'

@@ -102,8 +102,8 @@ class Option:
         if self.enum is None or value is None:
             return tuple(value) if isinstance(value, list) else value
         if value not in self.choices:
-            known = ", ".join(self.choices)
-            raise OptionError(f"{{{self.name}}} {str(value)!r}; expected one of {known}")
+            expected = ", ".join(self.choices)
+            raise OptionError(f"{{{self.name}}} {str(value)!r}; expected one of {expected}")
         return self.enum(value)
 
     def check(self, value: Any) -> None:
@@ -126,8 +126,8 @@ class Option:
         if self.enum is not None:
             return self.coerce(word)
         if self.choices and word not in self.choices:
-            known = ", ".join(self.choices)
-            raise OptionError(f"{{{self.name}}} {text!r}; expected one of {known}")
+            expected = ", ".join(self.choices)
+            raise OptionError(f"{{{self.name}}} {text!r}; expected one of {expected}")
         try:
             return self.kind(word) if self.kind in (int, float) and "_" not in word else word
         except ValueError:
@@ -193,10 +193,10 @@ def _complete(described: Option, name: str, default: Any, hint: Any) -> Option:
 def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
     if get_origin(hint) is Annotated:
         base, *extras = get_args(hint)
-        grammar = next((one for one in extras if isinstance(one, Grammar)), None)
+        grammar = next((argument for argument in extras if isinstance(argument, Grammar)), None)
         return _resolve(base)[0], grammar
     if get_origin(hint) in (Union, types.UnionType):
-        kinds = [one for one in get_args(hint) if one is not type(None)]
+        kinds = [argument for argument in get_args(hint) if argument is not type(None)]
         if len(kinds) == 1:
             return _resolve(kinds[0])
     return hint, None
@@ -216,7 +216,7 @@ AT_HELP = (
 
 def read_numbers(text: str, pairs: str, example: str) -> dict[str, float]:
     """Read numbers by name, ``X=0,Y=-225``; names come out in capitals."""
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for part in text.replace(";", ",").split(","):
         name, equals, number = part.partition("=")
         name = name.strip().upper()
@@ -229,21 +229,21 @@ def read_numbers(text: str, pairs: str, example: str) -> dict[str, float]:
                 f"{part.strip()!r} cannot be read; expected {pairs} pairs with commas between, for"
                 f" instance {example}"
             )
-        if name in found:
+        if name in numbers:
             raise ValueError(f"{name} is given twice")
-        found[name] = value
-    return found
+        numbers[name] = value
+    return numbers
 
 
 def read_place(text: str, axes: Collection[str]) -> dict[str, float]:
     """Read axis positions as they are typed, ``X=0,Y=-225,B=30``, mm or degrees."""
-    found = read_numbers(text, "axis=number", "X=0,Y=-225,B=30")
-    for name, value in found.items():
+    place = read_numbers(text, "axis=number", "X=0,Y=-225,B=30")
+    for name, value in place.items():
         if name not in axes:
             raise ValueError(f"unknown axis {name}; expected one of {', '.join(axes)}")
         if abs(value) > MAX_LENGTH_MM:
             raise ValueError(f"{value:g}; expected at most ±{MAX_LENGTH_MM:g} mm or degrees")
-    return found
+    return place
 
 
 def _place(text: str, scene: "Scene") -> tuple[tuple[str, float], ...]:
@@ -254,9 +254,9 @@ def read_keys(text: str, _scene: "Scene") -> tuple[str, ...]:
     """Read keys of error parameters with commas between, in any case; `ALL` for every one."""
     from warpspace.machine.axes import PARAMETERS, parameter
 
-    known = {ALL: ALL, **{key.lower(): key for key in PARAMETERS}}
-    given = [part.strip() for part in text.split(",")]
-    keys = tuple(known.get(part.lower(), part) for part in given if part)
+    spelling = {ALL: ALL, **{key.lower(): key for key in PARAMETERS}}
+    names = [part.strip() for part in text.split(",")]
+    keys = tuple(spelling.get(part.lower(), part) for part in names if part)
     if not keys:
         raise ValueError("expected keys such as EA0Z,EC0Y")
     for key in keys:
@@ -267,7 +267,7 @@ def read_keys(text: str, _scene: "Scene") -> tuple[str, ...]:
 
 def read_limits(text: str, _scene: "Scene") -> tuple[tuple[str, float], ...]:
     """Read numbers above 0 by parameter; one without a key is for all, with the key `ALL`."""
-    found: dict[str, float] = {}
+    limits: dict[str, float] = {}
     for part in (part.strip() for part in text.split(",")):
         name, equals, number = part.rpartition("=")
         try:
@@ -279,8 +279,8 @@ def read_limits(text: str, _scene: "Scene") -> tuple[tuple[str, float], ...]:
                 ("" if part == text.strip() else f"{part!r}: ")
                 + "expected KEY=VALUE or one VALUE for all errors, in µm or µrad and above 0"
             )
-        found[name.strip().upper() if equals else ALL] = value
-    return tuple(found.items())
+        limits[name.strip().upper() if equals else ALL] = value
+    return tuple(limits.items())
 
 
 def typed_word(text: str, _scene: "Scene") -> str:
@@ -323,17 +323,17 @@ def place_words(place: Mapping[str, float]) -> str:
 
 
 def outside_travel(machine: "Machine", place: Mapping[str, float]) -> list[str]:
-    said: list[str] = []
+    warnings: list[str] = []
     for name, value in place.items():
         axis = machine.axes[name]
         low, high = axis.travel
         if not low <= value <= high:
             unit = f" {axis.unit}" if axis.is_linear else axis.unit
-            said.append(
+            warnings.append(
                 f"{name}={value:g} is outside the travel of {name}, {low:g} to {high:g}{unit};"
                 " its errors are continued beyond it"
             )
-    return said
+    return warnings
 
 
 def error_words(key: str) -> str:

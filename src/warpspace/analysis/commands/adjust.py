@@ -155,8 +155,8 @@ class Adjust(Analysis):
             for change in result.changes()
         ]
         sets = [
-            replace(one, exact=Summary(*numbers.four))
-            for one, numbers in zip(result.adjustments, exact, strict=True)
+            replace(adjusted, exact=Summary(*numbers.four))
+            for adjusted, numbers in zip(result.adjustments, exact, strict=True)
         ]
         left_out = second_order(scene, self.evaluated_loop)
         result = replace(result, adjustments=tuple(sets), second_order=left_out)
@@ -197,12 +197,12 @@ class AdjustResult(Result):
 
     @property
     def all_sets_compared(self) -> list[bool]:
-        return [one.proven for one in self.adjustments]
+        return [adjusted.proven for adjusted in self.adjustments]
 
     def changes(self) -> Sequence[Change]:
         return [
-            Change(f"after repair: {_values(one)}", repaired(self.scene, one.adjust))
-            for one in self.adjustments
+            Change(f"after repair: {_values(adjusted)}", repaired(self.scene, adjusted.adjust))
+            for adjusted in self.adjustments
         ]
 
     def blocks(self) -> Iterator[Block]:
@@ -210,7 +210,8 @@ class AdjustResult(Result):
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
-        yield from u95_lines(scene_uncertainty(self.scene, self.analysis.evaluated_loop), {"": self.before})
+        uncertainty = scene_uncertainty(self.scene, self.analysis.evaluated_loop)
+        yield from u95_lines(uncertainty, {"": self.before})
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
@@ -220,8 +221,15 @@ class AdjustResult(Result):
             *number_columns(("then: mean", "RMS", "max"), unit="µm"),
         )
         rows = [
-            (one.key, one.present, one.unit, *one.left_out.three, one.best.value, *one.best.three)
-            for one in self.errors
+            (
+                effect.key,
+                effect.present,
+                effect.unit,
+                *effect.left_out.three,
+                effect.best.value,
+                *effect.best.three,
+            )
+            for effect in self.errors
         ]
         yield Table(
             columns,
@@ -230,10 +238,14 @@ class AdjustResult(Result):
             empty="  all errors that act in this loop are zero",
         )
         yield from self._set_blocks()
-        for one in self.errors:
-            if (share := one.best.expanded_uncertainty.get("probability")) is not None:
-                now = f"{one.key} {one.present:.4g} {plus_minus(one.expanded_uncertainty['u95_present'], '.3g')}"
-                yield f"  {now} {one.unit}: best value {one.best.value:.1f} helps with {share:.1%}"
+        for effect in self.errors:
+            probability = effect.best.expanded_uncertainty.get("probability")
+            if probability is not None:
+                u95 = plus_minus(effect.expanded_uncertainty["u95_present"], ".3g")
+                yield (
+                    f"  {effect.key} {effect.present:.4g} {u95} {effect.unit}: best value"
+                    f" {effect.best.value:.1f} helps with {probability:.1%}"
+                )
         yield self.bars()
 
     @property
@@ -257,7 +269,10 @@ class AdjustResult(Result):
             *number_columns(("mean", "RMS", "P95", "max"), unit="µm"),
             Column("adjust", wraps=True),
         )
-        rows = [(len(one.adjust), *one.four, self._adjustments(one)) for one in self.adjustments]
+        rows = [
+            (len(adjusted.adjust), *adjusted.four, self._adjustments(adjusted))
+            for adjusted in self.adjustments
+        ]
         yield Table(columns, rows, title="Best sets of adjustments:")
         if len(set(self.adjustable.values())) == 1:
             bounds = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
@@ -265,7 +280,7 @@ class AdjustResult(Result):
             each = (f"{key} ±{limit:g}" for key, limit in self.adjustable.items())
             bounds = f"by at most {', '.join(each)}"
         yield f"  adjusted: {', '.join(self.adjustable)}; {bounds}"
-        sizes = [str(len(one.adjust)) for one in self.adjustments if not one.proven]
+        sizes = [str(len(adjusted.adjust)) for adjusted in self.adjustments if not adjusted.proven]
         yield (
             "  all sets compared"
             if not sizes
@@ -273,20 +288,20 @@ class AdjustResult(Result):
             " members swapped as long as that helped"
         )
         name = f"{self.objective}_um"
-        exact = [
-            f"set {len(one.adjust)}: {value:.3f} µm ({round(value - first, 3) + 0.0:+.3f})"
-            for one in self.adjustments
-            if one.exact is not None
-            for value, first in ((getattr(one.exact, name), getattr(one, name)),)
-        ]
+        exact: list[str] = []
+        for adjusted in self.adjustments:
+            if adjusted.exact is not None:
+                um = getattr(adjusted.exact, name)
+                change = round(um - getattr(adjusted, name), 3) + 0.0
+                exact.append(f"set {len(adjusted.adjust)}: {um:.3f} µm ({change:+.3f})")
         if exact:
             heading = f"{self._objective_words} by the exact chain (exact − first order)"
             yield f"  {heading}: {', '.join(exact)}"
 
-    def _adjustments(self, one: AdjustedSet) -> str:
+    def _adjustments(self, adjusted: AdjustedSet) -> str:
         return ", ".join(
             f"{key} {self.present[key]:.4g} → {value:.4g} {parameter(key).unit}"
-            for key, value in one.adjust.items()
+            for key, value in adjusted.adjust.items()
         )
 
     def bars(self) -> Bars:
@@ -308,9 +323,9 @@ class AdjustResult(Result):
             for name, before in zip(("mean_um", "rms_um", "max_um"), self.before.three, strict=True)
         )
         rows = [
-            f"{one.parameter.name}  {one.key}  {spell_short(one.present)} →"
-            f" {spell(one.best.value)} {one.unit}"
-            for one in errors
+            f"{effect.parameter.name}  {effect.key}  {spell_short(effect.present)} →"
+            f" {spell(effect.best.value)} {effect.unit}"
+            for effect in errors
         ]
         where = (self.scene.machine.title, *self._where, f"{self.analysis.grid} nodes per axis")
         return Bars(
@@ -338,36 +353,36 @@ def find_adjustments(
     basis: ErrorBasis,
     grid: Grid,
     amplitudes: Array,
-    asked: Adjust,
+    analysis: Adjust,
     scene: Scene,
     watch: ProgressCallback = ignore_progress,
 ) -> AdjustResult:
     volume = Volume(basis, grid, amplitudes)
-    candidates = _candidates(volume, asked)
-    limits = np.array([asked.limit_of(key) for key in basis.keys])
+    candidates = _candidates(volume, analysis)
+    limits = np.array([analysis.limit_of(key) for key in basis.keys])
     low = np.maximum(-limits, -MAX_ERROR - amplitudes)
     high = np.minimum(limits, MAX_ERROR - amplitudes)
     bounds = np.column_stack([np.minimum(low, 0.0), np.maximum(high, 0.0)])
     off = bool(np.any(volume.error_um))
-    count = asked.count
+    count = analysis.count
     sets: list[AdjustedSet] = []
-    search = Search(volume, asked.objective, bounds)
-    for found, proven in search.best_sets(candidates if off else (), count):
-        values = amplitudes[list(found.indices)] + found.change
-        adjust = {basis.keys[i]: float(v) for i, v in zip(found.indices, values, strict=True)}
-        numbers = volume.statistics(volume.changed(found.indices, values))
+    search = Search(volume, analysis.objective, bounds)
+    for best, proven in search.best_sets(candidates if off else (), count):
+        values = amplitudes[list(best.indices)] + best.change
+        adjust = {basis.keys[i]: float(v) for i, v in zip(best.indices, values, strict=True)}
+        numbers = volume.statistics(volume.changed(best.indices, values))
         sets.append(AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=None))
         watch(len(sets) / (count + 1))
     errors = [_effect(search, index) for index in volume.active_indices if amplitudes[index] != 0.0]
-    wanted = f"{asked.objective}_um"
+    objective = f"{analysis.objective}_um"
     keys = [basis.keys[index] for index in candidates]
     return AdjustResult(
-        analysis=asked,
+        analysis=analysis,
         scene=scene,
         before=Summary(*volume.statistics(amplitudes).four),
-        errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
+        errors=tuple(sorted(errors, key=lambda effect: round(getattr(effect.best, objective), 6))),
         adjustments=tuple(sets),
-        adjustable={key: asked.limit_of(key) for key in keys},
+        adjustable={key: analysis.limit_of(key) for key in keys},
         present={key: float(amplitudes[i]) for key, i in zip(keys, candidates, strict=True)},
     )
 
@@ -400,24 +415,24 @@ def _with_uncertainty(
     )
 
 
-def _candidates(volume: Volume, asked: Adjust) -> tuple[int, ...]:
+def _candidates(volume: Volume, analysis: Adjust) -> tuple[int, ...]:
     keys = volume.basis.keys
-    acting = [keys[index] for index in volume.active_indices]
-    if ALL in asked.adjustable:
+    active = [keys[index] for index in volume.active_indices]
+    if ALL in analysis.adjustable:
         places = volume.active_indices
-    elif not asked.adjustable:
+    elif not analysis.adjustable:
         places = tuple(i for i in volume.active_indices if parameter(keys[i]).is_constant)
     else:
-        for key in asked.adjustable:
-            if key not in acting:
+        for key in analysis.adjustable:
+            if key not in active:
                 parameter(key)
                 raise OptionError(
                     f"{{adjustable}} {key}: it moves no point in this loop; expected some of"
-                    f" {', '.join(acting) or 'none'}"
+                    f" {', '.join(active) or 'none'}"
                 )
-        places = tuple(sorted({keys.index(key) for key in asked.adjustable}))
+        places = tuple(sorted({keys.index(key) for key in analysis.adjustable}))
     tried = [keys[index] for index in places]
-    for key, limit in asked.limit:
+    for key, limit in analysis.limit:
         if key not in (ALL, *tried):
             raise OptionError(
                 f"{{limit}} of {key}: it is not among the errors that are adjusted"
@@ -434,20 +449,20 @@ def _candidates(volume: Volume, asked: Adjust) -> tuple[int, ...]:
 def _effect(search: Search, index: int) -> Effect:
     volume = search.volume
     indices, present = (index,), float(volume.amplitudes[index])
-    found = search.least(indices)
-    best = np.array([present]) + (np.zeros(1) if found is None else found.change)
-    out, then = (
+    optimum = search.least(indices)
+    best = np.array([present]) + (np.zeros(1) if optimum is None else optimum.change)
+    out, improved = (
         volume.statistics(volume.changed(indices, values)).four for values in (np.zeros(1), best)
     )
     return Effect(
         key=volume.basis.keys[index],
         present=present,
         left_out=Summary(*out),
-        best=Best(*then, value=float(best[0])),
+        best=Best(*improved, value=float(best[0])),
     )
 
 
-def _values(one: AdjustedSet) -> str:
-    if len(one.adjust) > MOST_VALUES:
-        return f"{len(one.adjust)} adjusted: {', '.join(one.adjust)}"
-    return ", ".join(f"{key} → {spell(value)}" for key, value in one.adjust.items())
+def _values(adjusted: AdjustedSet) -> str:
+    if len(adjusted.adjust) > MOST_VALUES:
+        return f"{len(adjusted.adjust)} adjusted: {', '.join(adjusted.adjust)}"
+    return ", ".join(f"{key} → {spell(value)}" for key, value in adjusted.adjust.items())

@@ -57,13 +57,13 @@ class Conformance(Analysis):
         keeps = field.norm_um <= self.limit_um
         ranges = scene.workspace.ranges
         lengths = [float(np.ptp(ranges[axis])) if axis else 0.0 for axis in axes]
-        found = largest_box(keeps, lengths)
+        box_nodes = largest_box(keeps, lengths)
         watch(0.9)
         box = None
-        if found is not None:
+        if box_nodes is not None:
             box = {
                 axis: _span(ranges[axis], ends, count)
-                for axis, ends, count in zip(axes, found, keeps.shape, strict=True)
+                for axis, ends, count in zip(axes, box_nodes, keeps.shape, strict=True)
                 if axis
             }
         uncertainty = field_uncertainty(
@@ -145,19 +145,19 @@ def largest_box(
     keeps: NDArray[np.bool_], lengths: list[float]
 ) -> tuple[tuple[int, int], ...] | None:
     """Find the largest box whose nodes all keep a limit, [x, y, z]: first and last node an axis."""
-    best, found = 0.0, None
+    largest, box = 0.0, None
     steps = [length / max(count - 1, 1) for length, count in zip(lengths, keeps.shape, strict=True)]
     pairs = [[(i, j) for i in range(n) for j in range(i + (n > 1), n)] for n in keeps.shape]
     for x in pairs[0]:
         slab = np.all(keeps[x[0] : x[1] + 1], axis=0)
         for y in pairs[1]:
             size = _extent(x, steps[0]) * _extent(y, steps[1])
-            if size * max(lengths[2], 1.0) <= best:
+            if size * max(lengths[2], 1.0) <= largest:
                 continue
             z = _longest_run(np.all(slab[y[0] : y[1] + 1], axis=0))
-            if z is not None and size * _extent(z, steps[2]) > best:
-                best, found = size * _extent(z, steps[2]), (x, y, z)
-    return found
+            if z is not None and size * _extent(z, steps[2]) > largest:
+                largest, box = size * _extent(z, steps[2]), (x, y, z)
+    return box
 
 
 def _longest_run(row: NDArray[np.bool_]) -> tuple[int, int] | None:

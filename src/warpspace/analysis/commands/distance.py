@@ -72,7 +72,10 @@ class Distance(Between):
         distance = np.linalg.norm(end - start, axis=-1)
         angle = _angles_rad(start - corner[0], end - corner[0]) if corner else None
         return DistanceResult(
-            at=tuple(dict(zip(at, one, strict=True)) for one in np.transpose([*at.values()])),
+            at=tuple(
+                dict(zip(at, coordinates, strict=True))
+                for coordinates in np.transpose([*at.values()])
+            ),
             nominal_mm=nominal,
             error_um=error,
             distance_mm=distance,
@@ -121,14 +124,14 @@ class DistanceResult(Result):
         """Say it in short: the distance, its parts, and the angle where there is one."""
         nominal, actual = self.distance_mm
         parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", self.along_um, strict=True))
-        words = [
+        lines = [
             f"{nominal:.3f} → {actual:.3f} mm, {self.difference_um:+.1f} µm",
             f"{'  '.join(parts)} µm",
         ]
         if self.angle_deg is not None:
             nominal, actual = self.angle_deg
-            words.append(f"angle {nominal:.4f} → {actual:.4f}°, {self.deviation_urad:+.1f} µrad")
-        return [one.replace("-", MINUS) for one in words]
+            lines.append(f"angle {nominal:.4f} → {actual:.4f}°, {self.deviation_urad:+.1f} µrad")
+        return [line.replace("-", MINUS) for line in lines]
 
     def blocks(self) -> Iterator[Block]:
         start, end, *_ = (place_words(place) for place in self.at)
@@ -145,7 +148,7 @@ class DistanceResult(Result):
                 self.expanded_uncertainty["u95_difference_um"],
                 *self.expanded_uncertainty["u95_along_um"],
             )
-            rows = [(*row, plus_minus(one)) for row, one in zip(rows, u95, strict=True)]
+            rows = [(*row, plus_minus(expanded)) for row, expanded in zip(rows, u95, strict=True)]
         columns = (
             Column(key="of", leads=True),
             *number_columns(("nominal", "actual"), ".4f", "mm", ("nominal_mm", "actual_mm")),

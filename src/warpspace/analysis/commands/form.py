@@ -13,6 +13,7 @@ from warpspace.analysis.description import (
     ExpandedUncertainty,
     ProgressCallback,
     Result,
+    count_progress,
 )
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
@@ -63,26 +64,29 @@ class Form(Analysis):
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
-            raise OptionError("certify: expected a working volume with two or three linear axes")
+            raise OptionError("form: expected a working volume with two or three linear axes")
         view = choose_view(scene, self.loop)
         error = evaluate_grid(scene, grid, view).error_um
-        found, asked = [*_deviations(axes, grid.nominal_mm, error)], 1
-        sure = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
-        count = 2 * (1 + len(sure.errors.keys)) if sure else 1
-        watch(1 / count)
-        if sure is None:
-            return FormResult(deviations=tuple(found), title=scene.title)
+        deviations = tuple(_deviations(axes, grid.nominal_mm, error))
+        uncertainty = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
+        n_evaluations = 2 * (1 + len(uncertainty.errors.keys)) if uncertainty else 1
+        advance = count_progress(watch, n_evaluations)
+        advance(1)
+        if uncertainty is None:
+            return FormResult(deviations=deviations, title=scene.title)
 
-        def ask(error_um: Array) -> Array:
-            nonlocal asked
-            watch((asked := asked + 1) / count)
-            return np.array([one.value for one in _deviations(axes, grid.nominal_mm, error_um)])
+        def deviation_values(error_um: Array) -> Array:
+            advance(1)
+            return np.array(
+                [deviation.value for deviation in _deviations(axes, grid.nominal_mm, error_um)]
+            )
 
-        each = zip(found, sure.propagate(ask), strict=True)
-        told = tuple(
-            replace(one, expanded_uncertainty=ExpandedUncertainty(u95=u95)) for one, u95 in each
+        u95 = uncertainty.propagate(deviation_values)
+        deviations = tuple(
+            replace(deviation, expanded_uncertainty=ExpandedUncertainty(u95=expanded))
+            for deviation, expanded in zip(deviations, u95, strict=True)
         )
-        return FormResult(deviations=told, title=scene.title, uncertainty=sure.errors)
+        return FormResult(deviations=deviations, title=scene.title, uncertainty=uncertainty.errors)
 
 
 def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[FormDeviation]:
@@ -110,18 +114,12 @@ class FormResult(Result):
             *([Column("U95"), Column(key="u95", shows=False)] if self.uncertainty else ()),
             Column("unit", key="unit"),
         )
-        rows = [
-            (
-                d.kind,
-                d.of,
-                d.at,
-                d.value,
-                *([plus_minus(u95), u95] if self.uncertainty else ()),
-                d.unit,
-            )
-            for d in self.deviations
-            for u95 in [d.expanded_uncertainty.get("u95")]
-        ]
+        rows: list[tuple[object, ...]] = []
+        for deviation in self.deviations:
+            u95 = deviation.expanded_uncertainty.get("u95")
+            expanded = (plus_minus(u95), u95) if self.uncertainty else ()
+            location = deviation.kind, deviation.of, deviation.at
+            rows.append((*location, deviation.value, *expanded, deviation.unit))
         yield Table(columns, rows)
 
 
@@ -135,8 +133,8 @@ def zone_width(deviation: Array, *places: Array) -> float:
     bounds = [(None, None)] * design.shape[1] + [(0.0, None)]
     matrix = np.block([[design, -half], [-design, -half]])
     limits = np.concatenate([deviation, -deviation])
-    found = linprog([0.0] * design.shape[1] + [1.0], matrix, limits, bounds=bounds)
-    return 2.0 * float(found.x[-1])
+    solution = linprog([0.0] * design.shape[1] + [1.0], matrix, limits, bounds=bounds)
+    return 2.0 * float(solution.x[-1])
 
 
 def _flatness(
@@ -154,15 +152,17 @@ def _flatness(
 def _straightness(
     axes: tuple[str, ...], nominal: Array, error: Array, moving: list[int], axis: int
 ) -> Iterator[FormDeviation]:
-    others = [i for i in moving if i != axis]
-    for across in others:
+    across_axes = [i for i in moving if i != axis]
+    for across in across_axes:
         widths: dict[str, float] = {}
-        for places in product(PLACES.items(), repeat=len(others)):
+        for places in product(PLACES.items(), repeat=len(across_axes)):
             index: list[slice | int] = [slice(None) if i == axis else 0 for i in range(3)]
-            for i, (_, share) in zip(others, places, strict=True):
+            for i, (_, share) in zip(across_axes, places, strict=True):
                 index[i] = round(share * (error.shape[i] - 1))
             line = tuple(index)
-            at = ", ".join(f"{axes[i]} {word}" for i, (word, _) in zip(others, places, strict=True))
+            at = ", ".join(
+                f"{axes[i]} {word}" for i, (word, _) in zip(across_axes, places, strict=True)
+            )
             widths[at] = zone_width(error[line][:, across], nominal[line][:, axis])
         worst = max(widths, key=lambda at: widths[at])
         name = f"{axes[axis]} in {'xyz'[across]}"

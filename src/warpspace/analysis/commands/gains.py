@@ -123,9 +123,9 @@ def gains_at(
     chosen = loop_keys(model, loop, keys)
     coordinates = complete_coordinates(model.machine, at)
     point = nominal_point(model, loop, coordinates)
-    found = responses(model, loop, chosen, coordinates, point)
-    here = {name: float(value) for name, value in coordinates.items()}
-    rows = [_gain(model, loop, key, found[key], here) for key in chosen]
+    columns = responses(model, loop, chosen, coordinates, point)
+    position = {name: float(value) for name, value in coordinates.items()}
+    rows = [_gain(model, loop, key, columns[key], position) for key in chosen]
     return mark_key_errors(rows, share)
 
 
@@ -142,9 +142,9 @@ def gains_max(
     best: dict[str, Gain] = {}
     for coordinates in _sweep(model, loop, ranges, step_deg):
         point = nominal_point(model, loop, coordinates)
-        found = responses(model, loop, chosen, coordinates, point)
+        columns = responses(model, loop, chosen, coordinates, point)
         for key in chosen:
-            best[key] = _larger(model, loop, key, found[key], coordinates, best.get(key))
+            best[key] = _larger(model, loop, key, columns[key], coordinates, best.get(key))
     return mark_key_errors(list(best.values()), share)
 
 
@@ -163,12 +163,12 @@ def mark_key_errors(rows: Sequence[Gain], share: float = DEFAULT_SHARE) -> tuple
     )
 
 
-def _gain(model: Model, loop: Loop, key: str, col: Response, here: Mapping[str, float]) -> Gain:
+def _gain(model: Model, loop: Loop, key: str, col: Response, at: Mapping[str, float]) -> Gain:
     position = np.broadcast_to(col.position, (3,))
     x, y, z = vector(position)
     norm = float(np.linalg.norm(position))
-    parts = lever_parts(model, loop, key, here)
-    return Gain(key, x, y, z, norm, vector(np.broadcast_to(col.lever_mm, (3,))), here, parts)
+    parts = lever_parts(model, loop, key, at)
+    return Gain(key, x, y, z, norm, vector(np.broadcast_to(col.lever_mm, (3,))), at, parts)
 
 
 def _larger(
@@ -191,11 +191,11 @@ def _larger(
     x, y, z = vector(top)
     if best is not None and norm <= best.norm + 1e-9:
         return replace(best, x=x, y=y, z=z)
-    here = {
+    at = {
         name: float(np.broadcast_to(values, shape)[index]) for name, values in coordinates.items()
     }
     lever = vector(np.broadcast_to(col.lever_mm, (*shape, 3))[index])
-    return Gain(key, x, y, z, norm, lever, here, lever_parts(model, loop, key, here))
+    return Gain(key, x, y, z, norm, lever, at, lever_parts(model, loop, key, at))
 
 
 def _sweep(
@@ -224,8 +224,8 @@ def _sweep(
     for ends in product(*(dict.fromkeys(ranges[name]) for name in linear)):
         for first in product(*(turns[name] for name in outer)):
             fixed = zip((*linear, *outer), (*ends, *first), strict=True)
-            given = {**mesh, **{name: np.asarray(value) for name, value in fixed}}
-            yield complete_coordinates(model.machine, given)
+            positions = {**mesh, **{name: np.asarray(value) for name, value in fixed}}
+            yield complete_coordinates(model.machine, positions)
 
 
 def _default_step(ranges: Mapping[str, tuple[float, float]], rotary: Sequence[str]) -> float:
@@ -277,11 +277,11 @@ class Gains(Analysis):
         keys = scene.parameter_keys
         if self.over_travel:
             travel = {name: axis.travel for name, axis in scene.machine.axes.items()}
-            found = gains_max(scene.model, self.loop, keys, travel, self.step_deg, self.share)
+            gains = gains_max(scene.model, self.loop, keys, travel, self.step_deg, self.share)
         else:
             place = {**scene.workspace.positions, **dict(self.at)}
-            found = gains_at(scene.model, self.loop, keys, place, self.share)
-        return GainsResult(gains=found, analysis=self, machine=scene.machine)
+            gains = gains_at(scene.model, self.loop, keys, place, self.share)
+        return GainsResult(gains=gains, analysis=self, machine=scene.machine)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,12 +316,12 @@ class GainsResult(Result, Sequence[Gain]):
         yield self.bars()
 
     def _table(self) -> Table:
-        over = self.analysis.over_travel
+        over_travel = self.analysis.over_travel
         printed = {
             publication.name: publication.key_errors(self.machine.name)
             for publication in PUBLICATIONS.members()
         }
-        lever = "lever of |E| at" if over else "largest component read off the lever"
+        lever = "lever of |E| at" if over_travel else "largest component read off the lever"
         columns = (
             Column(form=lambda key: "*" if key else "", key="key_error", leads=True),
             Column("key", key="key", leads=True),
@@ -350,7 +350,7 @@ class GainsResult(Result, Sequence[Gain]):
                 *(gain.key in keys for keys in printed.values()), gain.parameter.name,
                 *gain.lever_mm,
                 *(gain.lever_mm if gain.parameter.is_rotation else (None, None, None)),
-                _place(gain) if over else _explain(gain), *gain.at.values(),
+                _place(gain) if over_travel else _explain(gain), *gain.at.values(),
             )
             for gain in self.gains
         ]  # fmt: skip
@@ -375,12 +375,12 @@ class GainsResult(Result, Sequence[Gain]):
             for name, form, width in (("norm", ".2f", 2.2), *((name, "", 1.0) for name in "xyz"))
         )
         count = sum(gain.is_key for gain in self.gains)
-        words = f"key errors: the largest {count}, {self.analysis.share:.0%} of the sum of squares"
+        legend = f"key errors: the largest {count}, {self.analysis.share:.0%} of the sum of squares"
         return Bars(
             f"Error gains · {self.machine.title}", self.where,
             [error_words(gain.key) for gain in self.gains], panels,
             keys=[gain.is_key for gain in self.gains],
-            legend=((words, "key"), ("others", "plain")),
+            legend=((legend, "key"), ("others", "plain")),
         )  # fmt: skip
 
 

@@ -35,17 +35,19 @@ class Between(Analysis):
         (), "Second point", unset="upper ends of the working volume", flag="--to", label="To"
     )
 
-    def places(self, scene: Scene, *others: Place) -> dict[str, Array]:
+    def places(self, scene: Scene, *further_points: Place) -> dict[str, Array]:
         """Give where all axes stand at both points, and at others that are given, [n]."""
-        ranges, asked = scene.workspace.ranges, [dict(self.start), dict(self.end)]
-        if not any(asked):
-            asked = [{name: at[end] for name, at in ranges.items()} for end in (0, -1)]
-        asked += [dict(one) for one in others if one]
+        ranges, points = scene.workspace.ranges, [dict(self.start), dict(self.end)]
+        if not any(points):
+            points = [{name: at[end] for name, at in ranges.items()} for end in (0, -1)]
+        points += [dict(point) for point in further_points if point]
         stand = scene.workspace.positions
-        found = [complete_coordinates(scene.machine, one, stand) for one in asked]
-        if found[0] == found[1]:
+        coordinates = [complete_coordinates(scene.machine, point, stand) for point in points]
+        if coordinates[0] == coordinates[1]:
             raise OptionError("{start} and {end} are one point; expected two")
-        places = {name: np.array([one[name] for one in found]) for name in scene.machine.axes}
+        places = {
+            name: np.array([point[name] for point in coordinates]) for name in scene.machine.axes
+        }
         check_magnitude(scene, places)
         return places
 
@@ -74,11 +76,13 @@ class Line(Between):
         field = evaluate(scene, at=axes, loop=self.loop, exact=self.exact)
         watch(1.0)
         nominal = field.nominal_mm
-        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nominal, axis=0), axis=1))])
+        along_mm = np.concatenate(
+            [[0.0], np.cumsum(np.linalg.norm(np.diff(nominal, axis=0), axis=1))]
+        )
         return LineResult(
-            length_mm=float(way[-1]),
+            length_mm=float(along_mm[-1]),
             axes={name: np.broadcast_to(at, share.shape) for name, at in axes.items()},
-            along_mm=way,
+            along_mm=along_mm,
             nominal_mm=nominal,
             error_um=field.error_um,
             orientation_urad=field.orientation_urad,

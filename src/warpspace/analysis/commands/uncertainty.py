@@ -57,30 +57,32 @@ class Uncertainty(Analysis):
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "UncertaintyResult":
         view = choose_view(scene, self.loop)
         grid = build_grid(scene.model, scene.workspace, self.nodes)
-        found = volume_uncertainty(scene, view, self.nodes)
+        uncertainty = volume_uncertainty(scene, view, self.nodes)
         limit = scene.limit_um if self.limit_um is None else self.limit_um
         statistics = volume_statistics(evaluate_grid(scene, grid, view), grid)
         beyond = (scene.covariance or Covariance((), ())).outside(grid.coordinates, grid.shape)
         result = UncertaintyResult(
             limit_um=limit,
-            statistics=found.with_expanded_uncertainty(statistics) if found else statistics,
+            statistics=uncertainty.with_expanded_uncertainty(statistics)
+            if uncertainty
+            else statistics,
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
-            k=found and found.errors.factor,
-            unknown=found.errors.unknown if found else [*scene.errors],
-            remarks=tuple(found.errors.remarks()) if found else (UNSTATED,),
+            k=uncertainty and uncertainty.errors.factor,
+            unknown=uncertainty.errors.unknown if uncertainty else [*scene.errors],
+            remarks=tuple(uncertainty.errors.remarks()) if uncertainty else (UNSTATED,),
             title=f"{scene.title} · {self.loop} loop",
         )
-        if found is None or not found.errors.is_known:
+        if uncertainty is None or not uncertainty.errors.is_known:
             return result
-        above = found.norm_um > found.u95_norm_um
+        above = uncertainty.norm_um > uncertainty.u95_norm_um
         significant = 100.0 * float(grid.weights[above].sum())
-        result = replace(result, significant_percent=significant, shares=_shares(found))
+        result = replace(result, significant_percent=significant, shares=_shares(uncertainty))
         if limit is None and not self.verify:
             return result
-        worst, drawn = int(np.argmax(found.norm_um)), list[Array]()
-        for norm in found.machines(self.samples, self.seed):
-            others = _three(norm, grid.weights.reshape(-1)) if self.verify else ()
-            drawn.append(np.stack([norm[:, worst], *others, norm.max(axis=1)]))
+        worst, drawn = int(np.argmax(uncertainty.norm_um)), list[Array]()
+        for norm in uncertainty.machines(self.samples, self.seed):
+            summaries = _three(norm, grid.weights.reshape(-1)) if self.verify else ()
+            drawn.append(np.stack([norm[:, worst], *summaries, norm.max(axis=1)]))
             watch(min(sum(part.shape[1] for part in drawn) / self.samples, 1.0))
         at_worst, *numbers = np.concatenate(drawn, axis=1)
         return replace(
@@ -104,14 +106,14 @@ def _spread(drawn: Array) -> Mapping[str, float]:
     return {"mean_um": float(drawn.mean()), "u95_um": float(high - low) / 2.0}
 
 
-def _shares(found: FieldUncertainty) -> list[Mapping[str, Any]]:
-    mean, _, _, largest = found.gradients
-    of_mean, doubt = found.variance_shares(mean), found.errors
-    u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))
+def _shares(field: FieldUncertainty) -> list[Mapping[str, Any]]:
+    mean, _, _, largest = field.gradients
+    of_mean, errors = field.variance_shares(mean), field.errors
+    u = dict(zip(errors.keys, np.diagonal(errors.covariance) ** 0.5, strict=True))
     return [
         {"key": key, "u": float(u[key]), "percent_of_max": 100.0 * part,
          "percent_of_mean": 100.0 * of_mean[key]}
-        for key, part in found.variance_shares(largest).items()
+        for key, part in field.variance_shares(largest).items()
     ]  # fmt: skip
 
 
@@ -148,15 +150,16 @@ class UncertaintyResult(Result):
             *number_columns(("difference",) if drawn else (), "+.1f", "%"),
         )
         rows: list[tuple[Any, ...]] = []
-        for name, words in NAMES.items():
-            u95, more = (
-                self.statistics.expanded_uncertainty.get(f"u95_{name}"),
-                [*drawn.get(name, {}).values()],
-            )
-            more += [100.0 * (more[1] / u95 - 1.0) if u95 else None] if more else []
-            rows.append((words, getattr(self.statistics, name), plus_minus(u95), u95, *more))
+        for name, label in NAMES.items():
+            u95 = self.statistics.expanded_uncertainty.get(f"u95_{name}")
+            row = (label, getattr(self.statistics, name), plus_minus(u95), u95)
+            if drawn:
+                mean, drawn_u95 = drawn[name].values()
+                difference = 100.0 * (drawn_u95 / u95 - 1.0) if u95 else None
+                row = (*row, mean, drawn_u95, difference)
+            rows.append(row)
         yield Table(columns, rows)
-        yield from (f"  {words}" for words in self.remarks)
+        yield from (f"  {label}" for label in self.remarks)
         if self.probability_worst is not None and self.probability_everywhere is not None:
             yield (
                 f"  |E| ≤ {self.limit_um:g} µm with {100.0 * self.probability_worst:.1f} % at the"
@@ -170,7 +173,7 @@ class UncertaintyResult(Result):
         if self.never_measured_percent:
             yield f"  {self.never_measured_percent:.1f} % of the volume was never measured"
         numbers = Column("u", ".3g"), *number_columns(("of max", "of mean"), ".1f", "%")
-        each = (one.values() for one in self.shares[:MOST_SHARES])
+        each = (share.values() for share in self.shares[:MOST_SHARES])
         rows = [(key, parameter(key).unit, *three) for key, *three in each]
         if rows:
             title = "Where it comes from, in shares of the variance:"

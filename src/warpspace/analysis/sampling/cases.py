@@ -342,8 +342,8 @@ class Case:
         return find(self.plan.nodes)
 
     def build_job(self) -> Job:
-        over = Over(self.plan.over)
-        if over is Over.SAMPLED:
+        quantity = Over(self.plan.over)
+        if quantity is Over.SAMPLED:
             site = self.site
 
             def one_point_each(rng: np.random.Generator, count: int) -> Array:
@@ -358,7 +358,7 @@ class Case:
         gains = self.responses(places)
 
         def all_points_each(rng: np.random.Generator, count: int) -> Array:
-            return reduce_nodes(self.draws.draw(rng, count), gains, over, places.weights)
+            return reduce_nodes(self.draws.draw(rng, count), gains, quantity, places.weights)
 
         return all_points_each
 
@@ -367,14 +367,15 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     """Evaluate the first machines of a case to first order and exactly, [n, N, 3] each, µm."""
     model = replace(case.model, direction=TravelDirection.MEAN)
     view, loop = case.view, case.view.loop
-    rng, most = case.plan.block(0)
-    amplitudes = case.draws.draw(rng, most)[:count]
+    rng, n_machines = case.plan.block(0)
+    amplitudes = case.draws.draw(rng, n_machines)[:count]
     if case.plan.over == Over.SAMPLED:
-        places = case.site.random(rng, most)
+        places = case.site.random(rng, n_machines)
         axes = {
-            key: np.broadcast_to(q, most)[:count, None] for key, q in places.coordinates.items()
+            key: np.broadcast_to(q, n_machines)[:count, None]
+            for key, q in places.coordinates.items()
         }
-        point = np.broadcast_to(places.point_mm, (most, 3))[:count, None]
+        point = np.broadcast_to(places.point_mm, (n_machines, 3))[:count, None]
     else:
         places = case.site.extreme(case.plan.nodes)
         axes, point = places.coordinates, places.point_mm
@@ -384,9 +385,10 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     def error(at: Coordinates, point_mm: Array, exact: bool) -> Array:
         return loop_error(model, loop, at, values, point_mm, exact=exact)[0]
 
-    first, exact = (error(axes, point, way) for way in (False, True))
-    if (held := reference_point(model, view, axes)) is not None:
-        first, exact = first - error(*held, False), exact - error(*held, True)
+    first, exact = (error(axes, point, exactly) for exactly in (False, True))
+    reference = reference_point(model, view, axes)
+    if reference is not None:
+        first, exact = first - error(*reference, False), exact - error(*reference, True)
     return first, exact
 
 

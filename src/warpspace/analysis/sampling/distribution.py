@@ -60,7 +60,7 @@ def summarise(
     """Summarise one block of samples or more, [n] each, µm."""
     sums: list[float] = []
     squares: list[float] = []
-    kept: list[Array] = []
+    samples: list[Array] = []
     fine = np.zeros(_BINS + 2, dtype=np.int64) if count else None
     number, within, largest = 0, 0, 0.0
     for values in blocks:
@@ -73,7 +73,7 @@ def summarise(
             bins, counts = np.unique(_fine_bins(values), return_counts=True)
             fine[bins] += counts
         if keep:
-            kept.append(values)
+            samples.append(values)
     filled = None if fine is None else np.flatnonzero(fine)
     return PartialSums(
         number,
@@ -81,7 +81,7 @@ def summarise(
         tuple(squares),
         largest,
         within,
-        np.concatenate(kept) if keep else None,
+        np.concatenate(samples) if keep else None,
         None if filled is None else filled.astype(np.uint32),
         None if fine is None or filled is None else fine[filled],
     )
@@ -299,22 +299,23 @@ def build_draws(
             " instance default = { translation = 10, rotation = 20, squareness = 25 }"
         )
         raise SceneError(source, [problem])
-    if missing := tolerances.missing(keys):
+    missing = tolerances.missing(keys)
+    if missing:
         problem = (
             f"tolerances: no half width for {', '.join(missing)}; expected one for each parameter"
             " of the loop, or a default for its class (0 holds it at its centre)"
         )
         raise SceneError(source, [problem])
-    found = [tolerance for key in keys if (tolerance := tolerances.get(key)) is not None]
-    for key, tolerance in zip(keys, found, strict=True):
+    ranges = [tolerance for tolerance in map(tolerances.get, keys) if tolerance is not None]
+    for key, tolerance in zip(keys, ranges, strict=True):
         if not tolerance.half_width >= 0.0:
             raise SceneError(
                 source, [f"tolerances.{key}: half width {tolerance.half_width:g}; expected ≥ 0"]
             )
     return Draws(
         tuple(keys),
-        np.array([tolerance.centre for tolerance in found], dtype=float),
-        np.array([tolerance.half_width for tolerance in found], dtype=float),
+        np.array([tolerance.centre for tolerance in ranges], dtype=float),
+        np.array([tolerance.half_width for tolerance in ranges], dtype=float),
         kind,
         clip,
     )

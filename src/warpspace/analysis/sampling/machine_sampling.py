@@ -64,10 +64,10 @@ def montecarlo(
     executor: Executor | None = None,
     take: Take | None = None,
 ) -> SampleStatistics:
-    (found,) = montecarlo_each(
+    (statistics,) = montecarlo_each(
         [case], workers=case.plan.workers, executor=executor, progress=progress, take=take
     )
-    return found
+    return statistics
 
 
 def montecarlo_each(
@@ -132,16 +132,16 @@ def _collect(
     take: Take | None,
 ) -> Iterator[SampleStatistics]:
     number, stream = 0, None
-    for (case, _, end, _, _), found in run_in_order(_run, tasks, executor, in_flight):
-        if isinstance(found, SampleStatistics):
-            done, result = case.plan.samples, found
+    for (case, _, end, _, _), sums in run_in_order(_run, tasks, executor, in_flight):
+        if isinstance(sums, SampleStatistics):
+            done, result = case.plan.samples, sums
         else:
             stream = Stream(case.plan.samples, case.plan.spec_um) if stream is None else stream
-            stream.merge(found)
-            done = found.count
+            stream.merge(sums)
+            done = sums.count
             result = _finish(case, stream) if end == case.plan.blocks else None
-            if take is not None and found.values is not None:
-                take(number, found.values)
+            if take is not None and sums.values is not None:
+                take(number, sums.values)
         if progress is not None:
             progress(done)
         if result is not None:

@@ -80,19 +80,19 @@ class Ensemble:
         if at is None:
             assert self.spread is not None  # noqa: S101 - each machine has a point of its own
             return np.einsum("cs,csk->k", pull, self.spread, optimize=True).astype(float)
-        found = np.zeros(len(self.keys))
+        slope = np.zeros(len(self.keys))
         for node in range(self.gains.shape[2]):
             chosen = at == node
             by_parameter = pull[:, chosen] @ self.unit[chosen]
-            found += np.einsum("ck,ck->k", by_parameter, self.gains[:, :, node])
-        return found
+            slope += np.einsum("ck,ck->k", by_parameter, self.gains[:, :, node])
+        return slope
 
 
 def build_ensemble(case: Case) -> Ensemble:
     """Draw machines whose tolerances are not known yet: those of the Monte Carlo of its seed."""
     keys, plan = case.draws.keys, case.plan
-    one = np.ones(len(keys))
-    draws = replace(case.draws, centre=0.0 * one, half_width=one)
+    ones = np.ones(len(keys))
+    draws = replace(case.draws, centre=0.0 * ones, half_width=ones)
     blocks = [plan.block(index) for index in range(plan.blocks)]
     unit = np.concatenate([draws.draw(*block) for block in blocks]).astype(np.float32)
     if plan.over == Over.SAMPLED:
@@ -100,8 +100,8 @@ def build_ensemble(case: Case) -> Ensemble:
             np.broadcast_to(case.responses(case.site.random(*block)), (3, len(keys), block[1]))
             for block in blocks
         ]
-        both = np.concatenate(parts, axis=2).astype(np.float32)
-        gains = np.ascontiguousarray(np.swapaxes(both, 1, 2))
+        stacked = np.concatenate(parts, axis=2).astype(np.float32)
+        gains = np.ascontiguousarray(np.swapaxes(stacked, 1, 2))
         return Ensemble(keys, unit, gains, gains * unit, Over.SAMPLED)
     refuse_many_points(case.view.loop)
     gains = case.responses(case.common_places()).astype(np.float32)
@@ -144,36 +144,36 @@ class Task:
 
     def filled(self, free_widths: Array) -> Array:
         """Put the half widths of the free parameters, [F], beside those that stay, [K]."""
-        found = self.half_width.copy()
-        found[self.free] = free_widths
-        return found
+        widths = self.half_width.copy()
+        widths[self.free] = free_widths
+        return widths
 
 
 def scaled(task: Task, widths: Array, scale_of: ScaleOf) -> Array | None:
     """Widen or narrow the free tolerances together until enough machines keep the limit, [K]."""
     below = task.free & (widths < task.widest * (1.0 - 1e-6))
-    found = None
+    largest = None
     if below.any() and not np.array_equal(below, task.free):
-        held = np.where(task.free & ~below, task.widest, widths)
-        found = _scaled(task, held, below, scale_of)
-    return _scaled(task, widths, task.free, scale_of) if found is None else found
+        fixed = np.where(task.free & ~below, task.widest, widths)
+        largest = _scaled(task, fixed, below, scale_of)
+    return _scaled(task, widths, task.free, scale_of) if largest is None else largest
 
 
 def _scaled(
     task: Task, widths: Array, moving: NDArray[np.bool_], scale_of: ScaleOf
 ) -> Array | None:
-    found, moving = widths.copy(), moving.copy()
+    result, moving = widths.copy(), moving.copy()
     while moving.any():
-        scale = scale_of(found, moving)
+        scale = scale_of(result, moving)
         if scale is None:
             return None
-        over = moving & (found * scale > task.widest)
-        if not over.any():
-            found[moving] *= scale
+        capped = moving & (result * scale > task.widest)
+        if not capped.any():
+            result[moving] *= scale
             break
-        found[over] = task.widest
-        moving &= ~over
-    return found
+        result[capped] = task.widest
+        moving &= ~capped
+    return result
 
 
 def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> float | None:
@@ -234,7 +234,7 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
     def remembered(log_scale: bytes) -> tuple[float, Array]:
         return within(np.frombuffer(log_scale))
 
-    found = optimize.minimize(
+    optimum = optimize.minimize(
         lambda x: float(np.sum(share * np.exp(-x))),
         np.zeros(len(first)),
         jac=lambda x: -share * np.exp(-x),
@@ -250,9 +250,9 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
         callback=lambda _: step(),
         options={"maxiter": MOST_STEPS, "ftol": ENOUGH},
     )
-    if not np.isfinite(found.x).all():
+    if not np.isfinite(optimum.x).all():
         return start
-    better = exact(task.filled(first * np.exp(found.x)))
+    better = exact(task.filled(first * np.exp(optimum.x)))
     return better if better is not None and task.spent(better) < task.spent(start) else start
 
 
@@ -279,6 +279,6 @@ def largest_scale(within: Array, probability: float) -> float | None:
     valid = within[within[:, 0] <= within[:, 1]]
     low, high = np.sort(valid[:, 0]), np.sort(valid[:, 1])
     entered = np.searchsorted(low, high, side="right")
-    left = np.searchsorted(high, high, side="left")
-    enough = entered - left >= needed
+    lower = np.searchsorted(high, high, side="left")
+    enough = entered - lower >= needed
     return float(high[enough].max()) if enough.any() else None

@@ -16,7 +16,7 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from warpspace.analysis.description import ExpandedUncertainty
+from warpspace.analysis.description import ExpandedUncertainty, UncertaintySource
 from warpspace.analysis.loop_parameters import loop_axes
 from warpspace.analysis.statistics import P95, Summary
 from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
@@ -38,13 +38,13 @@ Layer: TypeAlias = tuple[ErrorSet, tuple[str, ...]]
 
 
 @lru_cache(maxsize=256)
-def coverage_factor(freedom: float) -> float:
+def coverage_factor(dof: float) -> float:
     """Give k of U95 = k · u: 2 for infinite degrees of freedom."""
-    if np.isinf(freedom):
+    if np.isinf(dof):
         return 2.0
     from scipy.stats import t
 
-    return float(t.ppf(0.5 + COVERAGE / 2.0, max(freedom, 1.0)))
+    return float(t.ppf(0.5 + COVERAGE / 2.0, max(dof, 1.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +68,8 @@ class ErrorUncertainty:
     ) -> ErrorBasis:
         """Give how errors of points respond to the amplitudes."""
         bases = [build_basis(model, *layer, at, view, point_mm) for layer in self.layers]
-        both = zip(*((one.position, one.orientation) for one in bases), strict=True)
-        return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, both))
+        responses = zip(*((basis.position, basis.orientation) for basis in bases), strict=True)
+        return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, responses))
 
     @cached_property
     def dof(self) -> float:
@@ -83,7 +83,7 @@ class ErrorUncertainty:
     @cached_property
     def factors(self) -> Array:
         """U95 / u by the degrees of freedom of each, [K]."""
-        return np.array([coverage_factor(one) for one in self.dofs.tolist()])
+        return np.array([coverage_factor(dof) for dof in self.dofs.tolist()])
 
     @cached_property
     def expanded(self) -> Array:
@@ -118,14 +118,12 @@ class ErrorUncertainty:
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
         """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom."""
-        found = rng.standard_normal((count, len(self.keys))) @ self.root.T
-        for freedom in {*self.dofs.tolist()} - {np.inf}:
-            found[:, self.dofs == freedom] *= np.sqrt(
-                freedom / rng.chisquare(freedom, (count, 1))
-            )
-        return found
+        changes = rng.standard_normal((count, len(self.keys))) @ self.root.T
+        for dof in {*self.dofs.tolist()} - {np.inf}:
+            changes[:, self.dofs == dof] *= np.sqrt(dof / rng.chisquare(dof, (count, 1)))
+        return changes
 
-    def propagate(self, ask: Callable[[Array], Array]) -> list[float | None]:
+    def propagate(self, function: Callable[[Array], Array]) -> list[float | None]:
         """Give U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
 
         Notes
@@ -133,16 +131,19 @@ class ErrorUncertainty:
         Half the difference of what one standard uncertainty up and down gives (ISO/IEC Guide 98-3,
         5.1.3, note 2), or where both go the same way, as at the least of a width, their RMS.
         """
-        present = ask(np.zeros(len(self.keys)))
+        present = function(np.zeros(len(self.keys)))
         if not self.is_known:
             return [None] * len(present)
-        steps = [(ask(way), ask(-way)) for way in (self.root * self.factors[:, None]).T]
+        steps = [
+            (function(step), function(-step)) for step in (self.root * self.factors[:, None]).T
+        ]
         variance = np.sum((np.array(steps).reshape(-1, len(present)) - present) ** 2, axis=0) / 2.0
         return _root(variance).tolist()
 
     def remarks(self) -> Iterator[str]:
         """Say what is not stated, and what the data did not determine."""
-        if unstated := [key for key in self.unknown if key not in self.undetermined]:
+        unstated = [key for key in self.unknown if key not in self.undetermined]
+        if unstated:
             yield (
                 f"uncertainty not stated of {', '.join(unstated)}: it is unknown wherever they"
                 " act, not zero"
@@ -159,34 +160,38 @@ class ErrorUncertainty:
 
 def scene_uncertainty(scene: Scene, loop: Loop = Loop.TOOL) -> ErrorUncertainty | None:
     """Collect how sure the errors of a scene are; None where it says nothing of that."""
-    joint, alone = scene.covariance, scene.uncertainty
-    if joint is None and not alone:
+    covariance, curves = scene.covariance or Covariance((), ()), scene.uncertainty
+    if scene.covariance is None and not curves:
         return None
-    axes, together = loop_axes(scene.model, loop), () if joint is None else joint.keys
-    first = {key: scene.errors.functions[key] for key in together if key in scene.errors}
+    axes, joint = loop_axes(scene.model, loop), covariance.keys
+    first = {key: scene.errors.functions[key] for key in joint if key in scene.errors}
     second: dict[str, ErrorFunction] = {}
-    for key, curve in alone.items():
-        first[key], *rest = _modes(key, curve)
-        second |= dict.fromkeys((key,), *rest) if rest else {}
-    keys = tuple(key for key in (*together, *alone) if parameter(key).axis in axes)
-    more = tuple(key for key in second if key in keys)
-    layers = (ErrorSet(first), keys), (ErrorSet(second), more)
-    width = [first[key].amplitude if key in alone else 0.0 for key in keys]
-    covariance = np.diag([one**2 for one in (*width, *(second[key].amplitude for key in more))])
-    freedoms = np.full(len(covariance), np.inf)
-    if joint is not None:
-        own = [key for key in keys if key in together]
-        rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
-        covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
-        freedoms[rows] = joint.dof
-    known = joint or Covariance((), ())
-    undetermined = tuple(key for key in known.undetermined if parameter(key).axis in axes)
-    acting = (
-        key for key in scene.errors if parameter(key).axis in axes and key not in undetermined
+    for key, curve in curves.items():
+        modes = _modes(key, curve)
+        first[key] = modes[0]
+        second |= dict.fromkeys((key,), *modes[1:]) if modes[1:] else {}
+    keys = tuple(key for key in (*joint, *curves) if parameter(key).axis in axes)
+    second_keys = tuple(key for key in second if key in keys)
+    layers = (ErrorSet(first), keys), (ErrorSet(second), second_keys)
+    widths = [first[key].amplitude if key in curves else 0.0 for key in keys]
+    widths += [second[key].amplitude for key in second_keys]
+    matrix = np.diag(np.square(widths))
+    dofs = np.full(len(matrix), np.inf)
+    if joint:
+        rows = [index for index, key in enumerate(keys) if key in joint]
+        places = [joint.index(keys[index]) for index in rows]
+        matrix[np.ix_(rows, rows)] = covariance.matrix[np.ix_(places, places)]
+        dofs[rows] = covariance.dof
+    undetermined = tuple(key for key in covariance.undetermined if parameter(key).axis in axes)
+    unstated = tuple(
+        key
+        for key in scene.errors
+        if parameter(key).axis in axes
+        and key not in (*undetermined, *keys)
+        and scene.errors.amplitude(key)
     )
-    unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
-    every = *unknown, *undetermined
-    return ErrorUncertainty(layers, covariance, freedoms, every, undetermined, known.lack_of_fit)
+    unknown = (*unstated, *undetermined)
+    return ErrorUncertainty(layers, matrix, dofs, unknown, undetermined, covariance.lack_of_fit)
 
 
 def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
@@ -200,7 +205,7 @@ def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
         return (curve,)
     at = np.unique([*curve.kinks, *np.linspace(low, high, SAMPLES)])
     phase = 0.5 * np.pi * np.clip((at - low) / (high - low), 0.0, 1.0)
-    parts = (curve.evaluate(at) * way for way in (np.cos(phase), np.sin(phase)))
+    parts = (curve.evaluate(at) * weights for weights in (np.cos(phase), np.sin(phase)))
     return tuple(
         TableCurve(curve.span, tuple(zip(at.tolist(), u.tolist(), strict=True))) for u in parts
     )
@@ -265,17 +270,18 @@ class FieldUncertainty:
         return self.error_um / np.where(length > 0.0, length, 1.0)
 
     def _along(self, square: Array) -> Array:
-        way = self.direction
-        turned = np.einsum("...ij,...i->...j", square, way)
-        variance = np.einsum("...j,...j->...", turned, way)
-        if (none := self.norm_um == 0.0).any():
+        direction = self.direction
+        turned = np.einsum("...ij,...i->...j", square, direction)
+        variance = np.einsum("...j,...j->...", turned, direction)
+        none = self.norm_um == 0.0
+        if none.any():
             variance = np.where(none, np.trace(square, axis1=-2, axis2=-1), variance)
         return _root(variance)
 
-    def u95_along(self, point: int, way: Array) -> float | None:
+    def u95_along(self, point: int, direction: Array) -> float | None:
         """Give U95 of the error of a point by its number, along a unit vector, [3]."""
         square = self.expanded_um2.reshape(-1, 3, 3)[point]
-        return float(_root(way @ square @ way)) if self.errors.is_known else None
+        return float(_root(direction @ square @ direction)) if self.errors.is_known else None
 
     def u95_at(self, point: int) -> float | None:
         """Give U95 of |E| at a point by its number; None where it is unknown."""
@@ -285,10 +291,10 @@ class FieldUncertainty:
         """Give U95 of a number by its growth per unit of each amplitude, [K]."""
         return float(_root(gradient @ self.errors.expanded @ gradient))
 
-    def propagate(self, ask: Callable[[Array], Array]) -> list[float | None]:
+    def propagate(self, function: Callable[[Array], Array]) -> list[float | None]:
         """Give U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
         return self.errors.propagate(
-            lambda change: ask(self.error_um + np.tensordot(change, self.response, 1))
+            lambda change: function(self.error_um + np.tensordot(change, self.response, 1))
         )
 
     def variance_shares(self, gradient: Array) -> dict[str, float]:
@@ -297,12 +303,12 @@ class FieldUncertainty:
         They add up to one; a share is below zero where a correlation makes the variance smaller.
         """
         parts = gradient * (self.errors.covariance @ gradient)
-        found = dict.fromkeys(self.errors.keys, 0.0)
+        shares = dict.fromkeys(self.errors.keys, 0.0)
         for key, part in zip(
             self.errors.keys, (parts / (parts.sum() or 1.0)).tolist(), strict=True
         ):
-            found[key] += part
-        return dict(sorted(found.items(), key=lambda one: -abs(one[1])))
+            shares[key] += part
+        return dict(sorted(shares.items(), key=lambda item: -abs(item[1])))
 
     def conformance_probability(self, limit_um: float) -> Array:
         """Give the probability that |E| is within a limit at each point, [...].
@@ -327,9 +333,10 @@ class FieldUncertainty:
         if not self.errors.is_known:
             return dict.fromkeys(NAMES)
         u95 = [self.u95(gradient) for gradient in self.gradients]
-        if (none := self.norm_um.reshape(-1) == 0.0).any():
-            more = self.counts[:, none] @ self.u95_norm_um.reshape(-1)[none]
-            u95 = np.add(u95, more).tolist()
+        none = self.norm_um.reshape(-1) == 0.0
+        if none.any():
+            increase = self.counts[:, none] @ self.u95_norm_um.reshape(-1)[none]
+            u95 = np.add(u95, increase).tolist()
         return dict(zip(NAMES, u95, strict=True))
 
     def with_expanded_uncertainty(self, numbers: S) -> S:
@@ -364,13 +371,13 @@ class FieldUncertainty:
     @cached_property
     def gradients(self) -> Array:
         """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
-        response, found = self.response.reshape(-1, self.norm_um.size, 3), list[Array]()
-        way = self.direction.reshape(-1, 3)
+        response, gradients = self.response.reshape(-1, self.norm_um.size, 3), list[Array]()
+        direction = self.direction.reshape(-1, 3)
         for count in self.counts:
-            few = np.flatnonzero(count) if not count.all() else slice(None)  # tell P95 and max
-            own = (count[few, None] * way[few]).reshape(-1)
-            found.append(response[:, few].reshape(len(response), own.size) @ own)
-        return np.stack(found)
+            points = np.flatnonzero(count) if not count.all() else slice(None)  # tell P95 and max
+            weighted = (count[points, None] * direction[points]).reshape(-1)
+            gradients.append(response[:, points].reshape(len(response), weighted.size) @ weighted)
+        return np.stack(gradients)
 
     def probability_of_improvement(self, after: "FieldUncertainty", name: str) -> float | None:
         """Give the probability that RMS or max of |E| is smaller with other errors of the points.
@@ -379,22 +386,25 @@ class FieldUncertainty:
         """
         if not self.errors.is_known:
             return None
-        squares, ways = np.zeros(2), list[Array]()
-        for index, one in enumerate((self, after)):
-            square = one.norm_um.reshape(-1) ** 2
+        squares, gradients = np.zeros(2), list[Array]()
+        for index, field in enumerate((self, after)):
+            square = field.norm_um.reshape(-1) ** 2
             squares[index] = square.max() if name == "max_um" else self.weights @ square
-            ways.append(2.0 * squares[index] ** 0.5 * one.gradients[[*NAMES].index(name)])
-        way, fall = ways[1] - ways[0], float(squares[0] - squares[1])
-        return float(self.errors.probability_within(fall, self.u95(way), 0.0, np.inf))
+            gradients.append(2.0 * squares[index] ** 0.5 * field.gradients[[*NAMES].index(name)])
+        gradient, fall = gradients[1] - gradients[0], float(squares[0] - squares[1])
+        return float(self.errors.probability_within(fall, self.u95(gradient), 0.0, np.inf))
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
         """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""
         rng, points = np.random.default_rng(seed), self.norm_um.size
         gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
         present = self.error_um.reshape(points, 3).T
-        for start in range(0, count, step := max(1, MOST_DRAWN // points)):
+        step = max(1, MOST_DRAWN // points)
+        for start in range(0, count, step):
             change = self.errors.draw(rng, min(step, count - start))
-            parts = (change @ gain + own for gain, own in zip(gains, present, strict=True))
+            parts = (
+                change @ gain + component for gain, component in zip(gains, present, strict=True)
+            )
             yield np.sqrt(sum(part**2 for part in parts))
 
 
@@ -407,45 +417,44 @@ def field_uncertainty(
     shares: Array | None = None,
 ) -> FieldUncertainty | None:
     """Say how sure a field of a scene is; None where the scene says nothing of that."""
-    doubt = scene_uncertainty(scene, view.loop)
-    return doubt and _field_doubt(doubt, scene.model, error_um, at, view, point_mm, shares)
+    uncertainty = scene_uncertainty(scene, view.loop)
+    return uncertainty and _propagate_to_field(
+        uncertainty, scene.model, error_um, at, view, point_mm, shares
+    )
 
 
-def _field_doubt(
-    doubt: ErrorUncertainty, model: Model, error_um: Array, at: Coordinates, view: View,
+def _propagate_to_field(
+    errors: ErrorUncertainty, model: Model, error_um: Array, at: Coordinates, view: View,
     point_mm: Array | None, shares: Array | None = None,
 ) -> FieldUncertainty:  # fmt: skip
-    basis = doubt.respond(model, at, view, point_mm)
-    return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
+    basis = errors.respond(model, at, view, point_mm)
+    return replace(combine(errors, basis.position, error_um, shares), turning=basis.orientation)
 
 
 def u95_columns(
     scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
 ) -> ExpandedUncertainty[Array]:
     """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
-    shape, found, doubt = (
-        field.norm_um.shape,
-        ExpandedUncertainty[Array](),
-        scene_uncertainty(scene, view.loop),
-    )
-    if doubt is None or not doubt.is_known:
-        return found
+    shape, columns = field.norm_um.shape, ExpandedUncertainty[Array]()
+    errors = scene_uncertainty(scene, view.loop)
+    if errors is None or not errors.is_known:
+        return columns
     point_mm = None if point_mm is None else np.broadcast_to(point_mm, (*shape, 3))
     for piece in pieces(shape):
-        here = {name: cut(np.asarray(values), piece) for name, values in at.items()}
+        axes = {name: cut(np.asarray(values), piece) for name, values in at.items()}
         point = None if point_mm is None else point_mm[piece]
-        one = _field_doubt(doubt, scene.model, field.error_um[piece], here, view, point)
-        for name, values in one.columns.items():
-            whole = found.setdefault(name, np.empty(shape + values.shape[len(shape) :]))
-            whole[piece] = values
-    return found
+        part = _propagate_to_field(errors, scene.model, field.error_um[piece], axes, view, point)
+        for name, values in part.columns.items():
+            column = columns.setdefault(name, np.empty(shape + values.shape[len(shape) :]))
+            column[piece] = values
+    return columns
 
 
 def combine(
-    doubt: ErrorUncertainty, response: Array, error_um: Array, shares: Array | None = None
+    errors: ErrorUncertainty, response: Array, error_um: Array, shares: Array | None = None
 ) -> FieldUncertainty:
     """Carry how sure errors are to points, by the response of these, [K, ..., 3]."""
-    return FieldUncertainty(doubt, response, _carry(doubt.expanded, response), error_um, shares)
+    return FieldUncertainty(errors, response, _carry(errors.expanded, response), error_um, shares)
 
 
 def _carry(covariance: Array, response: Array) -> Array:
@@ -462,17 +471,17 @@ def volume_uncertainty(
     return field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm, grid.weights)
 
 
-def u95_lines(doubt: ErrorUncertainty | None, named: Mapping[str, Summary]) -> Iterator[str]:
+def u95_lines(uncertainty: UncertaintySource | None, named: Mapping[str, Summary]) -> Iterator[str]:
     """Say U95 of mean, RMS, P95 and max by what they are of, and what is not stated."""
-    if doubt is None:
+    if uncertainty is None:
         return
-    for of, one in named.items():
+    for of, summary in named.items():
         each = (
-            f"{word} {plus_minus(one.expanded_uncertainty[f'u95_{name}'])}"
+            f"{word} {plus_minus(summary.expanded_uncertainty[f'u95_{name}'])}"
             for name, word in NAMES.items()
         )
-        yield f"  U95{of and f', {of}'} (k = {doubt.factor:.3g}): {', '.join(each)} µm"
-    yield from (f"  {words}" for words in doubt.remarks())
+        yield f"  U95{of and f', {of}'} (k = {uncertainty.factor:.3g}): {', '.join(each)} µm"
+    yield from (f"  {remark}" for remark in uncertainty.remarks())
 
 
 def plus_minus(u95: float | None, form: str = ".2f") -> str:

@@ -136,7 +136,7 @@ class Compensate(Analysis):
     )
     stem: str = "compensation"  # name of the files
 
-    def written(self, stem: str | None) -> "Compensate":
+    def for_output(self, stem: str | None) -> "Compensate":
         if not self.sweep and (len(self.formats) != 1 or stem is None):
             raise OptionError(
                 "expected {formats} F and {output} FILE; {sweep} compares several tables"
