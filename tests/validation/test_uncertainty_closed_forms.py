@@ -195,7 +195,8 @@ def test_the_probability_that_a_point_keeps_a_limit(limit, error):
     found = field_uncertainty(scene, np.array(error), at, scene.view())
     square = float(np.sum(np.square(error)))
     expected = ncx2.cdf(limit**2 / 4.0, 3, square / 4.0) if square else chi2.cdf(limit**2 / 4.0, 3)
-    assert float(found.conformance_probability(limit)) == pytest.approx(expected, abs=0.02 if square else 1e-9)
+    probability = float(found.conformance_probability(limit))
+    assert probability == pytest.approx(expected, abs=0.02 if square else 1e-9)
 
 
 def test_a_sure_point_keeps_its_limit_or_not():
