@@ -1,4 +1,4 @@
-"""Additions of other packages: analyses, figures, formats, curves and conventions they register."""
+"""Plug-ins: analyses, figures, formats, curves and conventions registered by other packages."""
 
 import logging
 import signal
@@ -41,28 +41,27 @@ def load_plugins() -> None:
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Tell a signal, for which commands have a class, from what a plug-in raises."""
+    """Distinguish a signal, for which commands have a class, from an exception of a plug-in."""
     if type(error) is KeyboardInterrupt:
         return signal.getsignal(signal.SIGINT) is signal.default_int_handler
     return isinstance(error, KeyboardInterrupt)
 
 
 class Registry(dict[str, T], Generic[T]):
-    """Things of one kind by name: those of the house, and what plug-ins register."""
+    """Members of one kind by name: the bundled ones, and those that plug-ins register."""
 
     def __init__(self, kind: str, bundled: Mapping[str, T], key: str = "name") -> None:
         super().__init__(bundled)
         self._what, self._key = kind, key
 
     def register(self, member: T) -> None:
-        """Add one; it then appears wherever these are listed."""
+        """Add a member; it appears wherever the kind is listed."""
         name = getattr(member, self._key)
         if name in self:
             raise OptionError(f"{self._what} {name!r} is there already; expected another name")
         self[name] = member
 
     def unregister(self, name: str) -> None:
-        """Take one away again."""
         del self[name]
 
     def members(self) -> tuple[T, ...]:

@@ -1,4 +1,4 @@
-"""The best values of errors over the volume: of one set of them, and of the best sets."""
+"""Search for the best values of errors over the volume, for one set and for the best sets."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class Volume:
 
     @cached_property
     def triangle(self) -> tuple[Array, Array]:
-        """What the RMS depends on: a matrix, [M, K], and the present error in it, [M]."""
+        """Reduced rows that determine the RMS: a matrix, [M, K], and the present error, [M]."""
         nodes = self.error_um.shape[0]
         root = np.sqrt(self.grid.weights.reshape(-1))
         triangle = np.empty((0, len(self.basis.keys) + 1))
@@ -66,7 +66,7 @@ class Volume:
         return triangle[:, :-1], triangle[:, -1]
 
     def changed(self, indices: tuple[int, ...], values: Array) -> Array:
-        """Give all amplitudes with some of them set to other values, [K], µm or µrad."""
+        """Return all amplitudes with some of them replaced, [K], µm or µrad."""
         amplitudes = self.amplitudes.copy()
         amplitudes[list(indices)] = values
         return amplitudes
@@ -76,7 +76,7 @@ class Volume:
 
 
 class Objective(StrEnum):
-    """What is made as small as possible over the volume."""
+    """Quantity that is minimised over the volume."""
 
     RMS = "rms"
     MAX = "max"
@@ -97,14 +97,14 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """What is made smallest, and how far each error may be changed."""
+    """Objective of a search, and the bounds of each error."""
 
     volume: Volume
     objective: Objective
     bounds: Array  # [K, 2], µm or µrad; least and largest change of every error of the basis
 
     def least(self, indices: tuple[int, ...], give_up_um: float = np.inf) -> Solution | None:
-        """Find the best change of some errors; None where it is proven to be of no use."""
+        """Find the best change of some errors; None where it cannot beat `give_up_um`."""
         if self.objective is Objective.RMS:
             return least_rms(self.volume, indices, self.bounds)
         return least_max(self.volume, indices, self.bounds, give_up_um)
@@ -112,7 +112,7 @@ class Search:
     def best(
         self, sets: Iterator[tuple[int, ...]], start: Solution | None = None
     ) -> Solution | None:
-        """Give the best of some sets; None where none is better than the start."""
+        """Return the best of some sets; None where none is better than the start."""
         best = start
         for indices in sets:
             limit = np.inf if best is None else best.value_um
@@ -122,7 +122,7 @@ class Search:
         return None if best is start else best
 
     def best_sets(self, candidates: Sequence[int], count: int) -> Iterator[tuple[Solution, bool]]:
-        """Find the best set of one adjustment, of two, up to a number of them."""
+        """Find the best sets of one, two, … up to `count` adjustments."""
         before: Solution | None = None
         for size in range(1, min(count, len(candidates)) + 1):
             proven = comb(len(candidates), size) <= MOST_SETS[self.objective]
@@ -154,7 +154,7 @@ class Search:
 
 
 def least_rms(volume: Volume, indices: tuple[int, ...], bounds: Array) -> Solution:
-    """Make the root mean square of the volume smallest: weighted least squares within bounds."""
+    """Minimise the root mean square over the volume: weighted least squares within bounds."""
     matrix, error = volume.triangle
     chosen = matrix[:, indices]
     change = _least_squares(chosen, -error, *bounds[list(indices)].T)
@@ -174,7 +174,7 @@ def _least_squares(matrix: Array, goal: Array, low: Array, high: Array) -> Array
 def least_max(
     volume: Volume, indices: tuple[int, ...], bounds: Array, give_up_um: float = np.inf
 ) -> Solution | None:
-    """Make the largest error of all nodes smallest; see `Search.least`.
+    """Minimise the largest error of all nodes; see `Search.least`.
 
     Notes
     -----
@@ -224,7 +224,7 @@ def least_max(
 def _least_max_of_one(
     volume: Volume, index: int, bounds: Array, give_up_um: float
 ) -> Solution | None:
-    """Do the same along one error: the planes are lines, and two of them give the next place."""
+    """Minimise along one error: the planes are lines, and two of them give the next value."""
     response = volume.response[index]
     low, high = map(float, bounds)
     along = (np.einsum("nc,nc->n", other, response) for other in (volume.error_um, response))

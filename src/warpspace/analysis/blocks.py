@@ -1,4 +1,4 @@
-"""What an analysis says, in order: sentences, tables and charts in numbers, drawn nowhere yet."""
+"""Content of a result: sentences, tables, and charts as numbers, independent of a renderer."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -19,7 +19,7 @@ Mark: TypeAlias = Literal["", "better", "worse", "key"]
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a table: its rows hold raw values, the form spells them."""
+    """One column of a table: rows hold raw values, `form` formats them."""
 
     heading: str = ""
     form: Form = ""  # format specification, or what spells a value; None is an empty cell
@@ -37,7 +37,7 @@ class Column:
 
     @property
     def is_number(self) -> bool:
-        """Whether its cells are aligned at the right."""
+        """True if its cells are right-aligned."""
         return isinstance(self.form, str) and bool(self.form)
 
     def spell(self, value: Any) -> str:
@@ -53,7 +53,7 @@ class Column:
 def number_columns(
     heads: Iterable[str], form: str = ".2f", unit: str = "", keys: Sequence[str] = ()
 ) -> tuple[Column, ...]:
-    """Give columns of numbers that have the same unit and stay side by side."""
+    """Return columns of numbers with a common unit that stay side by side."""
     heads = tuple(heads)
     return tuple(
         Column(head, form, unit, key, joins=index > 0)
@@ -150,7 +150,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """What lies between two curves: scatter."""
+    """Area between two curves: scatter."""
 
     name: str
     x: "Array"  # [n]
@@ -210,7 +210,7 @@ def _block_html(block: Block) -> str:
 
 
 def table_html(table: Table) -> str:
-    """Give a table; what a user wrote in it is text."""
+    """Render a table; user input is escaped."""
     title = f"<p>{escape(table.title.strip())}</p>" if table.title else ""
     if not table.rows:
         return title + (f"<p>{escape(table.empty.strip())}</p>" if table.empty else "")
@@ -230,7 +230,7 @@ def table_html(table: Table) -> str:
 
 
 def table_markdown(table: Table) -> str:
-    """Give a table in Markdown; nothing that a user wrote acts as a mark of it."""
+    """Render a table in Markdown; user input is escaped."""
     heads = [column.head for column in table.visible_columns]
     rule = ["---:" if column.is_number else "---" for column in table.visible_columns]
     rows = [rule, *([*map(_escaped, row)] for row in table.cells())]

@@ -1,4 +1,4 @@
-"""Review notes held against their scene: what their numbers are now, and a table of them."""
+"""Tables of review notes, with their numbers re-evaluated in the scene."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -28,7 +28,7 @@ _COLUMNS = (
 
 
 def note_numbers(scene: Scene, notes: Iterable[Note]) -> list[Numbers]:
-    """Give what the numbers of notes are now, µm, by their keys; empty where there are none.
+    """Evaluate the present numbers of notes, µm, by key; empty where there are none.
 
     They are those of the scene's own evaluation: mean and max over the working volume where the
     rotary axes stand as in the note, and the length of the error at its point.
@@ -46,13 +46,13 @@ def note_numbers(scene: Scene, notes: Iterable[Note]) -> list[Numbers]:
         still = {q: at for q, at in note.at.items() if q not in scene.workspace.volume_axes}
         try:
             volume_numbers = of_volume(note.loop, tuple(sorted(still.items())))
-            numbers.append({**volume_numbers, **_here(scene, note)})
+            numbers.append({**volume_numbers, **_point_numbers(scene, note)})
         except WarpspaceError:  # its axes are no longer there
             numbers.append({})
     return numbers
 
 
-def _here(scene: Scene, note: Note) -> Numbers:
+def _point_numbers(scene: Scene, note: Note) -> Numbers:
     mark, loop = note.on, note.loop
     if not note.at or (mark and mark.body):
         return {}
@@ -63,13 +63,13 @@ def _here(scene: Scene, note: Note) -> Numbers:
 
 
 def stale_remark(note: Note, present: Numbers) -> str:
-    """Say that the numbers of a note no longer hold: "changed: 51.7 → 46.1 µm"."""
+    """Format the changes of the numbers of a note: "changed: 51.7 → 46.1 µm"."""
     changes = told(note.numbers, present)
     return f"changed: {changes}" if changes else ""
 
 
 def spell_change(note: Note) -> str:
-    """Spell what a decision changed: "EA0Z 33.9 → 20.2 µrad"."""
+    """Format the changes made by a decision: "EA0Z 33.9 → 20.2 µrad"."""
     changes: list[str] = []
     for key, (old, new) in note.change.items():
         row = parameter(key.removeprefix(TOLERANCES))
@@ -79,7 +79,7 @@ def spell_change(note: Note) -> str:
 
 
 def spell_place(note: Note) -> str:
-    """Spell what a note is pinned to: the whole, a body, or positions of axes."""
+    """Format the place of a note: the whole, a body, or positions of axes."""
     if note.on and note.on.body:
         return f"body {note.on.body}"
     where = " ".join(f"{axis} {spell_short(at)}" for axis, at in note.at.items())
@@ -87,7 +87,7 @@ def spell_place(note: Note) -> str:
 
 
 def spell_numbers(note: Note) -> str:
-    """Spell the numbers of a note: "mean 30.88, max 60.00 → 51.72, here 51.72 µm"."""
+    """Format the numbers of a note: "mean 30.88, max 60.00 → 51.72, here 51.72 µm"."""
     numbers = [
         f"{name.removesuffix('_um')} "
         + (f"{note.before[name]:.2f} → {at:.2f}" if name in note.before else f"{at:.2f}")
@@ -97,7 +97,7 @@ def spell_numbers(note: Note) -> str:
 
 
 def notes_table(scene: Scene, title: str = "") -> Table:
-    """List the notes of a scene, other versions of them, and replies, with what holds now."""
+    """Tabulate the notes of a scene with their versions, replies and present numbers."""
     rows: list[tuple[object, ...]] = []
     marks: list[Mark] = []
     heads = [(number, remark) for number, note in enumerate(scene.review, 1)

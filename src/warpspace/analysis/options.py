@@ -1,4 +1,4 @@
-"""Options of an analysis: fields of its dataclass, and how their values are typed."""
+"""Options of an analysis: fields of its dataclass, and the parsers of their values."""
 
 import math
 import types
@@ -36,7 +36,7 @@ UNIT_ENDINGS = ("_mm", "_um", "_urad", "_deg")
 
 @dataclass(frozen=True, slots=True)
 class Grammar:
-    """How a value is typed that is no number, word or choice: ``Annotated[T, Grammar(…)]``."""
+    """Syntax of a value that is no number, string or choice: ``Annotated[T, Grammar(…)]``."""
 
     metavar: str  # what stands in its place in a help text
     # takes what was typed and the scene, gives the value, which is hashable; raises `ValueError`
@@ -74,7 +74,7 @@ class Option:
 
     @property
     def help(self) -> str:
-        """The sentence with unit, limits and default."""
+        """Help text with unit, limits and default."""
         parts = [self.about]
         if self.unit and self.grammar is None:
             parts.append(f", {self.unit}")
@@ -96,7 +96,7 @@ class Option:
         return f"{self.default:g}" if isinstance(self.default, float) else str(self.default)
 
     def coerce(self, value: Any) -> Any:
-        """Give a value as its field holds it: a word as a member, a mapping as pairs."""
+        """Convert a value to the type of the field: a string to a member, a mapping to pairs."""
         if isinstance(value, Mapping):
             return tuple(value.items())
         if self.enum is None or value is None:
@@ -215,7 +215,7 @@ AT_HELP = (
 
 
 def read_numbers(text: str, pairs: str, example: str) -> dict[str, float]:
-    """Read numbers by name, ``X=0,Y=-225``; names come out in capitals."""
+    """Parse numbers by name, ``X=0,Y=-225``; names are converted to capitals."""
     numbers: dict[str, float] = {}
     for part in text.replace(";", ",").split(","):
         name, equals, number = part.partition("=")
@@ -236,7 +236,7 @@ def read_numbers(text: str, pairs: str, example: str) -> dict[str, float]:
 
 
 def read_place(text: str, axes: Collection[str]) -> dict[str, float]:
-    """Read axis positions as they are typed, ``X=0,Y=-225,B=30``, mm or degrees."""
+    """Parse axis positions, ``X=0,Y=-225,B=30``, mm or degrees."""
     place = read_numbers(text, "axis=number", "X=0,Y=-225,B=30")
     for name, value in place.items():
         if name not in axes:
@@ -251,7 +251,7 @@ def _place(text: str, scene: "Scene") -> tuple[tuple[str, float], ...]:
 
 
 def read_keys(text: str, _scene: "Scene") -> tuple[str, ...]:
-    """Read keys of error parameters with commas between, in any case; `ALL` for every one."""
+    """Parse keys of error parameters separated by commas, in any case; `ALL` stands for all."""
     from warpspace.machine.axes import PARAMETERS, parameter
 
     spelling = {ALL: ALL, **{key.lower(): key for key in PARAMETERS}}
@@ -266,7 +266,7 @@ def read_keys(text: str, _scene: "Scene") -> tuple[str, ...]:
 
 
 def read_limits(text: str, _scene: "Scene") -> tuple[tuple[str, float], ...]:
-    """Read numbers above 0 by parameter; one without a key is for all, with the key `ALL`."""
+    """Parse positive numbers by parameter; one without a key is for all, under the key `ALL`."""
     limits: dict[str, float] = {}
     for part in (part.strip() for part in text.split(",")):
         name, equals, number = part.rpartition("=")

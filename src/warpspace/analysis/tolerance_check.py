@@ -1,4 +1,4 @@
-"""Measured machines: errors against tolerances, and what they predict."""
+"""Measured machines: errors against tolerances, and the predicted volumetric error."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Check:
 
     @property
     def passes(self) -> bool | None:
-        """Whether the value lies within the tolerance, limits included; None without one."""
+        """Verdict: within the tolerance, limits included; None without one."""
         if self.centre is None or self.half_width is None:
             return None
         return bool(abs(self.value - self.centre) <= self.half_width * (1.0 + 1e-12))
@@ -67,7 +67,7 @@ def measured(
     loop: Loop | str = Loop.TOOL,
     grid: int | Sequence[int] = PREDICTED_NODES,
 ) -> Measured:
-    """Judge the errors of a scene against tolerances and predict its volumetric error.
+    """Check the errors of a scene against tolerances and predict its volumetric error.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What to repair: which errors to adjust, and to what, so that the volume gets better."""
+"""Adjustment: errors to adjust, and their new values, that reduce the volumetric error."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -42,7 +42,7 @@ FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Best(Summary):
-    """The whole volume with one error at its best value."""
+    """Statistics of the volume with one error at its best value."""
 
     json_keys: ClassVar[tuple[str, ...]] = ("value", *FOUR, "expanded_uncertainty")
     value: float  # µm or µrad; within its limit
@@ -50,7 +50,7 @@ class Best(Summary):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """One error alone: left out, or at its best value, with all others as they are."""
+    """Effect of one error: omitted, or at its best value, with all others unchanged."""
 
     json_keys: ClassVar[tuple[str, ...]] = (
         "key", "unit", "present", "left_out", "best", "expanded_uncertainty",
@@ -74,7 +74,7 @@ class Effect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdjustedSet(Summary):
-    """The best set of so many adjustments, and the whole volume with it."""
+    """Best set of adjustments of one size, and the statistics of the volume with it."""
 
     json_keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact", "expanded_uncertainty")
     adjust: Mapping[str, float]  # µm or µrad; new values by key
@@ -169,14 +169,14 @@ class Adjust(Analysis):
         return scene.parameter_keys
 
     def limit_of(self, key: str) -> float:
-        """Give the largest change of one error, µm or µrad."""
+        """Return the largest change of one error, µm or µrad."""
         limits = dict(self.limit)
         return limits.get(key, limits.get(ALL, DEFAULT_LIMIT))
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdjustResult(Result):
-    """What repairs a machine."""
+    """Adjustments of a machine."""
 
     json_keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
     no_change = "there is nothing to adjust in this loop"

@@ -1,4 +1,4 @@
-"""The widest tolerances that keep a limit of |E| with a given probability."""
+"""Allocation of tolerances: the widest that keep a limit of |E| with a required probability."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -120,7 +120,7 @@ class Exact(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class AllocateResult(Result):
-    """Tolerances that keep a limit, and how sure that is."""
+    """Allocated tolerances, and the probability that the limit is kept."""
 
     analysis: Allocate
     scene: Scene | None = None
@@ -145,7 +145,7 @@ class AllocateResult(Result):
 
     @property
     def at_widest(self) -> tuple[str, ...]:
-        """Parameters that got the largest half width there is."""
+        """Parameters with the largest half width allowed."""
         return tuple(key for key, width in self.tolerances.items() if width >= self.widest)
 
     def json_fields(self) -> dict[str, Any]:
@@ -299,7 +299,7 @@ def allocate(
 
 
 def round_down(widths: Array) -> Array:
-    """Round positive numbers down to `DIGITS` significant digits; what is rounded already stays."""
+    """Round positive numbers down to `DIGITS` significant digits."""
     rounded = np.zeros_like(widths)
     for index, width in enumerate(widths):
         if width > 0.0:

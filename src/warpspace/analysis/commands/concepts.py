@@ -1,4 +1,4 @@
-"""Several machines side by side with the same tolerances, to choose between concepts."""
+"""Comparison of machine concepts with the same tolerances."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ LETTERS = ascii_uppercase[:MOST_CONCEPTS]  # what the machines are called, in th
 
 @dataclass(frozen=True, slots=True)
 class Concept:
-    """One machine among others."""
+    """One machine of a comparison."""
 
     scene: Scene  # with the tolerances that were taken, its errors absolute
     sampled: SampleStatistics  # |E| of machines within tolerance
@@ -210,7 +210,7 @@ def compare_concepts(
 def with_equal_tolerances(
     scenes: Sequence[Scene], *, own_tolerances: bool = False
 ) -> tuple[Scene, ...]:
-    """Give scenes the tolerances of the first one by class, and no point held still."""
+    """Return scenes, errors absolute, with the tolerances of the first one by class."""
     absolute = [replace(scene, reference=None, placed=False) for scene in scenes]
     if own_tolerances or not scenes:
         return tuple(absolute)

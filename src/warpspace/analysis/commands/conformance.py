@@ -1,4 +1,4 @@
-"""Which part of the volume keeps a limit: its share, and the largest box that does."""
+"""Conformance share: the part of the volume within a limit, and the largest box within it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -96,7 +96,7 @@ class Conformance(Analysis):
 
 @dataclass(frozen=True, kw_only=True)
 class ConformanceResult(Result):
-    """The part of a volume that keeps a limit."""
+    """Part of a volume within a limit."""
 
     json_keys = ("limit_um", "percent", "box", "keeps_um", "expanded_uncertainty")
     limit_um: float
@@ -144,7 +144,7 @@ class ConformanceResult(Result):
 def largest_box(
     keeps: NDArray[np.bool_], lengths: list[float]
 ) -> tuple[tuple[int, int], ...] | None:
-    """Find the largest box whose nodes all keep a limit, [x, y, z]: first and last node an axis."""
+    """Find the largest box whose nodes are all within a limit: first and last node of each axis."""
     largest, box = 0.0, None
     steps = [length / max(count - 1, 1) for length, count in zip(lengths, keeps.shape, strict=True)]
     pairs = [[(i, j) for i in range(n) for j in range(i + (n > 1), n)] for n in keeps.shape]

@@ -1,4 +1,4 @@
-"""What each parameter contributes: its tolerance to the variance, its error to that of a point."""
+"""Contributions of parameters: tolerances to the variance, errors to the error of a point."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ DEFAULT_SOBOL, MAX_SOBOL = 1024, 65_536
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What one parameter's tolerance adds."""
+    """Contribution of the tolerance of one parameter."""
 
     key: str
     half_width: float  # µm or µrad
@@ -245,7 +245,7 @@ def share_bars(rows: tuple[Share, ...], title: str, subtitle: str) -> Bars:
 
 @dataclass(frozen=True, slots=True)
 class PointContribution:
-    """What one parameter does to one point."""
+    """Contribution of one parameter to the error of one point."""
 
     key: str  # parameter key
     value: float  # µm or µrad; the error at the point's axis position
@@ -259,7 +259,7 @@ class PointContribution:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The error of one point, taken apart."""
+    """Budget of the error of one point."""
 
     nominal_mm: Array  # [3]
     error_um: Array  # [3]; from the exact chain
@@ -313,6 +313,6 @@ def explain(
 
 
 def budget_words(budget: Mapping[str, float], max_terms: int = 3) -> str:
-    """Name the parameters that add most to a number, the largest first, µm or µrad."""
+    """Format the largest contributions to a number, µm or µrad."""
     terms = [(key, part) for key, part in budget.items() if abs(part) >= LEAST_SHOWN]
     return ", ".join(f"{key} {spell_signed(part)}" for key, part in terms[:max_terms])

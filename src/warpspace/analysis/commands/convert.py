@@ -1,4 +1,4 @@
-"""The errors of a scene in another convention: the same field from other numbers."""
+"""Conversion of the errors of a scene to another convention; the field stays the same."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -84,7 +84,7 @@ class Convert(Analysis):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Conventions to write a scene in; what is left out stays as it is."""
+    """Conventions to convert a scene to; None leaves a convention unchanged."""
 
     # axis to "after_motion" or "before_motion"
     component_errors: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -149,7 +149,7 @@ class ConvertResult(Result):
 
 
 def convert_scene(scene: Scene, target: Target, wishes: tuple[str, ...] = ()) -> ConvertResult:
-    """Write the errors of a scene in other conventions, in the order of the fields of `Target`."""
+    """Convert the errors of a scene, in the order of the fields of `Target`."""
     named = (target.component_errors, target.straightness, target.zero_at)
     for table in (*named, target.notation.measuring_line_mm):
         for axis in table:

@@ -1,4 +1,4 @@
-"""Distance between two points and the angle at a third: nominal, actual, and how they differ."""
+"""Distance between two points and the angle at a third: nominal, actual and difference."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -98,7 +98,7 @@ def _angles_rad(first: Array, second: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class DistanceResult(Result):
-    """Distance, its parts along x, y and z, and the angle at the corner where there is one."""
+    """Distance, its components, and the angle at the corner if there is one."""
 
     json_keys = (
         "at", "nominal_mm", "error_um", "distance_mm", "difference_um", "along_mm", "along_um",
@@ -121,7 +121,7 @@ class DistanceResult(Result):
     )
 
     def lines(self) -> list[str]:
-        """Say it in short: the distance, its parts, and the angle where there is one."""
+        """Format the distance, its components, and the angle if there is a corner."""
         nominal, actual = self.distance_mm
         parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", self.along_um, strict=True))
         lines = [

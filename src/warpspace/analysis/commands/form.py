@@ -1,4 +1,4 @@
-"""Flatness, straightness and squareness of the bent volume: what an inspector would certify."""
+"""Form of the distorted volume: flatness, straightness and squareness."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -29,7 +29,7 @@ PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
 
 @dataclass(frozen=True, slots=True)
 class FormDeviation:
-    """One form deviation of one plane or line."""
+    """Form deviation of one plane or line."""
 
     json_keys: ClassVar[tuple[str, ...]] = (
         "kind", "of", "at", "value", "unit", "expanded_uncertainty",
@@ -100,7 +100,7 @@ def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator
 
 @dataclass(frozen=True, kw_only=True)
 class FormResult(Result):
-    """Form deviations of the bent volume."""
+    """Form deviations of the distorted volume."""
 
     json_keys = ("deviations",)
     deviations: tuple[FormDeviation, ...]
@@ -124,7 +124,7 @@ class FormResult(Result):
 
 
 def zone_width(deviation: Array, *places: Array) -> float:
-    """Width of the narrowest zone d − (a + Σ bᵢ·xᵢ) that holds all points, [n]."""
+    """Compute the minimum zone: the least width of d − (a + Σ bᵢ·xᵢ) over all points, [n]."""
     from scipy.optimize import linprog
 
     centred = ((place - place.mean()) / (float(np.ptp(place)) or 1.0) for place in places)

@@ -1,4 +1,4 @@
-"""Error gains: how much of each error parameter arrives at the functional point, and why."""
+"""Error gains: displacement of the functional point per unit of each error, and its lever."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -68,7 +68,7 @@ def _end_stops(model: Model, side: str, last: Array) -> list[tuple[str, Array]]:
 
 
 def vector(values: Array) -> tuple[float, float, float]:
-    """Give the three floats of an array, free of rounding errors and negative zeros."""
+    """Return the three floats of an array without rounding errors and negative zeros."""
     x, y, z = (round(float(value), 9) + 0.0 for value in values)
     return x, y, z
 

@@ -1,4 +1,4 @@
-"""Where along a line: the error along a straight path between two points, six components."""
+"""Error along a straight line between two points, six components."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene, check_magnitude, evaluate
 from warpspace.units import Array
 
-SHOWN = 21  # points that the table of a longer line shows; the file has all
+MAX_ROWS = 21  # points that the table of a longer line shows; the file has all
 
 
 @dataclass(frozen=True, kw_only=True)
 class Between(Analysis):
-    """A question about two points, by default the ends of the volume's diagonal."""
+    """Analysis of two points, by default the ends of the diagonal of the volume."""
 
     start: Place = option(
         (), "First point, mm and degrees", unset="lower ends of the working volume",
@@ -36,7 +36,7 @@ class Between(Analysis):
     )
 
     def places(self, scene: Scene, *further_points: Place) -> dict[str, Array]:
-        """Give where all axes stand at both points, and at others that are given, [n]."""
+        """Return the positions of all axes at both points and at further ones, [n]."""
         ranges, points = scene.workspace.ranges, [dict(self.start), dict(self.end)]
         if not any(points):
             points = [{name: at[end] for name, at in ranges.items()} for end in (0, -1)]
@@ -119,7 +119,7 @@ class LineResult(Result):
         yield f"  largest |E| {norm[worst]:.2f}{about} µm at {place_words(place)}"
         columns = self.along_mm, *self.axes.values(), norm, *u95
         everything = np.column_stack([*columns, self.error_um, self.orientation_urad])
-        step = -(-(len(norm) - 1) // (SHOWN - 1)) if len(norm) > SHOWN else 1
+        step = -(-(len(norm) - 1) // (MAX_ROWS - 1)) if len(norm) > MAX_ROWS else 1
         units = {name: "mm" if is_linear(name) else "deg" for name in self.axes}
         columns = (
             Column("along", ".1f", "mm", key="along_mm", leads=True),

@@ -1,4 +1,4 @@
-"""Machines within tolerance: the distribution of their |E|."""
+"""Monte Carlo simulation: distribution of |E| over machines within tolerance."""
 
 import math
 from collections import deque
@@ -217,7 +217,7 @@ class MonteCarlo(SampledMachines):
         progress: Progress | None = None,
         take: Take | None = None,
     ) -> "Iterator[SweepPoint]":
-        """Sample scene by scene, taken as they are needed; the last half width changes first."""
+        """Sample scenes as they are needed; the last half width changes first."""
         plan = replace(self.plan(self.over, self.limit_um, self.grid), workers=workers)
         plan.check()
         steps = dict(self.tolerance)
@@ -290,7 +290,7 @@ class MonteCarloResult(Result):
                 f" {first.draws.distribution} · seed {analysis.seed}"
             )
         else:
-            yield self._words(first)
+            yield self._settings(first)
         rows: Sequence[Mapping[str, Any]] = self.rows or [point.row for point in self.points]
         swept = [key for key, _ in analysis.tolerance]
         limit = number_columns(
@@ -316,11 +316,12 @@ class MonteCarloResult(Result):
 
     def _one(self, scene: Scene, sampled: SampleStatistics) -> Iterator[Block]:
         analysis = self.analysis
-        settings = self._words(sampled)
+        settings = self._settings(sampled)
         yield f"{scene.title} · {settings}"
         yield (
             f"  mean {sampled.mean_um:.2f}, mode {sampled.mode_um:.1f},"
-            f" median {sampled.median_um:.2f}, P95 {sampled.p95_um:.2f}, P99 {sampled.p99_um:.2f}, max {sampled.max_um:.2f} µm"
+            f" median {sampled.median_um:.2f}, P95 {sampled.p95_um:.2f},"
+            f" P99 {sampled.p99_um:.2f}, max {sampled.max_um:.2f} µm"
         )
         printed: dict[str, PrintedNumber] = {}
         if analysis.over is Over.SAMPLED:
@@ -352,13 +353,13 @@ class MonteCarloResult(Result):
         marks = [(name, number.value_um) for name, number in printed.items()]
         yield sampled_histogram(sampled, scene.title, settings, marks)
 
-    def _words(self, sampled: SampleStatistics) -> str:
+    def _settings(self, sampled: SampleStatistics) -> str:
         analysis, drawn = self.analysis, str(sampled.draws.distribution)
         if drawn == "normal":
             drawn = "normal, 3σ = half width" + (", clipped" if sampled.draws.clip else "")
         return (
-            f"{analysis.loop} loop · {analysis.samples:,} machines, {WHAT[analysis.over]} · {drawn} · seed"
-            f" {analysis.seed}"
+            f"{analysis.loop} loop · {analysis.samples:,} machines, {WHAT[analysis.over]}"
+            f" · {drawn} · seed {analysis.seed}"
         )
 
 
@@ -398,7 +399,8 @@ def sampled_histogram(
         ()
         if probability is None
         else (
-            f"{100.0 * probability.probability:.2f} % of the machines\nstay within {probability.spec_um:g} µm",
+            f"{100.0 * probability.probability:.2f} % of the machines\n"
+            f"stay within {probability.spec_um:g} µm",
             f"95 % interval {100.0 * probability.low:.2f} … {100.0 * probability.high:.2f} %",
         ),
     )

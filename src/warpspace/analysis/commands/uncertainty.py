@@ -1,4 +1,4 @@
-"""How sure the map of a machine is, whether it keeps its limit, and what makes it unsure."""
+"""Uncertainty of the error map of a machine, its conformity with a limit, and its budget."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -94,7 +94,7 @@ class Uncertainty(Analysis):
 
 
 def _three(norm: Array, weights: Array) -> tuple[Array, Array, Array]:
-    """Give mean, RMS and P95 of machines, [n] each, from their |E|, [n, N]."""
+    """Compute mean, RMS and P95 of machines, [n] each, from their |E|, [n, N]."""
     order = np.argsort(norm, axis=1)
     place = np.argmax(np.cumsum(weights[order], axis=1) >= P95, axis=1)
     p95 = norm[range(len(norm)), order[range(len(norm)), place]]
@@ -119,7 +119,7 @@ def _shares(field: FieldUncertainty) -> list[Mapping[str, Any]]:
 
 @dataclass(frozen=True, kw_only=True)
 class UncertaintyResult(Result):
-    """How sure a map is; None is not known, or was not asked for."""
+    """Uncertainty of an error map; None where unknown or not requested."""
 
     json_keys = (
         "limit_um", "statistics", "k", "unknown", "probability_worst", "probability_everywhere",

@@ -1,4 +1,4 @@
-"""The distribution of a sampled quantity, collected as a stream in bounded memory."""
+"""Distribution of a sampled quantity, collected as a stream in bounded memory."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -40,7 +40,7 @@ class Probability:
 
 @dataclass(frozen=True, slots=True)
 class PartialSums:
-    """Some blocks of samples, as little of them as a stream needs."""
+    """Sums, and samples or bins, of some blocks of samples."""
 
     count: int  # how many samples
     # of each block in order; added up one by one, so that grouping blocks does not change a bit
@@ -88,7 +88,7 @@ def summarise(
 
 
 class Stream:
-    """Collects samples that are not negative."""
+    """Accumulator of non-negative samples."""
 
     def __init__(self, expected: int, spec_um: float | None = None) -> None:
         self.count = 0
@@ -103,7 +103,7 @@ class Stream:
         self.merge(summarise([values], self.spec_um, keep=exact, count=not exact))
 
     def merge(self, part: PartialSums) -> None:
-        """Take in blocks of samples that were summarised, in their order."""
+        """Merge summarised blocks of samples, in their order."""
         if self._values is not None and part.values is not None:
             self._values[self.count : self.count + part.count] = part.values
         if self._fine is not None and part.bins is not None and part.counts is not None:
@@ -129,11 +129,11 @@ class Stream:
 
     @property
     def exact_quantiles(self) -> bool:
-        """Whether quantiles are those of the samples and not of the fine histogram."""
+        """True if quantiles are those of the samples and not of the fine histogram."""
         return self._values is not None
 
     def quantile(self, share: float) -> float:
-        """Give a quantile, µm: exact up to a million samples, beyond to 0.002 % of its value."""
+        """Compute a quantile, µm: exact up to a million samples, beyond to 0.002 % of its value."""
         if self._values is not None:
             return float(np.quantile(self._values[: self.count], share))
         assert self._fine is not None  # noqa: S101 - one of both is kept
@@ -157,7 +157,7 @@ class Stream:
         return self.histogram(np.arange(bins + 1, dtype=np.float64) * width)
 
     def mode_um(self) -> float:
-        """Give the most frequent value, µm: the peak of a Gaussian kernel estimate.
+        """Estimate the mode, µm: the peak of a Gaussian kernel estimate.
 
         Notes
         -----
@@ -178,7 +178,7 @@ class Stream:
         return float((edges[peak] + edges[peak + 1]) / 2.0)
 
     def probability(self) -> Probability | None:
-        """Give the share within the specification; None without one."""
+        """Compute the share within the limit; None without one."""
         if self.spec_um is None:
             return None
         from scipy import stats
@@ -191,7 +191,7 @@ class Stream:
 
 
 def machines_needed(samples: int, probability: float) -> int:
-    """Count how many of the machines have to keep a limit to show that so large a share does."""
+    """Compute the number of machines within a limit that proves a share of the population."""
     from scipy import special
 
     deviation = special.ndtri(0.5 + CONFIDENCE / 2.0)
@@ -200,7 +200,7 @@ def machines_needed(samples: int, probability: float) -> int:
 
 
 def round_width(least: float) -> float:
-    """Give the smallest of 1, 2, 5 × 10ⁿ that is not below a number; 1 for zero."""
+    """Round up to 1, 2 or 5 × 10ⁿ; 1 for zero."""
     if not least > 0.0:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(least))
@@ -223,7 +223,7 @@ SIGMAS = 3.0
 
 
 class Distribution(StrEnum):
-    """How a parameter falls into its tolerance."""
+    """Distribution of a parameter within its tolerance."""
 
     UNIFORM = "uniform"
     NORMAL = "normal"
@@ -267,7 +267,7 @@ class Draws:
         return self.centre + self.half_width / SIGMAS * unit
 
     def from_unit(self, unit: Array) -> Array:
-        """Turn numbers between 0 and 1, [..., K], into values through the inverse distribution."""
+        """Map numbers between 0 and 1, [..., K], to values through the inverse distribution."""
         if self.distribution is Distribution.UNIFORM:
             return self.centre + self.half_width * (2.0 * unit - 1.0)
         from scipy import special

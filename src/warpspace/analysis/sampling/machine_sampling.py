@@ -37,7 +37,7 @@ EXECUTOR_WORKERS = 32
 Progress = Callable[[int], object]  # called with the number of machines done since the last call
 Take = Callable[[int, Array], object]
 """Called with the number of a case and |E| of its next machines, [n], µm."""
-Given = TypeVarTuple("Given")
+Arguments = TypeVarTuple("Arguments")
 Result = TypeVar("Result")
 
 
@@ -88,7 +88,7 @@ def montecarlo_each(
 
 
 def sample_chunks(job: Job, plan: SamplingPlan) -> Iterator[Array]:
-    """Run a job for every block on several threads and give the results in order, a few at once."""
+    """Run a job for every block on several threads and yield the results in order."""
 
     def block(index: int) -> Array:
         return job(*plan.block(index))
@@ -168,12 +168,12 @@ def _finish(case: Case, stream: Stream) -> SampleStatistics:
 
 
 def run_in_order(
-    function: Callable[[Unpack[Given]], Result],
+    function: Callable[[Unpack[Arguments]], Result],
     tasks: Iterable[tuple[*Given]],
     executor: Executor | None,
     in_flight: int,
 ) -> Iterator[tuple[tuple[*Given], Result]]:
-    """Run a function for every task; tasks and results come out in the order of the tasks."""
+    """Run a function for every task; yield tasks and results in order."""
     if executor is None:
         for task in tasks:
             yield task, function(*task)
@@ -212,7 +212,7 @@ def threads(workers: int) -> Generator[Executor | None]:
 def _oldest(
     pending: "deque[tuple[tuple[*Given], Future[Result]]]",
 ) -> tuple[tuple[*Given], Result]:
-    """Wait for the oldest task; it stays in the row until it is done, so that it can be stopped."""
+    """Wait for the oldest task; it stays in the queue, so that it can be cancelled."""
     task, future = pending[0]
     result = future.result()
     pending.popleft()

@@ -72,7 +72,7 @@ class Sampled(Analysis):
 
 @dataclass(frozen=True, kw_only=True)
 class SampledMachines(Sampled):
-    """An analysis that draws many of them."""
+    """An analysis of a sample of machines within tolerance."""
 
     samples: int = option(
         DEFAULT_SAMPLES,
@@ -87,7 +87,7 @@ class SampledMachines(Sampled):
 
 @dataclass(frozen=True, kw_only=True)
 class KeptLimit(SampledMachines):
-    """An analysis of how many of them keep a limit."""
+    """An analysis of the share of machines within a limit."""
 
     over: Literal["max", "sampled"] = option(
         "max",

@@ -1,4 +1,4 @@
-"""The cheapest proportions of tolerances on a sample of machines, and how far they can be widened.
+"""Search for the cheapest proportions of tolerances on a sample of machines, and their scale.
 
 The error of a sampled machine is base + t · move, where t widens all free tolerances in the same
 ratio. |base + t · move| ≤ limit is a quadratic inequality, so that each machine keeps the limit on
@@ -24,7 +24,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Ensemble:
-    """Sampled machines before their tolerances are known."""
+    """Sampled machines of unit tolerances."""
 
     keys: tuple[str, ...]  # (K,); parameters of the loop
     # [S, K]; place of each parameter in its tolerance: 0 in the centre, ±1 at the limits
@@ -66,7 +66,7 @@ class Ensemble:
     def norm_and_slope(
         self, centre: Array, half_width: Array
     ) -> tuple[Array, "Floats", NDArray[np.intp] | None]:
-        """Evaluate |E| of every machine, [S], µm, and what its slopes follow from."""
+        """Evaluate |E| of every machine, [S], µm, with its direction and node."""
         error = self.error_um(centre, half_width)
         at = None
         if error.ndim == 3:
@@ -89,7 +89,7 @@ class Ensemble:
 
 
 def build_ensemble(case: Case) -> Ensemble:
-    """Draw machines whose tolerances are not known yet: those of the Monte Carlo of its seed."""
+    """Draw machines of unit tolerances: those of the Monte Carlo run with the same seed."""
     keys, plan = case.draws.keys, case.plan
     ones = np.ones(len(keys))
     draws = replace(case.draws, centre=0.0 * ones, half_width=ones)
@@ -127,7 +127,7 @@ ScaleOf = Callable[[Array, NDArray[np.bool_]], float | None]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is to be minimised, on which machines."""
+    """Objective and constraints of an allocation."""
 
     ensemble: Ensemble
     centre: Array  # [K], µm or µrad; tolerances before; those that are not free stay
@@ -143,7 +143,7 @@ class Task:
         return float(np.sum(self.cost[self.free] / half_width[self.free]))
 
     def filled(self, free_widths: Array) -> Array:
-        """Put the half widths of the free parameters, [F], beside those that stay, [K]."""
+        """Return all half widths, [K], from those of the free parameters, [F]."""
         widths = self.half_width.copy()
         widths[self.free] = free_widths
         return widths
@@ -177,7 +177,7 @@ def _scaled(
 
 
 def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> float | None:
-    """Give the largest scale of the tolerances that move, on the machines of the ensemble."""
+    """Compute the largest scale of the moving tolerances on the machines of the ensemble."""
     none = np.zeros_like(half_width)
     base = task.ensemble.error_um(task.centre, np.where(moving, 0.0, half_width))
     move = task.ensemble.error_um(none, np.where(moving, half_width, 0.0))
@@ -186,7 +186,7 @@ def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> fl
 
 
 def variance_widths(task: Task) -> Array:
-    """Give the proportions that are cheapest if only the variance of E counts, [K], µm or µrad."""
+    """Compute the cheapest proportions for a given variance of E, [K], µm or µrad."""
     square = task.ensemble.mean_square_gain[task.free]
     widths = np.cbrt(task.cost[task.free] / square)
     return task.filled(widths * (0.5 * task.widest / widths.max()))
@@ -274,7 +274,7 @@ def scales_within(base_um: Array, move_um: Array, limit_um: float) -> Array:
 
 
 def largest_scale(within: Array, probability: float) -> float | None:
-    """Give the largest scale where enough machines, [S, 2], keep the limit; see `scales_within`."""
+    """Return the largest scale with enough machines within the limit; see `scales_within`."""
     needed = math.ceil(probability * len(within) - 1e-9)
     valid = within[within[:, 0] <= within[:, 1]]
     low, high = np.sort(valid[:, 0]), np.sort(valid[:, 1])

@@ -1,4 +1,4 @@
-"""How sure numbers are: the covariance of a machine's errors, carried to points and statistics.
+"""Uncertainty of results: the covariance of errors, propagated to points and statistics.
 
 An error of a scene is sure by its standard uncertainty at points of its axis (``[uncertainty]``,
 errors independent of each other), or by the covariance of amplitudes that a calibration found. To
@@ -39,7 +39,7 @@ Layer: TypeAlias = tuple[ErrorSet, tuple[str, ...]]
 
 @lru_cache(maxsize=256)
 def coverage_factor(dof: float) -> float:
-    """Give k of U95 = k · u: 2 for infinite degrees of freedom."""
+    """Compute the coverage factor k of U95 = k · u: 2 for infinite degrees of freedom."""
     if np.isinf(dof):
         return 2.0
     from scipy.stats import t
@@ -49,7 +49,7 @@ def coverage_factor(dof: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class ErrorUncertainty:
-    """How sure the errors of a scene are, through one loop."""
+    """Uncertainty of the errors of a scene that act in one loop."""
 
     layers: tuple[Layer, ...]  # curves that are not sure; their amplitudes play no part
     covariance: Array  # [K, K], µm and µrad; of the amplitudes, one layer behind the other
@@ -66,14 +66,14 @@ class ErrorUncertainty:
     def respond(
         self, model: Model, at: Coordinates, view: View, point_mm: Array | None = None
     ) -> ErrorBasis:
-        """Give how errors of points respond to the amplitudes."""
+        """Compute the response of errors of points to the amplitudes."""
         bases = [build_basis(model, *layer, at, view, point_mm) for layer in self.layers]
         responses = zip(*((basis.position, basis.orientation) for basis in bases), strict=True)
         return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, responses))
 
     @cached_property
     def dof(self) -> float:
-        """Degrees of freedom that all have, else infinite; `expanded` counts each by its own."""
+        """Common degrees of freedom, else infinite; `expanded` uses those of each amplitude."""
         return float(self.dofs[0]) if len({*self.dofs.tolist()}) == 1 else np.inf
 
     @property
@@ -87,7 +87,7 @@ class ErrorUncertainty:
 
     @cached_property
     def expanded(self) -> Array:
-        """Covariance times the factors: U95 of what grows by g is the root of g · this · g."""
+        """Covariance times the factors: U95 of a number of gradient g is √(g · this · g)."""
         return self.covariance * np.outer(self.factors, self.factors)
 
     @property
@@ -102,14 +102,14 @@ class ErrorUncertainty:
         return width[:, None] * vectors * _root(values)
 
     def u95_of(self, key: str) -> float | None:
-        """Give U95 of the amplitude of one error; None where it is not stated."""
+        """Return U95 of the amplitude of one error; None where it is not stated."""
         at = self.keys.index(key) if key in self.keys else None
         return None if at is None else float(self.expanded[at, at]) ** 0.5
 
     def probability_within(
         self, value: Array | float, u95: Array | float, low: float, high: float
     ) -> Array:
-        """Give the probability that numbers lie between two, by their U95."""
+        """Compute the probability that quantities lie between limits, by their U95."""
         from scipy.stats import t
 
         unit = np.maximum(u95, 1e-12) / self.factor
@@ -117,14 +117,14 @@ class ErrorUncertainty:
         return above - below
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom."""
+        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their dof."""
         changes = rng.standard_normal((count, len(self.keys))) @ self.root.T
         for dof in {*self.dofs.tolist()} - {np.inf}:
             changes[:, self.dofs == dof] *= np.sqrt(dof / rng.chisquare(dof, (count, 1)))
         return changes
 
     def propagate(self, function: Callable[[Array], Array]) -> list[float | None]:
-        """Give U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
+        """Compute U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
 
         Notes
         -----
@@ -141,7 +141,7 @@ class ErrorUncertainty:
         return _root(variance).tolist()
 
     def remarks(self) -> Iterator[str]:
-        """Say what is not stated, and what the data did not determine."""
+        """List the errors whose uncertainty is unknown, and a lack of fit."""
         unstated = [key for key in self.unknown if key not in self.undetermined]
         if unstated:
             yield (
@@ -159,7 +159,7 @@ class ErrorUncertainty:
 
 
 def scene_uncertainty(scene: Scene, loop: Loop = Loop.TOOL) -> ErrorUncertainty | None:
-    """Collect how sure the errors of a scene are; None where it says nothing of that."""
+    """Collect the uncertainty of the errors of a scene; None where it states none."""
     covariance, curves = scene.covariance or Covariance((), ()), scene.uncertainty
     if scene.covariance is None and not curves:
         return None
@@ -195,7 +195,7 @@ def scene_uncertainty(scene: Scene, loop: Loop = Loop.TOOL) -> ErrorUncertainty 
 
 
 def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
-    """Give what an error varies by whose points along its axis are as sure as a curve says.
+    """Return the modes of an error whose standard uncertainty along its axis is a curve.
 
     u · cos φ and u · sin φ, φ from 0 at one end to 90° at the other: near points vary together, the
     ends by themselves, so that widths and differences along the axis are not sure either.
@@ -217,7 +217,7 @@ def _root(variance: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class FieldUncertainty:
-    """How sure the errors of points are; `replace` error_um where only these change."""
+    """Uncertainty of the errors of points; `replace` error_um where only these change."""
 
     errors: ErrorUncertainty
     response: Array  # [K, ..., 3], of the position errors to what is not sure
@@ -279,20 +279,20 @@ class FieldUncertainty:
         return _root(variance)
 
     def u95_along(self, point: int, direction: Array) -> float | None:
-        """Give U95 of the error of a point by its number, along a unit vector, [3]."""
+        """Compute U95 of the error of a point by its index, along a unit vector, [3]."""
         square = self.expanded_um2.reshape(-1, 3, 3)[point]
         return float(_root(direction @ square @ direction)) if self.errors.is_known else None
 
     def u95_at(self, point: int) -> float | None:
-        """Give U95 of |E| at a point by its number; None where it is unknown."""
+        """Return U95 of |E| at a point by its index; None where unknown."""
         return self.u95_norm_um.item(point) if self.errors.is_known else None
 
     def u95(self, gradient: Array) -> float:
-        """Give U95 of a number by its growth per unit of each amplitude, [K]."""
+        """Compute U95 of a number from its gradient in the amplitudes, [K]."""
         return float(_root(gradient @ self.errors.expanded @ gradient))
 
     def propagate(self, function: Callable[[Array], Array]) -> list[float | None]:
-        """Give U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
+        """Compute U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
         return self.errors.propagate(
             lambda change: function(self.error_um + np.tensordot(change, self.response, 1))
         )
@@ -311,7 +311,7 @@ class FieldUncertainty:
         return dict(sorted(shares.items(), key=lambda item: -abs(item[1])))
 
     def conformance_probability(self, limit_um: float) -> Array:
-        """Give the probability that |E| is within a limit at each point, [...].
+        """Compute the probability that |E| is within a limit at each point, [...].
 
         |E|² is a quadratic form; a gamma distribution of its mean and variance stands for it.
         """
@@ -326,7 +326,7 @@ class FieldUncertainty:
         return np.where(variance > 1e-12 * mean**2, gammainc(mean * per, limit_um**2 * per), sharp)
 
     def statistics(self) -> dict[str, float | None]:
-        """Give U95 of mean, RMS, P95 and max of |E| by their keys; None where it is unknown.
+        """Compute U95 of mean, RMS, P95 and max of |E| by key; None where unknown.
 
         Points without an error count by U95 of their vector.
         """
@@ -340,7 +340,7 @@ class FieldUncertainty:
         return dict(zip(NAMES, u95, strict=True))
 
     def with_expanded_uncertainty(self, numbers: S) -> S:
-        """Say U95 beside statistics of the field."""
+        """Return statistics of the field with their expanded uncertainties."""
         u95 = ExpandedUncertainty(
             (f"u95_{name}", value) for name, value in self.statistics().items()
         )
@@ -352,12 +352,12 @@ class FieldUncertainty:
         return np.full(size, 1.0 / size) if self.shares is None else self.shares.reshape(-1)
 
     def transform(self, linear: Callable[[Array], Array]) -> "FieldUncertainty":
-        """Give the same of what a linear function makes of position errors, [..., n, 3]."""
+        """Propagate through a linear function of the position errors, [..., n, 3]."""
         return combine(self.errors, linear(self.response), linear(self.error_um), self.shares)
 
     @cached_property
     def counts(self) -> Array:
-        """How much |E| of each point counts in mean, RMS, P95 and max, [4, N]."""
+        """Weight of |E| of each point in mean, RMS, P95 and max, [4, N]."""
         norm, weights = self.norm_um.reshape(-1), self.weights
         order = np.argsort(norm)
         place = np.cumsum(weights[order])
@@ -370,7 +370,7 @@ class FieldUncertainty:
 
     @cached_property
     def gradients(self) -> Array:
-        """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
+        """Gradients of mean, RMS, P95 and max of |E| in the amplitudes, [4, K]."""
         response, gradients = self.response.reshape(-1, self.norm_um.size, 3), list[Array]()
         direction = self.direction.reshape(-1, 3)
         for count in self.counts:
@@ -380,7 +380,7 @@ class FieldUncertainty:
         return np.stack(gradients)
 
     def probability_of_improvement(self, after: "FieldUncertainty", name: str) -> float | None:
-        """Give the probability that RMS or max of |E| is smaller with other errors of the points.
+        """Compute the probability that RMS or max of |E| is smaller after a change of the errors.
 
         Squares are compared: that of the RMS is linear in what is not sure, however large that is.
         """
@@ -395,7 +395,7 @@ class FieldUncertainty:
         return float(self.errors.probability_within(fall, self.u95(gradient), 0.0, np.inf))
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
-        """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""
+        """Draw machines from the covariance; yield |E| of each at every point, [n, N], in pieces."""
         rng, points = np.random.default_rng(seed), self.norm_um.size
         gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
         present = self.error_um.reshape(points, 3).T
@@ -416,7 +416,7 @@ def field_uncertainty(
     point_mm: Array | None = None,
     shares: Array | None = None,
 ) -> FieldUncertainty | None:
-    """Say how sure a field of a scene is; None where the scene says nothing of that."""
+    """Propagate the uncertainty of a scene to a field; None where the scene states none."""
     uncertainty = scene_uncertainty(scene, view.loop)
     return uncertainty and _propagate_to_field(
         uncertainty, scene.model, error_um, at, view, point_mm, shares
@@ -434,7 +434,7 @@ def _propagate_to_field(
 def u95_columns(
     scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
 ) -> ExpandedUncertainty[Array]:
-    """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
+    """Compute `FieldUncertainty.columns` of points, [...], in pieces; none where unknown."""
     shape, columns = field.norm_um.shape, ExpandedUncertainty[Array]()
     errors = scene_uncertainty(scene, view.loop)
     if errors is None or not errors.is_known:
@@ -453,7 +453,7 @@ def u95_columns(
 def combine(
     errors: ErrorUncertainty, response: Array, error_um: Array, shares: Array | None = None
 ) -> FieldUncertainty:
-    """Carry how sure errors are to points, by the response of these, [K, ..., 3]."""
+    """Propagate the uncertainty of errors to points by their response, [K, ..., 3]."""
     return FieldUncertainty(errors, response, _carry(errors.expanded, response), error_um, shares)
 
 
@@ -465,14 +465,14 @@ def _carry(covariance: Array, response: Array) -> Array:
 def volume_uncertainty(
     scene: Scene, view: View, nodes: int = DEFAULT_NODES
 ) -> FieldUncertainty | None:
-    """Say how sure the errors over the working volume are; None where a scene does not say."""
+    """Propagate the uncertainty of a scene to its working volume; None where it states none."""
     grid = build_grid(scene.model, scene.workspace, min(nodes, DEFAULT_NODES))
     error = evaluate_grid(scene, grid, view).error_um
     return field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm, grid.weights)
 
 
 def u95_lines(uncertainty: UncertaintySource | None, named: Mapping[str, Summary]) -> Iterator[str]:
-    """Say U95 of mean, RMS, P95 and max by what they are of, and what is not stated."""
+    """Format U95 of mean, RMS, P95 and max of named statistics, and the remarks."""
     if uncertainty is None:
         return
     for of, summary in named.items():
