@@ -37,7 +37,7 @@ def load_plugins() -> None:
         except BaseException as error:
             if _is_interrupt(error):
                 raise
-            logger.exception("the plug-in %s cannot be loaded and is left out", entry.name)
+            logger.exception("the plug-in %s cannot be loaded and is ignored", entry.name)
 
 
 def _is_interrupt(error: BaseException) -> bool:
@@ -58,7 +58,7 @@ class Registry(dict[str, T], Generic[T]):
         """Add a member; it appears wherever the kind is listed."""
         name = getattr(member, self._key)
         if name in self:
-            raise OptionError(f"{self._what} {name!r} is there already; expected another name")
+            raise OptionError(f"{self._what} {name!r} is already registered; expected another name")
         self[name] = member
 
     def unregister(self, name: str) -> None:

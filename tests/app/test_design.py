@@ -162,7 +162,7 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     plan = Concepts(limit_um=chosen.specification.limit_um, samples=SAMPLES)
     expected = compare_concepts([FIRST, OTHER], plan)
     assert [one.said for one in found.concepts] == [one.json_fields for one in expected]
-    assert "matter most share of the variance" in section(part, chosen)
+    assert "largest contributions share of the variance" in section(part, chosen)
     part.take(chosen, "sheet", "")
     wait(part)
     assert [one.title for one in asked[0]] == [FIRST.title, OTHER.title]

@@ -66,7 +66,7 @@ class Result(ABC):
     json_keys: ClassVar[tuple[str, ...]] = ()
     # "module:function" that draws its chart, where Bars and Lines do not suffice
     drawn_by: ClassVar[str] = ""
-    no_change: ClassVar[str] = "nothing is to be changed"
+    no_change: ClassVar[str] = "there is nothing to change"
     # deviation of the first order from the exact chain: a warning, and `second_order_um` in JSON
     second_order: "SecondOrder | None" = field(default=None, metadata=NO_JSON)
     # of the errors that its expanded uncertainties result from

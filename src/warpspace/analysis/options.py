@@ -205,12 +205,12 @@ def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
 ALL = "all"
 LOOP_HELP = "Structural loop: tool point, workpiece point, or tool relative to workpiece"
 PLACED_HELP = (
-    "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted for"
-    " the least RMS over the working volume. Looks at the relative loop"
+    "Fit out the placement of the workpiece: three shifts and three small rotations of it that"
+    " minimise the RMS over the working volume. Evaluates the relative loop"
 )
 AT_HELP = (
-    "Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480; axes left out stand at their"
-    " place in the scene"
+    "Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480; omitted axes stay at their"
+    " position in the scene"
 )
 
 

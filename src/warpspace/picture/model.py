@@ -94,7 +94,7 @@ QUANTITIES = {
     "uncertainty": "uncertainty of the position error",
 }
 """What can be coloured."""
-NOT_STATED = "the scene does not state how sure its errors are; expected [uncertainty]"
+NOT_STATED = "the scene states no uncertainty of its errors; expected [uncertainty]"
 DIFFERENCE_LENGTH = "|E_B − E_A|"
 """What the statistics of a change are of: the length of the change of the error vector."""
 SAME_PLACE_MM = 1e-6  # nodes nearer to each other than this are the same

@@ -105,23 +105,23 @@ class Adjust(Analysis):
     placed: bool = option(False, PLACED_HELP)
     objective: Objective = option(
         Objective.RMS,
-        "What is made as small as possible over the volume: RMS or largest |E|",
+        "Quantity to minimise over the volume: RMS or largest |E|",
         choice_labels={"rms": "RMS of the whole volume", "max": "largest |E| of the volume"},
     )
     count: int = option(
         3,
-        "The best sets of one up to this many adjustments",
+        "Largest number of adjustments in a set",
         low=REPAIR_COUNT[0],
         high=REPAIR_COUNT[1],
     )
     adjustable: Keys = option(
         (),
-        "Errors that may be adjusted; of a curve its amplitude is (compensation)",
+        "Errors that may be adjusted; of a curve the amplitude (compensation)",
         unset="squareness and alignment: the constant errors",
     )
     limit: Limits = option(
         (),
-        "By how much one error, or each, may be changed, in µm or µrad",
+        "Largest change of one error or of each, in µm or µrad",
         unset=f"±{DEFAULT_LIMIT:g}",
     )
     grid: int = option(
@@ -201,7 +201,10 @@ class AdjustResult(Result):
 
     def changes(self) -> Sequence[Change]:
         return [
-            Change(f"after repair: {_values(adjusted)}", repaired(self.scene, adjusted.adjust))
+            Change(
+                f"after adjustment: {_values(adjusted)}",
+                apply_adjustments(self.scene, adjusted.adjust),
+            )
             for adjusted in self.adjustments
         ]
 
@@ -216,7 +219,7 @@ class AdjustResult(Result):
             Column("key", leads=True),
             Column("now", ".4g"),
             Column("unit"),
-            *number_columns(("left out: mean", "RMS", "max"), unit="µm"),
+            *number_columns(("omitted: mean", "RMS", "max"), unit="µm"),
             Column("best value", ".1f"),
             *number_columns(("then: mean", "RMS", "max"), unit="µm"),
         )
@@ -234,7 +237,7 @@ class AdjustResult(Result):
         yield Table(
             columns,
             rows,
-            title="Each error alone, all others as they are:",
+            title="Each error alone, all others unchanged:",
             empty="  all errors that act in this loop are zero",
         )
         yield from self._set_blocks()
@@ -244,7 +247,7 @@ class AdjustResult(Result):
                 u95 = plus_minus(effect.expanded_uncertainty["u95_present"], ".3g")
                 yield (
                     f"  {effect.key} {effect.present:.4g} {u95} {effect.unit}: best value"
-                    f" {effect.best.value:.1f} helps with {probability:.1%}"
+                    f" {effect.best.value:.1f} improves with probability {probability:.1%}"
                 )
         yield self.bars()
 
@@ -259,7 +262,7 @@ class AdjustResult(Result):
 
     def _set_blocks(self) -> Iterator[Block]:
         if not self.before.max_um:
-            yield "The error is zero everywhere in this loop: there is nothing to repair."
+            yield "The error is zero everywhere in this loop: there is nothing to adjust."
             return
         if not self.adjustments:
             yield "No squareness or alignment acts in this loop; other errors can be adjusted."
@@ -329,24 +332,24 @@ class AdjustResult(Result):
         ]
         where = (self.scene.machine.title, *self._where, f"{self.analysis.grid} nodes per axis")
         return Bars(
-            f"Repair · {self.scene.title}",
+            f"Adjustment · {self.scene.title}",
             " · ".join(where),
             [*rows, *map(_values, sets)],
             panels,
             legend=(
                 ("before", "before"),
-                ("this error left out", "plain"),
+                ("this error omitted", "plain"),
                 ("this error at its best value", "key"),
                 ("best set of adjustments", "set"),
             ),
         )
 
 
-def repaired(scene: Scene, adjust: Mapping[str, float]) -> Scene:
+def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
     errors = scene.errors
     for key, value in adjust.items():
         errors = errors.with_amplitude(key, value, scene.axis_span(parameter(key).axis))
-    return replace(scene, title=f"{scene.title}, repaired"[:MAX_TEXT], errors=errors)
+    return replace(scene, title=f"{scene.title}, adjusted"[:MAX_TEXT], errors=errors)
 
 
 def find_adjustments(
@@ -391,7 +394,7 @@ def _with_uncertainty(
     result: AdjustResult, before: FieldUncertainty, basis: ErrorBasis
 ) -> AdjustResult:
     def u95_after(adjust: Mapping[str, float]) -> ExpandedUncertainty[float | None]:
-        values = amplitudes_of(repaired(result.scene, adjust).errors, basis.keys)
+        values = amplitudes_of(apply_adjustments(result.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
         u95 = after.with_expanded_uncertainty(result.before).expanded_uncertainty
         if adjust:

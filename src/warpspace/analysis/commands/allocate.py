@@ -83,7 +83,7 @@ class Allocate(KeptLimit):
         "Cost of an error's tolerance, 1 if not given: a half width w costs NUMBER/w",
         flag="--cost",
     )
-    fixed: Fixed = option((), "Errors whose tolerance stays as it is")
+    fixed: Fixed = option((), "Errors whose tolerance stays unchanged")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "AllocateResult":
         case = self.case(scene, self.plan_of(self.limit_um))
@@ -99,7 +99,7 @@ class Allocate(KeptLimit):
                     f"{{costs}} of {key}: {cost:g}; expected {COST[0]:g} to {COST[1]:g}"
                 )
         for key in sorted({*self.fixed}.intersection(dict(self.costs))):
-            raise OptionError(f"{key}: has a cost and is fixed; expected one of both")
+            raise OptionError(f"{key}: has a cost and is fixed; expected one of the two")
 
 
 class Exact(NamedTuple):
@@ -215,7 +215,7 @@ class AllocateResult(Result):
         if not free:
             return "fixed" if key in self.analysis.fixed else "zero" if zero else "no effect"
         if key in self.at_widest:
-            return "the widest there is"
+            return "widest allowed"
         cost = dict(self.analysis.costs).get(key)
         return "" if cost is None else f"cost {cost:g}"
 

@@ -95,7 +95,7 @@ class Concepts(KeptLimit):
     )
     limit_um: float | None = option(
         None,
-        "Of |E|, to say how likely it is kept",
+        "Limit of |E|, for the probability that it is kept",
         unit="µm",
         low=LIMIT_UM[0],
         high=LIMIT_UM[1],
@@ -165,7 +165,7 @@ class ConceptsResult(Result):
             Column(key="limit_um", shows=False),
             Column(key="probability", shows=False),
             Column(f"≤ {limit or 0.0:g} µm", ".2f", "%", shows=limit is not None),
-            Column("matter most", unit="share of the variance", wraps=True),
+            Column("largest contributions", unit="share of the variance", wraps=True),
             *(Column(key=name, shows=False) for name in named),
         )
 

@@ -138,7 +138,7 @@ class ConformanceResult(Result):
                 (*row, plus_minus(self.expanded_uncertainty["u95_keeps_um"][row[0]]))
                 for row in rows
             ]
-        yield Table(columns, rows, title="What parts of the volume keep:")
+        yield Table(columns, rows, title="Limits kept by parts of the volume:")
 
 
 def largest_box(

@@ -208,7 +208,7 @@ class ContributionsResult(Result):
         ]  # fmt: skip
         yield f"{self.title} · {self.where}"
         yield Table(columns, cells)
-        title = f"Which tolerances matter · {self.title}"
+        title = f"Contributions of tolerances · {self.title}"
         yield share_bars(self.rows, title, self.where)
 
 

@@ -50,7 +50,7 @@ class Convert(Analysis):
     """Write the errors of SCENE in another convention.
 
     The field stays the same: the file is read again, and the exact fields of both are compared at
-    500 places of the travel, whose largest difference is printed. What cannot be converted exactly
+    500 positions of the travel, whose largest difference is printed. What cannot be converted exactly
     is refused.
     """
 
@@ -131,7 +131,7 @@ class ConvertResult(Result):
 
     def blocks(self) -> Iterator[Block]:
         count = len(self.changed)
-        yield f"{self.before.title}: {count} error{'' if count == 1 else 's'} written otherwise"
+        yield f"{self.before.title}: {count} error{'' if count == 1 else 's'} converted"
         columns = (
             Column("error", leads=True),
             Column("unit"),
@@ -144,7 +144,7 @@ class ConvertResult(Result):
         yield from (f"  {note}" for note in self.notes)
         yield (
             f"  exact fields differ by at most {self.largest_um:.1e} µm and"
-            f" {self.largest_urad:.1e} µrad (500 places of the travel, read again from the file)"
+            f" {self.largest_urad:.1e} µrad (500 positions of the travel, read again from the file)"
         )
 
 
@@ -170,7 +170,7 @@ def convert_scene(scene: Scene, target: Target, wishes: tuple[str, ...] = ()) ->
     other = replace(other, measured=measured)
     text = scene_to_toml(other, target.notation)
     read = parse_scene(text, scene.name, "the converted scene")
-    gone = f"readings of {', '.join(dropped)} are left out: they are of other curves"
+    gone = f"readings of {', '.join(dropped)} are omitted: they belong to other curves"
     notes = (gone,) if dropped else ()
     converted = write_errors(other, target.notation)
     amplitudes = {

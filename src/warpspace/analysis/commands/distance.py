@@ -38,7 +38,7 @@ class Distance(Between):
     has_table = True
     corner: Place = option((), "Point whose angle between both edges is measured", unset="no angle")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
-    placed: bool = option(False, "Leave out where the workpiece lies; of the relative loop")
+    placed: bool = option(False, "Fit out the placement of the workpiece; relative loop only")
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "DistanceResult":

@@ -107,7 +107,7 @@ class FormResult(Result):
     title: str
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.title} · form of the bent volume"
+        yield f"{self.title} · form of the distorted volume"
         columns = (
             *(Column(name, key=name, leads=name != "at") for name in ("kind", "of", "at")),
             Column("value", ".2f", key="value"),

@@ -128,7 +128,7 @@ class MonteCarlo(SampledMachines):
     grid: int = option(DEFAULT_NODES, "Nodes per axis for --over max|mean", low=2, high=101)
     limit_um: float | None = option(
         None,
-        "Of |E|, to say how likely a machine keeps it",
+        "Limit of |E|, for the probability that a machine keeps it",
         unit="µm",
         low=0.0,
         flag="--limit",
@@ -278,11 +278,11 @@ class MonteCarloResult(Result):
     def blocks(self) -> Iterator[Block]:
         first = self.points[0]
         if self.analysis.in_rows or len(self.points) > 1:
-            yield from self._several()
+            yield from self._several_scenes()
         else:
-            yield from self._one(first.scene, first.sampled)
+            yield from self._single_scene(first.scene, first.sampled)
 
-    def _several(self) -> Iterator[Block]:
+    def _several_scenes(self) -> Iterator[Block]:
         analysis, first = self.analysis, self.points[0].sampled
         if analysis.in_rows:
             yield (
@@ -314,7 +314,7 @@ class MonteCarloResult(Result):
         if n_hidden > 0:
             yield f"… and {n_hidden:,} {'rows' if analysis.in_rows else 'scenes'} more"
 
-    def _one(self, scene: Scene, sampled: SampleStatistics) -> Iterator[Block]:
+    def _single_scene(self, scene: Scene, sampled: SampleStatistics) -> Iterator[Block]:
         analysis = self.analysis
         settings = self._settings(sampled)
         yield f"{scene.title} · {settings}"

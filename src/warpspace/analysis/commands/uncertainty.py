@@ -27,7 +27,7 @@ from warpspace.units import Array
 
 MOSTLY = 50.0  # percent of the volume
 MOST_SHARES = 10  # errors that the table of the largest shares has
-UNSTATED = "the scene does not state how sure its errors are; expected [uncertainty]"
+UNSTATED = "the scene states no uncertainty of its errors; expected [uncertainty]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +51,8 @@ class Uncertainty(Analysis):
     verify: bool = option(False, "Monte Carlo beside the linear propagation")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     nodes: int = option(11, "Nodes per axis of the working volume", low=2, high=21, flag="--grid")
-    samples: int = option(10_000, "How many machines are drawn", low=100, high=1_000_000)
-    seed: int = option(0, "Of the random numbers", low=0, high=2**63 - 1)
+    samples: int = option(10_000, "Number of machines drawn", low=100, high=1_000_000)
+    seed: int = option(0, "Seed of the random numbers", low=0, high=2**63 - 1)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "UncertaintyResult":
         view = choose_view(scene, self.loop)
@@ -169,12 +169,12 @@ class UncertaintyResult(Result):
         if self.significant_percent is not None:
             yield f"  |E| is above its own U95 in {self.significant_percent:.1f} % of the volume"
             if self.significant_percent < MOSTLY:
-                yield "  below it the first order is not enough: --verify says how much more it is"
+                yield "  below it the first order does not suffice: --verify adds a Monte Carlo result"
         if self.never_measured_percent:
             yield f"  {self.never_measured_percent:.1f} % of the volume was never measured"
         numbers = Column("u", ".3g"), *number_columns(("of max", "of mean"), ".1f", "%")
         each = (share.values() for share in self.shares[:MOST_SHARES])
         rows = [(key, parameter(key).unit, *three) for key, *three in each]
         if rows:
-            title = "Where it comes from, in shares of the variance:"
+            title = "Uncertainty budget, in shares of the variance:"
             yield Table((Column("error", leads=True), Column("unit"), *numbers), rows, title)

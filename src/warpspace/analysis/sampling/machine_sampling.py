@@ -169,16 +169,16 @@ def _finish(case: Case, stream: Stream) -> SampleStatistics:
 
 def run_in_order(
     function: Callable[[Unpack[Arguments]], Result],
-    tasks: Iterable[tuple[*Given]],
+    tasks: Iterable[tuple[*Arguments]],
     executor: Executor | None,
     in_flight: int,
-) -> Iterator[tuple[tuple[*Given], Result]]:
+) -> Iterator[tuple[tuple[*Arguments], Result]]:
     """Run a function for every task; yield tasks and results in order."""
     if executor is None:
         for task in tasks:
             yield task, function(*task)
         return
-    pending: deque[tuple[tuple[*Given], Future[Result]]] = deque()
+    pending: deque[tuple[tuple[*Arguments], Future[Result]]] = deque()
     try:
         for task in tasks:
             if len(pending) >= in_flight:
@@ -210,8 +210,8 @@ def threads(workers: int) -> Generator[Executor | None]:
 
 
 def _oldest(
-    pending: "deque[tuple[tuple[*Given], Future[Result]]]",
-) -> tuple[tuple[*Given], Result]:
+    pending: "deque[tuple[tuple[*Arguments], Future[Result]]]",
+) -> tuple[tuple[*Arguments], Result]:
     """Wait for the oldest task; it stays in the queue, so that it can be cancelled."""
     task, future = pending[0]
     result = future.result()

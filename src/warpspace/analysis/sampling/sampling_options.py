@@ -56,7 +56,7 @@ class Sampled(Analysis):
         unset="the one whose top rim the scene's workpiece point lies on: 550x450 on the DVF5000",
     )
     seed: int = option(
-        0, "Of the random numbers; the same seed gives the same numbers", low=0, high=2**63 - 1
+        0, "Seed of the random numbers; the same seed gives the same numbers", low=0, high=2**63 - 1
     )
 
     @property
@@ -76,7 +76,7 @@ class SampledMachines(Sampled):
 
     samples: int = option(
         DEFAULT_SAMPLES,
-        "How many machines are drawn from the tolerances",
+        "Number of machines drawn from the tolerances",
         low=SAMPLES[0],
         high=SAMPLES[1],
     )

@@ -145,16 +145,16 @@ class ErrorUncertainty:
         unstated = [key for key in self.unknown if key not in self.undetermined]
         if unstated:
             yield (
-                f"uncertainty not stated of {', '.join(unstated)}: it is unknown wherever they"
-                " act, not zero"
+                f"uncertainty of {', '.join(unstated)} is unknown; results that depend on it show"
+                " “± ?”"
             )
         if self.undetermined:
             names = ", ".join(self.undetermined)
-            yield f"the readings did not determine {names}: unknown wherever they act"
+            yield f"not estimable from the readings: {names}; results that depend on them show “± ?”"
         if self.lack_of_fit:
             yield (
-                f"the calibration missed something: its residuals were {self.lack_of_fit:.1f} times"
-                " what its readings scatter; U95 does not contain that"
+                f"lack of fit: the residuals of the calibration are {self.lack_of_fit:.1f} times the"
+                " scatter of its readings; U95 does not include that"
             )
 
 
@@ -395,7 +395,7 @@ class FieldUncertainty:
         return float(self.errors.probability_within(fall, self.u95(gradient), 0.0, np.inf))
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
-        """Draw machines from the covariance; yield |E| of each at every point, [n, N], in pieces."""
+        """Draw machines from the covariance; yield |E| at every point, [n, N], in pieces."""
         rng, points = np.random.default_rng(seed), self.norm_um.size
         gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
         present = self.error_um.reshape(points, 3).T

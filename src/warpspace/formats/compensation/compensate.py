@@ -81,7 +81,7 @@ def _read_sizes(text: str, _scene: Scene) -> tuple[int, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Compensate(Analysis):
-    """Write a table of compensation, and say what it leaves.
+    """Write a compensation table and report the residual error.
 
     The program reads its own file back and does with it what the controller does: it interpolates,
     rounds and clips, and adds the result to the commanded positions. What is left is evaluated with

@@ -110,7 +110,7 @@ def chart_figure(chart: Bars | Lines | Histogram) -> Figure:
         return charts_sheet([replace(chart, title="")], "", "")
     if isinstance(chart, Bars):
         return bars_chart(replace(chart, title="", subtitle=""))
-    return histogram_chart(replace(chart, title="", subtitle="", told=()))
+    return histogram_chart(replace(chart, title="", subtitle="", captions=()))
 
 
 def charts_sheet(
