@@ -209,7 +209,7 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(46.09, abs=0.01)
     assert applied.comparison.b is not None
     previewed = part.take(START, "preview", "0")
-    assert previewed.comparison.b.title == "after repair: EA0Z → 30.0"
+    assert previewed.comparison.b.title == "after adjustment: EA0Z → 30.0"
     assert previewed.amplitudes == START.amplitudes
     assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(46.09, abs=0.01)
     moved = START.with_amplitude("EAX", 9.0)

@@ -50,7 +50,7 @@ class Convert(Analysis):
     """Write the errors of SCENE in another convention.
 
     The field stays the same: the file is read again, and the exact fields of both are compared at
-    500 positions of the travel, whose largest difference is printed. What cannot be converted exactly
+    500 places of the travel, whose largest difference is printed. What cannot be converted exactly
     is refused.
     """
 
@@ -144,7 +144,7 @@ class ConvertResult(Result):
         yield from (f"  {note}" for note in self.notes)
         yield (
             f"  exact fields differ by at most {self.largest_um:.1e} µm and"
-            f" {self.largest_urad:.1e} µrad (500 positions of the travel, read again from the file)"
+            f" {self.largest_urad:.1e} µrad (500 places of the travel, read again from the file)"
         )
 
 
