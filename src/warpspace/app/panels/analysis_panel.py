@@ -48,7 +48,7 @@ TITLES = {
     "uncertainty": "Uncertainty of the map",
     "form": "Flatness, straightness, squareness", "convert": "Another convention",
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
-    "allocate": "Tolerances", "concepts": "Machines side by side",
+    "adjust": "Adjustment", "allocate": "Tolerances", "concepts": "Machines side by side",
 }  # fmt: skip
 """What sections are called, where the name of the command does not do."""
 OF_STATE = frozenset({"loop", "placed"})

@@ -356,6 +356,6 @@ class ConceptsPanel(AnalysisPanel):
         scenes, dark = tuple(self.scenes(state)), state.shown.dark
         self._make(
             "Drawing the machines",
-            lambda job: draw(scenes, asked.asked, dark, job),
+            lambda job: draw(scenes, asked.analysis, dark, job),
             partial(self.context.save_file, "concepts.png"),
         )  # fmt: skip
