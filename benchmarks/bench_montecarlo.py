@@ -7,8 +7,9 @@ from timing import best, in_turns, python
 
 import warpspace
 from warpspace.analysis.commands.concepts import Concepts, compare_concepts
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.sampling.cases import SamplingPlan, Site, node_gains, reduce_nodes
-from warpspace.analysis.sampling.distribution import build_draws, loop_keys
+from warpspace.analysis.sampling.distribution import build_draws
 from warpspace.analysis.sampling.machine_sampling import sample_chunks
 from warpspace.field.evaluate import View
 from warpspace.kinematics.model import Loop

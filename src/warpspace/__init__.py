@@ -1,4 +1,4 @@
-"""warpspace: see and steer how a machine tool's geometric errors bend the space it works in.
+"""warpspace: visualise how the geometric errors of a machine tool distort its working volume.
 
 Names are loaded when first used, so that ``import warpspace`` costs next to nothing.
 """
@@ -75,7 +75,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name from its module, or give an analysis as a function."""
+    """Load a public name from its module, or return an analysis as a function."""
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     if not name.startswith("_"):

@@ -1,4 +1,4 @@
-"""Every exception that warpspace raises on purpose.
+"""Exceptions of warpspace.
 
 All derive from `WarpspaceError`, whose text is fit to be shown to a user as it is: it names what
 was given, what was expected and, where there is one, the near miss.
@@ -14,42 +14,42 @@ _LONG = re.compile(r"(?<!\S)(\S{80})\S{40,}(\S{80})|^(.{2000}).+(.{80})$", re.MU
 
 
 def shorten(text: str) -> str:
-    """Shorten endless numbers, words and lines of a message; both ends of them stay."""
+    """Shorten very long numbers, words and lines of a message to their ends."""
     return _LONG.sub(r"\1\3…\2\4", _DIGITS.sub(r"\1…\2", text))
 
 
 class WarpspaceError(Exception):
-    """Base of all errors with a message meant for the user."""
+    """Base of all exceptions; the message is meant for the user."""
 
     def __str__(self) -> str:
         return shorten(super().__str__())
 
 
 class ChainError(WarpspaceError):
-    """A kinematic chain string that describes no machine."""
+    """An invalid kinematic chain string."""
 
 
 class OptionError(WarpspaceError):
-    """A value given by a user (option, argument, widget) that cannot be used.
+    """An invalid value of an option, argument or widget.
 
     The text names an option of an analysis as ``{its_name}``; `said` puts in what it is called
     where it is read: a flag on the command line, a label on a page.
     """
 
-    def said(self, word: Callable[[str], str]) -> str:
-        """Give the text with the reader's word for each option it names."""
-        return re.sub(r"\{([a-z_]+)\}", lambda found: word(found[1]), super().__str__())
+    def with_names(self, name_of: Callable[[str], str]) -> str:
+        """Return the message with each option named as the reader knows it."""
+        return re.sub(r"\{([a-z_]+)\}", lambda found: name_of(found[1]), super().__str__())
 
     def __str__(self) -> str:
-        return self.said(lambda name: name)
+        return self.with_names(lambda name: name)
 
 
 class RenderError(WarpspaceError):
-    """A picture that could not be drawn on this system."""
+    """A picture that cannot be rendered on this system."""
 
 
 class NoRendererError(RenderError):
-    """A system that cannot draw at all; its text says what to install."""
+    """A system without a renderer; the message lists what to install."""
 
 
 class OutputError(WarpspaceError):
@@ -57,15 +57,15 @@ class OutputError(WarpspaceError):
 
 
 class WorkersLostError(WarpspaceError):
-    """Processes or machines that computed and are gone."""
+    """Worker processes or machines that were lost during a computation."""
 
 
 class UnknownNameError(WarpspaceError):
-    """A name that is not among the known ones."""
+    """An unknown name."""
 
-    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+    def __init__(self, what: str, name: str, expected: Iterable[str]) -> None:
         self.name = name
-        self.known = tuple(known)
+        self.known = tuple(expected)
         super().__init__(f"unknown {what} {name!r}{near_miss(name, self.known)}")
 
 
@@ -93,8 +93,8 @@ class SceneError(WarpspaceError):
         super().__init__(text)
 
 
-def near_miss(name: str, known: Iterable[str]) -> str:
-    names = list(known)
+def near_miss(name: str, expected: Iterable[str]) -> str:
+    names = list(expected)
     folded = {candidate.casefold(): candidate for candidate in names}
     close = get_close_matches(name.casefold(), folded, n=2, cutoff=0.6)
     if close:

@@ -1,4 +1,4 @@
-"""Additions of other packages: analyses, figures, formats, curves and conventions they register."""
+"""Plug-ins: analyses, figures, formats, curves and conventions registered by other packages."""
 
 import logging
 import signal
@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from contextlib import redirect_stdout
 from functools import cache
+from importlib import import_module
 from typing import Generic, TypeVar
 
 from warpspace.exceptions import OptionError, UnknownNameError
@@ -13,6 +14,8 @@ from warpspace.exceptions import OptionError, UnknownNameError
 T = TypeVar("T")
 logger = logging.getLogger(__name__)
 GROUP = "warpspace.plugins"
+BUNDLED = ("warpspace.thesis_example",)
+"""Modules of this package that register additions as those of other packages do."""
 
 
 @cache
@@ -25,6 +28,8 @@ def load_plugins() -> None:
     """
     from importlib.metadata import entry_points  # a sixth of the start of a short command
 
+    for module in BUNDLED:
+        import_module(module)
     for entry in entry_points(group=GROUP):
         try:
             with redirect_stdout(sys.stderr):
@@ -32,35 +37,34 @@ def load_plugins() -> None:
         except BaseException as error:
             if _is_interrupt(error):
                 raise
-            logger.exception("the plug-in %s cannot be loaded and is left out", entry.name)
+            logger.exception("the plug-in %s cannot be loaded and is ignored", entry.name)
 
 
 def _is_interrupt(error: BaseException) -> bool:
-    """Tell a signal, for which commands have a class, from what a plug-in raises."""
+    """Distinguish a signal, for which commands have a class, from an exception of a plug-in."""
     if type(error) is KeyboardInterrupt:
         return signal.getsignal(signal.SIGINT) is signal.default_int_handler
     return isinstance(error, KeyboardInterrupt)
 
 
 class Registry(dict[str, T], Generic[T]):
-    """Things of one kind by name: those of the house, and what plug-ins register."""
+    """Members of one kind by name: the bundled ones, and those that plug-ins register."""
 
-    def __init__(self, what: str, own: Mapping[str, T], key: str = "name") -> None:
-        super().__init__(own)
-        self._what, self._key = what, key
+    def __init__(self, kind: str, bundled: Mapping[str, T], key: str = "name") -> None:
+        super().__init__(bundled)
+        self._what, self._key = kind, key
 
-    def register(self, one: T) -> None:
-        """Add one; it then appears wherever these are listed."""
-        name = getattr(one, self._key)
+    def register(self, member: T) -> None:
+        """Add a member; it appears wherever the kind is listed."""
+        name = getattr(member, self._key)
         if name in self:
-            raise OptionError(f"{self._what} {name!r} is there already; expected another name")
-        self[name] = one
+            raise OptionError(f"{self._what} {name!r} is already registered; expected another name")
+        self[name] = member
 
     def unregister(self, name: str) -> None:
-        """Take one away again."""
         del self[name]
 
-    def every(self) -> tuple[T, ...]:
+    def members(self) -> tuple[T, ...]:
         load_plugins()
         return tuple(self.values())
 

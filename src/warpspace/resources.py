@@ -1,4 +1,4 @@
-"""What ships with the package: its version, and where the bundled scenes and machines are."""
+"""Resources of the package: version, bundled scenes and machines."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Units of the product, the factors between them, and how numbers are spelled.
+"""Units, the factors between them, and the formatting of numbers.
 
 Lengths are millimetres, errors micrometres, small angles microradians. Rotary positions are degrees
 in files and on screen and radians inside. A millimetre times a microradian is a nanometre.
@@ -27,7 +27,7 @@ THIN_SPACE = "\N{NARROW NO-BREAK SPACE}"
 
 
 def spell(value: float, digits: int = 3) -> str:
-    """Spell a number with a few significant digits, without powers of ten where possible."""
+    """Format a number with a few significant digits, without powers of ten where possible."""
     if value == 0.0 or not math.isfinite(value):
         return "0" if value == 0.0 else str(value)
     size = int(f"{value:.{digits - 1}e}".rpartition("e")[2])  # of the rounded number
@@ -39,15 +39,15 @@ def spell(value: float, digits: int = 3) -> str:
 
 
 def spell_signed(value: float, digits: int = 3) -> str:
-    """Spell a change with its sign: ``+3.24``, ``−17.1``, ``0``."""
+    """Format a change with its sign: ``+3.24``, ``−17.1``, ``0``."""
     return ("+" if value > 0.0 else "") + spell(value, digits)
 
 
 def spell_short(value: float) -> str:
-    """Spell a number without trailing zeros, with a true minus sign."""
+    """Format a number without trailing zeros, with a true minus sign."""
     return f"{value:.6g}".replace("-", MINUS)
 
 
 def spell_count(number: int) -> str:
-    """Spell a whole number, its digits in groups of three from 10 000 up."""
+    """Format a whole number, its digits in groups of three from 10 000 up."""
     return f"{number:,}".replace(",", THIN_SPACE) if abs(number) >= 10_000 else str(number)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.parts import lone_part
-from warpspace.analysis.commands.adjust import repaired
+from warpspace.analysis.commands.adjust import apply_adjustments
 from warpspace.app.documents.legend import order_conditions, picture_conditions, subject_words
 from warpspace.app.documents.scene_file import open_text, state_to_toml
 from warpspace.app.evaluation.live_model import LiveModel
@@ -154,7 +154,7 @@ def test_the_drawn_field_is_that_of_the_command_wherever_the_axes_stand(at):
 
 def test_the_heading_and_files_say_when_the_first_order_is_not_enough():
     assert order_conditions(LIVE.evaluate(START)) == ()
-    large = start_state(repaired(START.scene, {"EC0Y": 3000.0, "EA0Z": 3000.0}))
+    large = start_state(apply_adjustments(START.scene, {"EC0Y": 3000.0, "EA0Z": 3000.0}))
     picture = LIVE.evaluate(large)
     (words,) = order_conditions(picture)
     assert words.startswith("first order; the exact chain differs by up to")

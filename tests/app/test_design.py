@@ -58,7 +58,7 @@ def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
     assert shown.count("adjust:apply") == 2
     assert re.search(r"<b>EC0Y 23\.1 → [\d.]+ µrad</b>.*max</th><td>51\.7 → ", shown)
     applied = part.take(state, "apply", "1")
-    assert applied.comparison.a.title == "before repair"
+    assert applied.comparison.a.title == "before adjustment"
     ran(part, applied)
     assert "at their best values already" in section(part, applied)
     for index in ("9", "-1", "²", ""):
@@ -161,8 +161,8 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     found = part._answer.found
     plan = Concepts(limit_um=chosen.specification.limit_um, samples=SAMPLES)
     expected = compare_concepts([FIRST, OTHER], plan)
-    assert [one.said for one in found.concepts] == [one.said for one in expected]
-    assert "matter most share of the variance" in section(part, chosen)
+    assert [one.json_fields for one in found.concepts] == [one.json_fields for one in expected]
+    assert "largest contributions share of the variance" in section(part, chosen)
     part.take(chosen, "sheet", "")
     wait(part)
     assert [one.title for one in asked[0]] == [FIRST.title, OTHER.title]

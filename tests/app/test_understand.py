@@ -209,7 +209,7 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(46.09, abs=0.01)
     assert applied.comparison.b is not None
     previewed = part.take(START, "preview", "0")
-    assert previewed.comparison.b.title == "after repair: EA0Z → 30.0"
+    assert previewed.comparison.b.title == "after adjustment: EA0Z → 30.0"
     assert previewed.amplitudes == START.amplitudes
     assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(46.09, abs=0.01)
     moved = START.with_amplitude("EAX", 9.0)
@@ -305,7 +305,7 @@ def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_
     found = Distance(
         start={"X": -200, "Y": 0}, end={"X": 200, "Y": 0}, corner={"X": -200, "Y": 200}
     ).run(FIRST, ignore_progress)
-    assert words == found.words()
+    assert words == found.lines()
     assert words[0].startswith("400.000 → ")
     assert words[1].count("Δ") == 3
     shapes = around(picture)

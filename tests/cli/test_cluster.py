@@ -29,7 +29,7 @@ def dask_cluster(workers, folder):
 
 distributed = pytest.importorskip("distributed")
 RUN = (
-    *("montecarlo", "dvf5000_general", "--over", "max", "--spec-um", "90", "--seed", "4", "--json"),
+    *("montecarlo", "dvf5000_general", "--over", "max", "--limit", "90", "--seed", "4", "--json"),
 )
 
 
@@ -55,7 +55,7 @@ def test_a_cluster_gives_the_same_numbers_to_the_last_bit(warpspace, scheduler, 
 
 def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
     sweep = ("sweep", "dvf5000_general", "dvf5000_proposed", "--samples", "5000")
-    steps = ("--tolerance", "rotation=10:30:3", "--limit-um", "40", "--json")
+    steps = ("--tolerance", "rotation=10:30:3", "--limit", "40", "--json")
     here, there = warpspace(*sweep, *steps), warpspace(*sweep, *steps, "--scheduler", scheduler)
     assert there.status == 0, there.err
     assert here.out == there.out
@@ -80,7 +80,7 @@ def test_without_dask_it_is_said_what_to_install(warpspace, monkeypatch):
 def test_a_worker_killed_half_way_changes_nothing(tmp_path):
     samples = 2_500_000
     scene = package.load_scene("dvf5000_general")
-    alone = package.montecarlo(scene, samples=samples, seed=4, spec_um=40.0)
+    alone = package.montecarlo(scene, samples=samples, seed=4, limit_um=40.0)
     with (
         dask_cluster(3, tmp_path) as cluster,
         distributed.Client(cluster.scheduler_address, set_as_default=False) as client,
@@ -95,7 +95,7 @@ def test_a_worker_killed_half_way_changes_nothing(tmp_path):
 
         counted: list[int] = []
         found = package.montecarlo(
-            scene, samples=samples, seed=4, spec_um=40.0,
+            scene, samples=samples, seed=4, limit_um=40.0,
             executor=client.get_executor(pure=False), workers=3, progress=kill_one,
         )  # fmt: skip
         assert killed

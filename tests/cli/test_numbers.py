@@ -71,7 +71,7 @@ COMMANDS = {
     "montecarlo": QUICK,
     "sweep": ("--tolerance", "EC0Y=10,3000", *QUICK),
     "concepts": ("dvf5000_first", *QUICK),
-    "allocate": ("--limit-um", "4000", *QUICK),
+    "allocate": ("--limit", "4000", *QUICK),
 }
 FILES = {"draw": ".svg", "export": ".csv"}
 
@@ -130,7 +130,7 @@ def test_a_repair_is_verified_with_the_exact_chain(warpspace, gantry):
 
 
 def test_an_allocation_is_verified_with_the_exact_chain(warpspace, gantry):
-    wide = ("allocate", gantry, "--limit-um", "5000", *QUICK)
+    wide = ("allocate", gantry, "--limit", "5000", *QUICK)
     found = warpspace(*wide, "--json").json["exact"]
     assert found["machines"] == 2000
     assert 0.9 < found["probability"] < 1.0
@@ -151,12 +151,12 @@ def machines(warpspace, tmp_path):
 
 
 def test_concepts_agree_with_montecarlo_and_contributions(warpspace, machines):
-    limit = ("--limit-um", "25")
+    limit = ("--limit", "25")
     found = warpspace("concepts", *machines, *limit, *SAMPLES, "--json").json
     assert found["tolerances"] == {"translation": 10.0, "rotation": 20.0, "squareness": 25.0}
     for path, concept in zip(machines, found["concepts"], strict=True):
         alone = warpspace(
-            *("montecarlo", path, *SAMPLES, "--spec-um", "25", "--over", "max"),
+            *("montecarlo", path, *SAMPLES, "--limit", "25", "--over", "max"),
             *("--grid", "11", "--loop", "relative", "--json"),
         ).json
         for key in ("mean_um", "p95_um", "max_um"):
@@ -190,7 +190,7 @@ FEW = ("--samples", "3000")
 
 def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path):
     steps = ("--tolerance", "EAX=5:20:2", "--tolerance", "translation=4,8")
-    found = warpspace("sweep", "dvf5000_general", *steps, "--limit-um", "40", *FEW, "--json").json
+    found = warpspace("sweep", "dvf5000_general", *steps, "--limit", "40", *FEW, "--json").json
     assert found["tolerances"] == {"EAX": [5.0, 20.0], "translation": [4.0, 8.0]}
     rows = found["rows"]
     assert [(row["EAX"], row["translation"]) for row in rows] == [
@@ -201,7 +201,7 @@ def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path):
     changed = text.replace("{ translation = 10,", "{ translation = 8,") + "EAX = 20\n"
     assert changed.count("translation = 8") == 1
     scene.write_text(changed, encoding="utf-8")
-    run = ("montecarlo", scene, "--spec-um", "40", *FEW, "--json")
+    run = ("montecarlo", scene, "--limit", "40", *FEW, "--json")
     alone = warpspace(*run).json
     for key in ("mean_um", "median_um", "p95_um", "p99_um", "max_um"):
         assert rows[3][key] == pytest.approx(alone[key], rel=1e-12), key

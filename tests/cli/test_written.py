@@ -141,7 +141,7 @@ FORMATS = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 PLOTS = {
     "gains": ("gains", "dvf5000_general", "--at", "Y=-225,Z=-480"),
     "gains over the travel": ("gains", "dvf5000_general", "--loop", "workpiece", "--max"),
-    "montecarlo": ("montecarlo", "dvf5000_general", "--samples", "2000", "--spec-um", "50"),
+    "montecarlo": ("montecarlo", "dvf5000_general", "--samples", "2000", "--limit", "50"),
     "contributions": ("contributions", "dvf5000_general"),
     "tables": ("compensate", "dvf5000_first", "--sweep", "3,5", "--format", "sinumerik-enc"),
     "sobol": ("contributions", "dvf5000_proposed", "--sobol", "64"),

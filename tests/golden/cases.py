@@ -10,7 +10,7 @@ SCENES = (
 )
 TOLERANCED = "dvf5000_general"
 FEW = "--samples 2000 --seed 7"
-LIMIT = f"--limit-um 60 --probability 0.9 {FEW}"
+LIMIT = f"--limit 60 --probability 0.9 {FEW}"
 
 _EACH = {
     "check": "check {scene}",

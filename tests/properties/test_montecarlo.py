@@ -4,8 +4,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan, reduce_nodes
-from warpspace.analysis.sampling.distribution import Distribution, Stream, build_draws, loop_keys
+from warpspace.analysis.sampling.distribution import Distribution, Stream, build_draws
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.field.evaluate import View
 from warpspace.field.grid import Workspace

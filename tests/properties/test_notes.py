@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from products import first
 from warpspace import load_scene
-from warpspace.analysis.note_tables import note_numbers, said_stale
+from warpspace.analysis.note_tables import note_numbers, stale_remark
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.machine.limits import MAX_NOTE_TEXT, MAX_NOTES, MAX_REPLACED, MAX_REPLIES
 from warpspace.scene.library import parse_scene
@@ -188,9 +188,9 @@ def test_a_note_holds_for_its_scene_and_is_stale_where_the_error_at_its_point_ch
     errors = SCENE.errors.with_amplitude("EA0Z", 33.9 + change, (-480.0, -80.0))
     changed = replace(SCENE, errors=errors)
     (now,) = note_numbers(changed, [note])
-    assert said_stale(note, note_numbers(SCENE, [note])[0]) == ""
+    assert stale_remark(note, note_numbers(SCENE, [note])[0]) == ""
     off = max(abs(now[name] - at) for name, at in note.numbers.items())
-    assert bool(said_stale(note, now)) == (off > 0.0105)  # of two digits each
+    assert bool(stale_remark(note, now)) == (off > 0.0105)  # of two digits each
 
 
 def test_a_note_of_an_axis_that_is_gone_has_no_numbers():

@@ -215,7 +215,7 @@ def _run_program(content: bytes, folder: Path) -> object:
     """Run a program and write the corrected one, as the command does."""
     program = Program(file=str(_put(content, folder, "p.ngc")), offset=(("G54X", 5.0),))
     outcome = program.run(load_scene("dvf5000_first"), lambda _: None)
-    outcome.as_plain()
+    outcome.json_fields()
     lines = "".join(outcome.output_files().values()).split("\n")
     last = (n for n, line in enumerate(lines) if n and re.search(r"^%|M(0?2|30)(?![0-9])", line))
     lines = lines[: next(last, None)]  # what stands behind the end of a program is no program

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpspace import evaluate, load_scene
-from warpspace.analysis.note_tables import note_numbers, said_stale
+from warpspace.analysis.note_tables import note_numbers, stale_remark
 from warpspace.analysis.statistics import statistics
 from warpspace.app.documents.scene_file import reopened
 from warpspace.app.state.app_state import start_state
@@ -112,7 +112,7 @@ def test_the_review_tells_the_measured_machine_in_six_steps_whose_numbers_hold()
     steps = story(scene.review)
     assert [one.step for one in steps] == [1, 2, 3, 4, 5, 6]
     assert {one.kind for one in steps} == set(KINDS)
-    assert not any(map(said_stale, steps, note_numbers(scene, steps)))
+    assert not any(map(stale_remark, steps, note_numbers(scene, steps)))
     errors = scene.errors.with_amplitude("EA0Z", 20.2, (-480.0, -80.0))
     (shimmed,) = note_numbers(replace(scene, errors=errors), steps[2:3])
     said = re.findall(r"to ([\d.]+) µm", steps[2].text)

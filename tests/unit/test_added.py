@@ -205,7 +205,7 @@ def added():
 @pytest.mark.parametrize("name", [name for name in ADDED if name not in ("names", ".zip")])
 def test_what_is_there_cannot_be_added_again(name):
     register, _, what = ADDED[name]
-    with pytest.raises(OptionError, match=f"'{name}' is there already"):
+    with pytest.raises(OptionError, match=f"'{name}' is already registered"):
         register(what)
 
 

@@ -19,7 +19,7 @@ from warpspace.exceptions import OptionError, SceneError, shorten
 def test_endless_numbers_words_and_lines_are_shortened_everywhere(text, expected):
     expected = text if expected is None else expected
     assert shorten(text) == expected
-    assert str(OptionError(text)) == OptionError(text).said(str) == expected
+    assert str(OptionError(text)) == OptionError(text).with_names(str) == expected
 
 
 def test_problems_of_a_scene_are_shortened_one_by_one():

@@ -310,7 +310,7 @@ def test_predicted_covariance_of_the_next_measurement_is_the_one_obtained(instru
     asked = [one.key for one in found.parameters]
     said = np.sqrt(np.diag(step.covariance))
     got = np.sqrt(np.diag(both.covariance))
-    for at, key in enumerate(both.keys):
+    for at, key in enumerate(both.fit):
         assert said[asked.index(key)] == pytest.approx(got[at], rel=0.02)
     assert any(
         width < one.standard_uncertainty

@@ -113,6 +113,6 @@ def test_a_model_that_misses_something_says_so_after_it_is_saved():
     back = parse_scene(scene_to_toml(found.scene), "s")
     assert back.covariance.lack_of_fit == found.lack_of_fit
     (said,) = scene_uncertainty(back).remarks()
-    assert f"residuals were {found.lack_of_fit:.1f} times" in said
+    assert f"residuals of the calibration are {found.lack_of_fit:.1f} times" in said
     honest = replace(readings, sigma_mm=np.full(50, 1e-3))
     assert calibrate(SCENE, [honest], Calibrate(fit=KEYS)).scene.covariance.lack_of_fit == 0.0

@@ -110,7 +110,7 @@ def test_without_a_statement_verdicts_are_those_of_the_model():
 
 
 def path(text, lines):
-    return Program(file="p.ngc", text=lines).run(scene(text), ignore_progress).as_plain()
+    return Program(file="p.ngc", text=lines).run(scene(text), ignore_progress).json_fields()
 
 
 def test_a_path_is_as_unsure_along_it_as_across_it():

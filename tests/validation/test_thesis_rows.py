@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import warpspace
-from warpspace.cli.commands.machine import thesis_markdown
+from warpspace.thesis_example.presentation import markdown_page
 
 # What the print and the model cannot agree on; each has a sentence why.
 DISAGREE = {
@@ -54,7 +54,7 @@ def test_all_tables_are_there_and_no_row_is_twice(rows):
 
 
 def test_generated_page_is_up_to_date(rows):
-    expected = thesis_markdown(rows)
+    expected = markdown_page(rows)
     assert PAGE.read_text("utf-8") == expected, (
         "run: warpspace thesis --markdown docs/thesis_rows.md --force"
     )

@@ -195,14 +195,15 @@ def test_the_probability_that_a_point_keeps_a_limit(limit, error):
     found = field_uncertainty(scene, np.array(error), at, scene.view())
     square = float(np.sum(np.square(error)))
     expected = ncx2.cdf(limit**2 / 4.0, 3, square / 4.0) if square else chi2.cdf(limit**2 / 4.0, 3)
-    assert float(found.keeps(limit)) == pytest.approx(expected, abs=0.02 if square else 1e-9)
+    probability = float(found.conformance_probability(limit))
+    assert probability == pytest.approx(expected, abs=0.02 if square else 1e-9)
 
 
 def test_a_sure_point_keeps_its_limit_or_not():
     scene = parse_scene(HEAD + "EXX = 3\n[uncertainty]\nEC0Y = 1\n", "s")
     at = complete_coordinates(scene.machine, {"Y": 0.0}, scene.workspace.positions)
     found = field_uncertainty(scene, np.array([3.0, 0.0, 0.0]), at, scene.view())
-    assert [float(found.keeps(limit)) for limit in (2.9, 3.1)] == [0.0, 1.0]
+    assert [float(found.conformance_probability(limit)) for limit in (2.9, 3.1)] == [0.0, 1.0]
 
 
 def test_where_nothing_that_is_stated_acts_all_is_unknown():

@@ -9,8 +9,9 @@ import warpspace
 from products import pairwise
 from warpspace.analysis.commands.contributions import expected_square
 from warpspace.analysis.commands.montecarlo import case_of
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.sampling.cases import Case, SamplingPlan
-from warpspace.analysis.sampling.distribution import build_draws, loop_keys
+from warpspace.analysis.sampling.distribution import build_draws
 from warpspace.analysis.sampling.machine_sampling import montecarlo
 from warpspace.kinematics.model import Loop
 

@@ -1,7 +1,6 @@
-"""Questions about a scene, each described once: options, computation, result (`description.py`).
+"""Analyses of a scene, each described once: options, computation, result (`description.py`).
 
-What stands here is what an analysis of one's own needs; it is registered with `register`. Numbers
-drawn from error fields and Jacobians stand in the other modules.
+The public names are those that a plug-in needs to define and register an analysis.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""The best values of errors over the volume: of one set of them, and of the best sets."""
+"""Search for the best values of errors over the volume, for one set and for the best sets."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -46,14 +46,14 @@ class Volume:
         return np.einsum("nc,nc->n", self.error_um, self.error_um)
 
     @cached_property
-    def acting(self) -> tuple[int, ...]:
+    def active_indices(self) -> tuple[int, ...]:
         """Indices of the errors that move any node at all in this loop."""
         largest = np.abs(self.response).max(axis=(1, 2), initial=0.0)
         return tuple(int(index) for index in np.flatnonzero(largest > SILENT))
 
     @cached_property
     def triangle(self) -> tuple[Array, Array]:
-        """What the RMS depends on: a matrix, [M, K], and the present error in it, [M]."""
+        """Reduced rows that determine the RMS: a matrix, [M, K], and the present error, [M]."""
         nodes = self.error_um.shape[0]
         root = np.sqrt(self.grid.weights.reshape(-1))
         triangle = np.empty((0, len(self.basis.keys) + 1))
@@ -66,7 +66,7 @@ class Volume:
         return triangle[:, :-1], triangle[:, -1]
 
     def changed(self, indices: tuple[int, ...], values: Array) -> Array:
-        """Give all amplitudes with some of them set to other values, [K], µm or µrad."""
+        """Return all amplitudes with some of them replaced, [K], µm or µrad."""
         amplitudes = self.amplitudes.copy()
         amplitudes[list(indices)] = values
         return amplitudes
@@ -76,7 +76,7 @@ class Volume:
 
 
 class Objective(StrEnum):
-    """What is made as small as possible over the volume."""
+    """Quantity that is minimised over the volume."""
 
     RMS = "rms"
     MAX = "max"
@@ -97,14 +97,14 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """What is made smallest, and how far each error may be changed."""
+    """Objective of a search, and the bounds of each error."""
 
     volume: Volume
     objective: Objective
     bounds: Array  # [K, 2], µm or µrad; least and largest change of every error of the basis
 
     def least(self, indices: tuple[int, ...], give_up_um: float = np.inf) -> Solution | None:
-        """Find the best change of some errors; None where it is proven to be of no use."""
+        """Find the best change of some errors; None where it cannot beat `give_up_um`."""
         if self.objective is Objective.RMS:
             return least_rms(self.volume, indices, self.bounds)
         return least_max(self.volume, indices, self.bounds, give_up_um)
@@ -112,32 +112,32 @@ class Search:
     def best(
         self, sets: Iterator[tuple[int, ...]], start: Solution | None = None
     ) -> Solution | None:
-        """Give the best of some sets; None where none is better than the start."""
+        """Return the best of some sets; None where none is better than the start."""
         best = start
         for indices in sets:
             limit = np.inf if best is None else best.value_um
-            found = self.least(indices, limit)
-            if found is not None and (best is None or found.value_um < best.value_um - 1e-9):
-                best = found
+            solution = self.least(indices, limit)
+            if solution is not None and (best is None or solution.value_um < best.value_um - 1e-9):
+                best = solution
         return None if best is start else best
 
     def best_sets(self, candidates: Sequence[int], count: int) -> Iterator[tuple[Solution, bool]]:
-        """Find the best set of one adjustment, of two, up to a number of them."""
+        """Find the best sets of one, two, … up to `count` adjustments."""
         before: Solution | None = None
         for size in range(1, min(count, len(candidates)) + 1):
             proven = comb(len(candidates), size) <= MOST_SETS[self.objective]
             if proven or before is None:
-                found = self.best(_joined(group) for group in combinations(candidates, size))
+                best = self.best(_joined(group) for group in combinations(candidates, size))
             else:
-                found = self._extended(before, candidates)
-            if found is None:
+                best = self._extended(before, candidates)
+            if best is None:
                 return
-            yield found, proven
-            before = found
+            yield best, proven
+            before = best
 
     def _extended(self, before: Solution, candidates: Sequence[int]) -> Solution | None:
-        others = [index for index in candidates if index not in before.indices]
-        best = self.best(_joined((*before.indices, index)) for index in others)
+        additions = [index for index in candidates if index not in before.indices]
+        best = self.best(_joined((*before.indices, index)) for index in additions)
         while best is not None:
             members = best.indices
             swaps = (
@@ -154,7 +154,7 @@ class Search:
 
 
 def least_rms(volume: Volume, indices: tuple[int, ...], bounds: Array) -> Solution:
-    """Make the root mean square of the volume smallest: weighted least squares within bounds."""
+    """Minimise the root mean square over the volume: weighted least squares within bounds."""
     matrix, error = volume.triangle
     chosen = matrix[:, indices]
     change = _least_squares(chosen, -error, *bounds[list(indices)].T)
@@ -174,7 +174,7 @@ def _least_squares(matrix: Array, goal: Array, low: Array, high: Array) -> Array
 def least_max(
     volume: Volume, indices: tuple[int, ...], bounds: Array, give_up_um: float = np.inf
 ) -> Solution | None:
-    """Make the largest error of all nodes smallest; see `Search.least`.
+    """Minimise the largest error of all nodes; see `Search.least`.
 
     Notes
     -----
@@ -201,7 +201,8 @@ def least_max(
     for _ in range(MOST_STEPS):
         error = volume.error_um + np.tensordot(change, chosen, 1)
         norm = np.sqrt(np.einsum("nc,nc->n", error, error))
-        if (largest := float(norm.max())) < best_um:
+        largest = float(norm.max())
+        if largest < best_um:
             best, best_um = change, largest
         count = min(NODES_AT_ONCE, norm.size)
         worst = np.argpartition(norm, -count)[-count:]
@@ -209,24 +210,24 @@ def least_max(
         slopes = np.einsum("knc,nc->nk", chosen[:, worst], unit)
         planes.append(np.column_stack([slopes, -np.ones(len(worst))]))
         offsets.append(-np.einsum("nc,nc->n", volume.error_um[worst], unit))
-        found = linprog(goal, np.concatenate(planes), np.concatenate(offsets), bounds=ranges)
-        if found.status != 0:
+        solution = linprog(goal, np.concatenate(planes), np.concatenate(offsets), bounds=ranges)
+        if solution.status != 0:
             break
-        if found.fun > give_up_um - CLOSE_UM:
+        if solution.fun > give_up_um - CLOSE_UM:
             return None
-        if best_um - found.fun < CLOSE_UM:
+        if best_um - solution.fun < CLOSE_UM:
             break
-        change = np.clip(found.x[:size], *bounds[list(indices)].T)
+        change = np.clip(solution.x[:size], *bounds[list(indices)].T)
     return Solution(indices, best, best_um)
 
 
 def _least_max_of_one(
     volume: Volume, index: int, bounds: Array, give_up_um: float
 ) -> Solution | None:
-    """Do the same along one error: the planes are lines, and two of them give the next place."""
-    way = volume.response[index]
+    """Minimise along one error: the planes are lines, and two of them give the next value."""
+    response = volume.response[index]
     low, high = map(float, bounds)
-    along = (np.einsum("nc,nc->n", other, way) for other in (volume.error_um, way))
+    along = (np.einsum("nc,nc->n", other, response) for other in (volume.error_um, response))
     products = np.stack([volume.square_um2, *along])
     ends: dict[bool, tuple[float, float, float]] = {}  # place, value, slope where it falls, rises
     at, best, best_um = 0.0, 0.0, np.inf

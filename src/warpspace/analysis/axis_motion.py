@@ -1,4 +1,4 @@
-"""Error motions of a rotary axis as a traced point has them: radial, axial and tilt (ISO 230-7)."""
+"""Error motions of a rotary axis at a traced point: radial, axial and tilt (ISO 230-7)."""
 
 from dataclasses import dataclass
 
@@ -41,7 +41,7 @@ class ErrorMotion:
 
 @dataclass(frozen=True, slots=True)
 class AxisMotion:
-    """How an axis carries one point round."""
+    """Error motions of a rotary axis at one point."""
 
     angle_deg: Array  # [n]; position of the axis
     closed: bool  # whether that is a full turn
@@ -60,7 +60,7 @@ class AxisMotion:
 def axis_motion(
     nominal_mm: Array, angle_deg: Array, on_axis_um: Array, above_um: Array, *, closed: bool
 ) -> AxisMotion:
-    """Take the error motion of a rotating body apart, in the direction of one of its points.
+    """Resolve the error motion of a rotating body in the direction of one of its points.
 
     The nominal circle or arc of the point, [n, 3], has five places or more, not all in one line, at
     rising positions of the axis. The errors are those of the body where the axis meets the plane of
@@ -83,16 +83,16 @@ def axis_motion(
 def assemble_motion(
     angle_deg: Array, radius_mm: float, deviations: tuple[Array, Array, Array], *, closed: bool
 ) -> AxisMotion:
-    """Give the motions of radial, axial and tilt deviations, [n] each."""
+    """Build the motions from radial, axial and tilt deviations, [n] each."""
     theta = np.deg2rad(angle_deg)
-    kept = slice(None, -1 if closed else None)  # the last place of a turn is the first one
+    distinct = slice(None, -1 if closed else None)  # the last place of a turn is the first one
     turn = np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], -1)
 
     def motion(name: str, unit: str, values: Array, line: Array) -> ErrorMotion:
         strongest = times_a_turn(values) if closed else None
-        coefficients = np.linalg.lstsq(line[kept], values[kept], rcond=None)[0]
-        rest, once = values - line @ coefficients, float(np.linalg.norm(coefficients[1:]))
-        return ErrorMotion(name, f"{name} error motion", unit, values, rest, once, strongest)
+        coefficients = np.linalg.lstsq(line[distinct], values[distinct], rcond=None)[0]
+        residual, once = values - line @ coefficients, float(np.linalg.norm(coefficients[1:]))
+        return ErrorMotion(name, f"{name} error motion", unit, values, residual, once, strongest)
 
     radial, axial, tilt = deviations
     return AxisMotion(
@@ -106,7 +106,7 @@ def assemble_motion(
 
 
 def points_on_axis(nominal_mm: Array) -> tuple[Array, Array]:
-    """Give the nominal points whose errors `axis_motion` needs, [n, 3] each, mm."""
+    """Compute the nominal points whose errors `axis_motion` needs, [n, 3] each, mm."""
     centre, _, normal = fit_circle(nominal_mm)
     shape = nominal_mm.shape
     return np.broadcast_to(centre, shape), np.broadcast_to(centre + LEVER_MM * normal, shape)

@@ -1,4 +1,4 @@
-"""What an analysis says, in order: sentences, tables and charts in numbers, drawn nowhere yet."""
+"""Content of a result: sentences, tables, and charts as numbers, independent of a renderer."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -19,7 +19,7 @@ Mark: TypeAlias = Literal["", "better", "worse", "key"]
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a table: its rows hold raw values, the form spells them."""
+    """One column of a table: rows hold raw values, `form` formats them."""
 
     heading: str = ""
     form: Form = ""  # format specification, or what spells a value; None is an empty cell
@@ -37,7 +37,7 @@ class Column:
 
     @property
     def is_number(self) -> bool:
-        """Whether its cells are aligned at the right."""
+        """True if its cells are right-aligned."""
         return isinstance(self.form, str) and bool(self.form)
 
     def spell(self, value: Any) -> str:
@@ -53,7 +53,7 @@ class Column:
 def number_columns(
     heads: Iterable[str], form: str = ".2f", unit: str = "", keys: Sequence[str] = ()
 ) -> tuple[Column, ...]:
-    """Give columns of numbers that have the same unit and stay side by side."""
+    """Return columns of numbers with a common unit that stay side by side."""
     heads = tuple(heads)
     return tuple(
         Column(head, form, unit, key, joins=index > 0)
@@ -75,7 +75,7 @@ class Table:
     exact: bool = False  # numbers of a file with all their digits; otherwise nine
 
     @property
-    def shown(self) -> tuple[Column, ...]:
+    def visible_columns(self) -> tuple[Column, ...]:
         """The columns of text and pages."""
         return tuple(column for column in self.columns if column.shows)
 
@@ -150,7 +150,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """What lies between two curves: scatter."""
+    """Area between two curves: scatter."""
 
     name: str
     x: "Array"  # [n]
@@ -185,7 +185,7 @@ class Histogram:
     heights: "Array"  # [n]
     marks: tuple[tuple[str, float], ...] = ()  # word and place
     limit: float | None = None
-    told: tuple[str, ...] = ()  # in words, in the chart: the first of them large
+    captions: tuple[str, ...] = ()  # in words, in the chart: the first of them large
 
 
 Block: TypeAlias = str | Table | Bars | Lines | Histogram
@@ -210,27 +210,29 @@ def _block_html(block: Block) -> str:
 
 
 def table_html(table: Table) -> str:
-    """Give a table; what a user wrote in it is text."""
+    """Render a table; user input is escaped."""
     title = f"<p>{escape(table.title.strip())}</p>" if table.title else ""
     if not table.rows:
         return title + (f"<p>{escape(table.empty.strip())}</p>" if table.empty else "")
-    head = "".join(_head(column) for column in table.shown)
+    head = "".join(_head(column) for column in table.visible_columns)
     marks = [*table.marks, *[""] * len(table.rows)]
     body = "".join(
         (f'<tr class="{mark}">' if mark else "<tr>")
-        + "".join(_cell(column, text) for column, text in zip(table.shown, row, strict=True))
+        + "".join(
+            _cell(column, text) for column, text in zip(table.visible_columns, row, strict=True)
+        )
         + "</tr>"
         for row, mark in zip(table.cells()[:MOST_ROWS], marks, strict=False)
     )
-    left = len(table.rows) - MOST_ROWS
-    more = f"<p>… and {left:,} more rows</p>" if left > 0 else ""
-    return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+    n_hidden = len(table.rows) - MOST_ROWS
+    footer = f"<p>… and {n_hidden:,} more rows</p>" if n_hidden > 0 else ""
+    return f"{title}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{footer}"
 
 
 def table_markdown(table: Table) -> str:
-    """Give a table in Markdown; nothing that a user wrote acts as a mark of it."""
-    heads = [column.head for column in table.shown]
-    rule = ["---:" if column.is_number else "---" for column in table.shown]
+    """Render a table in Markdown; user input is escaped."""
+    heads = [column.head for column in table.visible_columns]
+    rule = ["---:" if column.is_number else "---" for column in table.visible_columns]
     rows = [rule, *([*map(_escaped, row)] for row in table.cells())]
     lines = [f"| {' | '.join(row)} |" for row in (heads, *rows)] if table.rows else [table.empty]
     return "\n".join((f"# {_escaped(table.title)}", "", *lines, ""))
@@ -243,8 +245,8 @@ def _escaped(text: str) -> str:
 def _bars_html(bars: Bars) -> str:
     head = "".join(f"<th>{escape(panel.title)}{_unit(panel.unit)}</th>" for panel in bars.panels)
     rows = "".join(
-        f"<tr><th>{escape(words)}</th>" + "".join(_bar(panel, row) for panel in bars.panels)
-        for row, words in enumerate(bars.rows)
+        f"<tr><th>{escape(label)}</th>" + "".join(_bar(panel, row) for panel in bars.panels)
+        for row, label in enumerate(bars.rows)
     )
     return (
         f'<table class="bars"><caption>{escape(bars.title)} · {escape(bars.subtitle)}</caption>'
@@ -253,8 +255,8 @@ def _bars_html(bars: Bars) -> str:
 
 
 def _bar(panel: Panel, row: int) -> str:
-    numbers = [one.values[row] for one in panel.series]
-    everything = [abs(v) for one in panel.series for v in one.values if v is not None]
+    numbers = [series.values[row] for series in panel.series]
+    everything = [abs(v) for series in panel.series for v in series.values if v is not None]
     longest = max((*everything, panel.before or 0.0)) or 1.0
     parts = "".join(
         f'<div class="bar" style="width:{100.0 * abs(value) / longest:.1f}%">{value:.2f}</div>'

@@ -1,10 +1,10 @@
-"""What an analysis is: options as fields, one computation, one result that says itself."""
+"""Analyses: options as fields, one computation, one result that is rendered and serialised."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, Protocol, Self, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -12,19 +12,36 @@ from warpspace.analysis.blocks import Block, Table, blocks_html
 from warpspace.analysis.options import PLACE, Option, options_of, outside_travel
 
 if TYPE_CHECKING:
-    from warpspace.analysis.uncertainty.propagation import ErrorUncertainty
     from warpspace.field.evaluate import SecondOrder
     from warpspace.scene.model import Scene
 
 Task: TypeAlias = Literal["see", "understand", "measure", "improve", "design", "machine"]
 ProgressCallback: TypeAlias = Callable[[float], None]
-"""Called with the share of the work that is done; raises where nobody waits for it any more."""
-A = TypeVar("A", bound="type[Analysis]")
+"""Called with the completed share of the work; raises if the computation has been cancelled."""
+V = TypeVar("V")
+NO_JSON: Final = {"json": False}
+"""Metadata of a field that is not part of the JSON object."""
+
+
+class ExpandedUncertainty(dict[str, V]):
+    """Expanded uncertainties by JSON key, `u95_…`: None where unknown, empty where not stated.
+
+    A field of this type adds its keys to the JSON object of its owner.
+    """
+
+
+class UncertaintySource(Protocol):
+    """The uncertainty that a result was propagated from."""
+
+    @property
+    def factor(self) -> float: ...
+
+    def remarks(self) -> Iterable[str]: ...
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What one number of a result is: ``Annotated[float, Quantity("Flatness", "µm")]``."""
+    """Heading, unit and format of a number: ``Annotated[float, Quantity("Flatness", "µm")]``."""
 
     head: str
     unit: str = ""
@@ -35,59 +52,59 @@ class Quantity:
 class Change:
     """A scene that a result proposes: -o on the command line, Compare and Apply on the page."""
 
-    words: str
+    label: str
     scene: "Scene"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Result(ABC):
-    """What an analysis found. Fields are the keys of its JSON object, unless `keys` lists them."""
+    """The result of an analysis; the fields that a subclass adds are the keys of its JSON object.
 
-    keys: ClassVar[tuple[str, ...]] = ()
-    # "module:function" that draws its chart, where bars and curves do not say it
+    `json_keys` lists other attributes instead.
+    """
+
+    json_keys: ClassVar[tuple[str, ...]] = ()
+    # "module:function" that draws its chart, where Bars and Lines do not suffice
     drawn_by: ClassVar[str] = ""
-    no_change: ClassVar[str] = "nothing is to be changed"
-    # what its numbers leave out if they are of first order: a warning, and in its JSON object
-    second_order: "SecondOrder | None" = None
-    uncertainty: "ErrorUncertainty | None" = (
-        None  # how sure the errors are, where its numbers say U95
-    )
+    no_change: ClassVar[str] = "there is nothing to change"
+    # deviation of the first order from the exact chain: a warning, and `second_order_um` in JSON
+    second_order: "SecondOrder | None" = field(default=None, metadata=NO_JSON)
+    # of the errors that its expanded uncertainties result from
+    uncertainty: UncertaintySource | None = field(default=None, metadata=NO_JSON)
 
     @abstractmethod
     def blocks(self) -> Iterable[Block]:
-        """Say it, in order: sentences, tables, charts."""
+        """Return its content in order: sentences, tables, charts."""
 
     def changes(self) -> Sequence[Change]:
-        """Give the scenes it proposes, the best last."""
+        """Return the scenes it proposes, the best last."""
         return ()
 
     def caveats(self) -> Iterable[str]:
-        """Say what a reader should doubt of its numbers."""
+        """List restrictions on the validity of its numbers."""
         return self.uncertainty.remarks() if self.uncertainty else ()
 
     def output_files(self, _ending: str = "", /) -> Mapping[str, str | bytes]:
-        """Give the files that -o writes, by what is added to its name: "", "_X.COM"."""
+        """Return the files that -o writes, by the suffix added to its name: "", "_X.COM"."""
         return {}
 
     def as_json(self) -> dict[str, Any]:
-        """Give what ``--json`` prints."""
-        left_out = {"second_order_um": self.second_order.um} if self.second_order else {}
-        return self.as_plain() | left_out
+        """Return the object that ``--json`` prints."""
+        extra = {"second_order_um": self.second_order.um} if self.second_order else {}
+        return self.json_fields() | extra
 
-    def as_plain(self) -> dict[str, Any]:
-        """Give that, but for what the first order leaves out."""
-        said = to_json(self)
-        said.pop("second_order", None)
-        return said
+    def json_fields(self) -> dict[str, Any]:
+        """Return the object without the deviation of the first order."""
+        return to_json(self)
 
     def blocks_of(self, kind: type[Any]) -> list[Any]:
-        """Give its tables, or its charts."""
+        """List its blocks of one type, for instance its tables."""
         return [block for block in self.blocks() if isinstance(block, kind)]
 
     def file_table(self) -> Table | None:
-        """Give the table that --csv writes: the first whose columns have keys."""
+        """Return the table that --csv writes: the first whose columns have keys."""
         tables = self.blocks_of(Table)
-        return next((one for one in tables if any(c.key for c in one.columns)), None)
+        return next((table for table in tables if any(c.key for c in table.columns)), None)
 
     def _repr_html_(self) -> str:
         return blocks_html(self.blocks())
@@ -95,51 +112,51 @@ class Result(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis(ABC):
-    """A question about a scene. A subclass is one file; its fields are its options."""
+    """A computation on a scene. A subclass is one file; its fields are its options."""
 
     name: ClassVar[str]  # of the command
-    task: ClassVar[Task]  # where it stands: one of `catalogue.TASKS`
-    title: ClassVar[str] = ""  # what it is called in a report, where its section does not say it
-    # how many scenes it takes, at least and at most
+    task: ClassVar[Task]  # heading it is listed under: one of `registry.TASKS`
+    title: ClassVar[str] = ""  # in a report, where it differs from that of its section
+    # number of scenes, at least and at most
     scenes: ClassVar[tuple[int, int | None]] = (1, 1)
-    doing: ClassVar[str] = "computing"  # what is said while it works
+    doing: ClassVar[str] = "computing"  # label of the progress bar
     # whether its results propose scenes, so that there is an -o
     makes_scenes: ClassVar[bool] = False
-    scene_help: ClassVar[str] = "Write the scene proposed last"  # what that -o writes
-    # what -o writes where that is no scene; empty where there is no such -o
+    scene_help: ClassVar[str] = "Write the scene proposed last"  # of that -o
+    # help of -o where it writes no scene; empty where there is no such -o
     file_help: ClassVar[str] = ""
-    file_endings: ClassVar[tuple[str, ...]] = ()  # of what -o writes there; any where empty
-    needs_file: ClassVar[bool] = False  # whether a command line must give -o
+    file_endings: ClassVar[tuple[str, ...]] = ()  # accepted by that -o; any where empty
+    needs_file: ClassVar[bool] = False  # whether -o is required
     has_chart: ClassVar[bool] = False  # whether its results hold a chart, so that there is a --plot
     chart_help: ClassVar[str] = "chart"  # what that --plot draws
     has_table: ClassVar[bool] = False  # whether its results hold a table for --csv
 
     def __post_init__(self) -> None:
-        """Take words and mappings as Python users give them; refuse numbers out of range."""
-        for one in options_of(type(self)):
-            value = one.coerce(getattr(self, one.name))
-            one.check(value)
-            object.__setattr__(self, one.name, value)
+        """Convert strings and mappings to the types of the fields; check the ranges."""
+        for option in options_of(type(self)):
+            value = option.coerce(getattr(self, option.name))
+            option.check(value)
+            object.__setattr__(self, option.name, value)
 
     @classmethod
     def options(cls) -> tuple[Option, ...]:
-        """List its options as they are shown."""
+        """List its options in the order of display."""
         return options_of(cls)
 
     @classmethod
     def explained(cls) -> str:
-        """Give the help text of its command."""
+        """Return the help text of its command."""
         return cls.__doc__ or ""
 
     @abstractmethod
     def run(self, scene: "Scene", watch: ProgressCallback, /) -> Result:
-        """Answer it.
+        """Compute the result for a scene.
 
         Parameters
         ----------
         scene : Scene
         watch : callable
-            To be called with the share of the work that is done, 0 to 1.
+            To be called with the completed share of the work, 0 to 1.
 
         Raises
         ------
@@ -147,29 +164,29 @@ class Analysis(ABC):
             If an option cannot be used with the scene; names it as ``{name}``.
         """
 
-    def written(self, stem: str | None) -> Self:  # noqa: ARG002 - for others
-        """Give it as it is run for a file of this name; refuse one too many, or none."""
+    def for_output(self, stem: str | None) -> Self:  # noqa: ARG002 - for others
+        """Return the analysis for an output file of this name; refuse a wrong or missing one."""
         return self
 
     def run_all(self, scenes: "Sequence[Scene]", watch: ProgressCallback, /) -> Result:
-        """Answer it for several scenes; an analysis of one scene takes the only one."""
+        """Compute the result for several scenes; an analysis of one scene takes the only one."""
         (scene,) = scenes
         return self.run(scene, watch)
 
     def warnings(self, scene: "Scene") -> Iterable[str]:
-        """Say what a user should doubt of the options with this scene: places beyond the travel."""
-        for one in self.options():
-            if one.grammar is PLACE:
-                for words in outside_travel(scene.machine, dict(getattr(self, one.name))):
-                    yield f"{{{one.name}}} {words}"
+        """List doubtful options for this scene: axis positions beyond the travel."""
+        for option in self.options():
+            if option.grammar is PLACE:
+                for warning in outside_travel(scene.machine, dict(getattr(self, option.name))):
+                    yield f"{{{option.name}}} {warning}"
 
 
 def ignore_progress(_share: float) -> None:
-    """Watch nothing."""
+    pass
 
 
 def count_progress(watch: ProgressCallback, total: float) -> ProgressCallback:
-    """Give what is called with the work that was done since its last call."""
+    """Return a callback that takes the work done since its last call and reports the share."""
     done = 0.0
 
     def advance(step: float) -> None:
@@ -181,24 +198,25 @@ def count_progress(watch: ProgressCallback, total: float) -> ProgressCallback:
 
 
 def to_json(value: Any) -> Any:
-    """Spell a value in what JSON has: objects by their fields, or by the `keys` of their class.
+    """Convert to JSON types: a dataclass by its `json_keys`, or by all fields that are not NO_JSON.
 
-    What a mapping `expanded_uncertainty` of theirs holds stands beside their other keys.
+    Expanded uncertainties follow the other keys of their owner.
     """
-    keys: Sequence[str] = getattr(type(value), "keys", ())
     if isinstance(value, Enum):
         return value.value
     if isinstance(value, Mapping):
-        return {str(key): to_json(one) for key, one in value.items()}
+        return {str(key): to_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
-        names = keys or [entry.name for entry in fields(value)]
-        found = {
-            name: to_json(getattr(value, name)) for name in names if name != "expanded_uncertainty"
-        }
-        sure = getattr(value, "expanded_uncertainty", None)
-        return found | to_json(sure) if isinstance(sure, Mapping) else found
+        declared = [entry.name for entry in fields(value) if entry.metadata.get("json", True)]
+        names = getattr(value, "json_keys", ()) or declared
+        members = {name: getattr(value, name) for name in names}
+        u95: dict[str, Any] = {}
+        for name in names:
+            if isinstance(members[name], ExpandedUncertainty):
+                u95 |= members.pop(name)
+        return to_json(members | u95)
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [to_json(one) for one in value]
+        return [to_json(item) for item in value]
     return value

@@ -1,4 +1,4 @@
-"""Review notes held against their scene: what their numbers are now, and a table of them."""
+"""Tables of review notes, with their numbers re-evaluated in the scene."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -28,7 +28,7 @@ _COLUMNS = (
 
 
 def note_numbers(scene: Scene, notes: Iterable[Note]) -> list[Numbers]:
-    """Give what the numbers of notes are now, µm, by their keys; empty where there are none.
+    """Evaluate the present numbers of notes, µm, by key; empty where there are none.
 
     They are those of the scene's own evaluation: mean and max over the working volume where the
     rotary axes stand as in the note, and the length of the error at its point.
@@ -38,21 +38,21 @@ def note_numbers(scene: Scene, notes: Iterable[Note]) -> list[Numbers]:
     def of_volume(loop: str, still: tuple[tuple[str, float], ...]) -> Numbers:
         moved = replace(scene, workspace=scene.workspace.moved(dict(still))) if still else scene
         grid = build_grid(moved.model, moved.workspace, DEFAULT_NODES)
-        found = volume_statistics(evaluate_grid(moved, grid, moved.view(Loop(loop))), grid)
-        return {"mean_um": round(found.mean_um, 2), "max_um": round(found.max_um, 2)}
+        statistics = volume_statistics(evaluate_grid(moved, grid, moved.view(Loop(loop))), grid)
+        return {"mean_um": round(statistics.mean_um, 2), "max_um": round(statistics.max_um, 2)}
 
-    found: list[Numbers] = []
+    numbers: list[Numbers] = []
     for note in notes:
         still = {q: at for q, at in note.at.items() if q not in scene.workspace.volume_axes}
         try:
-            whole = of_volume(note.loop, tuple(sorted(still.items())))
-            found.append({**whole, **_here(scene, note)})
+            volume_numbers = of_volume(note.loop, tuple(sorted(still.items())))
+            numbers.append({**volume_numbers, **_point_numbers(scene, note)})
         except WarpspaceError:  # its axes are no longer there
-            found.append({})
-    return found
+            numbers.append({})
+    return numbers
 
 
-def _here(scene: Scene, note: Note) -> Numbers:
+def _point_numbers(scene: Scene, note: Note) -> Numbers:
     mark, loop = note.on, note.loop
     if not note.at or (mark and mark.body):
         return {}
@@ -62,24 +62,24 @@ def _here(scene: Scene, note: Note) -> Numbers:
     return {"here_um": round(float(evaluate(scene, at=note.at, loop=loop).norm_um), 2)}
 
 
-def said_stale(note: Note, found: Numbers) -> str:
-    """Say that the numbers of a note no longer hold: "changed: 51.7 → 46.1 µm"."""
-    said = changed_number(note.numbers, found)
-    return f"changed: {said}" if said else ""
+def stale_remark(note: Note, present: Numbers) -> str:
+    """Format the changes of the numbers of a note: "changed: 51.7 → 46.1 µm"."""
+    changes = changed_number(note.numbers, present)
+    return f"changed: {changes}" if changes else ""
 
 
 def spell_change(note: Note) -> str:
-    """Spell what a decision changed: "EA0Z 33.9 → 20.2 µrad"."""
-    said: list[str] = []
+    """Format the changes made by a decision: "EA0Z 33.9 → 20.2 µrad"."""
+    changes: list[str] = []
     for key, (old, new) in note.change.items():
         row = parameter(key.removeprefix(TOLERANCES))
         name = row.key if key in PARAMETERS else f"tolerance of {row.key}"
-        said.append(f"{name} {spell_short(old)} → {spell_short(new)} {row.unit}")
-    return ", ".join(said)
+        changes.append(f"{name} {spell_short(old)} → {spell_short(new)} {row.unit}")
+    return ", ".join(changes)
 
 
 def spell_place(note: Note) -> str:
-    """Spell what a note is pinned to: the whole, a body, or positions of axes."""
+    """Format the place of a note: the whole, a body, or positions of axes."""
     if note.on and note.on.body:
         return f"body {note.on.body}"
     where = " ".join(f"{axis} {spell_short(at)}" for axis, at in note.at.items())
@@ -87,31 +87,31 @@ def spell_place(note: Note) -> str:
 
 
 def spell_numbers(note: Note) -> str:
-    """Spell the numbers of a note: "mean 30.88, max 60.00 → 51.72, here 51.72 µm"."""
-    said = [
+    """Format the numbers of a note: "mean 30.88, max 60.00 → 51.72, here 51.72 µm"."""
+    numbers = [
         f"{name.removesuffix('_um')} "
         + (f"{note.before[name]:.2f} → {at:.2f}" if name in note.before else f"{at:.2f}")
         for name, at in note.numbers.items()
     ]
-    return f"{', '.join(said)} µm" if said else ""
+    return f"{', '.join(numbers)} µm" if numbers else ""
 
 
 def notes_table(scene: Scene, title: str = "") -> Table:
-    """List the notes of a scene, other versions of them, and replies, with what holds now."""
+    """Tabulate the notes of a scene with their versions, replies and present numbers."""
     rows: list[tuple[object, ...]] = []
     marks: list[Mark] = []
-    heads = [(number, one) for number, note in enumerate(scene.review, 1)
-             for one in (note, *note.versions)]  # fmt: skip
-    found = note_numbers(scene, [note for _, note in heads])
-    for (number, note), now in zip(heads, found, strict=True):
-        stale = said_stale(note, now)
+    heads = [(number, remark) for number, note in enumerate(scene.review, 1)
+             for remark in (note, *note.versions)]  # fmt: skip
+    numbers = note_numbers(scene, [note for _, note in heads])
+    for (number, note), now in zip(heads, numbers, strict=True):
+        stale = stale_remark(note, now)
         facts = "; ".join(filter(None, (spell_change(note), spell_numbers(note), stale)))
         kinds = (note.kind, note.status), *(("reply", "") for _ in note.replies)
-        for one, (kind, status) in zip((note, *note.replies), kinds, strict=True):
-            text, author = (" ".join(words.split()) for words in (one.text, one.author))
-            date, what = f"{one.date:%Y-%m-%d}", f"{kind}{status and f', {status}'}"
-            about = (spell_place(note), facts) if one is note else ("", "")
+        for remark, (kind, status) in zip((note, *note.replies), kinds, strict=True):
+            text, author = (" ".join(string.split()) for string in (remark.text, remark.author))
+            date, what = f"{remark.date:%Y-%m-%d}", f"{kind}{status and f', {status}'}"
+            about = (spell_place(note), facts) if remark is note else ("", "")
             by = f"{author} {date}".strip()
             rows.append((number, note.id, kind, status, what, text, author, date, by, *about))
-            marks.append("worse" if stale and one is note else "")
+            marks.append("worse" if stale and remark is note else "")
     return Table(_COLUMNS, rows, title, empty="No notes.", marks=marks)

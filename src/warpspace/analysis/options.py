@@ -1,16 +1,18 @@
-"""Options of an analysis: fields of its dataclass, and how their values are typed."""
+"""Options of an analysis: fields of its dataclass, and the parsers of their values."""
 
 import math
 import types
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cache
 from typing import (
     TYPE_CHECKING,
     Annotated,
     Any,
+    Concatenate,
     Literal,
+    ParamSpec,
     TypeAlias,
     TypeVar,
     Union,
@@ -28,12 +30,13 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
 T = TypeVar("T")
+P = ParamSpec("P")
 UNIT_ENDINGS = ("_mm", "_um", "_urad", "_deg")
 
 
 @dataclass(frozen=True, slots=True)
 class Grammar:
-    """How a value is typed that is no number, word or choice: ``Annotated[T, Grammar(…)]``."""
+    """Syntax of a value that is no number, string or choice: ``Annotated[T, Grammar(…)]``."""
 
     metavar: str  # what stands in its place in a help text
     # takes what was typed and the scene, gives the value, which is hashable; raises `ValueError`
@@ -47,30 +50,31 @@ class Grammar:
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """One option of an analysis, as its field says it."""
+    """One option of an analysis; see `option`."""
 
-    name: str
     about: str
-    default: Any
-    kind: Any  # bool, int, float, str, or None with a grammar
-    choices: tuple[str, ...]
-    grammar: Grammar | None
-    enum: type[StrEnum] | None
-    unit: str
-    low: float | None
-    high: float | None
-    unset: str  # what None or nothing means
-    needs: str  # name of the switch it belongs to
-    flag: str  # on the command line
-    former: tuple[str, ...]  # flags it had before; understood, not listed
-    label: str  # on a page
-    words: Mapping[str, str]  # what choices are called on a page
-    required: bool  # whether a command line must give it
-    positional: bool  # whether it is given there without its flag, behind the scene
+    _: KW_ONLY
+    unit: str = ""
+    low: float | None = None
+    high: float | None = None
+    unset: str = ""  # meaning of None or of an empty value
+    needs: str = ""  # name of the switch it belongs to
+    flag: str = ""  # on the command line; by default the name without its unit
+    label: str = ""  # on a page; likewise
+    choice_labels: Mapping[str, str] = field(default_factory=dict[str, str])  # on a page
+    required: bool = False  # on the command line
+    positional: bool = False  # whether the command line takes it as an argument after the scene
+    # from the field and its annotation, by `options_of`
+    name: str = ""
+    default: Any = None
+    kind: Any = None  # bool, int, float, str, or None with a grammar
+    choices: tuple[str, ...] = ()
+    grammar: Grammar | None = None
+    enum: type[StrEnum] | None = None
 
     @property
     def help(self) -> str:
-        """The sentence with unit, limits and default."""
+        """Help text with unit, limits and default."""
         parts = [self.about]
         if self.unit and self.grammar is None:
             parts.append(f", {self.unit}")
@@ -92,14 +96,14 @@ class Option:
         return f"{self.default:g}" if isinstance(self.default, float) else str(self.default)
 
     def coerce(self, value: Any) -> Any:
-        """Give a value as its field holds it: a word as a member, a mapping as pairs."""
+        """Convert a value to the type of the field: a string to a member, a mapping to pairs."""
         if isinstance(value, Mapping):
             return tuple(value.items())
         if self.enum is None or value is None:
             return tuple(value) if isinstance(value, list) else value
         if value not in self.choices:
-            known = ", ".join(self.choices)
-            raise OptionError(f"{{{self.name}}} {str(value)!r}; expected one of {known}")
+            expected = ", ".join(self.choices)
+            raise OptionError(f"{{{self.name}}} {str(value)!r}; expected one of {expected}")
         return self.enum(value)
 
     def check(self, value: Any) -> None:
@@ -122,8 +126,8 @@ class Option:
         if self.enum is not None:
             return self.coerce(word)
         if self.choices and word not in self.choices:
-            known = ", ".join(self.choices)
-            raise OptionError(f"{{{self.name}}} {text!r}; expected one of {known}")
+            expected = ", ".join(self.choices)
+            raise OptionError(f"{{{self.name}}} {text!r}; expected one of {expected}")
         try:
             return self.kind(word) if self.kind in (int, float) and "_" not in word else word
         except ValueError:
@@ -141,70 +145,58 @@ def _spell(value: float) -> str:
     return f"{value:,}" if isinstance(value, int) else f"{value:g}"
 
 
-def option(
-    default: T,
-    about: str,
-    *,
-    unit: str = "",
-    low: float | None = None,
-    high: float | None = None,
-    unset: str = "",
-    needs: str = "",
-    flag: str = "",
-    former: tuple[str, ...] = (),
-    label: str = "",
-    words: Mapping[str, str] | None = None,
-    required: bool = False,
-    positional: bool = False,
-) -> T:
-    """Give a field of an analysis that a user may set; its kind comes from its annotation.
+def _field_of(record: Callable[P, Option]) -> Callable[Concatenate[T, P], T]:
+    def option(default: T, *about: P.args, **traits: P.kwargs) -> T:
+        """Return a field of an analysis that a user may set.
 
-    See `Option` for the parameters; a flag is given where the name without its unit does not do.
-    """
-    said = {
-        "about": about, "unit": unit, "low": low, "high": high, "unset": unset, "needs": needs,
-        "flag": flag, "former": former, "label": label, "words": words or {},
-        "required": required, "positional": positional,
-    }  # fmt: skip
-    return field(default_factory=lambda: default, metadata={"option": said})
+        The type and the choices come from its annotation. See `Option` for the parameters.
+        """
+        described = record(*about, **traits)
+        return field(default_factory=lambda: default, metadata={"option": described})
+
+    return option
+
+
+option = _field_of(Option)
 
 
 @cache
 def options_of(kind: type) -> tuple[Option, ...]:
     hints = get_type_hints(kind, include_extras=True)
     return tuple(
-        _build(entry.name, entry.default_factory(), hints[entry.name], entry.metadata["option"])
+        _complete(entry.metadata["option"], entry.name, entry.default_factory(), hints[entry.name])
         for entry in fields(kind)
         if "option" in entry.metadata and callable(entry.default_factory)
     )
 
 
-def _build(name: str, default: Any, hint: Any, said: Mapping[str, Any]) -> Option:
+def _complete(described: Option, name: str, default: Any, hint: Any) -> Option:
     base, grammar = _resolve(hint)
     enum = base if isinstance(base, type) and issubclass(base, StrEnum) else None
-    choices = tuple(str(one) for one in enum) if enum else ()
-    if get_origin(base) is Literal:
-        choices = tuple(map(str, get_args(base)))
-    plain = name
+    choices = tuple(map(str, get_args(base) if get_origin(base) is Literal else enum or ()))
+    stem = name
     for ending in UNIT_ENDINGS:
-        plain = plain.removesuffix(ending)
-    called: dict[str, Any] = {
-        "flag": said["flag"] or "--" + plain.replace("_", "-"),
-        "label": said["label"] or plain.replace("_", " ").capitalize(),
-    }
-    return Option(
-        name=name, default=default, kind=base if base in (bool, int, float, str) else None,
-        choices=choices, grammar=grammar, enum=enum, **{**said, **called},
-    )  # fmt: skip
+        stem = stem.removesuffix(ending)
+    return replace(
+        described,
+        name=name,
+        default=default,
+        kind=base if base in (bool, int, float, str) else None,
+        choices=choices,
+        grammar=grammar,
+        enum=enum,
+        flag=described.flag or "--" + stem.replace("_", "-"),
+        label=described.label or stem.replace("_", " ").capitalize(),
+    )
 
 
 def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
     if get_origin(hint) is Annotated:
         base, *extras = get_args(hint)
-        grammar = next((one for one in extras if isinstance(one, Grammar)), None)
+        grammar = next((argument for argument in extras if isinstance(argument, Grammar)), None)
         return _resolve(base)[0], grammar
     if get_origin(hint) in (Union, types.UnionType):
-        kinds = [one for one in get_args(hint) if one is not type(None)]
+        kinds = [argument for argument in get_args(hint) if argument is not type(None)]
         if len(kinds) == 1:
             return _resolve(kinds[0])
     return hint, None
@@ -213,18 +205,18 @@ def _resolve(hint: Any) -> tuple[Any, Grammar | None]:
 ALL = "all"
 LOOP_HELP = "Structural loop: tool point, workpiece point, or tool relative to workpiece"
 PLACED_HELP = (
-    "Leave out where the workpiece lies: three shifts and three small rotations of it, fitted for"
-    " the least RMS over the working volume. Looks at the relative loop"
+    "Fit out the placement of the workpiece: three shifts and three small rotations of it that"
+    " minimise the RMS over the working volume. Evaluates the relative loop"
 )
 AT_HELP = (
-    "Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480; axes left out stand at their"
-    " place in the scene"
+    "Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480; omitted axes stay at their"
+    " position in the scene"
 )
 
 
 def read_numbers(text: str, pairs: str, example: str) -> dict[str, float]:
-    """Read numbers by name, ``X=0,Y=-225``; names come out in capitals."""
-    found: dict[str, float] = {}
+    """Parse numbers by name, ``X=0,Y=-225``; names are converted to capitals."""
+    numbers: dict[str, float] = {}
     for part in text.replace(";", ",").split(","):
         name, equals, number = part.partition("=")
         name = name.strip().upper()
@@ -237,21 +229,21 @@ def read_numbers(text: str, pairs: str, example: str) -> dict[str, float]:
                 f"{part.strip()!r} cannot be read; expected {pairs} pairs with commas between, for"
                 f" instance {example}"
             )
-        if name in found:
+        if name in numbers:
             raise ValueError(f"{name} is given twice")
-        found[name] = value
-    return found
+        numbers[name] = value
+    return numbers
 
 
 def read_place(text: str, axes: Collection[str]) -> dict[str, float]:
-    """Read axis positions as they are typed, ``X=0,Y=-225,B=30``, mm or degrees."""
-    found = read_numbers(text, "axis=number", "X=0,Y=-225,B=30")
-    for name, value in found.items():
+    """Parse axis positions, ``X=0,Y=-225,B=30``, mm or degrees."""
+    place = read_numbers(text, "axis=number", "X=0,Y=-225,B=30")
+    for name, value in place.items():
         if name not in axes:
             raise ValueError(f"unknown axis {name}; expected one of {', '.join(axes)}")
         if abs(value) > MAX_LENGTH_MM:
             raise ValueError(f"{value:g}; expected at most ±{MAX_LENGTH_MM:g} mm or degrees")
-    return found
+    return place
 
 
 def _place(text: str, scene: "Scene") -> tuple[tuple[str, float], ...]:
@@ -259,12 +251,12 @@ def _place(text: str, scene: "Scene") -> tuple[tuple[str, float], ...]:
 
 
 def read_keys(text: str, _scene: "Scene") -> tuple[str, ...]:
-    """Read keys of error parameters with commas between, in any case; `ALL` for every one."""
+    """Parse keys of error parameters separated by commas, in any case; `ALL` stands for all."""
     from warpspace.machine.axes import PARAMETERS, parameter
 
-    known = {ALL: ALL, **{key.lower(): key for key in PARAMETERS}}
-    given = [part.strip() for part in text.split(",")]
-    keys = tuple(known.get(part.lower(), part) for part in given if part)
+    spelling = {ALL: ALL, **{key.lower(): key for key in PARAMETERS}}
+    names = [part.strip() for part in text.split(",")]
+    keys = tuple(spelling.get(part.lower(), part) for part in names if part)
     if not keys:
         raise ValueError("expected keys such as EA0Z,EC0Y")
     for key in keys:
@@ -274,8 +266,8 @@ def read_keys(text: str, _scene: "Scene") -> tuple[str, ...]:
 
 
 def read_limits(text: str, _scene: "Scene") -> tuple[tuple[str, float], ...]:
-    """Read numbers above 0 by parameter; one without a key is for all, with the key `ALL`."""
-    found: dict[str, float] = {}
+    """Parse positive numbers by parameter; one without a key is for all, under the key `ALL`."""
+    limits: dict[str, float] = {}
     for part in (part.strip() for part in text.split(",")):
         name, equals, number = part.rpartition("=")
         try:
@@ -287,8 +279,8 @@ def read_limits(text: str, _scene: "Scene") -> tuple[tuple[str, float], ...]:
                 ("" if part == text.strip() else f"{part!r}: ")
                 + "expected KEY=VALUE or one VALUE for all errors, in µm or µrad and above 0"
             )
-        found[name.strip().upper() if equals else ALL] = value
-    return tuple(found.items())
+        limits[name.strip().upper() if equals else ALL] = value
+    return tuple(limits.items())
 
 
 def typed_word(text: str, _scene: "Scene") -> str:
@@ -331,17 +323,17 @@ def place_words(place: Mapping[str, float]) -> str:
 
 
 def outside_travel(machine: "Machine", place: Mapping[str, float]) -> list[str]:
-    said: list[str] = []
+    warnings: list[str] = []
     for name, value in place.items():
         axis = machine.axes[name]
         low, high = axis.travel
         if not low <= value <= high:
             unit = f" {axis.unit}" if axis.is_linear else axis.unit
-            said.append(
+            warnings.append(
                 f"{name}={value:g} is outside the travel of {name}, {low:g} to {high:g}{unit};"
                 " its errors are continued beyond it"
             )
-    return said
+    return warnings
 
 
 def error_words(key: str) -> str:

@@ -1,6 +1,6 @@
-"""The analyses there are: one line here, one file each; plug-ins register theirs.
+"""Registry of the analyses: one line here, one file each; plug-ins register theirs.
 
-Nothing is imported before an analysis is asked for, so that the list costs nothing.
+Analyses are imported when they are used, so that the list costs no start-up time.
 """
 
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ TASKS: "dict[Task, str]" = {
     "design": "Design",
     "machine": "Scenes and machines",
 }
-"""What the commands of a task are listed under."""
+"""Headings of the command list, by task."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What the list says of an analysis: the first line of its docstring, and where it is."""
+    """Entry of the list: name, task and summary of an analysis, and its place."""
 
     name: str
     task: "Task"
@@ -45,7 +45,7 @@ class Verb(Protocol[R_co]):
     """An analysis as a function: ``warpspace.NAME(scene, **options)``."""
 
     def __call__(self, *scenes: "Scene", watch: "ProgressCallback" = ..., **options: Any) -> R_co:
-        """Answer it; options are those of its command: ``at={"X": 0}``, ``over_travel=True``."""
+        """Run it; options are those of its command: ``at={"X": 0}``, ``over_travel=True``."""
         ...
 
 
@@ -76,7 +76,7 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("clamp", "improve", "parts.clamp:Clamp",
      "Find the best fixture position of a part on SCENE."),
     ("compensate", "improve", "formats.compensation.compensate:Compensate",
-     "Write a table of compensation, and say what it leaves."),
+     "Write a compensation table and report the residual error."),
     ("montecarlo", "design", "analysis.commands.montecarlo:MonteCarlo",
      "Show how large |E| gets on machines within tolerance."),
     ("allocate", "design", "analysis.commands.allocate:Allocate",
@@ -93,9 +93,9 @@ _ENTRIES = {
 
 
 def register(kind: "type[Analysis]") -> None:
-    """Add an analysis; it then is a command, a page and a section of the report."""
+    """Register an analysis; it becomes a command, a panel and a section of the report."""
     if kind.name in _ENTRIES:
-        raise ValueError(f"an analysis {kind.name!r} is there already")
+        raise ValueError(f"an analysis {kind.name!r} is already registered")
     _ADDED[kind.name] = kind
     _ENTRIES[kind.name] = Entry(kind.name, kind.task, first_line(kind))
 
@@ -126,21 +126,19 @@ def verb(name: str) -> "Verb[Result]":
     from warpspace.analysis.options import options_of
 
     kind = find_analysis(name)
-    names = {one.name: one.name for one in options_of(kind)}
-    for one in options_of(kind):
-        names |= {flag.strip("-").replace("-", "_"): one.name for flag in one.former}
-    of_run = kind.run_all.__kwdefaults__ or {}
+    names = [option.name for option in options_of(kind)]
+    run_names = [*(kind.run_all.__kwdefaults__ or {})]
 
-    def answer(
+    def run(
         *scenes: "Scene", watch: "ProgressCallback" = ignore_progress, **options: Any
     ) -> "Result":
-        for given in options:
-            if given not in names and given not in of_run:
-                raise UnknownNameError(f"option of {name}", given, [*names, *of_run])
-        asked = kind(**{names[one]: options[one] for one in options if one in names})
-        others = {one: value for one, value in options.items() if one in of_run}
-        return asked.run_all(scenes, watch, **others)
+        for key in options:
+            if key not in names and key not in run_names:
+                raise UnknownNameError(f"option of {name}", key, [*names, *run_names])
+        analysis = kind(**{key: options[key] for key in options if key in names})
+        arguments = {key: options[key] for key in options if key in run_names}
+        return analysis.run_all(scenes, watch, **arguments)
 
-    answer.__name__ = answer.__qualname__ = name
-    answer.__doc__ = kind.__doc__
-    return answer
+    run.__name__ = run.__qualname__ = name
+    run.__doc__ = kind.__doc__
+    return run

@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from warpspace.analysis.description import ExpandedUncertainty
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField
 from warpspace.field.grid import Grid
@@ -25,8 +26,10 @@ class Summary:
     rms_um: float
     p95_um: float
     max_um: float
-    # U95 of these, u95_mean_um and so on, µm; None is not known, empty where nothing is stated
-    expanded_uncertainty: Numbers = attribute(default_factory=dict[str, float | None], kw_only=True)
+    # of these, u95_mean_um and so on, µm
+    expanded_uncertainty: ExpandedUncertainty[float | None] = attribute(
+        default_factory=ExpandedUncertainty[float | None], kw_only=True
+    )
 
     @property
     def three(self) -> tuple[float, float, float]:
@@ -60,7 +63,7 @@ def volume_statistics(field: ErrorField, grid: Grid) -> Statistics:
 
 
 def volume_mean(values: Array, grid: Grid) -> float:
-    """Give the mean over the volume that a grid fills, of values at its nodes."""
+    """Compute the mean over the volume of a grid, of values at its nodes."""
     return float(np.sum(grid.weights * values.reshape(grid.shape)))
 
 
@@ -84,21 +87,21 @@ def _summed_up(
 
 
 def share_within(field: ErrorField, share: float) -> float:
-    """Limit, µm, that a share of the volume keeps; |E| interpolated between nodes."""
+    """Compute the limit of a share of the volume, µm; |E| is interpolated between nodes."""
     cells = field.cells_um.reshape(-1)
     within = _percentile(cells, share * cells.size - 0.5)
     return float(field.norm_um.max()) if share >= 1.0 else within
 
 
 def share_below(field: ErrorField, limit_um: float) -> float:
-    """Share of the volume whose |E| is at most a limit; |E| interpolated between nodes."""
+    """Compute the share of the volume within a limit; |E| is interpolated between nodes."""
     if field.norm_um.max() <= limit_um:
         return 1.0
     return np.count_nonzero(field.cells_um <= limit_um) / field.cells_um.size
 
 
 def _percentile(values: Array, place: float) -> float:
-    """Interpolate between the two values beside a place in their order, counted from 0."""
+    """Interpolate between the two values next to a rank, counted from 0."""
     place = min(max(place, 0.0), values.size - 1.0)
     below = int(place)
     above = min(below + 1, values.size - 1)

@@ -1,4 +1,4 @@
-"""Measured machines: errors against tolerances, and what they predict."""
+"""Measured machines: errors against tolerances, and the predicted volumetric error."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,15 +32,10 @@ class Check:
 
     @property
     def passes(self) -> bool | None:
-        """Whether the value lies within the tolerance, limits included; None without one."""
+        """Verdict: within the tolerance, limits included; None without one."""
         if self.centre is None or self.half_width is None:
             return None
         return bool(abs(self.value - self.centre) <= self.half_width * (1.0 + 1e-12))
-
-    @property
-    def mark(self) -> str:
-        """O, X or a dash, as the thesis marks them in table 5-5."""
-        return "–" if self.passes is None else "O" if self.passes else "X"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +44,7 @@ class Measured:
 
     checks: tuple[Check, ...]  # one per error of the set
     predicted: Statistics  # |E| of the loop over the working volume
-    # the same over the nodes of the grid, each counted once, as the thesis has it
+    # the same over the nodes of the grid, each with the same weight
     predicted_nodes: Statistics
     # angle by which the volume is out of square per plane, in the sign of the squareness parameter;
     # out of a least-squares affine fit to the whole map
@@ -72,7 +67,7 @@ def measured(
     loop: Loop | str = Loop.TOOL,
     grid: int | Sequence[int] = PREDICTED_NODES,
 ) -> Measured:
-    """Judge the errors of a scene against tolerances and predict its volumetric error.
+    """Check the errors of a scene against tolerances and predict its volumetric error.
 
     Parameters
     ----------

@@ -72,7 +72,6 @@ class BenchTest(Analysis):
         (),
         "Where axes stand that the test does not move",
         unset="what the scene says",
-        former=("--center", "--centre"),
     )
     tool_extension_mm: float = option(
         0.0, "How much longer than the scene's the tool or probe is", unit="mm", low=-1e4, high=1e4
@@ -204,7 +203,7 @@ class BenchResult(Result):
     def charts(self) -> tuple[Lines, ...]:
         return self.test.charts(self.runs)
 
-    def doubts(self) -> tuple[str, ...]:
+    def caveats(self) -> tuple[str, ...]:
         return self.notes
 
     def as_json(self) -> dict[str, Any]:

@@ -47,7 +47,7 @@ MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their un
 class FittedParameter:
     """One parameter after a calibration."""
 
-    keys: ClassVar[tuple[str, ...]] = (
+    json_keys: ClassVar[tuple[str, ...]] = (
         "key", "unit", "before", "value", "standard_uncertainty", "interval_95", "identifiable",
         "told",
     )  # fmt: skip
@@ -73,7 +73,7 @@ class FittedParameter:
 class Combination:
     """A sum of parameters that the readings tell, although not the parameters in it."""
 
-    keys: ClassVar[tuple[str, ...]] = (
+    json_keys: ClassVar[tuple[str, ...]] = (
         "factors", "unit", "value", "standard_uncertainty", "interval_95",
     )  # fmt: skip
     # factor by parameter; the first, with factor 1, is the one that was fitted
@@ -150,7 +150,7 @@ class Candidate:
 class NextMeasurement:
     """One measurement to make."""
 
-    keys: ClassVar[tuple[str, ...]] = (
+    json_keys: ClassVar[tuple[str, ...]] = (
         "measurement", "kind", "minutes", "before_um", "after_um", "map_before_um", "map_after_um",
     )  # fmt: skip
     candidate: Candidate

@@ -124,7 +124,7 @@ def _value(option: Option, text: str, given: str) -> Any:
     except ValueError:
         raise OptionError(f"{{kinds}} {given!r}: {text!r} is no point for {option.flag}") from None
     except OptionError as error:
-        said = error.said(lambda _: option.flag)
+        said = error.with_names(lambda _: option.flag)
         raise OptionError(f"{{kinds}} {given!r}: {said}") from None
 
 

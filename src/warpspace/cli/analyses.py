@@ -12,7 +12,6 @@ from warpspace.cli.file_arguments import DataFile, check_files, flag_of
 from warpspace.cli.sampling_output import MORE
 from warpspace.cli.shared_options import (
     SCENES,
-    RenamedOption,
     csv_option,
     force_option,
     json_option,
@@ -61,7 +60,7 @@ def _click_option(one: Option) -> Callable[..., Any]:
         metavar = one.grammar.metavar if one.required else f"[{one.grammar.metavar}]"
         kind = DataFile() if one.grammar.is_file else str
         return click.argument(one.name, type=kind, nargs=-1, required=one.required, metavar=metavar)
-    traits: dict[str, Any] = {"cls": RenamedOption, "former": one.former, "help": one.help}
+    traits: dict[str, Any] = {"help": one.help}
     if one.kind is bool:
         traits |= {"is_flag": True}
     elif one.grammar is not None:
@@ -94,8 +93,8 @@ def _runner(kind: "type[Analysis]", run_it: Callable[..., Any] | None) -> Callab
         own = {one.name for one in options_of(kind)}
         names, loaded = load_scenes(scenes or (scene,), kind.scenes)
         asked = read_options(kind, values, loaded[0])
-        asked = asked.written(Path(output).stem if output else None)
-        warn(*(OptionError(words).said(flag_of) for words in asked.warnings(loaded[0])))
+        asked = asked.for_output(Path(output).stem if output else None)
+        warn(*(OptionError(words).with_names(flag_of) for words in asked.warnings(loaded[0])))
         with progress(kind.doing, total=1.0, silent=as_json) as bar:
             if run_it is None:
                 found = asked.run_all(loaded, bar.reach)
@@ -148,7 +147,7 @@ def print_blocks(blocks: "Iterable[Block]") -> None:
             if block.title:
                 print_text(block.title)
             if block.rows:
-                print_table(block.shown, block.cells())
+                print_table(block.visible_columns, block.cells())
             elif block.empty:
                 print_text(block.empty)
 

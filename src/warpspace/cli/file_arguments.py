@@ -101,7 +101,7 @@ def guarded(command: click.Command) -> click.Command:
             try:
                 return run(**values)
             except OptionError as error:
-                raise OptionError(error.said(flag_of)) from None
+                raise OptionError(error.with_names(flag_of)) from None
 
         command.callback = check_and_run
     return command

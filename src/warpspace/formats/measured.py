@@ -181,7 +181,7 @@ def merge(parts: Sequence[Imported]) -> Imported:
 class ErrorSummary:
     """One error."""
 
-    keys: ClassVar[tuple[str, ...]] = (
+    json_keys: ClassVar[tuple[str, ...]] = (
         "key", "unit", "kind", "points", "runs", "directions", "range", "smallest", "largest",
         "mean_reversal", "repeatability", "uncertainty",
     )  # fmt: skip

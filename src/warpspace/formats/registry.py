@@ -166,7 +166,7 @@ def _known() -> Registry[Format]:
 
 
 def formats() -> tuple[Format, ...]:
-    return _known().every()
+    return _known().members()
 
 
 def find_format(name: str) -> Format:

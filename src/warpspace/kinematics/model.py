@@ -115,7 +115,7 @@ register_convention, unregister_convention = _CONVENTIONS.register, _CONVENTIONS
 
 
 def convention_names() -> tuple[str, ...]:
-    return tuple(one.name for one in _CONVENTIONS.every())
+    return tuple(one.name for one in _CONVENTIONS.members())
 
 
 Coordinates = Mapping[str, Array]

@@ -13,9 +13,8 @@ from typing import Literal
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import ProgressCallback, Result
+from warpspace.analysis.description import ExpandedUncertainty, ProgressCallback, Result
 from warpspace.analysis.options import option
-from warpspace.analysis.statistics import Numbers
 from warpspace.analysis.uncertainty.propagation import (
     FieldUncertainty,
     plus_minus,
@@ -49,9 +48,9 @@ class Clamping:
     max_um: float
     placed_um: float  # after the best rigid fit
     outside: int  # vertices beyond the travel
-    expanded_uncertainty: Numbers = field(
-        default_factory=dict[str, float | None]
-    )  # U95, where that is stated
+    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
 
 CRITERIA = attrgetter("max_um"), attrgetter("placed_um")  # as clamped; after the best rigid fit
@@ -148,7 +147,7 @@ def _uncertainties(scene: Scene, mesh: Workpiece, place: Sequence[float]) -> lis
 class ClampResult(Result):
     """Fixture positions of a part, the best one, and its gain."""
 
-    keys = ("places", "best", "present", "gain_um")
+    json_keys = ("places", "best", "present", "gain_um", "expanded_uncertainty")
     places: list[Clamping]  # from some of the vertices, best first
     best: Clamping
     present: Clamping
@@ -156,9 +155,9 @@ class ClampResult(Result):
     title: str
     placed: bool
     warnings: tuple[str, ...]  # of the mesh
-    expanded_uncertainty: Numbers = field(
-        default_factory=dict[str, float | None]
-    )  # U95 of the gain
+    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
     def with_expanded_uncertainty(self, *each: list[FieldUncertainty]) -> "ClampResult":
         """Return the result with U95 at present, at the best place and of the gain."""
@@ -167,7 +166,7 @@ class ClampResult(Result):
         clampings: list[Clamping] = []
         for clamping, uncertainties in zip((self.present, self.best), each, strict=True):
             largest = [uncertainty.statistics()["max_um"] for uncertainty in uncertainties]
-            u95 = dict(zip(U95, largest, strict=True))
+            u95 = ExpandedUncertainty[float | None](zip(U95, largest, strict=True))
             clampings.append(replace(clamping, expanded_uncertainty=u95))
         return replace(
             self,

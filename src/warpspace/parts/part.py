@@ -157,7 +157,7 @@ def _deviation(
 class PartResult(PartDeviation, Result):
     """The actual workpiece."""
 
-    keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
+    json_keys = ("vertices", "outside", "deviation", "normal", "placed", "features")
     vertices: int
     outside: int  # vertices beyond the travel
     placed: PartDeviation

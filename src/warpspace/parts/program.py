@@ -22,7 +22,13 @@ from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.contributions import budget_words, explain
-from warpspace.analysis.description import Analysis, ProgressCallback, Result, to_json
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+    to_json,
+)
 from warpspace.analysis.options import File, option, place_words
 from warpspace.analysis.statistics import P95, Statistics
 from warpspace.analysis.uncertainty.propagation import (
@@ -222,7 +228,7 @@ class PathPoint:
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
     budget: Mapping[str, float]  # contributions to |E| by parameter, µm, largest first
-    expanded_uncertainty: Mapping[str, float | None]  # u95_um of |E|; empty if none is stated
+    expanded_uncertainty: ExpandedUncertainty[float | None]  # u95_um of |E|; empty if none is stated
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -272,13 +278,16 @@ class Program(interpreter.ControlSettings, Analysis):
             model = interpreter.with_length(scene.model, length)
             parts = explain(model, scene.errors, axes, view).contributions
             ranked = sorted(parts, key=lambda part: -part.along_um)
+            u95 = ExpandedUncertainty[float | None]()
+            if path.uncertainty:
+                u95["u95_um"] = path.uncertainty.u95_at(sample)
             return PathPoint(
                 int(path.line[sample]),
                 float(path.norm_um[sample]),
                 axes,
                 path.error_um[sample],
                 {part.key: part.along_um for part in ranked},
-                {"u95_um": path.uncertainty.u95_at(sample)} if path.uncertainty else {},
+                u95,
             )
 
         ends = np.flatnonzero(path.line == self.at_line)
@@ -306,7 +315,7 @@ class Program(interpreter.ControlSettings, Analysis):
 class ProgramResult(Result):
     """Path of a program, and its worst blocks."""
 
-    keys = ("length_mm", "outside", "deviation", "along", "across", "worst")
+    json_keys = ("length_mm", "outside", "deviation", "along", "across", "worst")
     length_mm: float  # of the nominal path
     outside: int  # samples beyond the travel
     deviation: Statistics
@@ -321,7 +330,7 @@ class ProgramResult(Result):
     def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         return {"": "\n".join([*map(one_line, correct_program(self.analysis, self.program)), ""])}
 
-    def as_plain(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         refused = [{"line": line, "word": word} for line, word in self.program.refused.items()]
         line = {"line": to_json(self.line)} if self.line else {}
         return {"blocks": self.program.blocks, "refused": refused, **to_json(self), **line}

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import SupportsFloat
 
-from warpspace.analysis.sampling.distribution import loop_axes
+from warpspace.analysis.loop_parameters import loop_axes
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, plus_minus
 from warpspace.kinematics.model import Convention, Loop, Model
 from warpspace.machine.axes import DIRECTION_WORDS, TravelDirection, is_linear, is_rotary

@@ -176,7 +176,7 @@ class Picture:
         if uncertainty is None or self.u95_um is None or self.tilts:
             return None
         if self.limit_um is not None:
-            probability = uncertainty.keeps(self.limit_um)
+            probability = uncertainty.conformance_probability(self.limit_um)
             return (probability > 1.0 - VERDICT_PROBABILITY) & (probability < VERDICT_PROBABILITY)
         if not self.significant:
             return None

@@ -1,16 +1,14 @@
-"""Every number printed in the thesis beside ours."""
+"""Comparison of every number printed in the thesis with the computed one."""
 
 import math
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from warpspace.analysis.commands.gains import Gain, gains_at, gains_max
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.sampling.cases import Case, SamplingPlan
-from warpspace.analysis.sampling.distribution import Distribution, build_draws, loop_keys
+from warpspace.analysis.sampling.distribution import Distribution, build_draws
 from warpspace.analysis.sampling.machine_sampling import SampleStatistics, montecarlo
 from warpspace.analysis.tolerance_check import Check, check_errors, measured
 from warpspace.field.evaluate import View
@@ -19,6 +17,7 @@ from warpspace.machine.axes import ErrorKind, parameter
 from warpspace.machine.errors import ToleranceSet
 from warpspace.scene.library import load_scene
 from warpspace.scene.model import Scene
+from warpspace.thesis_example.printed import MACHINE, MEASURED_MACHINES, printed_tables
 
 
 class ThesisCase(NamedTuple):
@@ -57,12 +56,6 @@ class Row:
     note: str = ""  # why not, or what there is to know; empty for most
 
 
-@cache
-def printed_tables() -> dict[str, Any]:
-    """Read the printed numbers, and the notes on them."""
-    return tomllib.loads((files("warpspace.thesis_example") / "thesis.toml").read_text("utf-8"))
-
-
 def _source(table: str) -> str:
     kind, chapter, number = table.split("_")
     entry = printed_tables()[table]
@@ -80,8 +73,8 @@ def _number(
     note: str = "",
 ) -> Row:
     same = abs(computed - printed) <= 0.5 * 10.0**-digits + 1e-9
-    said = printed_tables()["notes"].get(note, note)
-    return Row(_source(table), key, float(printed), computed, same, unit, digits, said)
+    remark = printed_tables()["notes"].get(note, note)
+    return Row(_source(table), key, float(printed), computed, same, unit, digits, remark)
 
 
 def _text(table: str, key: str, printed: str, computed: str, unit: str = "", note: str = "") -> Row:
@@ -92,9 +85,9 @@ def _tolerance(centre: float, half_width: float) -> str:
     return f"{centre:g}±{half_width:g}" if centre else f"±{half_width:g}"
 
 
-def _own_tolerance(tolerances: ToleranceSet, key: str) -> str:
-    found = tolerances.get(key)
-    return "none" if found is None else _tolerance(found.centre, found.half_width)
+def _scene_tolerance(tolerances: ToleranceSet, key: str) -> str:
+    tolerance = tolerances.get(key)
+    return "none" if tolerance is None else _tolerance(tolerance.centre, tolerance.half_width)
 
 
 COLUMNS = {"|E|": "norm", "x": "x", "y": "y", "z": "z"}  # of a gain, by heading
@@ -117,9 +110,9 @@ def table_4_1(case: ThesisCase) -> Iterator[Row]:
 def table_4_2(case: ThesisCase) -> Iterator[Row]:
     printed = printed_tables()["table_4_2"]
     for axis in "XYZBC":
-        own = [row for key in case.keys if (row := parameter(key)).axis == axis]
-        constants = sum(row.is_constant for row in own)
-        counts = {"component": len(own) - constants, "constant": constants}
+        parameters = [parameter(key) for key in case.keys if parameter(key).axis == axis]
+        constants = sum(row.is_constant for row in parameters)
+        counts = {"component": len(parameters) - constants, "constant": constants}
         for (what, ours), count in zip(counts.items(), printed[axis], strict=True):
             yield _number("table_4_2", f"{axis} {what} errors", count, ours)
     yield _number("table_4_2", "all parameters", printed["total"], len(case.keys), note="total")
@@ -135,8 +128,8 @@ def workpiece_gains(model: Model) -> dict[str, Gain]:
     printed = printed_tables()["table_4_4"]
     ranges = {axis: (float(printed[axis][0]), float(printed[axis][1])) for axis in "BC"}
     keys = model.machine.parameter_keys
-    found = gains_max(model, Loop.WORKPIECE, keys, ranges, printed["step_deg"])
-    return {gain.key: gain for gain in found}
+    gains = gains_max(model, Loop.WORKPIECE, keys, ranges, printed["step_deg"])
+    return {gain.key: gain for gain in gains}
 
 
 def gain_rows(table: str, gains: dict[str, Gain]) -> Iterator[Row]:
@@ -185,7 +178,7 @@ def table_4_6(case: ThesisCase) -> Iterator[Row]:
     """General tolerance of the 37 parameters."""
     printed = printed_tables()["table_4_6"]
     for key in case.keys:
-        row, ours = parameter(key), _own_tolerance(case.general.tolerances, key)
+        row, ours = parameter(key), _scene_tolerance(case.general.tolerances, key)
         yield _text("table_4_6", key, _tolerance(0.0, printed[row.tolerance_class]), ours, row.unit)
 
 
@@ -193,7 +186,7 @@ def table_4_7(case: ThesisCase) -> Iterator[Row]:
     """Proposed tolerance of the key errors."""
     for key, values in printed_tables()["table_4_7"].items():
         if isinstance(values, list):
-            ours = _own_tolerance(case.proposed.tolerances, key)
+            ours = _scene_tolerance(case.proposed.tolerances, key)
             yield _text("table_4_7", key, _tolerance(*values), ours, parameter(key).unit)
 
 
@@ -203,19 +196,19 @@ def table_4_8(case: ThesisCase) -> Iterator[Row]:
     for group in printed["groups"]:
         keys, unit = group["keys"], parameter(group["keys"][0]).unit
         for name, scene in (("general", case.general), ("proposed", case.proposed)):
-            ours = " ".join(sorted({_own_tolerance(scene.tolerances, key) for key in keys}))
+            ours = " ".join(sorted({_scene_tolerance(scene.tolerances, key) for key in keys}))
             key = f"{' '.join(keys)} {name}"
             yield _text("table_4_8", key, _tolerance(*group[name]), ours, unit)
     notes = printed_tables()["notes"]
     for name, value in printed["predicted"].items():
-        found = sampled(case, name, "uniform")
+        statistics = sampled(case, name, "uniform")
         normal = sampled(case, name, "normal").mean_um
-        note = (notes["peak"] + notes[name]).format(mode=found.mode_um, normal=normal)
+        note = (notes["peak"] + notes[name]).format(mode=statistics.mode_um, normal=normal)
         key = f"{name.replace('_', ' loop, ')} tolerance: volumetric error"
-        yield _number("table_4_8", key, value, found.mean_um, 0, "µm", note)
+        yield _number("table_4_8", key, value, statistics.mean_um, 0, "µm", note)
 
 
-MACHINES = ("first", "second")
+MARKS = {True: "O", False: "X", None: "–"}  # of table 5-5: passes, fails, no tolerance
 
 
 def squareness_tables(case: ThesisCase) -> Iterator[Row]:
@@ -230,7 +223,7 @@ def squareness_tables(case: ThesisCase) -> Iterator[Row]:
 def table_5_5(case: ThesisCase) -> Iterator[Row]:
     """Key errors, their marks, and the volumetric error."""
     printed, notes = printed_tables()["table_5_5"], printed_tables()["notes"]
-    for which, name in enumerate(MACHINES):
+    for which, name in enumerate(MEASURED_MACHINES):
         scene: Scene = getattr(case, name)
         for key, check in _checks(case, scene).items():
             if which == 0:
@@ -240,26 +233,26 @@ def table_5_5(case: ThesisCase) -> Iterator[Row]:
             if key in {"EA0Z", "EB0Z"}:
                 note = notes["swapped"].format(table="5-3" if which == 0 else "5-4")
                 note += notes["digit"] if value == 13.9 else ""
-            said = f"{name} machine {key}"
-            yield _number("table_5_5", said, value, check.value, 1, check.unit, note)
-            yield _text("table_5_5", f"{said} mark", mark, check.mark, note=note)
-        mean, said = measured(scene).predicted_nodes.mean_um, f"{name} machine volumetric error"
-        yield _number("table_5_5", said, printed["volumetric_um"][which], mean, 0, "µm", "ramp")
+            label = f"{name} machine {key}"
+            yield _number("table_5_5", label, value, check.value, 1, check.unit, note)
+            yield _text("table_5_5", f"{label} mark", mark, MARKS[check.passes], note=note)
+        mean, label = measured(scene).predicted_nodes.mean_um, f"{name} machine volumetric error"
+        yield _number("table_5_5", label, printed["volumetric_um"][which], mean, 0, "µm", "ramp")
 
 
 def _checks(case: ThesisCase, scene: Scene) -> dict[str, Check]:
-    return {one.key: one for one in check_errors(scene.errors, case.proposed.tolerances)}
+    return {check.key: check for check in check_errors(scene.errors, case.proposed.tolerances)}
 
 
 def _tolerance_row(case: ThesisCase, table: str, check: Check) -> Row:
     printed = _tolerance(*printed_tables()["table_4_7"][check.key])
-    ours = _own_tolerance(case.proposed.tolerances, check.key)
+    ours = _scene_tolerance(case.proposed.tolerances, check.key)
     return _text(table, f"{check.key} tolerance", printed, ours, check.unit)
 
 
 def thesis() -> tuple[Row, ...]:
     """Set every number printed in tables 4-1 to 4-8 and 5-3 to 5-5 of the thesis beside ours."""
-    case = ThesisCase(*(load_scene(f"dvf5000_{name}") for name in ThesisCase._fields))
+    case = ThesisCase(*(load_scene(f"{MACHINE}_{name}") for name in ThesisCase._fields))
     gains = tool_gains(case.model)
     return (
         *table_4_1(case),

@@ -164,7 +164,7 @@ def test_the_measured_machine_keeps_the_limit_on_machines_of_its_own(loop, over)
     own |= {k: Tolerance(scene.tolerances.get(k).centre, w) for k, w in found.tolerances.items()}
     allocated = replace(scene, tolerances=replace(scene.tolerances, own=own))
     run = warpspace.montecarlo(
-        allocated, loop=loop, over=over, samples=40_000, seed=99, spec_um=60.0
+        allocated, loop=loop, over=over, samples=40_000, seed=99, limit_um=60.0
     )
     assert run.probability.probability == pytest.approx(0.95, abs=0.006)
     assert found.after.low - 0.003 < run.probability.probability < found.after.high + 0.003

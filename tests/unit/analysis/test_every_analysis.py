@@ -5,17 +5,28 @@ import subprocess
 import sys
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Annotated
 
 import click
 import pytest
 from click.testing import CliRunner
 
 from warpspace import load_scene
-from warpspace.analysis import Analysis, Column, Result, Table, option, register, unregister
+from warpspace.analysis import (
+    Analysis,
+    Column,
+    Quantity,
+    Result,
+    Table,
+    option,
+    register,
+    unregister,
+)
 from warpspace.analysis.blocks import Bars, Histogram, Lines
-from warpspace.analysis.description import ignore_progress, to_json
+from warpspace.analysis.description import ExpandedUncertainty, ignore_progress, to_json
 from warpspace.analysis.options import options_of
 from warpspace.analysis.registry import TASKS, entries, first_line
+from warpspace.analysis.uncertainty.propagation import scene_uncertainty
 from warpspace.cli.analyses import command_of, print_blocks
 from warpspace.cli.file_arguments import guarded
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -91,10 +102,12 @@ def test_text_page_and_json_say_the_result(entry, scene, capsys):
     loaded = scene_of(entry.name, scene)
     result = small(kind).run(loaded, ignore_progress)
     spelled = result.as_json()
-    if all(getattr(type(result), way) is getattr(Result, way) for way in ("as_json", "as_plain")):
-        own = [one.name for one in fields(result) if one.name != "second_order"]
-        keys = list(result.keys or own)
-        assert list(spelled) == keys + ["second_order_um"] * bool(result.second_order)
+    if type(result).json_fields is Result.json_fields and type(result).as_json is Result.as_json:
+        base = {entry.name for entry in fields(Result)}
+        own = [entry.name for entry in fields(result) if entry.name not in base]
+        keys = [key for key in result.json_keys or own if key != "expanded_uncertainty"]
+        keys += ["second_order_um"] * bool(result.second_order)
+        assert [key for key in spelled if not key.startswith("u95_")] == keys
     assert json.loads(json.dumps(spelled, allow_nan=False)) == to_json(spelled)
     print_blocks(result.blocks())
     text = capsys.readouterr().out
@@ -155,7 +168,7 @@ def test_importing_every_analysis_imports_nothing_heavy():
 class EvenResult(Result):
     """A number."""
 
-    keys = ("sum_mm",)
+    json_keys = ("sum_mm",)
     sum_mm: float
     word: str
 
@@ -178,10 +191,70 @@ class Even(Analysis):
         return EvenResult(sum_mm=total + (self.height_mm or 0.0), word=scene.title)
 
 
+@dataclass(frozen=True, kw_only=True)
+class FlatnessResult(Result):
+    """A result without `json_keys`."""
+
+    flatness_um: Annotated[float, Quantity("Flatness", "µm")]
+
+    def blocks(self):
+        yield f"flatness {self.flatness_um:g} µm"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flatness(Analysis):
+    """Compute a number from SCENE."""
+
+    name = "flatness"
+    task = "understand"
+
+    def run(self, scene, _watch, /):
+        return FlatnessResult(flatness_um=2.5, uncertainty=scene_uncertainty(scene))
+
+
+def test_json_of_a_result_without_keys_is_its_own_fields(tmp_path):
+    source = tmp_path / "uncertain.toml"
+    errors = "[errors]\nEC0Y = 5.0\n[uncertainty]\nEC0Y = 1.0\n"
+    source.write_text(f'title = "x"\nmachine = "dvf5000"\n{errors}', "utf-8")
+    assert scene_uncertainty(load_scene(source)) is not None
+    register(Flatness)
+    try:
+        said = CliRunner().invoke(command_of(Flatness), [str(source), "--json"])
+        assert said.exit_code == 0, said.exception
+        assert json.loads(said.output) == {"flatness_um": 2.5}
+    finally:
+        unregister("flatness")
+
+
+@dataclass(frozen=True)
+class Bore:
+    """A record with keys, not in the order of its fields, and with an expanded uncertainty."""
+
+    json_keys = ("radius_um", "expanded_uncertainty", "place")
+    place: str
+    radius_um: float
+    expanded_uncertainty: ExpandedUncertainty[float]
+    keys: tuple[str, ...] = ("no", "keys", "of", "JSON")
+
+
+def test_expanded_uncertainties_follow_the_other_keys():
+    bore = Bore("left", 3.0, ExpandedUncertainty(u95_radius_um=0.5))
+    assert [*to_json(bore).items()] == [
+        ("radius_um", 3.0), ("place", "left"), ("u95_radius_um", 0.5),
+    ]  # fmt: skip
+
+
+def test_an_option_is_described_once():
+    (height,) = options_of(Even)
+    assert (height.flag, height.label, height.kind) == ("--height", "Height", float)
+    with pytest.raises(TypeError, match="wide"):
+        option(1, "Something", wide=True)
+
+
 def test_an_analysis_of_ones_own_is_a_command_like_any_other(tmp_path):
     register(Even)
     try:
-        with pytest.raises(ValueError, match="there already"):
+        with pytest.raises(ValueError, match="already registered"):
             register(Even)
         (entry,) = (one for one in entries() if one.name == "even")
         command = guarded(command_of(entry.load()))

@@ -48,7 +48,13 @@ SCENE = warpspace.load_scene("dvf5000_general")
 def test_workers_do_not_change_a_bit(over, loop):
     one, three = (
         warpspace.montecarlo(
-            SCENE, samples=3 * BLOCK + 17, over=over, loop=loop, grid=4, workers=workers, spec_um=40
+            SCENE,
+            samples=3 * BLOCK + 17,
+            over=over,
+            loop=loop,
+            grid=4,
+            workers=workers,
+            limit_um=40,
         )
         .points[0]
         .sampled

@@ -184,7 +184,7 @@ def test_numbers_of_errors_that_nobody_states_are_unknown():
     for asked in (Form(nodes=3), Conformance(nodes=5)):
         found = asked.run(scene, lambda _: None)
         assert all(u95 is None for u95, _ in pairs(found.as_json()))
-        assert "uncertainty not stated of EC0Y" in " ".join(found.caveats())
+        assert "uncertainty of EC0Y is unknown" in " ".join(found.caveats())
         assert any("± ?" in row for block in found.blocks() for row in getattr(block, "rows", ()))
 
 

@@ -298,4 +298,4 @@ def test_readings_of_other_curves_are_left_out_and_named():
     scene = parse_scene(text, "s")
     found = convert_scene(scene, Target(component_errors={"Y": "before_motion"}))
     assert [*found.scene.measured] == ["EAX"]
-    assert found.notes == ("readings of EZY are left out: they are of other curves",)
+    assert found.notes == ("readings of EZY are omitted: they belong to other curves",)

@@ -1,4 +1,4 @@
-"""What to repair: which errors to adjust, and to what, so that the volume gets better."""
+"""Adjustment: errors to adjust, and their new values, that reduce the volumetric error."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,12 +12,13 @@ from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table,
 from warpspace.analysis.description import (
     Analysis,
     Change,
+    ExpandedUncertainty,
     ProgressCallback,
     Result,
     ignore_progress,
 )
 from warpspace.analysis.options import ALL, LOOP_HELP, PLACED_HELP, Keys, Limits, option
-from warpspace.analysis.statistics import Numbers, Summary, volume_statistics
+from warpspace.analysis.statistics import Summary, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
     FieldUncertainty,
     field_uncertainty,
@@ -41,22 +42,26 @@ FOUR = ("mean_um", "rms_um", "p95_um", "max_um")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Best(Summary):
-    """The whole volume with one error at its best value."""
+    """Statistics of the volume with one error at its best value."""
 
-    keys: ClassVar[tuple[str, ...]] = ("value", *FOUR)
+    json_keys: ClassVar[tuple[str, ...]] = ("value", *FOUR, "expanded_uncertainty")
     value: float  # µm or µrad; within its limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """One error alone: left out, or at its best value, with all others as they are."""
+    """Effect of one error: omitted, or at its best value, with all others unchanged."""
 
-    keys: ClassVar[tuple[str, ...]] = ("key", "unit", "present", "left_out", "best")
+    json_keys: ClassVar[tuple[str, ...]] = (
+        "key", "unit", "present", "left_out", "best", "expanded_uncertainty",
+    )  # fmt: skip
     key: str
     present: float  # µm or µrad
     left_out: Summary
     best: Best
-    expanded_uncertainty: Numbers = attribute(default_factory=dict[str, float | None])
+    expanded_uncertainty: ExpandedUncertainty[float | None] = attribute(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
     @property
     def parameter(self) -> Parameter:
@@ -69,9 +74,9 @@ class Effect:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdjustedSet(Summary):
-    """The best set of so many adjustments, and the whole volume with it."""
+    """Best set of adjustments of one size, and the statistics of the volume with it."""
 
-    keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact")
+    json_keys: ClassVar[tuple[str, ...]] = ("adjust", *FOUR, "exact", "expanded_uncertainty")
     adjust: Mapping[str, float]  # µm or µrad; new values by key
     # whether all sets of this size were compared; else the set was built up and improved by
     # swapping its members
@@ -100,23 +105,23 @@ class Adjust(Analysis):
     placed: bool = option(False, PLACED_HELP)
     objective: Objective = option(
         Objective.RMS,
-        "What is made as small as possible over the volume: RMS or largest |E|",
-        words={"rms": "RMS of the whole volume", "max": "largest |E| of the volume"},
+        "Quantity to minimise over the volume: RMS or largest |E|",
+        choice_labels={"rms": "RMS of the whole volume", "max": "largest |E| of the volume"},
     )
     count: int = option(
         3,
-        "The best sets of one up to this many adjustments",
+        "Largest number of adjustments in a set",
         low=REPAIR_COUNT[0],
         high=REPAIR_COUNT[1],
     )
     adjustable: Keys = option(
         (),
-        "Errors that may be adjusted; of a curve its amplitude is (compensation)",
+        "Errors that may be adjusted; of a curve the amplitude (compensation)",
         unset="squareness and alignment: the constant errors",
     )
     limit: Limits = option(
         (),
-        "By how much one error, or each, may be changed, in µm or µrad",
+        "Largest change of one error or of each, in µm or µrad",
         unset=f"±{DEFAULT_LIMIT:g}",
     )
     grid: int = option(
@@ -127,55 +132,55 @@ class Adjust(Analysis):
     )
 
     @property
-    def seen_loop(self) -> Loop:
+    def evaluated_loop(self) -> Loop:
         return self.loop or (Loop.RELATIVE if self.placed else Loop.TOOL)
 
-    def seen(self, scene: Scene) -> tuple[Scene, View]:
-        if self.placed and self.seen_loop is not Loop.RELATIVE:
+    def scene_and_view(self, scene: Scene) -> tuple[Scene, View]:
+        if self.placed and self.evaluated_loop is not Loop.RELATIVE:
             raise OptionError(
                 f"{{placed}}: the {self.loop} loop does not contain the placement of the workpiece;"
                 f" expected loop {Loop.RELATIVE}"
             )
         scene = replace(scene, placed=True) if self.placed else scene
-        return scene, scene.view(self.seen_loop)
+        return scene, scene.view(self.evaluated_loop)
 
     def run(self, scene: Scene, watch: ProgressCallback = ignore_progress, /) -> "AdjustResult":
-        scene, view = self.seen(scene)
+        scene, view = self.scene_and_view(scene)
         nodes = build_grid(scene.model, scene.workspace, self.grid)
         basis = grid_basis(scene, nodes, view, self.included(scene))
         values = amplitudes_of(scene.errors, basis.keys)
-        found = find_adjustments(basis, nodes, values, self, scene, watch)
+        result = find_adjustments(basis, nodes, values, self, scene, watch)
         exact = [
             volume_statistics(evaluate_grid(change.scene, nodes, view, exact=True), nodes)
-            for change in found.changes()
+            for change in result.changes()
         ]
         sets = [
-            replace(one, exact=Summary(*numbers.four))
-            for one, numbers in zip(found.adjustments, exact, strict=True)
+            replace(adjusted, exact=Summary(*numbers.four))
+            for adjusted, numbers in zip(result.adjustments, exact, strict=True)
         ]
-        left_out = second_order(scene, self.seen_loop)
-        found = replace(found, adjustments=tuple(sets), second_order=left_out)
+        left_out = second_order(scene, self.evaluated_loop)
+        result = replace(result, adjustments=tuple(sets), second_order=left_out)
         error = basis.evaluate(values, orientation=False).error_um
         at = nodes.coordinates, view, nodes.point_mm, nodes.weights
-        doubt = field_uncertainty(scene, error, *at)
-        return found if doubt is None else _with_doubt(found, doubt, basis)
+        uncertainty = field_uncertainty(scene, error, *at)
+        return result if uncertainty is None else _with_uncertainty(result, uncertainty, basis)
 
     def included(self, scene: Scene) -> Sequence[str]:
         return scene.parameter_keys
 
     def limit_of(self, key: str) -> float:
-        """Give the largest change of one error, µm or µrad."""
+        """Return the largest change of one error, µm or µrad."""
         limits = dict(self.limit)
         return limits.get(key, limits.get(ALL, DEFAULT_LIMIT))
 
 
 @dataclass(frozen=True, kw_only=True)
 class AdjustResult(Result):
-    """What repairs a machine."""
+    """Adjustments of a machine."""
 
-    keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
+    json_keys = ("objective", "before", "errors", "adjustable", "adjustments", "all_sets_compared")
     no_change = "there is nothing to adjust in this loop"
-    asked: Adjust
+    analysis: Adjust
     scene: Scene
     before: Summary
     # every error that is not zero and acts in the loop; the one whose best value helps the
@@ -188,16 +193,19 @@ class AdjustResult(Result):
 
     @property
     def objective(self) -> Objective:
-        return self.asked.objective
+        return self.analysis.objective
 
     @property
     def all_sets_compared(self) -> list[bool]:
-        return [one.proven for one in self.adjustments]
+        return [adjusted.proven for adjusted in self.adjustments]
 
     def changes(self) -> Sequence[Change]:
         return [
-            Change(f"after repair: {_values(one)}", repaired(self.scene, one.adjust))
-            for one in self.adjustments
+            Change(
+                f"after adjustment: {_values(adjusted)}",
+                apply_adjustments(self.scene, adjusted.adjust),
+            )
+            for adjusted in self.adjustments
         ]
 
     def blocks(self) -> Iterator[Block]:
@@ -205,35 +213,47 @@ class AdjustResult(Result):
         yield " · ".join((self.scene.title, *self._where, smallest))
         mean, rms, p95, largest = (f"{getattr(self.before, name):.2f}" for name in FOUR)
         yield f"  before: mean {mean}, RMS {rms}, P95 {p95}, max {largest} µm"
-        yield from u95_lines(scene_uncertainty(self.scene, self.asked.seen_loop), {"": self.before})
+        uncertainty = scene_uncertainty(self.scene, self.analysis.evaluated_loop)
+        yield from u95_lines(uncertainty, {"": self.before})
         columns = (
             Column("key", leads=True),
             Column("now", ".4g"),
             Column("unit"),
-            *number_columns(("left out: mean", "RMS", "max"), unit="µm"),
+            *number_columns(("omitted: mean", "RMS", "max"), unit="µm"),
             Column("best value", ".1f"),
             *number_columns(("then: mean", "RMS", "max"), unit="µm"),
         )
         rows = [
-            (one.key, one.present, one.unit, *one.left_out.three, one.best.value, *one.best.three)
-            for one in self.errors
+            (
+                effect.key,
+                effect.present,
+                effect.unit,
+                *effect.left_out.three,
+                effect.best.value,
+                *effect.best.three,
+            )
+            for effect in self.errors
         ]
         yield Table(
             columns,
             rows,
-            title="Each error alone, all others as they are:",
+            title="Each error alone, all others unchanged:",
             empty="  all errors that act in this loop are zero",
         )
         yield from self._set_blocks()
-        for one in self.errors:
-            if (share := one.best.expanded_uncertainty.get("probability")) is not None:
-                now = f"{one.key} {one.present:.4g} {plus_minus(one.expanded_uncertainty['u95_present'], '.3g')}"
-                yield f"  {now} {one.unit}: best value {one.best.value:.1f} helps with {share:.1%}"
+        for effect in self.errors:
+            probability = effect.best.expanded_uncertainty.get("probability")
+            if probability is not None:
+                u95 = plus_minus(effect.expanded_uncertainty["u95_present"], ".3g")
+                yield (
+                    f"  {effect.key} {effect.present:.4g} {u95} {effect.unit}: best value"
+                    f" {effect.best.value:.1f} improves with probability {probability:.1%}"
+                )
         yield self.bars()
 
     @property
     def _where(self) -> tuple[str, ...]:
-        loop = self.asked.seen_loop
+        loop = self.analysis.evaluated_loop
         return f"{loop} loop", *placed_words(self.scene.view(loop))
 
     @property
@@ -242,7 +262,7 @@ class AdjustResult(Result):
 
     def _set_blocks(self) -> Iterator[Block]:
         if not self.before.max_um:
-            yield "The error is zero everywhere in this loop: there is nothing to repair."
+            yield "The error is zero everywhere in this loop: there is nothing to adjust."
             return
         if not self.adjustments:
             yield "No squareness or alignment acts in this loop; other errors can be adjusted."
@@ -252,15 +272,18 @@ class AdjustResult(Result):
             *number_columns(("mean", "RMS", "P95", "max"), unit="µm"),
             Column("adjust", wraps=True),
         )
-        rows = [(len(one.adjust), *one.four, self._adjustments(one)) for one in self.adjustments]
+        rows = [
+            (len(adjusted.adjust), *adjusted.four, self._adjustments(adjusted))
+            for adjusted in self.adjustments
+        ]
         yield Table(columns, rows, title="Best sets of adjustments:")
         if len(set(self.adjustable.values())) == 1:
-            said = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
+            bounds = f"each by at most ±{next(iter(self.adjustable.values())):g} µm or µrad"
         else:
             each = (f"{key} ±{limit:g}" for key, limit in self.adjustable.items())
-            said = f"by at most {', '.join(each)}"
-        yield f"  adjusted: {', '.join(self.adjustable)}; {said}"
-        sizes = [str(len(one.adjust)) for one in self.adjustments if not one.proven]
+            bounds = f"by at most {', '.join(each)}"
+        yield f"  adjusted: {', '.join(self.adjustable)}; {bounds}"
+        sizes = [str(len(adjusted.adjust)) for adjusted in self.adjustments if not adjusted.proven]
         yield (
             "  all sets compared"
             if not sizes
@@ -268,20 +291,20 @@ class AdjustResult(Result):
             " members swapped as long as that helped"
         )
         name = f"{self.objective}_um"
-        exact = [
-            f"set {len(one.adjust)}: {value:.3f} µm ({round(value - first, 3) + 0.0:+.3f})"
-            for one in self.adjustments
-            if one.exact is not None
-            for value, first in ((getattr(one.exact, name), getattr(one, name)),)
-        ]
+        exact: list[str] = []
+        for adjusted in self.adjustments:
+            if adjusted.exact is not None:
+                um = getattr(adjusted.exact, name)
+                change = round(um - getattr(adjusted, name), 3) + 0.0
+                exact.append(f"set {len(adjusted.adjust)}: {um:.3f} µm ({change:+.3f})")
         if exact:
-            words = f"{self._objective_words} by the exact chain (exact − first order)"
-            yield f"  {words}: {', '.join(exact)}"
+            heading = f"{self._objective_words} by the exact chain (exact − first order)"
+            yield f"  {heading}: {', '.join(exact)}"
 
-    def _adjustments(self, one: AdjustedSet) -> str:
+    def _adjustments(self, adjusted: AdjustedSet) -> str:
         return ", ".join(
             f"{key} {self.present[key]:.4g} → {value:.4g} {parameter(key).unit}"
-            for key, value in one.adjust.items()
+            for key, value in adjusted.adjust.items()
         )
 
     def bars(self) -> Bars:
@@ -303,115 +326,116 @@ class AdjustResult(Result):
             for name, before in zip(("mean_um", "rms_um", "max_um"), self.before.three, strict=True)
         )
         rows = [
-            f"{one.parameter.name}  {one.key}  {spell_short(one.present)} →"
-            f" {spell(one.best.value)} {one.unit}"
-            for one in errors
+            f"{effect.parameter.name}  {effect.key}  {spell_short(effect.present)} →"
+            f" {spell(effect.best.value)} {effect.unit}"
+            for effect in errors
         ]
-        where = (self.scene.machine.title, *self._where, f"{self.asked.grid} nodes per axis")
+        where = (self.scene.machine.title, *self._where, f"{self.analysis.grid} nodes per axis")
         return Bars(
-            f"Repair · {self.scene.title}",
+            f"Adjustment · {self.scene.title}",
             " · ".join(where),
             [*rows, *map(_values, sets)],
             panels,
             legend=(
                 ("before", "before"),
-                ("this error left out", "plain"),
+                ("this error omitted", "plain"),
                 ("this error at its best value", "key"),
                 ("best set of adjustments", "set"),
             ),
         )
 
 
-def repaired(scene: Scene, adjust: Mapping[str, float]) -> Scene:
+def apply_adjustments(scene: Scene, adjust: Mapping[str, float]) -> Scene:
     errors = scene.errors
     for key, value in adjust.items():
         errors = errors.with_amplitude(key, value, scene.axis_span(parameter(key).axis))
-    return replace(scene, title=f"{scene.title}, repaired"[:MAX_TEXT], errors=errors)
+    return replace(scene, title=f"{scene.title}, adjusted"[:MAX_TEXT], errors=errors)
 
 
 def find_adjustments(
     basis: ErrorBasis,
     grid: Grid,
     amplitudes: Array,
-    asked: Adjust,
+    analysis: Adjust,
     scene: Scene,
     watch: ProgressCallback = ignore_progress,
 ) -> AdjustResult:
     volume = Volume(basis, grid, amplitudes)
-    candidates = _candidates(volume, asked)
-    limits = np.array([asked.limit_of(key) for key in basis.keys])
+    candidates = _candidates(volume, analysis)
+    limits = np.array([analysis.limit_of(key) for key in basis.keys])
     low = np.maximum(-limits, -MAX_ERROR - amplitudes)
     high = np.minimum(limits, MAX_ERROR - amplitudes)
     bounds = np.column_stack([np.minimum(low, 0.0), np.maximum(high, 0.0)])
     off = bool(np.any(volume.error_um))
-    count = asked.count
+    count = analysis.count
     sets: list[AdjustedSet] = []
-    search = Search(volume, asked.objective, bounds)
-    for found, proven in search.best_sets(candidates if off else (), count):
-        values = amplitudes[list(found.indices)] + found.change
-        adjust = {basis.keys[i]: float(v) for i, v in zip(found.indices, values, strict=True)}
-        numbers = volume.statistics(volume.changed(found.indices, values))
+    search = Search(volume, analysis.objective, bounds)
+    for best, proven in search.best_sets(candidates if off else (), count):
+        values = amplitudes[list(best.indices)] + best.change
+        adjust = {basis.keys[i]: float(v) for i, v in zip(best.indices, values, strict=True)}
+        numbers = volume.statistics(volume.changed(best.indices, values))
         sets.append(AdjustedSet(*numbers.four, adjust=adjust, proven=proven, exact=None))
         watch(len(sets) / (count + 1))
-    errors = [_effect(search, index) for index in volume.acting if amplitudes[index] != 0.0]
-    wanted = f"{asked.objective}_um"
+    errors = [_effect(search, index) for index in volume.active_indices if amplitudes[index] != 0.0]
+    objective = f"{analysis.objective}_um"
     keys = [basis.keys[index] for index in candidates]
     return AdjustResult(
-        asked=asked,
+        analysis=analysis,
         scene=scene,
         before=Summary(*volume.statistics(amplitudes).four),
-        errors=tuple(sorted(errors, key=lambda one: round(getattr(one.best, wanted), 6))),
+        errors=tuple(sorted(errors, key=lambda effect: round(getattr(effect.best, objective), 6))),
         adjustments=tuple(sets),
-        adjustable={key: asked.limit_of(key) for key in keys},
+        adjustable={key: analysis.limit_of(key) for key in keys},
         present={key: float(amplitudes[i]) for key, i in zip(keys, candidates, strict=True)},
     )
 
 
-def _with_doubt(found: AdjustResult, before: FieldUncertainty, basis: ErrorBasis) -> AdjustResult:
-    def sure(adjust: Mapping[str, float]) -> Numbers:
-        values = amplitudes_of(repaired(found.scene, adjust).errors, basis.keys)
+def _with_uncertainty(
+    result: AdjustResult, before: FieldUncertainty, basis: ErrorBasis
+) -> AdjustResult:
+    def u95_after(adjust: Mapping[str, float]) -> ExpandedUncertainty[float | None]:
+        values = amplitudes_of(apply_adjustments(result.scene, adjust).errors, basis.keys)
         after = replace(before, error_um=basis.evaluate(values, orientation=False).error_um)
-        helps = (
-            {"probability": before.probability_of_improvement(after, f"{found.objective}_um")}
-            if adjust
-            else {}
-        )
-        return {**after.with_expanded_uncertainty(found.before).expanded_uncertainty, **helps}
+        u95 = after.with_expanded_uncertainty(result.before).expanded_uncertainty
+        if adjust:
+            objective = f"{result.objective}_um"
+            u95["probability"] = before.probability_of_improvement(after, objective)
+        return u95
 
-    def sure_effect(one: Effect) -> Effect:
-        best = replace(one.best, expanded_uncertainty=sure({one.key: one.best.value}))
-        return replace(
-            one, best=best, expanded_uncertainty={"u95_present": before.errors.u95_of(one.key)}
-        )
+    def effect_with_u95(effect: Effect) -> Effect:
+        best = replace(effect.best, expanded_uncertainty=u95_after({effect.key: effect.best.value}))
+        present = ExpandedUncertainty(u95_present=before.errors.u95_of(effect.key))
+        return replace(effect, best=best, expanded_uncertainty=present)
 
     return replace(
-        found,
-        before=replace(found.before, expanded_uncertainty=sure({})),
-        errors=tuple(map(sure_effect, found.errors)),
+        result,
+        before=replace(result.before, expanded_uncertainty=u95_after({})),
+        errors=tuple(map(effect_with_u95, result.errors)),
         adjustments=tuple(
-            replace(one, expanded_uncertainty=sure(one.adjust)) for one in found.adjustments
+            replace(step, expanded_uncertainty=u95_after(step.adjust))
+            for step in result.adjustments
         ),
     )
 
 
-def _candidates(volume: Volume, asked: Adjust) -> tuple[int, ...]:
+def _candidates(volume: Volume, analysis: Adjust) -> tuple[int, ...]:
     keys = volume.basis.keys
-    acting = [keys[index] for index in volume.acting]
-    if ALL in asked.adjustable:
-        places = volume.acting
-    elif not asked.adjustable:
-        places = tuple(i for i in volume.acting if parameter(keys[i]).is_constant)
+    active = [keys[index] for index in volume.active_indices]
+    if ALL in analysis.adjustable:
+        places = volume.active_indices
+    elif not analysis.adjustable:
+        places = tuple(i for i in volume.active_indices if parameter(keys[i]).is_constant)
     else:
-        for key in asked.adjustable:
-            if key not in acting:
+        for key in analysis.adjustable:
+            if key not in active:
                 parameter(key)
                 raise OptionError(
                     f"{{adjustable}} {key}: it moves no point in this loop; expected some of"
-                    f" {', '.join(acting) or 'none'}"
+                    f" {', '.join(active) or 'none'}"
                 )
-        places = tuple(sorted({keys.index(key) for key in asked.adjustable}))
+        places = tuple(sorted({keys.index(key) for key in analysis.adjustable}))
     tried = [keys[index] for index in places]
-    for key, limit in asked.limit:
+    for key, limit in analysis.limit:
         if key not in (ALL, *tried):
             raise OptionError(
                 f"{{limit}} of {key}: it is not among the errors that are adjusted"
@@ -428,20 +452,20 @@ def _candidates(volume: Volume, asked: Adjust) -> tuple[int, ...]:
 def _effect(search: Search, index: int) -> Effect:
     volume = search.volume
     indices, present = (index,), float(volume.amplitudes[index])
-    found = search.least(indices)
-    best = np.array([present]) + (np.zeros(1) if found is None else found.change)
-    out, then = (
+    optimum = search.least(indices)
+    best = np.array([present]) + (np.zeros(1) if optimum is None else optimum.change)
+    out, improved = (
         volume.statistics(volume.changed(indices, values)).four for values in (np.zeros(1), best)
     )
     return Effect(
         key=volume.basis.keys[index],
         present=present,
         left_out=Summary(*out),
-        best=Best(*then, value=float(best[0])),
+        best=Best(*improved, value=float(best[0])),
     )
 
 
-def _values(one: AdjustedSet) -> str:
-    if len(one.adjust) > MOST_VALUES:
-        return f"{len(one.adjust)} adjusted: {', '.join(one.adjust)}"
-    return ", ".join(f"{key} → {spell(value)}" for key, value in one.adjust.items())
+def _values(adjusted: AdjustedSet) -> str:
+    if len(adjusted.adjust) > MOST_VALUES:
+        return f"{len(adjusted.adjust)} adjusted: {', '.join(adjusted.adjust)}"
+    return ", ".join(f"{key} → {spell(value)}" for key, value in adjusted.adjust.items())

@@ -1,4 +1,4 @@
-"""The widest tolerances that keep a limit of |E| with a given probability."""
+"""Allocation of tolerances: the widest that keep a limit of |E| with a required probability."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -70,7 +70,6 @@ class Allocate(KeptLimit):
         low=LIMIT_UM[0],
         high=LIMIT_UM[1],
         flag="--limit",
-        former=("--limit-um", "--spec-um"),
         required=True,
     )
     probability: float = option(
@@ -84,23 +83,23 @@ class Allocate(KeptLimit):
         "Cost of an error's tolerance, 1 if not given: a half width w costs NUMBER/w",
         flag="--cost",
     )
-    fixed: Fixed = option((), "Errors whose tolerance stays as it is")
+    fixed: Fixed = option((), "Errors whose tolerance stays unchanged")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "AllocateResult":
         case = self.case(scene, self.plan_of(self.limit_um))
         return replace(allocate(case, self, count_progress(watch, 1.0)), scene=scene)
 
-    def check_keys(self, known: Sequence[str]) -> None:
+    def check_keys(self, allowed: Sequence[str]) -> None:
         for key in (*dict(self.costs), *self.fixed):
-            if key not in known:
-                raise UnknownNameError("error parameter", key, known)
+            if key not in allowed:
+                raise UnknownNameError("error parameter", key, allowed)
         for key, cost in self.costs:
             if not COST[0] <= cost <= COST[1]:
                 raise OptionError(
                     f"{{costs}} of {key}: {cost:g}; expected {COST[0]:g} to {COST[1]:g}"
                 )
-        if both := sorted({*self.fixed}.intersection(dict(self.costs))):
-            raise OptionError(f"{both[0]}: has a cost and is fixed; expected one of both")
+        for key in sorted({*self.fixed}.intersection(dict(self.costs))):
+            raise OptionError(f"{key}: has a cost and is fixed; expected one of the two")
 
 
 class Exact(NamedTuple):
@@ -110,20 +109,20 @@ class Exact(NamedTuple):
     probability: float
     first_order: float  # probability on the same machines
 
-    def words(self) -> str:
+    def verdict(self) -> str:
         change = f"{100.0 * (self.probability - self.first_order):+.2f}"
-        beside = f"{change} % against" if float(change) else "as many as to"
+        comparison = f"{change} % against" if float(change) else "as many as to"
         return (
             f"exact chain: {100.0 * self.probability:.2f} % of {self.machines:,} of these machines,"
-            f" {beside} the first order"
+            f" {comparison} the first order"
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class AllocateResult(Result):
-    """Tolerances that keep a limit, and how sure that is."""
+    """Allocated tolerances, and the probability that the limit is kept."""
 
-    asked: Allocate
+    analysis: Allocate
     scene: Scene | None = None
     draws: Draws  # the tolerances before
     half_width: Array  # [K], µm or µrad; after, in the order of `draws.keys`
@@ -146,17 +145,17 @@ class AllocateResult(Result):
 
     @property
     def at_widest(self) -> tuple[str, ...]:
-        """Parameters that got the largest half width there is."""
+        """Parameters with the largest half width allowed."""
         return tuple(key for key, width in self.tolerances.items() if width >= self.widest)
 
-    def as_plain(self) -> dict[str, Any]:
-        asked = self.asked
+    def json_fields(self) -> dict[str, Any]:
+        analysis = self.analysis
         return {
-            "limit_um": asked.limit_um,
-            "wanted": asked.probability,
-            "loop": str(asked.loop),
-            "over": asked.over,
-            "distribution": str(asked.drawn),
+            "limit_um": analysis.limit_um,
+            "wanted": analysis.probability,
+            "loop": str(analysis.loop),
+            "over": analysis.over,
+            "distribution": str(analysis.drawn),
             "tolerances": dict(zip(self.draws.keys, self.half_width.tolist(), strict=True)),
             "allocated": list(self.tolerances),
             "probability": self.after.probability,
@@ -177,10 +176,10 @@ class AllocateResult(Result):
         return [Change("tolerances allocated", replace(self.scene, tolerances=tolerances))]
 
     def blocks(self) -> Iterator[Block]:
-        asked, draws = self.asked, self.draws
+        analysis, draws = self.analysis, self.draws
         title = () if self.scene is None else (self.scene.title,)
         yield " · ".join(
-            (*title, f"{asked.loop} loop", str(asked.drawn), f"evaluated {asked.where}")
+            (*title, f"{analysis.loop} loop", str(analysis.drawn), f"evaluated {analysis.where}")
         )
         columns = (
             Column("key", leads=True),
@@ -201,61 +200,63 @@ class AllocateResult(Result):
             ],
         )  # fmt: skip
         yield (
-            f"  |E| ≤ {asked.limit_um:g} µm before: {100.0 * self.before.probability:.2f} % of the"
-            f" machines, cost {self.cost_before:.3g}"
+            f"  |E| ≤ {analysis.limit_um:g} µm before: {100.0 * self.before.probability:.2f} %"
+            f" of the machines, cost {self.cost_before:.3g}"
         )
         yield (
-            f"  |E| ≤ {asked.limit_um:g} µm after: {100.0 * self.after.probability:.2f} % of the"
+            f"  |E| ≤ {analysis.limit_um:g} µm after: {100.0 * self.after.probability:.2f} % of the"
             f" machines, 95 % interval {100.0 * self.after.low:.2f} …"
             f" {100.0 * self.after.high:.2f} %, cost {self.cost_after:.3g}"
             f" ({self.samples:,} machines)"
         )
-        yield f"  {self.exact.words()}"
+        yield f"  {self.exact.verdict()}"
 
     def _note(self, key: str, *, zero: bool, free: bool) -> str:
         if not free:
-            return "fixed" if key in self.asked.fixed else "zero" if zero else "no effect"
+            return "fixed" if key in self.analysis.fixed else "zero" if zero else "no effect"
         if key in self.at_widest:
-            return "the widest there is"
-        cost = dict(self.asked.costs).get(key)
+            return "widest allowed"
+        cost = dict(self.analysis.costs).get(key)
         return "" if cost is None else f"cost {cost:g}"
 
 
 def allocate(
     case: Case,
-    asked: Allocate,
+    analysis: Allocate,
     report: Progress = lambda _: None,
     widest: float = MAX_HALF_WIDTH,
 ) -> AllocateResult:
     """Find the tolerances of least cost that keep a limit with a probability."""
-    asked.check_keys(case.model.machine.allowed_keys)
-    draws, plan = case.draws, replace(case.plan, spec_um=asked.limit_um)
+    analysis.check_keys(case.model.machine.allowed_keys)
+    draws, plan = case.draws, replace(case.plan, spec_um=analysis.limit_um)
     plan.check()
     if plan.over == Over.MEAN:
         raise OptionError("{over} mean: expected sampled or max")
     if plan.over == Over.MAX:
         tolerance_search.refuse_many_points(case.view.loop)
-    needed = machines_needed(plan.samples, asked.probability)
+    needed = machines_needed(plan.samples, analysis.probability)
     if needed > plan.samples:
         raise OptionError(
             f"{{samples}}: {plan.samples:,} machines are too few to show that"
-            f" {100.0 * asked.probability:g} % keep a limit (lower end of the 95 % interval)"
+            f" {100.0 * analysis.probability:g} % keep a limit (lower end of the 95 % interval)"
         )
     case = replace(case, plan=plan)
     # the search has machines of its own
     seed = int(np.random.SeedSequence((plan.seed, 1)).generate_state(1)[0])
-    few = replace(plan, samples=tolerance_search.SAMPLES, seed=seed)
-    task = _task(draws, asked, tolerance_search.build_ensemble(replace(case, plan=few)), widest)
+    coarse = replace(plan, samples=tolerance_search.SAMPLES, seed=seed)
+    task = _task(
+        draws, analysis, tolerance_search.build_ensemble(replace(case, plan=coarse)), widest
+    )
     steps: list[None] = []
 
     def step() -> None:
         steps.append(None)
         report(SEARCHED / tolerance_search.MOST_STEPS)
 
-    found = tolerance_search.search_widths(task, step)
+    widths = tolerance_search.search_widths(task, step)
     report(SEARCHED * (1.0 - len(steps) / tolerance_search.MOST_STEPS))
-    scale = _new_scales(case, asked.limit_um, needed / plan.samples, report)
-    found = None if found is None else tolerance_search.scaled(task, found, scale)
+    scale = _new_scales(case, analysis.limit_um, needed / plan.samples, report)
+    widths = None if widths is None else tolerance_search.scaled(task, widths, scale)
 
     def probability(half: Array, share: float) -> Probability:
         drawn = replace(case, draws=replace(draws, half_width=half))
@@ -263,13 +264,13 @@ def allocate(
         assert result.probability is not None  # noqa: S101 - the plan has a limit
         return result.probability
 
-    if found is None:
+    if widths is None:
         raise OptionError(_why_not(task))
     before = probability(draws.half_width, CHECKED / 2.0)
-    half_width = np.where(task.free, round_down(found), draws.half_width)
+    half_width = np.where(task.free, round_down(widths), draws.half_width)
     after = probability(half_width, CHECKED / 2.0)
     for _ in range(TRIES):
-        if after.low >= asked.probability:
+        if after.low >= analysis.probability:
             break
         half_width = np.where(task.free, round_down(NARROWER * half_width), draws.half_width)
         after = probability(half_width, 0.0)
@@ -277,11 +278,11 @@ def allocate(
         raise OptionError(_why_not(task))
     orders = both_orders(replace(case, draws=replace(draws, half_width=half_width)), EXACT_MACHINES)
     first, exact = (
-        float(np.mean(np.linalg.norm(each, axis=-1).max(axis=-1) <= asked.limit_um))
+        float(np.mean(np.linalg.norm(each, axis=-1).max(axis=-1) <= analysis.limit_um))
         for each in orders
     )
     return AllocateResult(
-        asked=asked,
+        analysis=analysis,
         draws=draws,
         half_width=half_width,
         free=task.free,
@@ -298,37 +299,37 @@ def allocate(
 
 
 def round_down(widths: Array) -> Array:
-    """Round positive numbers down to `DIGITS` significant digits; what is rounded already stays."""
-    found = np.zeros_like(widths)
+    """Round positive numbers down to `DIGITS` significant digits."""
+    rounded = np.zeros_like(widths)
     for index, width in enumerate(widths):
         if width > 0.0:
             places = DIGITS - 1 - math.floor(math.log10(width))
             nearest = round(float(width), places)
             step = 10.0**-places
-            found[index] = nearest if nearest <= width else round(nearest - step, places)
-    return found
+            rounded[index] = nearest if nearest <= width else round(nearest - step, places)
+    return rounded
 
 
 def _task(
-    draws: Draws, asked: Allocate, ensemble: tolerance_search.Ensemble, widest: float
+    draws: Draws, analysis: Allocate, ensemble: tolerance_search.Ensemble, widest: float
 ) -> tolerance_search.Task:
     moves = ensemble.mean_square_gain > NO_EFFECT
-    fixed = np.array([key in asked.fixed for key in draws.keys])
+    fixed = np.array([key in analysis.fixed for key in draws.keys])
     free = moves & (draws.half_width > 0.0) & ~fixed
     if not free.any():
         raise OptionError(
             "nothing to allocate: every tolerance is fixed, zero, or without effect on the error in"
             " this loop; expected one or more that are free"
         )
-    costs = dict(asked.costs)
+    costs = dict(analysis.costs)
     return tolerance_search.Task(
         ensemble,
         draws.centre,
         draws.half_width,
         free,
         np.array([costs.get(key, 1.0) for key in draws.keys]),
-        asked.limit_um,
-        asked.probability,
+        analysis.limit_um,
+        analysis.probability,
         widest,
     )
 
@@ -355,18 +356,18 @@ def _new_scales(
                 base_um, np.einsum("nk,ckn->cn", move, gains), limit_um
             )
 
-        found: list[Array] = []
+        scales: list[Array] = []
         for part in sample_chunks(chunk, case.plan):
-            found.append(part)
+            scales.append(part)
             report(WIDENED * len(part) / case.plan.samples)
-        return tolerance_search.largest_scale(np.concatenate(found), share)
+        return tolerance_search.largest_scale(np.concatenate(scales), share)
 
     return scale
 
 
 def _why_not(task: tolerance_search.Task) -> str:
-    held = np.where(task.free, 0.0, task.half_width)
-    norm = task.ensemble.norm_um(task.centre, held)
+    fixed = np.where(task.free, 0.0, task.half_width)
+    norm = task.ensemble.norm_um(task.centre, fixed)
     share = float(np.mean(norm <= task.limit_um))
     return (
         f"no tolerance, however narrow, keeps {task.limit_um:g} µm on"

@@ -1,4 +1,4 @@
-"""Several machines side by side with the same tolerances, to choose between concepts."""
+"""Comparison of machine concepts with the same tolerances."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ LETTERS = ascii_uppercase[:MOST_CONCEPTS]  # what the machines are called, in th
 
 @dataclass(frozen=True, slots=True)
 class Concept:
-    """One machine among others."""
+    """One machine of a comparison."""
 
     scene: Scene  # with the tolerances that were taken, its errors absolute
     sampled: SampleStatistics  # |E| of machines within tolerance
@@ -47,8 +47,8 @@ class Concept:
         return self.shares.rows[:NAMED]
 
     @property
-    def said(self) -> dict[str, Any]:
-        sampled, kept = self.sampled, self.sampled.probability
+    def json_fields(self) -> dict[str, Any]:
+        sampled, probability = self.sampled, self.sampled.probability
         return {
             "scene": self.scene.name,
             "title": self.scene.title,
@@ -56,9 +56,9 @@ class Concept:
             "mean_um": sampled.mean_um,
             "p95_um": sampled.p95_um,
             "max_um": sampled.max_um,
-            "probability": None if kept is None else kept.probability,
-            "low": None if kept is None else kept.low,
-            "high": None if kept is None else kept.high,
+            "probability": None if probability is None else probability.probability,
+            "low": None if probability is None else probability.low,
+            "high": None if probability is None else probability.high,
             "rms_um": self.shares.rms_um,
             "errors": [
                 {
@@ -95,12 +95,11 @@ class Concepts(KeptLimit):
     )
     limit_um: float | None = option(
         None,
-        "Of |E|, to say how likely it is kept",
+        "Limit of |E|, for the probability that it is kept",
         unit="µm",
         low=LIMIT_UM[0],
         high=LIMIT_UM[1],
         flag="--limit",
-        former=("--limit-um", "--spec-um"),
     )
     own_tolerances: bool = option(
         False, "Each scene with its own tolerances instead of those of the first one by class"
@@ -111,49 +110,49 @@ class Concepts(KeptLimit):
 
     def run_all(self, scenes: Sequence[Scene], watch: ProgressCallback, /) -> "ConceptsResult":
         progress = count_progress(watch, self.samples * len(scenes))
-        found = compare_concepts(scenes, self, progress=progress)
-        left_out = sampled_second_order(*((one.scene, one.sampled) for one in found))
-        return ConceptsResult(asked=self, concepts=found, second_order=left_out)
+        concepts = compare_concepts(scenes, self, progress=progress)
+        left_out = sampled_second_order(*((concept.scene, concept.sampled) for concept in concepts))
+        return ConceptsResult(analysis=self, concepts=concepts, second_order=left_out)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConceptsResult(Result):
     """Machines side by side."""
 
-    asked: Concepts
+    analysis: Concepts
     concepts: tuple[Concept, ...]
 
-    def as_plain(self) -> dict[str, Any]:
-        asked = self.asked
+    def json_fields(self) -> dict[str, Any]:
+        analysis = self.analysis
         default = dict(self.concepts[0].scene.tolerances.default)
         return {
-            "loop": str(asked.loop),
-            "over": asked.over,
-            "distribution": str(asked.drawn),
-            "samples": asked.samples,
-            "seed": asked.seed,
-            "limit_um": asked.limit_um,
-            "own_tolerances": asked.own_tolerances,
-            "tolerances": None if asked.own_tolerances else default,
-            "concepts": [concept.said for concept in self.concepts],
+            "loop": str(analysis.loop),
+            "over": analysis.over,
+            "distribution": str(analysis.drawn),
+            "samples": analysis.samples,
+            "seed": analysis.seed,
+            "limit_um": analysis.limit_um,
+            "own_tolerances": analysis.own_tolerances,
+            "tolerances": None if analysis.own_tolerances else default,
+            "concepts": [concept.json_fields for concept in self.concepts],
         }
 
     def blocks(self) -> Iterator[Block]:
-        asked, first = self.asked, self.concepts[0].scene
+        analysis, first = self.analysis, self.concepts[0].scene
         default = ", ".join(f"{name} ±{v:g}" for name, v in first.tolerances.default.items())
         tolerances = f"the tolerances of {first.name}: {default} (µm, µrad)"
-        if asked.own_tolerances:
+        if analysis.own_tolerances:
             tolerances = "each with its own tolerances"
-        words = f"{asked.loop} loop · evaluated {asked.where} · {asked.drawn}"
-        yield f"{words} · {tolerances}"
+        heading = f"{analysis.loop} loop · evaluated {analysis.where} · {analysis.drawn}"
+        yield f"{heading} · {tolerances}"
         lettered = zip(LETTERS, self.concepts, strict=False)
-        yield Table(self._columns(), [self._row(*one) for one in lettered])
+        yield Table(self._columns(), [self._row(*pair) for pair in lettered])
         means = [concept.sampled.mean_um for concept in self.concepts]
         if len(set(means)) > 1:
             yield f"  {LETTERS[means.index(min(means))]} has the smallest mean, {min(means):.2f} µm"
 
     def _columns(self) -> tuple[Column, ...]:
-        limit = self.asked.limit_um
+        limit = self.analysis.limit_um
         ranks = range(1, NAMED + 1)
         named = [name for rank in ranks for name in (f"error_{rank}", f"error_{rank}_share")]
         return (
@@ -166,12 +165,12 @@ class ConceptsResult(Result):
             Column(key="limit_um", shows=False),
             Column(key="probability", shows=False),
             Column(f"≤ {limit or 0.0:g} µm", ".2f", "%", shows=limit is not None),
-            Column("matter most", unit="share of the variance", wraps=True),
+            Column("largest contributions", unit="share of the variance", wraps=True),
             *(Column(key=name, shows=False) for name in named),
         )
 
     def _row(self, letter: str, concept: Concept) -> tuple[Any, ...]:
-        sampled, kept, scene = concept.sampled, concept.sampled.probability, concept.scene
+        sampled, probability, scene = concept.sampled, concept.sampled.probability, concept.scene
         leading = [value for row in concept.leading for value in (row.key, row.share)]
         return (
             letter,
@@ -180,9 +179,9 @@ class ConceptsResult(Result):
             str(scene.machine.chain),
             str(sampled.view.loop),
             *(sampled.mean_um, sampled.p95_um, sampled.max_um),
-            None if kept is None else kept.spec_um,
-            None if kept is None else kept.probability,
-            None if kept is None else 100.0 * kept.probability,
+            None if probability is None else probability.spec_um,
+            None if probability is None else probability.probability,
+            None if probability is None else 100.0 * probability.probability,
             ", ".join(f"{row.key} {100.0 * row.share:.0f} %" for row in concept.leading),
             *leading,
             *[None] * (2 * NAMED - len(leading)),
@@ -191,29 +190,34 @@ class ConceptsResult(Result):
 
 def compare_concepts(
     scenes: Sequence[Scene],
-    asked: Concepts | None = None,
+    analysis: Concepts | None = None,
     *,
     progress: Progress | None = None,
 ) -> tuple[Concept, ...]:
-    asked = asked or Concepts()
-    found: list[Concept] = []
-    for scene in with_equal_tolerances(scenes, own=asked.own_tolerances):
-        case = asked.case(scene, asked.plan_of(asked.limit_um))
+    analysis = analysis or Concepts()
+    concepts: list[Concept] = []
+    for scene in with_equal_tolerances(scenes, own_tolerances=analysis.own_tolerances):
+        case = analysis.case(scene, analysis.plan_of(analysis.limit_um))
         if not case.draws.variance.any():
-            problem = f"tolerances: none of the {asked.loop} loop has a width; expected one above 0"
+            problem = (
+                f"tolerances: none of the {analysis.loop} loop has a width; expected one above 0"
+            )
             raise SceneError(scene.name, [problem])
-        found.append(Concept(scene, montecarlo(case, progress), variance_contributions(case)))
-    return tuple(found)
+        concepts.append(Concept(scene, montecarlo(case, progress), variance_contributions(case)))
+    return tuple(concepts)
 
 
-def with_equal_tolerances(scenes: Sequence[Scene], *, own: bool = False) -> tuple[Scene, ...]:
-    """Give scenes the tolerances of the first one by class, and no point held still."""
+def with_equal_tolerances(
+    scenes: Sequence[Scene], *, own_tolerances: bool = False
+) -> tuple[Scene, ...]:
+    """Return scenes, errors absolute, with the tolerances of the first one by class."""
     absolute = [replace(scene, reference=None, placed=False) for scene in scenes]
-    if own or not scenes:
+    if own_tolerances or not scenes:
         return tuple(absolute)
     default = scenes[0].tolerances.default
     needed = {parameter(key).tolerance_class for scene in scenes for key in scene.parameter_keys}
-    if missing := [name for name in TOLERANCE_CLASSES if name in needed and name not in default]:
+    missing = [name for name in TOLERANCE_CLASSES if name in needed and name not in default]
+    if missing:
         problem = (
             f"tolerances.default has no {', '.join(missing)}; expected a half width for each class,"
             " which all machines then have (--own-tolerances takes those of each scene)"

@@ -1,4 +1,4 @@
-"""Which part of the volume keeps a limit: its share, and the largest box that does."""
+"""Conformance share: the part of the volume within a limit, and the largest box within it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
-from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+)
 from warpspace.analysis.options import LOOP_HELP, option
 from warpspace.analysis.statistics import share_below, share_within
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
@@ -52,33 +57,38 @@ class Conformance(Analysis):
         keeps = field.norm_um <= self.limit_um
         ranges = scene.workspace.ranges
         lengths = [float(np.ptp(ranges[axis])) if axis else 0.0 for axis in axes]
-        found = largest_box(keeps, lengths)
+        box_nodes = largest_box(keeps, lengths)
         watch(0.9)
         box = None
-        if found is not None:
+        if box_nodes is not None:
             box = {
                 axis: _span(ranges[axis], ends, count)
-                for axis, ends, count in zip(axes, found, keeps.shape, strict=True)
+                for axis, ends, count in zip(axes, box_nodes, keeps.shape, strict=True)
                 if axis
             }
-        sure = field_uncertainty(scene, field.error_um, grid.coordinates, view, grid.point_mm)
+        uncertainty = field_uncertainty(
+            scene, field.error_um, grid.coordinates, view, grid.point_mm
+        )
 
-        def ask(error_um: Array) -> Array:
+        def shares(error_um: Array) -> Array:
             moved = replace(field, error_um=error_um)
             keeps = (share_within(moved, part) for part in SHARES)
             return np.array([100.0 * share_below(moved, self.limit_um), *keeps])
 
-        percent, *keeps_um = ask(field.error_um).tolist()
-        u95, *u95_um = sure.propagate(ask) if sure else [None] * (1 + len(SHARES))
+        percent, *keeps_um = shares(field.error_um).tolist()
+        u95, *u95_um = uncertainty.propagate(shares) if uncertainty else [None] * (1 + len(SHARES))
         names = [f"{part:.0%}" for part in SHARES]
-        told = {"u95_percent": u95, "u95_keeps_um": dict(zip(names, u95_um, strict=True))}
+        expanded = ExpandedUncertainty[Any]()
+        if uncertainty:
+            expanded["u95_percent"] = u95
+            expanded["u95_keeps_um"] = dict(zip(names, u95_um, strict=True))
         return ConformanceResult(
             limit_um=self.limit_um,
             percent=percent,
             box=box,
             keeps_um=dict(zip(names, keeps_um, strict=True)),
-            expanded_uncertainty=told if sure else {},
-            uncertainty=sure and sure.errors,
+            expanded_uncertainty=expanded,
+            uncertainty=uncertainty and uncertainty.errors,
             title=scene.title,
             ranges={axis: ranges[axis] for axis in axes if axis},
         )
@@ -86,14 +96,14 @@ class Conformance(Analysis):
 
 @dataclass(frozen=True, kw_only=True)
 class ConformanceResult(Result):
-    """The part of a volume that keeps a limit."""
+    """Part of a volume within a limit."""
 
-    keys = ("limit_um", "percent", "box", "keeps_um")
+    json_keys = ("limit_um", "percent", "box", "keeps_um", "expanded_uncertainty")
     limit_um: float
     percent: float  # of the volume
     box: Mapping[str, tuple[float, float]] | None  # axis ranges, mm or degrees
     keeps_um: Mapping[str, float]  # limit by part of the volume
-    expanded_uncertainty: Mapping[str, Any]  # U95 of percent and of these
+    expanded_uncertainty: ExpandedUncertainty[Any]  # of percent and of these
     title: str
     ranges: Mapping[str, tuple[float, float]]
 
@@ -128,26 +138,26 @@ class ConformanceResult(Result):
                 (*row, plus_minus(self.expanded_uncertainty["u95_keeps_um"][row[0]]))
                 for row in rows
             ]
-        yield Table(columns, rows, title="What parts of the volume keep:")
+        yield Table(columns, rows, title="Limits kept by parts of the volume:")
 
 
 def largest_box(
     keeps: NDArray[np.bool_], lengths: list[float]
 ) -> tuple[tuple[int, int], ...] | None:
-    """Find the largest box whose nodes all keep a limit, [x, y, z]: first and last node an axis."""
-    best, found = 0.0, None
+    """Find the largest box whose nodes are all within a limit: first and last node of each axis."""
+    largest, box = 0.0, None
     steps = [length / max(count - 1, 1) for length, count in zip(lengths, keeps.shape, strict=True)]
     pairs = [[(i, j) for i in range(n) for j in range(i + (n > 1), n)] for n in keeps.shape]
     for x in pairs[0]:
         slab = np.all(keeps[x[0] : x[1] + 1], axis=0)
         for y in pairs[1]:
             size = _extent(x, steps[0]) * _extent(y, steps[1])
-            if size * max(lengths[2], 1.0) <= best:
+            if size * max(lengths[2], 1.0) <= largest:
                 continue
             z = _longest_run(np.all(slab[y[0] : y[1] + 1], axis=0))
-            if z is not None and size * _extent(z, steps[2]) > best:
-                best, found = size * _extent(z, steps[2]), (x, y, z)
-    return found
+            if z is not None and size * _extent(z, steps[2]) > largest:
+                largest, box = size * _extent(z, steps[2]), (x, y, z)
+    return box
 
 
 def _longest_run(row: NDArray[np.bool_]) -> tuple[int, int] | None:

@@ -1,4 +1,4 @@
-"""What each parameter contributes: its tolerance to the variance, its error to that of a point."""
+"""Contributions of parameters: tolerances to the variance, errors to the error of a point."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -37,7 +37,7 @@ DEFAULT_SOBOL, MAX_SOBOL = 1024, 65_536
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """What one parameter's tolerance adds."""
+    """Contribution of the tolerance of one parameter."""
 
     key: str
     half_width: float  # µm or µrad
@@ -101,11 +101,11 @@ def _sampled_variance(case: Case) -> Array:
     centred = values - values.mean(axis=0)
     spread = centred.var(axis=0)
     spread = np.where(spread > 0.0, spread, 1.0)
-    found = np.zeros(len(draws.keys))
+    contributions = np.zeros(len(draws.keys))
     for gain in gains:
         covariance = centred.T @ (values @ gain) / CHECK_MACHINES
-        found += np.mean(covariance**2, axis=1) / spread
-    return found
+        contributions += np.mean(covariance**2, axis=1) / spread
+    return contributions
 
 
 def _sobol(case: Case, base: int) -> Mapping[str, tuple[float, float, float]]:
@@ -130,8 +130,8 @@ def _sobol(case: Case, base: int) -> Mapping[str, tuple[float, float, float]]:
     ).common_places()
     gains = case.responses(places)
     result = reduce_nodes(draws.from_unit(unit), gains, Over.MEAN, places.weights)
-    found = analysis.analyze(problem, result, calc_second_order=False, seed=seed)
-    columns = zip(found["S1"], found["ST"], found["ST_conf"], strict=True)
+    indices = analysis.analyze(problem, result, calc_second_order=False, seed=seed)
+    columns = zip(indices["S1"], indices["ST"], indices["ST_conf"], strict=True)
     return {
         draws.keys[index]: (float(first), float(total), float(spread))
         for index, (first, total, spread) in zip(wide, columns, strict=True)
@@ -165,17 +165,17 @@ class Contributions(Sampled):
             raise OptionError(f"{{sobol}} {self.sobol}; expected a power of two, 2 or above")
         plan = SamplingPlan(seed=self.seed, cylinder=self.cylinder)
         plan.check()
-        found = variance_contributions(self.case(scene, plan), self.sobol)
+        result = variance_contributions(self.case(scene, plan), self.sobol)
         watch(1.0)
-        where = f"{self.loop} loop · {self.drawn} · RMS |E| {found.rms_um:.1f} µm"
-        return replace(found, title=scene.title, where=where)
+        where = f"{self.loop} loop · {self.drawn} · RMS |E| {result.rms_um:.1f} µm"
+        return replace(result, title=scene.title, where=where)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContributionsResult(Result):
     """Shares of the variance by parameter, largest first."""
 
-    keys = ("contributions", "variance_um2", "rms_um")
+    json_keys = ("contributions", "variance_um2", "rms_um")
     contributions: tuple[Share, ...]
     # µm²; trace(J Σ Jᵀ) averaged over the points: the variance of E between machines
     variance_um2: float
@@ -208,7 +208,7 @@ class ContributionsResult(Result):
         ]  # fmt: skip
         yield f"{self.title} · {self.where}"
         yield Table(columns, cells)
-        title = f"Which tolerances matter · {self.title}"
+        title = f"Contributions of tolerances · {self.title}"
         yield share_bars(self.rows, title, self.where)
 
 
@@ -245,7 +245,7 @@ def share_bars(rows: tuple[Share, ...], title: str, subtitle: str) -> Bars:
 
 @dataclass(frozen=True, slots=True)
 class PointContribution:
-    """What one parameter does to one point."""
+    """Contribution of one parameter to the error of one point."""
 
     key: str  # parameter key
     value: float  # µm or µrad; the error at the point's axis position
@@ -259,7 +259,7 @@ class PointContribution:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """The error of one point, taken apart."""
+    """Budget of the error of one point."""
 
     nominal_mm: Array  # [3]
     error_um: Array  # [3]; from the exact chain
@@ -286,7 +286,7 @@ def explain(
     total = vectors.sum(axis=0)
     length = float(np.linalg.norm(total))
     towards = total / length if length > 0.0 else np.zeros(3)
-    found = columns(model, view.loop, keys, coordinates, point)
+    responses = columns(model, view.loop, keys, coordinates, point)
     values = error_values(model, errors, coordinates)
     parts = [
         PointContribution(
@@ -294,12 +294,12 @@ def explain(
             float(values[key]),
             vector,
             float(vector @ towards),
-            found[key].direction,
-            point - found[key].lever_mm,
-            found[key].lever_mm,
+            responses[key].direction,
+            point - responses[key].lever_mm,
+            responses[key].lever_mm,
         )
         for key, vector in zip(keys, vectors, strict=True)
-        if key in found and np.any(vector != 0.0)
+        if key in responses and np.any(vector != 0.0)
     ]
     parts.sort(key=lambda part: float(np.linalg.norm(part.error_um)), reverse=True)
     exact = evaluate_exact(model, errors, coordinates, view, point)
@@ -312,7 +312,7 @@ def explain(
     )
 
 
-def budget_words(budget: Mapping[str, float], most: int = 3) -> str:
-    """Name the parameters that add most to a number, the largest first, µm or µrad."""
-    shown = [(key, part) for key, part in budget.items() if abs(part) >= LEAST_SHOWN]
-    return ", ".join(f"{key} {spell_signed(part)}" for key, part in shown[:most])
+def budget_words(budget: Mapping[str, float], max_terms: int = 3) -> str:
+    """Format the largest contributions to a number, µm or µrad."""
+    terms = [(key, part) for key, part in budget.items() if abs(part) >= LEAST_SHOWN]
+    return ", ".join(f"{key} {spell_signed(part)}" for key, part in terms[:max_terms])

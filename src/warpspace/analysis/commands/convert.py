@@ -1,4 +1,4 @@
-"""The errors of a scene in another convention: the same field from other numbers."""
+"""Conversion of the errors of a scene to another convention; the field stays the same."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -84,7 +84,7 @@ class Convert(Analysis):
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Conventions to write a scene in; what is left out stays as it is."""
+    """Conventions to convert a scene to; None leaves a convention unchanged."""
 
     # axis to "after_motion" or "before_motion"
     component_errors: Mapping[str, str] = field(default_factory=dict[str, str])
@@ -103,7 +103,7 @@ class Target:
 class ConvertResult(Result):
     """A scene in another convention."""
 
-    keys = ("largest_um", "largest_urad", "changed", "notes")
+    json_keys = ("largest_um", "largest_urad", "changed", "notes")
     wishes: tuple[str, ...]
     before: Scene
     scene: Scene  # equal to what a reader of the text gets
@@ -116,12 +116,12 @@ class ConvertResult(Result):
     changed: Mapping[str, tuple[float, float]]
     notes: tuple[str, ...]  # what could not be taken along
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         wishes = "; ".join(self.wishes)
         head = one_line(f"# Converted from {self.before.name} by warpspace convert: {wishes}")
         return {"": f"{head}\n{self.text}"}
 
-    def as_plain(self) -> dict[str, Any]:
+    def json_fields(self) -> dict[str, Any]:
         return {
             "largest_um": self.largest_um,
             "largest_urad": self.largest_urad,
@@ -131,14 +131,14 @@ class ConvertResult(Result):
 
     def blocks(self) -> Iterator[Block]:
         count = len(self.changed)
-        yield f"{self.before.title}: {count} error{'' if count == 1 else 's'} written otherwise"
+        yield f"{self.before.title}: {count} error{'' if count == 1 else 's'} converted"
         columns = (
             Column("error", leads=True),
             Column("unit"),
             *number_columns(("was", "is written"), ".4g", "largest"),
         )
-        shown = list(self.changed.items())[:MAX_SHOWN]
-        yield Table(columns, [(key, parameter(key).unit, a, b) for key, (a, b) in shown])
+        listed = list(self.changed.items())[:MAX_SHOWN]
+        yield Table(columns, [(key, parameter(key).unit, a, b) for key, (a, b) in listed])
         if count > MAX_SHOWN:
             yield f"  and {count - MAX_SHOWN} more; --json lists them all"
         yield from (f"  {note}" for note in self.notes)
@@ -149,7 +149,7 @@ class ConvertResult(Result):
 
 
 def convert_scene(scene: Scene, target: Target, wishes: tuple[str, ...] = ()) -> ConvertResult:
-    """Write the errors of a scene in other conventions, in the order of the fields of `Target`."""
+    """Convert the errors of a scene, in the order of the fields of `Target`."""
     named = (target.component_errors, target.straightness, target.zero_at)
     for table in (*named, target.notation.measuring_line_mm):
         for axis in table:
@@ -161,22 +161,22 @@ def convert_scene(scene: Scene, target: Target, wishes: tuple[str, ...] = ()) ->
     other = replace(scene, model=model, errors=extend_to_ranges(errors, model, scene.workspace))
     if target.reference is not None:
         other = _with_reference(other, target.reference)
-    left = tuple(
+    dropped = tuple(
         key
         for key in scene.measured
         if scene.errors.functions.get(key) != other.errors.functions.get(key)
     )
-    measured = {key: one for key, one in scene.measured.items() if key not in left}
+    measured = {key: run for key, run in scene.measured.items() if key not in dropped}
     other = replace(other, measured=measured)
     text = scene_to_toml(other, target.notation)
     read = parse_scene(text, scene.name, "the converted scene")
-    gone = f"readings of {', '.join(left)} are left out: they are of other curves"
-    notes = (gone,) if left else ()
-    written = write_errors(other, target.notation)
+    gone = f"readings of {', '.join(dropped)} are omitted: they belong to other curves"
+    notes = (gone,) if dropped else ()
+    converted = write_errors(other, target.notation)
     amplitudes = {
-        key: (scene.errors.amplitude(key), written.amplitude(key))
-        for key in dict.fromkeys((*scene.errors, *written))
-        if scene.errors.functions.get(key) != written.functions.get(key)
+        key: (scene.errors.amplitude(key), converted.amplitude(key))
+        for key in dict.fromkeys((*scene.errors, *converted))
+        if scene.errors.functions.get(key) != converted.functions.get(key)
     }
     largest_um, largest_urad = field_difference(scene, read)
     return ConvertResult(
@@ -203,21 +203,21 @@ def _with_reference(scene: Scene, reference: Mapping[str, float] | str) -> Scene
     if scene.reference is None:
         raise OptionError("the scene holds no point still; expected a reference in its [view]")
     place = complete_coordinates(scene.machine, {**scene.workspace.positions, **scene.reference})
-    held = held_by_constants(scene.model, scene.errors, place)
+    constants = held_by_constants(scene.model, scene.errors, place)
     return replace(
-        scene, errors=extend_to_ranges(held, scene.model, scene.workspace), reference=None
+        scene, errors=extend_to_ranges(constants, scene.model, scene.workspace), reference=None
     )
 
 
-def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
+def field_difference(first: Scene, second: Scene) -> tuple[float, float]:
     random = np.random.default_rng(SEED)
-    spans = covered_spans(one.model, one.workspace)
+    spans = covered_spans(first.model, first.workspace)
     at = {axis: random.uniform(*span, PROOFS) for axis, span in spans.items()}
-    loops = ("tool", "workpiece", "relative") if one.reference == other.reference else ("tool",)
+    loops = ("tool", "workpiece", "relative") if first.reference == second.reference else ("tool",)
     position, tilt = 0.0, 0.0
     for loop in loops:
-        here, there = (evaluate(scene, at=at, loop=loop, exact=True) for scene in (one, other))
-        change = here - there
+        before, after = (evaluate(scene, at=at, loop=loop, exact=True) for scene in (first, second))
+        change = before - after
         position = max(position, float(np.abs(change.error_um).max()))
         tilt = max(tilt, float(np.abs(change.orientation_urad).max()))
     return position, tilt
@@ -226,11 +226,11 @@ def field_difference(one: Scene, other: Scene) -> tuple[float, float]:
 def _with(target: Target, scene: Scene, name: str, text: str) -> Target:
 
     def by_axis(read: Callable[[str], object], kinds: str = "all") -> dict[str, Any]:
-        found: dict[str, object] = {}
+        orders: dict[str, object] = {}
         for part in text.split(","):
             axis, colon, value = (word.strip() for word in part.rpartition(":"))
-            found |= _choose_axes(scene, axis if colon else "all", read(value), kinds)
-        return found
+            orders |= _choose_axes(scene, axis if colon else "all", read(value), kinds)
+        return orders
 
     if name == "component_errors":
         return replace(target, component_errors=by_axis(ComponentErrors))
@@ -251,10 +251,10 @@ def _with(target: Target, scene: Scene, name: str, text: str) -> Target:
 
 
 def _numbers(text: str, count: int) -> tuple[float, ...]:
-    found = tuple(parse_number(part) for part in text.split("/"))
-    if len(found) != count or not all(abs(value) <= MAX_LENGTH_MM for value in found):
+    numbers = tuple(parse_number(part) for part in text.split("/"))
+    if len(numbers) != count or not all(abs(value) <= MAX_LENGTH_MM for value in numbers):
         raise ValueError(text)
-    return found
+    return numbers
 
 
 def _choose_axes(scene: Scene, text: str, value: object, kinds: str) -> dict[str, object]:
@@ -265,6 +265,6 @@ def _choose_axes(scene: Scene, text: str, value: object, kinds: str) -> dict[str
         "rotary": [name for name in axes if not axes[name].is_linear],
     }
     if text not in groups and text not in axes:
-        known = ", ".join((*axes, *groups))
-        raise OptionError(f"--to {text!r}: no such axis; expected one of {known}")
+        expected = ", ".join((*axes, *groups))
+        raise OptionError(f"--to {text!r}: no such axis; expected one of {expected}")
     return dict.fromkeys(groups.get(text, [text]), value)

@@ -1,4 +1,4 @@
-"""Distance between two points and the angle at a third: nominal, actual, and how they differ."""
+"""Distance between two points and the angle at a third: nominal, actual and difference."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table, number_columns
 from warpspace.analysis.commands.line import Between
-from warpspace.analysis.description import ProgressCallback, Result
+from warpspace.analysis.description import ExpandedUncertainty, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
@@ -38,7 +38,7 @@ class Distance(Between):
     has_table = True
     corner: Place = option((), "Point whose angle between both edges is measured", unset="no angle")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
-    placed: bool = option(False, "Leave out where the workpiece lies; of the relative loop")
+    placed: bool = option(False, "Fit out the placement of the workpiece; relative loop only")
     exact: bool = option(False, "The exact chain instead of the first order")
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "DistanceResult":
@@ -48,21 +48,20 @@ class Distance(Between):
         solve = evaluate_exact if self.exact else evaluate_first_order
         field = solve(scene.model, scene.errors, at, scene.view(self.loop), point)
         watch(1.0)
-        found = self.between(scene, at, field)
-        sure = field_uncertainty(scene, field.error_um, at, scene.view(self.loop), point)
-        if sure is None:
-            return found
+        result = self.between(scene, at, field)
+        uncertainty = field_uncertainty(scene, field.error_um, at, scene.view(self.loop), point)
+        if uncertainty is None:
+            return result
 
-        def ask(error_um: Array) -> Array:
-            off = self.between(scene, at, replace(field, error_um=error_um))
-            return np.array([off.difference_um, off.deviation_urad or 0.0, *off.along_um])
+        def measure(error_um: Array) -> Array:
+            moved = self.between(scene, at, replace(field, error_um=error_um))
+            return np.array([moved.difference_um, moved.deviation_urad or 0.0, *moved.along_um])
 
-        distance, angle, *along = sure.propagate(ask)
-        told = {"u95_difference_um": distance, "u95_along_um": along}
-        return replace(
-            found,
-            expanded_uncertainty=told | ({"u95_deviation_urad": angle} if self.corner else {}),
-        )
+        distance, angle, *along = uncertainty.propagate(measure)
+        u95 = ExpandedUncertainty[Any](u95_difference_um=distance, u95_along_um=along)
+        if self.corner:
+            u95["u95_deviation_urad"] = angle
+        return replace(result, expanded_uncertainty=u95)
 
     def between(self, scene: Scene, at: Coordinates, field: ErrorField) -> "DistanceResult":
         """Measure between points, [n], of a field in R."""
@@ -73,7 +72,10 @@ class Distance(Between):
         distance = np.linalg.norm(end - start, axis=-1)
         angle = _angles_rad(start - corner[0], end - corner[0]) if corner else None
         return DistanceResult(
-            at=tuple(dict(zip(at, one, strict=True)) for one in np.transpose([*at.values()])),
+            at=tuple(
+                dict(zip(at, coordinates, strict=True))
+                for coordinates in np.transpose([*at.values()])
+            ),
             nominal_mm=nominal,
             error_um=error,
             distance_mm=distance,
@@ -96,11 +98,11 @@ def _angles_rad(first: Array, second: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class DistanceResult(Result):
-    """Distance, its parts along x, y and z, and the angle at the corner where there is one."""
+    """Distance, its components, and the angle at the corner if there is one."""
 
-    keys = (
+    json_keys = (
         "at", "nominal_mm", "error_um", "distance_mm", "difference_um", "along_mm", "along_um",
-        "angle_deg", "deviation_urad", "is_squareness",
+        "angle_deg", "deviation_urad", "is_squareness", "expanded_uncertainty",
     )  # fmt: skip
     at: tuple[Mapping[str, float], ...]  # start, end and corner, mm or degrees
     nominal_mm: Array  # [n, 3], in the workpiece frame
@@ -114,22 +116,22 @@ class DistanceResult(Result):
     deviation_urad: float | None
     is_squareness: bool
     title: str
-    expanded_uncertainty: Mapping[str, Any] = attribute(
-        default_factory=dict[str, Any]
-    )  # U95 of what differs
+    expanded_uncertainty: ExpandedUncertainty[Any] = attribute(
+        default_factory=ExpandedUncertainty[Any]
+    )
 
-    def words(self) -> list[str]:
-        """Say it in short: the distance, its parts, and the angle where there is one."""
+    def lines(self) -> list[str]:
+        """Format the distance, its components, and the angle if there is a corner."""
         nominal, actual = self.distance_mm
         parts = (f"Δ{x} {um:+.1f}" for x, um in zip("xyz", self.along_um, strict=True))
-        words = [
+        lines = [
             f"{nominal:.3f} → {actual:.3f} mm, {self.difference_um:+.1f} µm",
             f"{'  '.join(parts)} µm",
         ]
         if self.angle_deg is not None:
             nominal, actual = self.angle_deg
-            words.append(f"angle {nominal:.4f} → {actual:.4f}°, {self.deviation_urad:+.1f} µrad")
-        return [one.replace("-", MINUS) for one in words]
+            lines.append(f"angle {nominal:.4f} → {actual:.4f}°, {self.deviation_urad:+.1f} µrad")
+        return [line.replace("-", MINUS) for line in lines]
 
     def blocks(self) -> Iterator[Block]:
         start, end, *_ = (place_words(place) for place in self.at)
@@ -146,7 +148,7 @@ class DistanceResult(Result):
                 self.expanded_uncertainty["u95_difference_um"],
                 *self.expanded_uncertainty["u95_along_um"],
             )
-            rows = [(*row, plus_minus(one)) for row, one in zip(rows, u95, strict=True)]
+            rows = [(*row, plus_minus(expanded)) for row, expanded in zip(rows, u95, strict=True)]
         columns = (
             Column(key="of", leads=True),
             *number_columns(("nominal", "actual"), ".4f", "mm", ("nominal_mm", "actual_mm")),

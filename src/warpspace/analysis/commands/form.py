@@ -1,4 +1,4 @@
-"""Flatness, straightness and squareness of the bent volume: what an inspector would certify."""
+"""Form of the distorted volume: flatness, straightness and squareness."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -8,9 +8,14 @@ from typing import ClassVar
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Table
-from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+    count_progress,
+)
 from warpspace.analysis.options import LOOP_HELP, option
-from warpspace.analysis.statistics import Numbers
 from warpspace.analysis.uncertainty.propagation import field_uncertainty, plus_minus
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import build_grid
@@ -24,17 +29,19 @@ PLACES = {"low": 0.0, "middle": 0.5, "high": 1.0}
 
 @dataclass(frozen=True, slots=True)
 class FormDeviation:
-    """One form deviation of one plane or line."""
+    """Form deviation of one plane or line."""
 
-    keys: ClassVar[tuple[str, ...]] = ("kind", "of", "at", "value", "unit")
+    json_keys: ClassVar[tuple[str, ...]] = (
+        "kind", "of", "at", "value", "unit", "expanded_uncertainty",
+    )  # fmt: skip
     kind: str  # "flatness", "straightness" or "squareness"
     of: str  # "XY", "X in y", "X to Y"
     at: str  # where the other axes stand
     value: float
     unit: str
-    expanded_uncertainty: Numbers = field(
-        default_factory=dict[str, float | None]
-    )  # u95, where that is stated
+    expanded_uncertainty: ExpandedUncertainty[float | None] = field(
+        default_factory=ExpandedUncertainty[float | None]
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,24 +64,29 @@ class Form(Analysis):
         grid = build_grid(scene.model, scene.workspace, self.nodes)
         axes = grid.axes
         if sum(map(bool, axes)) < 2 or not all(is_linear(axis) for axis in axes if axis):
-            raise OptionError("certify: expected a working volume with two or three linear axes")
+            raise OptionError("form: expected a working volume with two or three linear axes")
         view = choose_view(scene, self.loop)
         error = evaluate_grid(scene, grid, view).error_um
-        found, asked = [*_deviations(axes, grid.nominal_mm, error)], 1
-        sure = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
-        count = 2 * (1 + len(sure.errors.keys)) if sure else 1
-        watch(1 / count)
-        if sure is None:
-            return FormResult(deviations=tuple(found), title=scene.title)
+        deviations = tuple(_deviations(axes, grid.nominal_mm, error))
+        uncertainty = field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm)
+        n_evaluations = 2 * (1 + len(uncertainty.errors.keys)) if uncertainty else 1
+        advance = count_progress(watch, n_evaluations)
+        advance(1)
+        if uncertainty is None:
+            return FormResult(deviations=deviations, title=scene.title)
 
-        def ask(error_um: Array) -> Array:
-            nonlocal asked
-            watch((asked := asked + 1) / count)
-            return np.array([one.value for one in _deviations(axes, grid.nominal_mm, error_um)])
+        def deviation_values(error_um: Array) -> Array:
+            advance(1)
+            return np.array(
+                [deviation.value for deviation in _deviations(axes, grid.nominal_mm, error_um)]
+            )
 
-        each = zip(found, sure.propagate(ask), strict=True)
-        told = tuple(replace(one, expanded_uncertainty={"u95": u95}) for one, u95 in each)
-        return FormResult(deviations=told, title=scene.title, uncertainty=sure.errors)
+        u95 = uncertainty.propagate(deviation_values)
+        deviations = tuple(
+            replace(deviation, expanded_uncertainty=ExpandedUncertainty(u95=expanded))
+            for deviation, expanded in zip(deviations, u95, strict=True)
+        )
+        return FormResult(deviations=deviations, title=scene.title, uncertainty=uncertainty.errors)
 
 
 def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator[FormDeviation]:
@@ -88,37 +100,31 @@ def _deviations(axes: tuple[str, ...], nominal: Array, error: Array) -> Iterator
 
 @dataclass(frozen=True, kw_only=True)
 class FormResult(Result):
-    """Form deviations of the bent volume."""
+    """Form deviations of the distorted volume."""
 
-    keys = ("deviations",)
+    json_keys = ("deviations",)
     deviations: tuple[FormDeviation, ...]
     title: str
 
     def blocks(self) -> Iterator[Block]:
-        yield f"{self.title} · form of the bent volume"
+        yield f"{self.title} · form of the distorted volume"
         columns = (
-            *(Column(name, key=name, leads=name != "at") for name in FormDeviation.keys[:3]),
+            *(Column(name, key=name, leads=name != "at") for name in ("kind", "of", "at")),
             Column("value", ".2f", key="value"),
             *([Column("U95"), Column(key="u95", shows=False)] if self.uncertainty else ()),
             Column("unit", key="unit"),
         )
-        rows = [
-            (
-                d.kind,
-                d.of,
-                d.at,
-                d.value,
-                *([plus_minus(u95), u95] if self.uncertainty else ()),
-                d.unit,
-            )
-            for d in self.deviations
-            for u95 in [d.expanded_uncertainty.get("u95")]
-        ]
+        rows: list[tuple[object, ...]] = []
+        for deviation in self.deviations:
+            u95 = deviation.expanded_uncertainty.get("u95")
+            expanded = (plus_minus(u95), u95) if self.uncertainty else ()
+            location = deviation.kind, deviation.of, deviation.at
+            rows.append((*location, deviation.value, *expanded, deviation.unit))
         yield Table(columns, rows)
 
 
 def zone_width(deviation: Array, *places: Array) -> float:
-    """Width of the narrowest zone d − (a + Σ bᵢ·xᵢ) that holds all points, [n]."""
+    """Compute the minimum zone: the least width of d − (a + Σ bᵢ·xᵢ) over all points, [n]."""
     from scipy.optimize import linprog
 
     centred = ((place - place.mean()) / (float(np.ptp(place)) or 1.0) for place in places)
@@ -127,8 +133,8 @@ def zone_width(deviation: Array, *places: Array) -> float:
     bounds = [(None, None)] * design.shape[1] + [(0.0, None)]
     matrix = np.block([[design, -half], [-design, -half]])
     limits = np.concatenate([deviation, -deviation])
-    found = linprog([0.0] * design.shape[1] + [1.0], matrix, limits, bounds=bounds)
-    return 2.0 * float(found.x[-1])
+    solution = linprog([0.0] * design.shape[1] + [1.0], matrix, limits, bounds=bounds)
+    return 2.0 * float(solution.x[-1])
 
 
 def _flatness(
@@ -146,15 +152,17 @@ def _flatness(
 def _straightness(
     axes: tuple[str, ...], nominal: Array, error: Array, moving: list[int], axis: int
 ) -> Iterator[FormDeviation]:
-    others = [i for i in moving if i != axis]
-    for across in others:
+    across_axes = [i for i in moving if i != axis]
+    for across in across_axes:
         widths: dict[str, float] = {}
-        for places in product(PLACES.items(), repeat=len(others)):
+        for places in product(PLACES.items(), repeat=len(across_axes)):
             index: list[slice | int] = [slice(None) if i == axis else 0 for i in range(3)]
-            for i, (_, share) in zip(others, places, strict=True):
+            for i, (_, share) in zip(across_axes, places, strict=True):
                 index[i] = round(share * (error.shape[i] - 1))
             line = tuple(index)
-            at = ", ".join(f"{axes[i]} {word}" for i, (word, _) in zip(others, places, strict=True))
+            at = ", ".join(
+                f"{axes[i]} {word}" for i, (word, _) in zip(across_axes, places, strict=True)
+            )
             widths[at] = zone_width(error[line][:, across], nominal[line][:, axis])
         worst = max(widths, key=lambda at: widths[at])
         name = f"{axes[axis]} in {'xyz'[across]}"

@@ -1,4 +1,4 @@
-"""Error gains: how much of each error parameter arrives at the functional point, and why."""
+"""Error gains: displacement of the functional point per unit of each error, and its lever."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from warpspace.analysis.blocks import Bars, Block, Column, Panel, Series, Table, number_columns
 from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import AT_HELP, LOOP_HELP, Place, error_words, option, place_words
-from warpspace.analysis.sampling.distribution import loop_keys
+from warpspace.analysis.publications import PUBLICATIONS
 from warpspace.exceptions import OptionError
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import JacobianColumn as Response
@@ -67,7 +68,7 @@ def _end_stops(model: Model, side: str, last: Array) -> list[tuple[str, Array]]:
 
 
 def vector(values: Array) -> tuple[float, float, float]:
-    """Give the three floats of an array, free of rounding errors and negative zeros."""
+    """Return the three floats of an array without rounding errors and negative zeros."""
     x, y, z = (round(float(value), 9) + 0.0 for value in values)
     return x, y, z
 
@@ -83,7 +84,7 @@ MAX_DEFAULT_NODES = 500_000
 class Gain:
     """Gain of one parameter."""
 
-    keys: ClassVar[tuple[str, ...]] = ("key", "symbol", "unit", "x", "y", "z", "norm")
+    json_keys: ClassVar[tuple[str, ...]] = ("key", "symbol", "unit", "x", "y", "z", "norm")
     key: str
     x: float  # µm/µm or µm/µrad; in R: signed at a point, largest absolute value over the travel
     y: float
@@ -122,9 +123,9 @@ def gains_at(
     chosen = loop_keys(model, loop, keys)
     coordinates = complete_coordinates(model.machine, at)
     point = nominal_point(model, loop, coordinates)
-    found = responses(model, loop, chosen, coordinates, point)
-    here = {name: float(value) for name, value in coordinates.items()}
-    rows = [_gain(model, loop, key, found[key], here) for key in chosen]
+    columns = responses(model, loop, chosen, coordinates, point)
+    position = {name: float(value) for name, value in coordinates.items()}
+    rows = [_gain(model, loop, key, columns[key], position) for key in chosen]
     return mark_key_errors(rows, share)
 
 
@@ -141,9 +142,9 @@ def gains_max(
     best: dict[str, Gain] = {}
     for coordinates in _sweep(model, loop, ranges, step_deg):
         point = nominal_point(model, loop, coordinates)
-        found = responses(model, loop, chosen, coordinates, point)
+        columns = responses(model, loop, chosen, coordinates, point)
         for key in chosen:
-            best[key] = _larger(model, loop, key, found[key], coordinates, best.get(key))
+            best[key] = _larger(model, loop, key, columns[key], coordinates, best.get(key))
     return mark_key_errors(list(best.values()), share)
 
 
@@ -162,12 +163,12 @@ def mark_key_errors(rows: Sequence[Gain], share: float = DEFAULT_SHARE) -> tuple
     )
 
 
-def _gain(model: Model, loop: Loop, key: str, col: Response, here: Mapping[str, float]) -> Gain:
+def _gain(model: Model, loop: Loop, key: str, col: Response, at: Mapping[str, float]) -> Gain:
     position = np.broadcast_to(col.position, (3,))
     x, y, z = vector(position)
     norm = float(np.linalg.norm(position))
-    parts = lever_parts(model, loop, key, here)
-    return Gain(key, x, y, z, norm, vector(np.broadcast_to(col.lever_mm, (3,))), here, parts)
+    parts = lever_parts(model, loop, key, at)
+    return Gain(key, x, y, z, norm, vector(np.broadcast_to(col.lever_mm, (3,))), at, parts)
 
 
 def _larger(
@@ -190,11 +191,11 @@ def _larger(
     x, y, z = vector(top)
     if best is not None and norm <= best.norm + 1e-9:
         return replace(best, x=x, y=y, z=z)
-    here = {
+    at = {
         name: float(np.broadcast_to(values, shape)[index]) for name, values in coordinates.items()
     }
     lever = vector(np.broadcast_to(col.lever_mm, (*shape, 3))[index])
-    return Gain(key, x, y, z, norm, lever, here, lever_parts(model, loop, key, here))
+    return Gain(key, x, y, z, norm, lever, at, lever_parts(model, loop, key, at))
 
 
 def _sweep(
@@ -223,8 +224,8 @@ def _sweep(
     for ends in product(*(dict.fromkeys(ranges[name]) for name in linear)):
         for first in product(*(turns[name] for name in outer)):
             fixed = zip((*linear, *outer), (*ends, *first), strict=True)
-            given = {**mesh, **{name: np.asarray(value) for name, value in fixed}}
-            yield complete_coordinates(model.machine, given)
+            positions = {**mesh, **{name: np.asarray(value) for name, value in fixed}}
+            yield complete_coordinates(model.machine, positions)
 
 
 def _default_step(ranges: Mapping[str, tuple[float, float]], rotary: Sequence[str]) -> float:
@@ -276,20 +277,20 @@ class Gains(Analysis):
         keys = scene.parameter_keys
         if self.over_travel:
             travel = {name: axis.travel for name, axis in scene.machine.axes.items()}
-            found = gains_max(scene.model, self.loop, keys, travel, self.step_deg, self.share)
+            gains = gains_max(scene.model, self.loop, keys, travel, self.step_deg, self.share)
         else:
             place = {**scene.workspace.positions, **dict(self.at)}
-            found = gains_at(scene.model, self.loop, keys, place, self.share)
-        return GainsResult(gains=found, asked=self, machine=scene.machine)
+            gains = gains_at(scene.model, self.loop, keys, place, self.share)
+        return GainsResult(gains=gains, analysis=self, machine=scene.machine)
 
 
 @dataclass(frozen=True, kw_only=True)
 class GainsResult(Result, Sequence[Gain]):
     """Gains of all parameters in a loop, largest first."""
 
-    keys = ("gains",)
+    json_keys = ("gains",)
     gains: tuple[Gain, ...]
-    asked: Gains
+    analysis: Gains
     machine: Machine
 
     def __getitem__(self, index: Any) -> Any:
@@ -300,33 +301,39 @@ class GainsResult(Result, Sequence[Gain]):
 
     @property
     def where(self) -> str:
-        if self.asked.over_travel:
-            return f"{self.asked.loop} loop · largest absolute gains over the travel"
-        return f"{self.asked.loop} loop · gains at {place_words(self.gains[0].at)}"
+        if self.analysis.over_travel:
+            return f"{self.analysis.loop} loop · largest absolute gains over the travel"
+        return f"{self.analysis.loop} loop · gains at {place_words(self.gains[0].at)}"
 
     def blocks(self) -> Iterator[Block]:
         count = sum(gain.is_key for gain in self.gains)
         yield f"{self.machine.title} · {self.where}"
         yield self._table()
         yield (
-            f"  * key errors: the largest {count} make up {self.asked.share:.0%} of the sum of"
+            f"  * key errors: the largest {count} make up {self.analysis.share:.0%} of the sum of"
             " squares, one µm and one µrad counted alike"
         )
         yield self.bars()
 
     def _table(self) -> Table:
-        over = self.asked.over_travel
-        marked = thesis_keys(self.machine.name)
-        lever = "lever of |E| at" if over else "largest component read off the lever"
+        over_travel = self.analysis.over_travel
+        printed = {
+            publication.name: publication.key_errors(self.machine.name)
+            for publication in PUBLICATIONS.members()
+        }
+        lever = "lever of |E| at" if over_travel else "largest component read off the lever"
         columns = (
             Column(form=lambda key: "*" if key else "", key="key_error", leads=True),
             Column("key", key="key", leads=True),
             Column("symbol", key="symbol"),
             *number_columns(("|E|", "x", "y", "z"), ".3f", keys=("norm", "x", "y", "z")),
             Column("unit", key="unit"),
-            Column(
-                "thesis", lambda key: "key" if key else "", key="thesis_key_error",
-                shows=bool(marked),
+            *(
+                Column(
+                    name, lambda key: "key" if key else "", key=f"{name}_key_error",
+                    shows=bool(keys),
+                )
+                for name, keys in printed.items()
             ),
             Column("name", key="name", wraps=True),
             *(Column(key=f"lever_{x}_mm", shows=False) for x in "xyz"),
@@ -340,21 +347,23 @@ class GainsResult(Result, Sequence[Gain]):
         rows = [
             (
                 gain.is_key, gain.key, gain.symbol, gain.norm, gain.x, gain.y, gain.z, gain.unit,
-                gain.key in marked, gain.parameter.name, *gain.lever_mm,
+                *(gain.key in keys for keys in printed.values()), gain.parameter.name,
+                *gain.lever_mm,
                 *(gain.lever_mm if gain.parameter.is_rotation else (None, None, None)),
-                _place(gain) if over else _explain(gain), *gain.at.values(),
+                _place(gain) if over_travel else _explain(gain), *gain.at.values(),
             )
             for gain in self.gains
         ]  # fmt: skip
         levers = ("lever_x_mm", "lever_y_mm", "lever_z_mm")
         order = (
             "key", "symbol", "name", "unit", "x", "y", "z", "norm", *levers, "key_error",
-            "thesis_key_error", *(column.key for column in columns[-len(self.gains[0].at) :]),
+            *(f"{name}_key_error" for name in printed),
+            *(column.key for column in columns[-len(self.gains[0].at) :]),
         )  # fmt: skip
         return Table(columns, rows, csv_order=order)
 
     def bars(self) -> Bars:
-        signed = not self.asked.over_travel
+        signed = not self.analysis.over_travel
         panels = tuple(
             Panel(
                 title="|E|" if name == "norm" else name,
@@ -366,22 +375,13 @@ class GainsResult(Result, Sequence[Gain]):
             for name, form, width in (("norm", ".2f", 2.2), *((name, "", 1.0) for name in "xyz"))
         )
         count = sum(gain.is_key for gain in self.gains)
-        words = f"key errors: the largest {count}, {self.asked.share:.0%} of the sum of squares"
+        legend = f"key errors: the largest {count}, {self.analysis.share:.0%} of the sum of squares"
         return Bars(
             f"Error gains · {self.machine.title}", self.where,
             [error_words(gain.key) for gain in self.gains], panels,
             keys=[gain.is_key for gain in self.gains],
-            legend=((words, "key"), ("others", "plain")),
+            legend=((legend, "key"), ("others", "plain")),
         )  # fmt: skip
-
-
-def thesis_keys(machine: str) -> tuple[str, ...]:
-    """Give the key errors of the thesis (table 4-7) for its machine, none for any other."""
-    from warpspace.thesis_example.rows import printed_tables
-
-    if machine != "dvf5000":
-        return ()
-    return tuple(key for key, row in printed_tables()["table_4_7"].items() if isinstance(row, list))
 
 
 def _explain(gain: Gain) -> str:

@@ -1,4 +1,4 @@
-"""Where along a line: the error along a straight path between two points, six components."""
+"""Error along a straight line between two points, six components."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Curve, Lines, Table, number_columns
-from warpspace.analysis.description import Analysis, ProgressCallback, Result
+from warpspace.analysis.description import (
+    Analysis,
+    ExpandedUncertainty,
+    ProgressCallback,
+    Result,
+)
 from warpspace.analysis.options import LOOP_HELP, Place, option, place_words
 from warpspace.analysis.uncertainty.propagation import plus_minus, scene_uncertainty, u95_columns
 from warpspace.exceptions import OptionError
@@ -15,12 +20,12 @@ from warpspace.machine.axes import is_linear
 from warpspace.scene.model import Scene, check_magnitude, evaluate
 from warpspace.units import Array
 
-SHOWN = 21  # points that the table of a longer line shows; the file has all
+MAX_ROWS = 21  # points that the table of a longer line shows; the file has all
 
 
 @dataclass(frozen=True, kw_only=True)
 class Between(Analysis):
-    """A question about two points, by default the ends of the volume's diagonal."""
+    """Analysis of two points, by default the ends of the diagonal of the volume."""
 
     start: Place = option(
         (), "First point, mm and degrees", unset="lower ends of the working volume",
@@ -30,17 +35,19 @@ class Between(Analysis):
         (), "Second point", unset="upper ends of the working volume", flag="--to", label="To"
     )
 
-    def places(self, scene: Scene, *others: Place) -> dict[str, Array]:
-        """Give where all axes stand at both points, and at others that are given, [n]."""
-        ranges, asked = scene.workspace.ranges, [dict(self.start), dict(self.end)]
-        if not any(asked):
-            asked = [{name: at[end] for name, at in ranges.items()} for end in (0, -1)]
-        asked += [dict(one) for one in others if one]
+    def places(self, scene: Scene, *further_points: Place) -> dict[str, Array]:
+        """Return the positions of all axes at both points and at further ones, [n]."""
+        ranges, points = scene.workspace.ranges, [dict(self.start), dict(self.end)]
+        if not any(points):
+            points = [{name: at[end] for name, at in ranges.items()} for end in (0, -1)]
+        points += [dict(point) for point in further_points if point]
         stand = scene.workspace.positions
-        found = [complete_coordinates(scene.machine, one, stand) for one in asked]
-        if found[0] == found[1]:
+        coordinates = [complete_coordinates(scene.machine, point, stand) for point in points]
+        if coordinates[0] == coordinates[1]:
             raise OptionError("{start} and {end} are one point; expected two")
-        places = {name: np.array([one[name] for one in found]) for name in scene.machine.axes}
+        places = {
+            name: np.array([point[name] for point in coordinates]) for name in scene.machine.axes
+        }
         check_magnitude(scene, places)
         return places
 
@@ -69,11 +76,13 @@ class Line(Between):
         field = evaluate(scene, at=axes, loop=self.loop, exact=self.exact)
         watch(1.0)
         nominal = field.nominal_mm
-        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(nominal, axis=0), axis=1))])
+        along_mm = np.concatenate(
+            [[0.0], np.cumsum(np.linalg.norm(np.diff(nominal, axis=0), axis=1))]
+        )
         return LineResult(
-            length_mm=float(way[-1]),
+            length_mm=float(along_mm[-1]),
             axes={name: np.broadcast_to(at, share.shape) for name, at in axes.items()},
-            along_mm=way,
+            along_mm=along_mm,
             nominal_mm=nominal,
             error_um=field.error_um,
             orientation_urad=field.orientation_urad,
@@ -87,8 +96,9 @@ class Line(Between):
 class LineResult(Result):
     """Errors along a line."""
 
-    keys = (
-        "length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad"
+    json_keys = (
+        "length_mm", "axes", "along_mm", "nominal_mm", "error_um", "orientation_urad",
+        "expanded_uncertainty",
     )  # fmt: skip
     length_mm: float
     axes: Mapping[str, Array]  # [n], mm or degrees
@@ -97,7 +107,7 @@ class LineResult(Result):
     error_um: Array  # [n, 3], in R
     orientation_urad: Array  # [n, 3], in R
     title: str
-    expanded_uncertainty: Mapping[str, Array]  # U95 of these, by name; empty where it is not known
+    expanded_uncertainty: ExpandedUncertainty[Array]  # of these; empty where unknown
 
     def blocks(self) -> Iterator[Block]:
         norm = np.linalg.norm(self.error_um, axis=1)
@@ -109,7 +119,7 @@ class LineResult(Result):
         yield f"  largest |E| {norm[worst]:.2f}{about} µm at {place_words(place)}"
         columns = self.along_mm, *self.axes.values(), norm, *u95
         everything = np.column_stack([*columns, self.error_um, self.orientation_urad])
-        step = -(-(len(norm) - 1) // (SHOWN - 1)) if len(norm) > SHOWN else 1
+        step = -(-(len(norm) - 1) // (MAX_ROWS - 1)) if len(norm) > MAX_ROWS else 1
         units = {name: "mm" if is_linear(name) else "deg" for name in self.axes}
         columns = (
             Column("along", ".1f", "mm", key="along_mm", leads=True),

@@ -1,4 +1,4 @@
-"""Machines within tolerance: the distribution of their |E|."""
+"""Monte Carlo simulation: distribution of |E| over machines within tolerance."""
 
 import math
 from collections import deque
@@ -7,13 +7,16 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import islice, product
 from math import prod
+from operator import attrgetter
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 
 from warpspace.analysis.blocks import Block, Column, Histogram, Table, number_columns
+from warpspace.analysis.commands.contributions import expected_square
 from warpspace.analysis.description import ProgressCallback, Result, count_progress, to_json
 from warpspace.analysis.options import Grammar, option
+from warpspace.analysis.publications import PUBLICATIONS, PrintedNumber
 from warpspace.analysis.sampling.cases import DEFAULT_NODES, Case, Over, both_orders
 from warpspace.analysis.sampling.machine_sampling import (
     Progress,
@@ -33,6 +36,9 @@ NUMBERS = {
     "mean": "mean_um", "RMS": "rms_um", "median": "median_um", "P95": "p95_um", "P99": "p99_um",
     "max": "max_um",
 }  # fmt: skip
+JSON_NUMBERS = (
+    "mean_um", "mode_um", "median_um", "p95_um", "p99_um", "max_um", "histogram",
+)  # fmt: skip
 PRINTED = 200  # rows that are printed
 WHERE = {Over.SAMPLED: "at one random point", Over.MAX: "everywhere", Over.MEAN: "in the mean"}
 WHAT = {
@@ -48,17 +54,17 @@ def read_steps(text: str, _scene: Scene) -> tuple[str, tuple[float, ...]]:
         if ":" in values:
             low, high, number = values.split(":")
             count = parse_whole(number) if parse_whole(number) <= SWEEP_CASES else 0
-            found = np.linspace(parse_number(low), parse_number(high), count).tolist()
+            widths = np.linspace(parse_number(low), parse_number(high), count).tolist()
         else:
-            found = [parse_number(value) for value in values.split(",")]
+            widths = [parse_number(value) for value in values.split(",")]
     except ValueError:
-        found = []
-    if not (key.strip() and found):
+        widths = []
+    if not (key.strip() and widths):
         raise ValueError(
             f"expected KEY=FROM:TO:N with N from 1 to {SWEEP_CASES:,}, or KEY=NUMBER,…, for"
             " instance EAX=5:20:4 or rotation=10,20"
         )
-    return key.strip(), tuple(found)
+    return key.strip(), tuple(widths)
 
 
 Steps: TypeAlias = Annotated[
@@ -76,7 +82,7 @@ class SweepPoint:
 
     @property
     def row(self) -> dict[str, Any]:
-        sampled, kept = self.sampled, self.sampled.probability
+        sampled, probability = self.sampled, self.sampled.probability
         return {
             "scene": self.scene.name,
             "title": self.scene.title,
@@ -84,10 +90,10 @@ class SweepPoint:
             "samples": sampled.plan.samples,
             "seed": sampled.plan.seed,
             **{name: getattr(sampled, name) for name in NUMBERS.values()},
-            "spec_um": None if kept is None else kept.spec_um,
-            "probability": None if kept is None else kept.probability,
-            "probability_low": None if kept is None else kept.low,
-            "probability_high": None if kept is None else kept.high,
+            "spec_um": None if probability is None else probability.spec_um,
+            "probability": None if probability is None else probability.probability,
+            "probability_low": None if probability is None else probability.low,
+            "probability_high": None if probability is None else probability.high,
         }
 
 
@@ -122,11 +128,10 @@ class MonteCarlo(SampledMachines):
     grid: int = option(DEFAULT_NODES, "Nodes per axis for --over max|mean", low=2, high=101)
     limit_um: float | None = option(
         None,
-        "Of |E|, to say how likely a machine keeps it",
+        "Limit of |E|, for the probability that a machine keeps it",
         unit="µm",
         low=0.0,
         flag="--limit",
-        former=("--spec-um", "--limit-um"),
     )
     tolerance: Steps = option(
         (),
@@ -163,17 +168,17 @@ class MonteCarlo(SampledMachines):
             scenes, executor=executor, workers=workers, progress=advance, take=take
         )
         first = next(points)
-        widest, kept, rows = first, [first], [first.row] if self.in_rows else []
+        widest, retained, rows = first, [first], [first.row] if self.in_rows else []
         for point in points:
             if self.in_rows:
                 rows.append(point.row)
             else:
-                kept.append(point)
+                retained.append(point)
             if point.sampled.max_um > widest.sampled.max_um:
                 widest = point
         return MonteCarloResult(
-            asked=self,
-            points=tuple(kept),
+            analysis=self,
+            points=tuple(retained),
             rows=tuple(rows),
             second_order=sampled_second_order((widest.scene, widest.sampled)),
         )
@@ -198,7 +203,8 @@ class MonteCarlo(SampledMachines):
                         f"{{tolerance}} {key}: half width {value:g}; expected 0, or"
                         f" {MIN_HALF_WIDTH:g} to {MAX_ERROR:g} µm or µrad"
                     )
-        if (count := self.machines(scenes) // self.samples) > SWEEP_CASES:
+        count = self.machines(scenes) // self.samples
+        if count > SWEEP_CASES:
             what = "combinations" if steps else "rows"
             raise OptionError(f"{count:,} {what}; expected at most {SWEEP_CASES:,}")
 
@@ -211,7 +217,7 @@ class MonteCarlo(SampledMachines):
         progress: Progress | None = None,
         take: Take | None = None,
     ) -> "Iterator[SweepPoint]":
-        """Sample scene by scene, taken as they are needed; the last half width changes first."""
+        """Sample scenes as they are needed; the last half width changes first."""
         plan = replace(self.plan(self.over, self.limit_um, self.grid), workers=workers)
         plan.check()
         steps = dict(self.tolerance)
@@ -235,52 +241,60 @@ class MonteCarlo(SampledMachines):
 class MonteCarloResult(Result):
     """The distribution of |E| of the machines of one scene or several."""
 
-    keys = (
-        "samples", "seed", "distribution", "loop", "over", "mean_um", "mode_um", "median_um",
-        "p95_um", "p99_um", "max_um", "histogram",
-    )  # fmt: skip
-    asked: MonteCarlo
+    analysis: MonteCarlo
     points: tuple[SweepPoint, ...]  # of each scene; of many rows only the first
     rows: tuple[Mapping[str, Any], ...]  # for each combination, where these were asked for
 
-    def __getattr__(self, name: str) -> Any:
-        """Give a number of the first scene, for instance `mean_um`; see `MonteCarlo`."""
-        if name.startswith("_") or name == "points":
-            raise AttributeError(name)
-        return getattr(self.points[0].sampled, name)
+    @property
+    def sampled(self) -> SampleStatistics:
+        """Statistics of the first scene."""
+        return self.points[0].sampled
 
-    def as_plain(self) -> dict[str, Any]:
-        asked = self.asked
-        if asked.in_rows:
-            return {"tolerances": to_json(dict(asked.tolerance)), "rows": [*self.rows]}
+    mean_um = property(attrgetter("sampled.mean_um"))
+    rms_um = property(attrgetter("sampled.rms_um"))
+    mode_um = property(attrgetter("sampled.mode_um"))
+    median_um = property(attrgetter("sampled.median_um"))
+    p95_um = property(attrgetter("sampled.p95_um"))
+    p99_um = property(attrgetter("sampled.p99_um"))
+    max_um = property(attrgetter("sampled.max_um"))
+    histogram = property(attrgetter("sampled.histogram"))
+    probability = property(attrgetter("sampled.probability"))
+    plan = property(attrgetter("sampled.plan"))
+    draws = property(attrgetter("sampled.draws"))
+    view = property(attrgetter("sampled.view"))
+
+    def json_fields(self) -> dict[str, Any]:
+        analysis = self.analysis
+        if analysis.in_rows:
+            return {"tolerances": to_json(dict(analysis.tolerance)), "rows": [*self.rows]}
         if len(self.points) == 1:
             return _numbers(self.points[0].sampled)
         each = [
-            {"scene": one.scene.name, "title": one.scene.title, **_numbers(one.sampled)}
-            for one in self.points
+            {"scene": point.scene.name, "title": point.scene.title, **_numbers(point.sampled)}
+            for point in self.points
         ]
         return {"scenes": each}
 
     def blocks(self) -> Iterator[Block]:
         first = self.points[0]
-        if self.asked.in_rows or len(self.points) > 1:
-            yield from self._several()
+        if self.analysis.in_rows or len(self.points) > 1:
+            yield from self._several_scenes()
         else:
-            yield from self._one(first.scene, first.sampled)
+            yield from self._single_scene(first.scene, first.sampled)
 
-    def _several(self) -> Iterator[Block]:
-        asked, first = self.asked, self.points[0].sampled
-        if asked.in_rows:
+    def _several_scenes(self) -> Iterator[Block]:
+        analysis, first = self.analysis, self.points[0].sampled
+        if analysis.in_rows:
             yield (
-                f"{asked.loop} loop · {asked.samples:,} machines a row, {asked.over} ·"
-                f" {first.draws.distribution} · seed {asked.seed}"
+                f"{analysis.loop} loop · {analysis.samples:,} machines a row, {analysis.over} ·"
+                f" {first.draws.distribution} · seed {analysis.seed}"
             )
         else:
-            yield self._words(first)
+            yield self._settings(first)
         rows: Sequence[Mapping[str, Any]] = self.rows or [point.row for point in self.points]
-        swept = [key for key, _ in asked.tolerance]
+        swept = [key for key, _ in analysis.tolerance]
         limit = number_columns(
-            () if asked.limit_um is None else (f"≤ {asked.limit_um:g} µm",), unit="%"
+            () if analysis.limit_um is None else (f"≤ {analysis.limit_um:g} µm",), unit="%"
         )
         columns = (
             Column("scene", leads=True),
@@ -296,108 +310,109 @@ class MonteCarloResult(Result):
                 for row in islice(rows, PRINTED)
             ],
         )
-        if (left := len(rows) - PRINTED) > 0:
-            yield f"… and {left:,} {'rows' if asked.in_rows else 'scenes'} more"
+        n_hidden = len(rows) - PRINTED
+        if n_hidden > 0:
+            yield f"… and {n_hidden:,} {'rows' if analysis.in_rows else 'scenes'} more"
 
-    def _one(self, scene: Scene, found: SampleStatistics) -> Iterator[Block]:
-        from warpspace.analysis.commands.contributions import expected_square
-
-        asked = self.asked
-        told = self._words(found)
-        yield f"{scene.title} · {told}"
+    def _single_scene(self, scene: Scene, sampled: SampleStatistics) -> Iterator[Block]:
+        analysis = self.analysis
+        settings = self._settings(sampled)
+        yield f"{scene.title} · {settings}"
         yield (
-            f"  mean {found.mean_um:.2f}, mode {found.mode_um:.1f}, median {found.median_um:.2f},"
-            f" P95 {found.p95_um:.2f}, P99 {found.p99_um:.2f}, max {found.max_um:.2f} µm"
+            f"  mean {sampled.mean_um:.2f}, mode {sampled.mode_um:.1f},"
+            f" median {sampled.median_um:.2f}, P95 {sampled.p95_um:.2f},"
+            f" P99 {sampled.p99_um:.2f}, max {sampled.max_um:.2f} µm"
         )
-        printed = printed_um(scene, found)
-        if asked.over is Over.SAMPLED:
-            variance, offset = expected_square(case_of(scene, found))
+        printed: dict[str, PrintedNumber] = {}
+        if analysis.over is Over.SAMPLED:
+            for publication in PUBLICATIONS.members():
+                number = publication.sampled_mean(scene, analysis.loop)
+                if number is not None:
+                    printed[publication.name] = number
+            variance, offset = expected_square(case_of(scene, sampled))
+            expected_um = math.sqrt(variance.sum() + offset)
             yield (
-                f"  RMS  {found.rms_um:.2f} µm sampled, {math.sqrt(variance.sum() + offset):.2f} µm"
+                f"  RMS  {sampled.rms_um:.2f} µm sampled, {expected_um:.2f} µm"
                 " from trace(J Σ Jᵀ) without sampling"
             )
-        if printed is not None:
-            yield f"  the thesis prints {printed:g} µm (table 4-8; see `warpspace thesis`)"
-        if (kept := found.probability) is not None:
+        yield from (f"  {number.quotation}" for number in printed.values())
+        probability = sampled.probability
+        if probability is not None:
             yield (
-                f"  |E| ≤ {kept.spec_um:g} µm {WHERE[asked.over]}: {100.0 * kept.probability:.2f} %"
-                f" of the machines, 95 % interval {100.0 * kept.low:.2f} … {100.0 * kept.high:.2f}"
-                " %"
+                f"  |E| ≤ {probability.spec_um:g} µm {WHERE[analysis.over]}:"
+                f" {100.0 * probability.probability:.2f} % of the machines, 95 % interval"
+                f" {100.0 * probability.low:.2f} … {100.0 * probability.high:.2f} %"
             )
-        draws = found.draws
-        held = [k for k, width in zip(draws.keys, draws.half_width, strict=True) if width == 0.0]
-        count = len(draws.keys) - len(held)
-        note = f"; held at their centre: {', '.join(held)}" if held else ""
+        draws = sampled.draws
+        centred = [k for k, width in zip(draws.keys, draws.half_width, strict=True) if width == 0.0]
+        count = len(draws.keys) - len(centred)
+        note = f"; held at their centre: {', '.join(centred)}" if centred else ""
         yield f"  {count} parameters drawn{note}"
-        if not found.exact_quantiles:
+        if not sampled.exact_quantiles:
             yield "  quantiles to 0.002 % of their value"
-        yield sampled_histogram(found, scene.title, told, printed)
+        marks = [(name, number.value_um) for name, number in printed.items()]
+        yield sampled_histogram(sampled, scene.title, settings, marks)
 
-    def _words(self, found: SampleStatistics) -> str:
-        asked, drawn = self.asked, str(found.draws.distribution)
+    def _settings(self, sampled: SampleStatistics) -> str:
+        analysis, drawn = self.analysis, str(sampled.draws.distribution)
         if drawn == "normal":
-            drawn = "normal, 3σ = half width" + (", clipped" if found.draws.clip else "")
+            drawn = "normal, 3σ = half width" + (", clipped" if sampled.draws.clip else "")
         return (
-            f"{asked.loop} loop · {asked.samples:,} machines, {WHAT[asked.over]} · {drawn} · seed"
-            f" {asked.seed}"
+            f"{analysis.loop} loop · {analysis.samples:,} machines, {WHAT[analysis.over]}"
+            f" · {drawn} · seed {analysis.seed}"
         )
 
 
-def _numbers(found: SampleStatistics) -> dict[str, Any]:
-    plan, names = found.plan, MonteCarloResult.keys[5:]
-    kept = {} if found.probability is None else {"specification": found.probability}
+def _numbers(sampled: SampleStatistics) -> dict[str, Any]:
+    plan = sampled.plan
+    probability = {} if sampled.probability is None else {"specification": sampled.probability}
     return to_json(
         {
             "samples": plan.samples,
             "seed": plan.seed,
-            "distribution": found.draws.distribution,
-            "loop": found.view.loop,
+            "distribution": sampled.draws.distribution,
+            "loop": sampled.view.loop,
             "over": plan.over,
-            **{name: getattr(found, name) for name in names},
-            **kept,
+            **{name: getattr(sampled, name) for name in JSON_NUMBERS},
+            **probability,
         }
     )
 
 
 def sampled_histogram(
-    found: SampleStatistics, title: str, subtitle: str, printed: float | None = None
+    sampled: SampleStatistics,
+    title: str,
+    subtitle: str,
+    printed: Sequence[tuple[str, float]] = (),
 ) -> Histogram:
-    edges, kept = found.histogram.edges_um, found.probability
-    marks = [("mode", found.mode_um), ("mean", found.mean_um), ("P95", found.p95_um)]
+    edges, probability = sampled.histogram.edges_um, sampled.probability
+    marks = [("mode", sampled.mode_um), ("mean", sampled.mean_um), ("P95", sampled.p95_um)]
     return Histogram(
         title,
         subtitle,
         "volumetric error |E|, µm",
         f"machines per {edges[1] - edges[0]:g} µm, %",
         edges,
-        100.0 * found.histogram.counts / found.plan.samples,
-        (*marks, *([] if printed is None else [("thesis", printed)])),
-        found.plan.spec_um,
+        100.0 * sampled.histogram.counts / sampled.plan.samples,
+        (*marks, *printed),
+        sampled.plan.spec_um,
         ()
-        if kept is None
+        if probability is None
         else (
-            f"{100.0 * kept.probability:.2f} % of the machines\nstay within {kept.spec_um:g} µm",
-            f"95 % interval {100.0 * kept.low:.2f} … {100.0 * kept.high:.2f} %",
+            f"{100.0 * probability.probability:.2f} % of the machines\n"
+            f"stay within {probability.spec_um:g} µm",
+            f"95 % interval {100.0 * probability.low:.2f} … {100.0 * probability.high:.2f} %",
         ),
     )
 
 
-def printed_um(scene: Scene, found: SampleStatistics) -> float | None:
-    from warpspace.thesis_example.rows import printed_tables
-
-    name = f"{found.view.loop}_{scene.name.removeprefix('dvf5000_')}"
-    printed = printed_tables()["table_4_8"]["predicted"].get(name)
-    here = scene.machine.name == "dvf5000" and scene.name.startswith("dvf5000_")
-    return float(printed) if printed and here and found.plan.over == Over.SAMPLED else None
-
-
-def sampled_second_order(*found: tuple[Scene, SampleStatistics]) -> SecondOrder:
+def sampled_second_order(*sampled: tuple[Scene, SampleStatistics]) -> SecondOrder:
     """Compare first order and exact chain on machines drawn for the scene with the largest |E|."""
-    return compare_orders(*both_orders(case_of(*max(found, key=lambda one: one[1].max_um))))
+    return compare_orders(*both_orders(case_of(*max(sampled, key=lambda pair: pair[1].max_um))))
 
 
-def case_of(scene: Scene, found: SampleStatistics) -> Case:
-    return Case(scene.model, found.draws, scene.workspace, found.view, found.plan)
+def case_of(scene: Scene, sampled: SampleStatistics) -> Case:
+    return Case(scene.model, sampled.draws, scene.workspace, sampled.view, sampled.plan)
 
 
 def sweep(
@@ -443,9 +458,9 @@ def sweep(
         If an argument is out of range, or a scene has no such parameter.
     """
     steps = tuple((key, tuple(values)) for key, values in (half_widths or {}).items())
-    asked = MonteCarlo(tolerance=steps, **options)
-    asked.check_against(1)
-    yield from asked.points(
+    analysis = MonteCarlo(tolerance=steps, **options)
+    analysis.check_against(1)
+    yield from analysis.points(
         scenes, workers=workers, executor=executor, progress=progress, take=take
     )
 
@@ -455,10 +470,10 @@ def with_half_widths(scene: Scene, half_widths: Mapping[str, float]) -> Scene:
         return scene
     tolerances = scene.tolerances
     classes = {key: value for key, value in half_widths.items() if key in TOLERANCE_CLASSES}
-    own = {key: value for key, value in half_widths.items() if key not in classes}
-    for key in own:
+    by_key = {key: value for key, value in half_widths.items() if key not in classes}
+    for key in by_key:
         if key not in scene.machine.allowed_keys:
-            known = (*scene.parameter_keys, *TOLERANCE_CLASSES)
-            raise UnknownNameError("parameter or tolerance class", key, known)
+            expected = (*scene.parameter_keys, *TOLERANCE_CLASSES)
+            raise UnknownNameError("parameter or tolerance class", key, expected)
     tolerances = replace(tolerances, default={**tolerances.default, **classes})
-    return replace(scene, tolerances=tolerances.with_half_widths(own))
+    return replace(scene, tolerances=tolerances.with_half_widths(by_key))

@@ -1,4 +1,4 @@
-"""How sure the map of a machine is, whether it keeps its limit, and what makes it unsure."""
+"""Uncertainty of the error map of a machine, its conformity with a limit, and its budget."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,7 +11,7 @@ from warpspace.analysis.description import Analysis, ProgressCallback, Result
 from warpspace.analysis.options import LOOP_HELP, option, place_words
 from warpspace.analysis.statistics import P95, Statistics, volume_statistics
 from warpspace.analysis.uncertainty.propagation import (
-    COVERED,
+    COVERAGE,
     NAMES,
     FieldUncertainty,
     plus_minus,
@@ -27,7 +27,7 @@ from warpspace.units import Array
 
 MOSTLY = 50.0  # percent of the volume
 MOST_SHARES = 10  # errors that the table of the largest shares has
-UNSTATED = "the scene does not state how sure its errors are; expected [uncertainty]"
+UNSTATED = "the scene states no uncertainty of its errors; expected [uncertainty]"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,36 +51,38 @@ class Uncertainty(Analysis):
     verify: bool = option(False, "Monte Carlo beside the linear propagation")
     loop: Loop = option(Loop.TOOL, LOOP_HELP)
     nodes: int = option(11, "Nodes per axis of the working volume", low=2, high=21, flag="--grid")
-    samples: int = option(10_000, "How many machines are drawn", low=100, high=1_000_000)
-    seed: int = option(0, "Of the random numbers", low=0, high=2**63 - 1)
+    samples: int = option(10_000, "Number of machines drawn", low=100, high=1_000_000)
+    seed: int = option(0, "Seed of the random numbers", low=0, high=2**63 - 1)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "UncertaintyResult":
         view = choose_view(scene, self.loop)
         grid = build_grid(scene.model, scene.workspace, self.nodes)
-        found = volume_uncertainty(scene, view, self.nodes)
+        uncertainty = volume_uncertainty(scene, view, self.nodes)
         limit = scene.limit_um if self.limit_um is None else self.limit_um
         statistics = volume_statistics(evaluate_grid(scene, grid, view), grid)
         beyond = (scene.covariance or Covariance((), ())).outside(grid.coordinates, grid.shape)
         result = UncertaintyResult(
             limit_um=limit,
-            statistics=found.with_expanded_uncertainty(statistics) if found else statistics,
+            statistics=uncertainty.with_expanded_uncertainty(statistics)
+            if uncertainty
+            else statistics,
             never_measured_percent=100.0 * float(grid.weights[beyond].sum()),
-            k=found and found.errors.factor,
-            unknown=found.errors.unknown if found else [*scene.errors],
-            remarks=tuple(found.errors.remarks()) if found else (UNSTATED,),
+            k=uncertainty and uncertainty.errors.factor,
+            unknown=uncertainty.errors.unknown if uncertainty else [*scene.errors],
+            remarks=tuple(uncertainty.errors.remarks()) if uncertainty else (UNSTATED,),
             title=f"{scene.title} · {self.loop} loop",
         )
-        if found is None or not found.errors.is_known:
+        if uncertainty is None or not uncertainty.errors.is_known:
             return result
-        above = found.norm_um > found.u95_norm_um
+        above = uncertainty.norm_um > uncertainty.u95_norm_um
         significant = 100.0 * float(grid.weights[above].sum())
-        result = replace(result, significant_percent=significant, shares=_shares(found))
+        result = replace(result, significant_percent=significant, shares=_shares(uncertainty))
         if limit is None and not self.verify:
             return result
-        worst, drawn = int(np.argmax(found.norm_um)), list[Array]()
-        for norm in found.machines(self.samples, self.seed):
-            others = _three(norm, grid.weights.reshape(-1)) if self.verify else ()
-            drawn.append(np.stack([norm[:, worst], *others, norm.max(axis=1)]))
+        worst, drawn = int(np.argmax(uncertainty.norm_um)), list[Array]()
+        for norm in uncertainty.machines(self.samples, self.seed):
+            summaries = _three(norm, grid.weights.reshape(-1)) if self.verify else ()
+            drawn.append(np.stack([norm[:, worst], *summaries, norm.max(axis=1)]))
             watch(min(sum(part.shape[1] for part in drawn) / self.samples, 1.0))
         at_worst, *numbers = np.concatenate(drawn, axis=1)
         return replace(
@@ -92,7 +94,7 @@ class Uncertainty(Analysis):
 
 
 def _three(norm: Array, weights: Array) -> tuple[Array, Array, Array]:
-    """Give mean, RMS and P95 of machines, [n] each, from their |E|, [n, N]."""
+    """Compute mean, RMS and P95 of machines, [n] each, from their |E|, [n, N]."""
     order = np.argsort(norm, axis=1)
     place = np.argmax(np.cumsum(weights[order], axis=1) >= P95, axis=1)
     p95 = norm[range(len(norm)), order[range(len(norm)), place]]
@@ -100,26 +102,26 @@ def _three(norm: Array, weights: Array) -> tuple[Array, Array, Array]:
 
 
 def _spread(drawn: Array) -> Mapping[str, float]:
-    low, high = np.quantile(drawn, (0.5 - COVERED / 2.0, 0.5 + COVERED / 2.0))
+    low, high = np.quantile(drawn, (0.5 - COVERAGE / 2.0, 0.5 + COVERAGE / 2.0))
     return {"mean_um": float(drawn.mean()), "u95_um": float(high - low) / 2.0}
 
 
-def _shares(found: FieldUncertainty) -> list[Mapping[str, Any]]:
-    mean, _, _, largest = found.gradients
-    of_mean, doubt = found.variance_shares(mean), found.errors
-    u = dict(zip(doubt.keys, np.diagonal(doubt.covariance) ** 0.5, strict=True))
+def _shares(field: FieldUncertainty) -> list[Mapping[str, Any]]:
+    mean, _, _, largest = field.gradients
+    of_mean, errors = field.variance_shares(mean), field.errors
+    u = dict(zip(errors.keys, np.diagonal(errors.covariance) ** 0.5, strict=True))
     return [
         {"key": key, "u": float(u[key]), "percent_of_max": 100.0 * part,
          "percent_of_mean": 100.0 * of_mean[key]}
-        for key, part in found.variance_shares(largest).items()
+        for key, part in field.variance_shares(largest).items()
     ]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
 class UncertaintyResult(Result):
-    """How sure a map is; None is not known, or was not asked for."""
+    """Uncertainty of an error map; None where unknown or not requested."""
 
-    keys = (
+    json_keys = (
         "limit_um", "statistics", "k", "unknown", "probability_worst", "probability_everywhere",
         "significant_percent", "never_measured_percent", "shares", "montecarlo",
     )  # fmt: skip
@@ -148,15 +150,16 @@ class UncertaintyResult(Result):
             *number_columns(("difference",) if drawn else (), "+.1f", "%"),
         )
         rows: list[tuple[Any, ...]] = []
-        for name, words in NAMES.items():
-            u95, more = (
-                self.statistics.expanded_uncertainty.get(f"u95_{name}"),
-                [*drawn.get(name, {}).values()],
-            )
-            more += [100.0 * (more[1] / u95 - 1.0) if u95 else None] if more else []
-            rows.append((words, getattr(self.statistics, name), plus_minus(u95), u95, *more))
+        for name, label in NAMES.items():
+            u95 = self.statistics.expanded_uncertainty.get(f"u95_{name}")
+            row = (label, getattr(self.statistics, name), plus_minus(u95), u95)
+            if drawn:
+                mean, drawn_u95 = drawn[name].values()
+                difference = 100.0 * (drawn_u95 / u95 - 1.0) if u95 else None
+                row = (*row, mean, drawn_u95, difference)
+            rows.append(row)
         yield Table(columns, rows)
-        yield from (f"  {words}" for words in self.remarks)
+        yield from (f"  {label}" for label in self.remarks)
         if self.probability_worst is not None and self.probability_everywhere is not None:
             yield (
                 f"  |E| ≤ {self.limit_um:g} µm with {100.0 * self.probability_worst:.1f} % at the"
@@ -166,12 +169,12 @@ class UncertaintyResult(Result):
         if self.significant_percent is not None:
             yield f"  |E| is above its own U95 in {self.significant_percent:.1f} % of the volume"
             if self.significant_percent < MOSTLY:
-                yield "  below it the first order is not enough: --verify says how much more it is"
+                yield "  below it the first order does not suffice: --verify adds Monte Carlo"
         if self.never_measured_percent:
             yield f"  {self.never_measured_percent:.1f} % of the volume was never measured"
         numbers = Column("u", ".3g"), *number_columns(("of max", "of mean"), ".1f", "%")
-        each = (one.values() for one in self.shares[:MOST_SHARES])
+        each = (share.values() for share in self.shares[:MOST_SHARES])
         rows = [(key, parameter(key).unit, *three) for key, *three in each]
         if rows:
-            title = "Where it comes from, in shares of the variance:"
+            title = "Uncertainty budget, in shares of the variance:"
             yield Table((Column("error", leads=True), Column("unit"), *numbers), rows, title)

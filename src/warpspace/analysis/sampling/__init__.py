@@ -1,1 +1,1 @@
-"""Machines drawn from tolerances, and what is computed from them."""
+"""Machines drawn from tolerances, and their statistics."""

@@ -1,4 +1,4 @@
-"""Cases of a Monte Carlo run: a machine, its tolerances and a plan; small enough to be sent.
+"""Cases of a Monte Carlo run: a machine, its tolerances and a plan, small enough to be pickled.
 
 Samples come in blocks of fixed size, each with a random stream that follows from the seed and the
 number of the block. Whoever evaluates a block, and when, does not change its numbers.
@@ -42,7 +42,7 @@ class Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Positions of a machine and the points looked at there."""
+    """Positions of a machine and the points evaluated there."""
 
     coordinates: dict[str, Array]  # [...], mm or degrees
     point_mm: Array  # [..., 3]; nominal points in R
@@ -69,7 +69,7 @@ def choose_cylinder(model: Model, cylinder: Cylinder | None = None) -> Cylinder:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """A machine and where it is looked at.
+    """A machine and the volume it is evaluated in.
 
     Tool and relative loop: over the working volume, other axes at their place in the workspace.
     Workpiece loop: over the volume of the largest workpiece, its rotary axes over their travel.
@@ -82,7 +82,7 @@ class Site:
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """The axes that vary, and over which range."""
+        """Ranges of the axes that vary."""
         spans, axes = self.workspace.ranges, self.model.machine.axes
         if self.loop is not Loop.WORKPIECE:
             return {
@@ -95,14 +95,14 @@ class Site:
 
     @property
     def dimensions(self) -> int:
-        """Numbers that a place is told by."""
+        """Number of coordinates of a place."""
         return len(self.ranges) + (3 if self.loop is Loop.WORKPIECE else 0)
 
     def random(self, rng: np.random.Generator, count: int) -> Places:
         return self.places(rng.random((count, self.dimensions)))
 
     def spread(self, nodes: int) -> Places:
-        """Give the nodes that a mean over the points of one machine is taken over.
+        """Return the nodes for the mean over the points of one machine.
 
         The grid of the working volume, each node with its share of the volume. For the workpiece
         loop nodes³ low-discrepancy points (Sobol sequence) over cylinder and rotary travel, since a
@@ -116,7 +116,7 @@ class Site:
         return self._sobol(math.ceil(math.log2(count)), count)
 
     def extreme(self, nodes: int) -> Places:
-        """Give the nodes among which one machine's largest error is.
+        """Return the nodes for the largest error of one machine.
 
         For constant parameters E is affine in the linear axes and in the point of the workpiece, so
         that |E| is convex in them and largest at a corner of the volume or on a rim of the
@@ -141,7 +141,7 @@ class Site:
         return self._on_workpiece(axes, (size.diameter_mm / 2.0, angle, height))
 
     def average(self) -> Places:
-        """Give places whose plain mean is the mean over all points of anything quadratic in them.
+        """Return places whose unweighted mean is exact for functions quadratic in the points.
 
         Two Gauss points per linear axis, which is exact for the square of an error, and the middles
         of 16 parts of the range of a rotary one; for the workpiece loop 2¹⁴ points of a Sobol
@@ -157,7 +157,7 @@ class Site:
         )
 
     def places(self, unit: Array) -> Places:
-        """Turn numbers between 0 and 1, [n, dimensions], into places."""
+        """Map numbers between 0 and 1, [n, dimensions], to places."""
         axes = {
             name: low + (high - low) * unit[:, index]
             for index, (name, (low, high)) in enumerate(self.ranges.items())
@@ -212,7 +212,7 @@ Job = Callable[[np.random.Generator, int], Array]
 
 
 class Over(StrEnum):
-    """What one number a machine gives is taken over."""
+    """Reduction of |E| to one number per machine."""
 
     SAMPLED = "sampled"
     MAX = "max"
@@ -225,7 +225,7 @@ LIMIT_OVER = Over.MAX
 
 @dataclass(frozen=True, slots=True)
 class SamplingPlan:
-    """What is sampled and how."""
+    """Number of samples, seed and reduction of a Monte Carlo run."""
 
     samples: int = DEFAULT_SAMPLES
     seed: int = 0
@@ -252,11 +252,11 @@ class SamplingPlan:
 
     @property
     def blocks(self) -> int:
-        """How many blocks the samples come in; the last one may be shorter."""
+        """Number of blocks of samples; the last one may be shorter."""
         return -(-self.samples // BLOCK)
 
     def block(self, index: int) -> tuple[np.random.Generator, int]:
-        """Give the random stream of a block, and how many machines it has."""
+        """Return the random stream of a block and its number of machines."""
         # the same stream as SeedSequence(seed).spawn(index + 1)[index], without the list
         stream = np.random.SeedSequence(self.seed, spawn_key=(index,))
         return np.random.default_rng(stream), min(BLOCK, self.samples - index * BLOCK)
@@ -265,7 +265,7 @@ class SamplingPlan:
 def reduce_nodes(
     amplitudes: Array, gains: Array, over: Over | str, weights: Array | None = None
 ) -> Array:
-    """Evaluate |E| of machines at all nodes and keep its largest or mean, [n], µm.
+    """Evaluate |E| of machines at all nodes and return its largest or mean, [n], µm.
 
     Amplitudes are [n, K], gains [3, K, N]; weights, [N], say what each node counts for in the mean
     and add up to 1, all alike by default.
@@ -299,7 +299,7 @@ def reduce_nodes(
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What is sampled."""
+    """One Monte Carlo run."""
 
     model: Model
     draws: Draws  # the parameters and their distributions, see `build_draws`
@@ -318,7 +318,7 @@ class Case:
 
     @property
     def is_exact(self) -> bool:
-        """Whether every sample is kept for the quantiles."""
+        """True if all samples are stored for exact quantiles."""
         return self.plan.samples <= EXACT_SAMPLES
 
     @property
@@ -329,7 +329,7 @@ class Case:
         return max(LEAST_BLOCKS, min(self.plan.blocks // TASKS_ASKED, MOST_BLOCKS))
 
     def responses(self, places: Places) -> Array:
-        """Compute what parameters that hold everywhere do at places, [3, K, N], µm per unit."""
+        """Compute the responses of constant parameters at places, [3, K, N], µm per unit."""
         model = replace(self.model, direction=TravelDirection.MEAN)  # gains have none
         keys, at = self.draws.keys, places.coordinates
         basis = build_basis(model, ErrorSet(), keys, at, self.view, places.point_mm)
@@ -337,13 +337,13 @@ class Case:
         return np.ascontiguousarray(np.moveaxis(flat, -1, 0))
 
     def common_places(self) -> Places:
-        """Give the points that the largest, or the mean, of each machine is taken over."""
+        """Return the points for the largest or the mean of each machine."""
         find = self.site.spread if self.plan.over == Over.MEAN else self.site.extreme
         return find(self.plan.nodes)
 
     def build_job(self) -> Job:
-        over = Over(self.plan.over)
-        if over is Over.SAMPLED:
+        quantity = Over(self.plan.over)
+        if quantity is Over.SAMPLED:
             site = self.site
 
             def one_point_each(rng: np.random.Generator, count: int) -> Array:
@@ -358,7 +358,7 @@ class Case:
         gains = self.responses(places)
 
         def all_points_each(rng: np.random.Generator, count: int) -> Array:
-            return reduce_nodes(self.draws.draw(rng, count), gains, over, places.weights)
+            return reduce_nodes(self.draws.draw(rng, count), gains, quantity, places.weights)
 
         return all_points_each
 
@@ -367,14 +367,15 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     """Evaluate the first machines of a case to first order and exactly, [n, N, 3] each, µm."""
     model = replace(case.model, direction=TravelDirection.MEAN)
     view, loop = case.view, case.view.loop
-    rng, most = case.plan.block(0)
-    amplitudes = case.draws.draw(rng, most)[:count]
+    rng, n_machines = case.plan.block(0)
+    amplitudes = case.draws.draw(rng, n_machines)[:count]
     if case.plan.over == Over.SAMPLED:
-        places = case.site.random(rng, most)
+        places = case.site.random(rng, n_machines)
         axes = {
-            key: np.broadcast_to(q, most)[:count, None] for key, q in places.coordinates.items()
+            key: np.broadcast_to(q, n_machines)[:count, None]
+            for key, q in places.coordinates.items()
         }
-        point = np.broadcast_to(places.point_mm, (most, 3))[:count, None]
+        point = np.broadcast_to(places.point_mm, (n_machines, 3))[:count, None]
     else:
         places = case.site.extreme(case.plan.nodes)
         axes, point = places.coordinates, places.point_mm
@@ -384,9 +385,10 @@ def both_orders(case: Case, count: int = EXACT_MACHINES) -> tuple[Array, Array]:
     def error(at: Coordinates, point_mm: Array, exact: bool) -> Array:
         return loop_error(model, loop, at, values, point_mm, exact=exact)[0]
 
-    first, exact = (error(axes, point, way) for way in (False, True))
-    if (held := reference_point(model, view, axes)) is not None:
-        first, exact = first - error(*held, False), exact - error(*held, True)
+    first, exact = (error(axes, point, exactly) for exactly in (False, True))
+    reference = reference_point(model, view, axes)
+    if reference is not None:
+        first, exact = first - error(*reference, False), exact - error(*reference, True)
     return first, exact
 
 

@@ -1,4 +1,4 @@
-"""The distribution of a sampled quantity, collected as a stream in bounded memory."""
+"""Distribution of a sampled quantity, collected as a stream in bounded memory."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.kinematics.model import Loop, Model
-from warpspace.machine.axes import parameter
 from warpspace.machine.errors import ToleranceSet
 from warpspace.units import Array
 
@@ -42,7 +40,7 @@ class Probability:
 
 @dataclass(frozen=True, slots=True)
 class PartialSums:
-    """Some blocks of samples, as little of them as a stream needs."""
+    """Sums, and samples or bins, of some blocks of samples."""
 
     count: int  # how many samples
     # of each block in order; added up one by one, so that grouping blocks does not change a bit
@@ -62,7 +60,7 @@ def summarise(
     """Summarise one block of samples or more, [n] each, µm."""
     sums: list[float] = []
     squares: list[float] = []
-    kept: list[Array] = []
+    samples: list[Array] = []
     fine = np.zeros(_BINS + 2, dtype=np.int64) if count else None
     number, within, largest = 0, 0, 0.0
     for values in blocks:
@@ -75,7 +73,7 @@ def summarise(
             bins, counts = np.unique(_fine_bins(values), return_counts=True)
             fine[bins] += counts
         if keep:
-            kept.append(values)
+            samples.append(values)
     filled = None if fine is None else np.flatnonzero(fine)
     return PartialSums(
         number,
@@ -83,14 +81,14 @@ def summarise(
         tuple(squares),
         largest,
         within,
-        np.concatenate(kept) if keep else None,
+        np.concatenate(samples) if keep else None,
         None if filled is None else filled.astype(np.uint32),
         None if fine is None or filled is None else fine[filled],
     )
 
 
 class Stream:
-    """Collects samples that are not negative."""
+    """Accumulator of non-negative samples."""
 
     def __init__(self, expected: int, spec_um: float | None = None) -> None:
         self.count = 0
@@ -105,7 +103,7 @@ class Stream:
         self.merge(summarise([values], self.spec_um, keep=exact, count=not exact))
 
     def merge(self, part: PartialSums) -> None:
-        """Take in blocks of samples that were summarised, in their order."""
+        """Merge summarised blocks of samples, in their order."""
         if self._values is not None and part.values is not None:
             self._values[self.count : self.count + part.count] = part.values
         if self._fine is not None and part.bins is not None and part.counts is not None:
@@ -131,11 +129,11 @@ class Stream:
 
     @property
     def exact_quantiles(self) -> bool:
-        """Whether quantiles are those of the samples and not of the fine histogram."""
+        """True if quantiles are those of the samples and not of the fine histogram."""
         return self._values is not None
 
     def quantile(self, share: float) -> float:
-        """Give a quantile, µm: exact up to a million samples, beyond to 0.002 % of its value."""
+        """Compute a quantile, µm: exact up to a million samples, beyond to 0.002 % of its value."""
         if self._values is not None:
             return float(np.quantile(self._values[: self.count], share))
         assert self._fine is not None  # noqa: S101 - one of both is kept
@@ -159,7 +157,7 @@ class Stream:
         return self.histogram(np.arange(bins + 1, dtype=np.float64) * width)
 
     def mode_um(self) -> float:
-        """Give the most frequent value, µm: the peak of a Gaussian kernel estimate.
+        """Estimate the mode, µm: the peak of a Gaussian kernel estimate.
 
         Notes
         -----
@@ -180,7 +178,7 @@ class Stream:
         return float((edges[peak] + edges[peak + 1]) / 2.0)
 
     def probability(self) -> Probability | None:
-        """Give the share within the specification; None without one."""
+        """Compute the share within the limit; None without one."""
         if self.spec_um is None:
             return None
         from scipy import stats
@@ -193,7 +191,7 @@ class Stream:
 
 
 def machines_needed(samples: int, probability: float) -> int:
-    """Count how many of the machines have to keep a limit to show that so large a share does."""
+    """Compute the number of machines within a limit that proves a share of the population."""
     from scipy import special
 
     deviation = special.ndtri(0.5 + CONFIDENCE / 2.0)
@@ -202,7 +200,7 @@ def machines_needed(samples: int, probability: float) -> int:
 
 
 def round_width(least: float) -> float:
-    """Give the smallest of 1, 2, 5 × 10ⁿ that is not below a number; 1 for zero."""
+    """Round up to 1, 2 or 5 × 10ⁿ; 1 for zero."""
     if not least > 0.0:
         return 1.0
     decade = 10.0 ** math.floor(math.log10(least))
@@ -225,7 +223,7 @@ SIGMAS = 3.0
 
 
 class Distribution(StrEnum):
-    """How a parameter falls into its tolerance."""
+    """Distribution of a parameter within its tolerance."""
 
     UNIFORM = "uniform"
     NORMAL = "normal"
@@ -269,7 +267,7 @@ class Draws:
         return self.centre + self.half_width / SIGMAS * unit
 
     def from_unit(self, unit: Array) -> Array:
-        """Turn numbers between 0 and 1, [..., K], into values through the inverse distribution."""
+        """Map numbers between 0 and 1, [..., K], to values through the inverse distribution."""
         if self.distribution is Distribution.UNIFORM:
             return self.centre + self.half_width * (2.0 * unit - 1.0)
         from scipy import special
@@ -278,18 +276,6 @@ class Draws:
         return self.centre + self.half_width / SIGMAS * special.ndtri(
             tail + unit * (1.0 - 2.0 * tail)
         )
-
-
-def loop_axes(model: Model, loop: Loop) -> set[str]:
-    sides = ("tool", "workpiece") if loop is Loop.RELATIVE else (str(loop),)
-    return {axis.name for side in sides for axis in model.machine.branch(side)}
-
-
-def loop_keys(model: Model, loop: Loop, keys: Sequence[str]) -> tuple[str, ...]:
-    axes = loop_axes(model, loop)
-    if not axes:
-        raise OptionError(f"loop {loop}: the machine {model.machine.chain} has no axis in it")
-    return tuple(key for key in keys if parameter(key).axis in axes)
 
 
 def choose_distribution(word: Distribution | str) -> Distribution:
@@ -313,22 +299,23 @@ def build_draws(
             " instance default = { translation = 10, rotation = 20, squareness = 25 }"
         )
         raise SceneError(source, [problem])
-    if missing := tolerances.missing(keys):
+    missing = tolerances.missing(keys)
+    if missing:
         problem = (
             f"tolerances: no half width for {', '.join(missing)}; expected one for each parameter"
             " of the loop, or a default for its class (0 holds it at its centre)"
         )
         raise SceneError(source, [problem])
-    found = [tolerance for key in keys if (tolerance := tolerances.get(key)) is not None]
-    for key, tolerance in zip(keys, found, strict=True):
+    ranges = [tolerance for tolerance in map(tolerances.get, keys) if tolerance is not None]
+    for key, tolerance in zip(keys, ranges, strict=True):
         if not tolerance.half_width >= 0.0:
             raise SceneError(
                 source, [f"tolerances.{key}: half width {tolerance.half_width:g}; expected ≥ 0"]
             )
     return Draws(
         tuple(keys),
-        np.array([tolerance.centre for tolerance in found], dtype=float),
-        np.array([tolerance.half_width for tolerance in found], dtype=float),
+        np.array([tolerance.centre for tolerance in ranges], dtype=float),
+        np.array([tolerance.half_width for tolerance in ranges], dtype=float),
         kind,
         clip,
     )

@@ -37,7 +37,7 @@ EXECUTOR_WORKERS = 32
 Progress = Callable[[int], object]  # called with the number of machines done since the last call
 Take = Callable[[int, Array], object]
 """Called with the number of a case and |E| of its next machines, [n], µm."""
-Given = TypeVarTuple("Given")
+Arguments = TypeVarTuple("Arguments")
 Result = TypeVar("Result")
 
 
@@ -64,10 +64,10 @@ def montecarlo(
     executor: Executor | None = None,
     take: Take | None = None,
 ) -> SampleStatistics:
-    (found,) = montecarlo_each(
+    (statistics,) = montecarlo_each(
         [case], workers=case.plan.workers, executor=executor, progress=progress, take=take
     )
-    return found
+    return statistics
 
 
 def montecarlo_each(
@@ -88,7 +88,7 @@ def montecarlo_each(
 
 
 def sample_chunks(job: Job, plan: SamplingPlan) -> Iterator[Array]:
-    """Run a job for every block on several threads and give the results in order, a few at once."""
+    """Run a job for every block on several threads and yield the results in order."""
 
     def block(index: int) -> Array:
         return job(*plan.block(index))
@@ -132,16 +132,16 @@ def _collect(
     take: Take | None,
 ) -> Iterator[SampleStatistics]:
     number, stream = 0, None
-    for (case, _, end, _, _), found in run_in_order(_run, tasks, executor, in_flight):
-        if isinstance(found, SampleStatistics):
-            done, result = case.plan.samples, found
+    for (case, _, end, _, _), sums in run_in_order(_run, tasks, executor, in_flight):
+        if isinstance(sums, SampleStatistics):
+            done, result = case.plan.samples, sums
         else:
             stream = Stream(case.plan.samples, case.plan.spec_um) if stream is None else stream
-            stream.merge(found)
-            done = found.count
+            stream.merge(sums)
+            done = sums.count
             result = _finish(case, stream) if end == case.plan.blocks else None
-            if take is not None and found.values is not None:
-                take(number, found.values)
+            if take is not None and sums.values is not None:
+                take(number, sums.values)
         if progress is not None:
             progress(done)
         if result is not None:
@@ -168,17 +168,17 @@ def _finish(case: Case, stream: Stream) -> SampleStatistics:
 
 
 def run_in_order(
-    function: Callable[[Unpack[Given]], Result],
-    tasks: Iterable[tuple[*Given]],
+    function: Callable[[Unpack[Arguments]], Result],
+    tasks: Iterable[tuple[*Arguments]],
     executor: Executor | None,
     in_flight: int,
-) -> Iterator[tuple[tuple[*Given], Result]]:
-    """Run a function for every task; tasks and results come out in the order of the tasks."""
+) -> Iterator[tuple[tuple[*Arguments], Result]]:
+    """Run a function for every task; yield tasks and results in order."""
     if executor is None:
         for task in tasks:
             yield task, function(*task)
         return
-    pending: deque[tuple[tuple[*Given], Future[Result]]] = deque()
+    pending: deque[tuple[tuple[*Arguments], Future[Result]]] = deque()
     try:
         for task in tasks:
             if len(pending) >= in_flight:
@@ -210,9 +210,9 @@ def threads(workers: int) -> Generator[Executor | None]:
 
 
 def _oldest(
-    pending: "deque[tuple[tuple[*Given], Future[Result]]]",
-) -> tuple[tuple[*Given], Result]:
-    """Wait for the oldest task; it stays in the row until it is done, so that it can be stopped."""
+    pending: "deque[tuple[tuple[*Arguments], Future[Result]]]",
+) -> tuple[tuple[*Arguments], Result]:
+    """Wait for the oldest task; it stays in the queue, so that it can be cancelled."""
     task, future = pending[0]
     result = future.result()
     pending.popleft()

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
 from warpspace.analysis.description import Analysis
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import LOOP_HELP, Grammar, option
 from warpspace.analysis.sampling.cases import (
     DEFAULT_NODES,
@@ -13,7 +14,7 @@ from warpspace.analysis.sampling.cases import (
     Over,
     SamplingPlan,
 )
-from warpspace.analysis.sampling.distribution import Distribution, Draws, build_draws, loop_keys
+from warpspace.analysis.sampling.distribution import Distribution, Draws, build_draws
 from warpspace.kinematics.model import Loop
 from warpspace.machine.limits import LOCAL_WORKERS, SAMPLES
 from warpspace.scene.model import Scene
@@ -55,7 +56,7 @@ class Sampled(Analysis):
         unset="the one whose top rim the scene's workpiece point lies on: 550x450 on the DVF5000",
     )
     seed: int = option(
-        0, "Of the random numbers; the same seed gives the same numbers", low=0, high=2**63 - 1
+        0, "Seed of the random numbers; the same seed gives the same numbers", low=0, high=2**63 - 1
     )
 
     @property
@@ -71,11 +72,11 @@ class Sampled(Analysis):
 
 @dataclass(frozen=True, kw_only=True)
 class SampledMachines(Sampled):
-    """An analysis that draws many of them."""
+    """An analysis of a sample of machines within tolerance."""
 
     samples: int = option(
         DEFAULT_SAMPLES,
-        "How many machines are drawn from the tolerances",
+        "Number of machines drawn from the tolerances",
         low=SAMPLES[0],
         high=SAMPLES[1],
     )
@@ -86,7 +87,7 @@ class SampledMachines(Sampled):
 
 @dataclass(frozen=True, kw_only=True)
 class KeptLimit(SampledMachines):
-    """An analysis of how many of them keep a limit."""
+    """An analysis of the share of machines within a limit."""
 
     over: Literal["max", "sampled"] = option(
         "max",

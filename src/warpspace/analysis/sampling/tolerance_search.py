@@ -1,4 +1,4 @@
-"""The cheapest proportions of tolerances on a sample of machines, and how far they can be widened.
+"""Search for the cheapest proportions of tolerances on a sample of machines, and their scale.
 
 The error of a sampled machine is base + t · move, where t widens all free tolerances in the same
 ratio. |base + t · move| ≤ limit is a quadratic inequality, so that each machine keeps the limit on
@@ -24,7 +24,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True)
 class Ensemble:
-    """Sampled machines before their tolerances are known."""
+    """Sampled machines of unit tolerances."""
 
     keys: tuple[str, ...]  # (K,); parameters of the loop
     # [S, K]; place of each parameter in its tolerance: 0 in the centre, ±1 at the limits
@@ -66,7 +66,7 @@ class Ensemble:
     def norm_and_slope(
         self, centre: Array, half_width: Array
     ) -> tuple[Array, "Floats", NDArray[np.intp] | None]:
-        """Evaluate |E| of every machine, [S], µm, and what its slopes follow from."""
+        """Evaluate |E| of every machine, [S], µm, with its direction and node."""
         error = self.error_um(centre, half_width)
         at = None
         if error.ndim == 3:
@@ -80,19 +80,19 @@ class Ensemble:
         if at is None:
             assert self.spread is not None  # noqa: S101 - each machine has a point of its own
             return np.einsum("cs,csk->k", pull, self.spread, optimize=True).astype(float)
-        found = np.zeros(len(self.keys))
+        slope = np.zeros(len(self.keys))
         for node in range(self.gains.shape[2]):
             chosen = at == node
             by_parameter = pull[:, chosen] @ self.unit[chosen]
-            found += np.einsum("ck,ck->k", by_parameter, self.gains[:, :, node])
-        return found
+            slope += np.einsum("ck,ck->k", by_parameter, self.gains[:, :, node])
+        return slope
 
 
 def build_ensemble(case: Case) -> Ensemble:
-    """Draw machines whose tolerances are not known yet: those of the Monte Carlo of its seed."""
+    """Draw machines of unit tolerances: those of the Monte Carlo run with the same seed."""
     keys, plan = case.draws.keys, case.plan
-    one = np.ones(len(keys))
-    draws = replace(case.draws, centre=0.0 * one, half_width=one)
+    ones = np.ones(len(keys))
+    draws = replace(case.draws, centre=0.0 * ones, half_width=ones)
     blocks = [plan.block(index) for index in range(plan.blocks)]
     unit = np.concatenate([draws.draw(*block) for block in blocks]).astype(np.float32)
     if plan.over == Over.SAMPLED:
@@ -100,8 +100,8 @@ def build_ensemble(case: Case) -> Ensemble:
             np.broadcast_to(case.responses(case.site.random(*block)), (3, len(keys), block[1]))
             for block in blocks
         ]
-        both = np.concatenate(parts, axis=2).astype(np.float32)
-        gains = np.ascontiguousarray(np.swapaxes(both, 1, 2))
+        stacked = np.concatenate(parts, axis=2).astype(np.float32)
+        gains = np.ascontiguousarray(np.swapaxes(stacked, 1, 2))
         return Ensemble(keys, unit, gains, gains * unit, Over.SAMPLED)
     refuse_many_points(case.view.loop)
     gains = case.responses(case.common_places()).astype(np.float32)
@@ -127,7 +127,7 @@ ScaleOf = Callable[[Array, NDArray[np.bool_]], float | None]
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is to be minimised, on which machines."""
+    """Objective and constraints of an allocation."""
 
     ensemble: Ensemble
     centre: Array  # [K], µm or µrad; tolerances before; those that are not free stay
@@ -143,41 +143,41 @@ class Task:
         return float(np.sum(self.cost[self.free] / half_width[self.free]))
 
     def filled(self, free_widths: Array) -> Array:
-        """Put the half widths of the free parameters, [F], beside those that stay, [K]."""
-        found = self.half_width.copy()
-        found[self.free] = free_widths
-        return found
+        """Return all half widths, [K], from those of the free parameters, [F]."""
+        widths = self.half_width.copy()
+        widths[self.free] = free_widths
+        return widths
 
 
 def scaled(task: Task, widths: Array, scale_of: ScaleOf) -> Array | None:
     """Widen or narrow the free tolerances together until enough machines keep the limit, [K]."""
     below = task.free & (widths < task.widest * (1.0 - 1e-6))
-    found = None
+    largest = None
     if below.any() and not np.array_equal(below, task.free):
-        held = np.where(task.free & ~below, task.widest, widths)
-        found = _scaled(task, held, below, scale_of)
-    return _scaled(task, widths, task.free, scale_of) if found is None else found
+        fixed = np.where(task.free & ~below, task.widest, widths)
+        largest = _scaled(task, fixed, below, scale_of)
+    return _scaled(task, widths, task.free, scale_of) if largest is None else largest
 
 
 def _scaled(
     task: Task, widths: Array, moving: NDArray[np.bool_], scale_of: ScaleOf
 ) -> Array | None:
-    found, moving = widths.copy(), moving.copy()
+    result, moving = widths.copy(), moving.copy()
     while moving.any():
-        scale = scale_of(found, moving)
+        scale = scale_of(result, moving)
         if scale is None:
             return None
-        over = moving & (found * scale > task.widest)
-        if not over.any():
-            found[moving] *= scale
+        capped = moving & (result * scale > task.widest)
+        if not capped.any():
+            result[moving] *= scale
             break
-        found[over] = task.widest
-        moving &= ~over
-    return found
+        result[capped] = task.widest
+        moving &= ~capped
+    return result
 
 
 def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> float | None:
-    """Give the largest scale of the tolerances that move, on the machines of the ensemble."""
+    """Compute the largest scale of the moving tolerances on the machines of the ensemble."""
     none = np.zeros_like(half_width)
     base = task.ensemble.error_um(task.centre, np.where(moving, 0.0, half_width))
     move = task.ensemble.error_um(none, np.where(moving, half_width, 0.0))
@@ -186,7 +186,7 @@ def sample_scale(task: Task, half_width: Array, moving: NDArray[np.bool_]) -> fl
 
 
 def variance_widths(task: Task) -> Array:
-    """Give the proportions that are cheapest if only the variance of E counts, [K], µm or µrad."""
+    """Compute the cheapest proportions for a given variance of E, [K], µm or µrad."""
     square = task.ensemble.mean_square_gain[task.free]
     widths = np.cbrt(task.cost[task.free] / square)
     return task.filled(widths * (0.5 * task.widest / widths.max()))
@@ -234,7 +234,7 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
     def remembered(log_scale: bytes) -> tuple[float, Array]:
         return within(np.frombuffer(log_scale))
 
-    found = optimize.minimize(
+    optimum = optimize.minimize(
         lambda x: float(np.sum(share * np.exp(-x))),
         np.zeros(len(first)),
         jac=lambda x: -share * np.exp(-x),
@@ -250,9 +250,9 @@ def search_widths(task: Task, step: Callable[[], object]) -> Array | None:
         callback=lambda _: step(),
         options={"maxiter": MOST_STEPS, "ftol": ENOUGH},
     )
-    if not np.isfinite(found.x).all():
+    if not np.isfinite(optimum.x).all():
         return start
-    better = exact(task.filled(first * np.exp(found.x)))
+    better = exact(task.filled(first * np.exp(optimum.x)))
     return better if better is not None and task.spent(better) < task.spent(start) else start
 
 
@@ -274,11 +274,11 @@ def scales_within(base_um: Array, move_um: Array, limit_um: float) -> Array:
 
 
 def largest_scale(within: Array, probability: float) -> float | None:
-    """Give the largest scale where enough machines, [S, 2], keep the limit; see `scales_within`."""
+    """Return the largest scale with enough machines within the limit; see `scales_within`."""
     needed = math.ceil(probability * len(within) - 1e-9)
     valid = within[within[:, 0] <= within[:, 1]]
     low, high = np.sort(valid[:, 0]), np.sort(valid[:, 1])
     entered = np.searchsorted(low, high, side="right")
-    left = np.searchsorted(high, high, side="left")
-    enough = entered - left >= needed
+    lower = np.searchsorted(high, high, side="left")
+    enough = entered - lower >= needed
     return float(high[enough].max()) if enough.any() else None

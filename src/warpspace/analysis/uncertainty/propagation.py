@@ -1,4 +1,4 @@
-"""How sure numbers are: the covariance of a machine's errors, carried to points and statistics.
+"""Uncertainty of results: the covariance of errors, propagated to points and statistics.
 
 An error of a scene is sure by its standard uncertainty at points of its axis (``[uncertainty]``,
 errors independent of each other), or by the covariance of amplitudes that a calibration found. To
@@ -16,7 +16,8 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from warpspace.analysis.sampling.distribution import loop_axes
+from warpspace.analysis.description import ExpandedUncertainty, UncertaintySource
+from warpspace.analysis.loop_parameters import loop_axes
 from warpspace.analysis.statistics import P95, Summary
 from warpspace.field.evaluate import ErrorBasis, ErrorField, View, build_basis
 from warpspace.field.grid import DEFAULT_NODES, build_grid, cut, pieces
@@ -27,7 +28,7 @@ from warpspace.scene.model import Scene, evaluate_grid
 from warpspace.units import Array
 
 NAMES = {"mean_um": "mean", "rms_um": "RMS", "p95_um": "P95", "max_um": "max"}
-COVERED = 0.9545  # of a normal distribution, within two standard deviations
+COVERAGE = 0.9545  # of a normal distribution, within two standard deviations
 NEAR = 0.01  # part of the points that tells how their 95th percentile moves
 MOST_DRAWN = 2_000_000  # |E| of machines that are held at a time
 SAMPLES = 17  # points that a mode along an axis is drawn through
@@ -36,22 +37,22 @@ Layer: TypeAlias = tuple[ErrorSet, tuple[str, ...]]
 
 
 @lru_cache(maxsize=256)
-def coverage_factor(freedom: float) -> float:
-    """Give k of U95 = k · u: 2 for infinite degrees of freedom."""
-    if np.isinf(freedom):
+def coverage_factor(dof: float) -> float:
+    """Compute the coverage factor k of U95 = k · u: 2 for infinite degrees of freedom."""
+    if np.isinf(dof):
         return 2.0
     from scipy.stats import t
 
-    return float(t.ppf(0.5 + COVERED / 2.0, max(freedom, 1.0)))
+    return float(t.ppf(0.5 + COVERAGE / 2.0, max(dof, 1.0)))
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorUncertainty:
-    """How sure the errors of a scene are, through one loop."""
+    """Uncertainty of the errors of a scene that act in one loop."""
 
     layers: tuple[Layer, ...]  # curves that are not sure; their amplitudes play no part
     covariance: Array  # [K, K], µm and µrad; of the amplitudes, one layer behind the other
-    freedoms: Array  # [K], degrees of freedom
+    dofs: Array  # [K], degrees of freedom
     unknown: tuple[str, ...]  # errors of which nobody says how sure they are
     undetermined: tuple[str, ...] = ()  # of the unknown: what a calibration left open
     lack_of_fit: float = 0.0  # that it saw
@@ -64,28 +65,28 @@ class ErrorUncertainty:
     def respond(
         self, model: Model, at: Coordinates, view: View, point_mm: Array | None = None
     ) -> ErrorBasis:
-        """Give how errors of points respond to the amplitudes."""
+        """Compute the response of errors of points to the amplitudes."""
         bases = [build_basis(model, *layer, at, view, point_mm) for layer in self.layers]
-        both = zip(*((one.position, one.orientation) for one in bases), strict=True)
-        return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, both))
+        responses = zip(*((basis.position, basis.orientation) for basis in bases), strict=True)
+        return ErrorBasis(self.keys, bases[0].nominal_mm, *map(np.concatenate, responses))
 
     @cached_property
-    def freedom(self) -> float:
-        """Degrees of freedom that all have, else infinite; `expanded` counts each by its own."""
-        return float(self.freedoms[0]) if len({*self.freedoms.tolist()}) == 1 else np.inf
+    def dof(self) -> float:
+        """Common degrees of freedom, else infinite; `expanded` uses those of each amplitude."""
+        return float(self.dofs[0]) if len({*self.dofs.tolist()}) == 1 else np.inf
 
     @property
     def factor(self) -> float:
-        return coverage_factor(self.freedom)
+        return coverage_factor(self.dof)
 
     @cached_property
     def factors(self) -> Array:
         """U95 / u by the degrees of freedom of each, [K]."""
-        return np.array([coverage_factor(one) for one in self.freedoms.tolist()])
+        return np.array([coverage_factor(dof) for dof in self.dofs.tolist()])
 
     @cached_property
     def expanded(self) -> Array:
-        """Covariance times the factors: U95 of what grows by g is the root of g · this · g."""
+        """Covariance times the factors: U95 of a number of gradient g is √(g · this · g)."""
         return self.covariance * np.outer(self.factors, self.factors)
 
     @property
@@ -100,95 +101,100 @@ class ErrorUncertainty:
         return width[:, None] * vectors * _root(values)
 
     def u95_of(self, key: str) -> float | None:
-        """Give U95 of the amplitude of one error; None where it is not stated."""
+        """Return U95 of the amplitude of one error; None where it is not stated."""
         at = self.keys.index(key) if key in self.keys else None
         return None if at is None else float(self.expanded[at, at]) ** 0.5
 
     def probability_within(
         self, value: Array | float, u95: Array | float, low: float, high: float
     ) -> Array:
-        """Give the probability that numbers lie between two, by their U95."""
+        """Compute the probability that quantities lie between limits, by their U95."""
         from scipy.stats import t
 
         unit = np.maximum(u95, 1e-12) / self.factor
-        below, above = (t.cdf((end - value) / unit, self.freedom) for end in (low, high))
+        below, above = (t.cdf((end - value) / unit, self.dof) for end in (low, high))
         return above - below
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their freedom."""
-        found = rng.standard_normal((count, len(self.keys))) @ self.root.T
-        for freedom in {*self.freedoms.tolist()} - {np.inf}:
-            found[:, self.freedoms == freedom] *= np.sqrt(
-                freedom / rng.chisquare(freedom, (count, 1))
-            )
-        return found
+        """Draw changes of the amplitudes, [count, K]: normal, or Student's t of their dof."""
+        changes = rng.standard_normal((count, len(self.keys))) @ self.root.T
+        for dof in {*self.dofs.tolist()} - {np.inf}:
+            changes[:, self.dofs == dof] *= np.sqrt(dof / rng.chisquare(dof, (count, 1)))
+        return changes
 
-    def propagate(self, ask: Callable[[Array], Array]) -> list[float | None]:
-        """Give U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
+    def propagate(self, function: Callable[[Array], Array]) -> list[float | None]:
+        """Compute U95 of numbers, [n], that are a function of changes of the amplitudes, [K].
 
         Notes
         -----
         Half the difference of what one standard uncertainty up and down gives (ISO/IEC Guide 98-3,
         5.1.3, note 2), or where both go the same way, as at the least of a width, their RMS.
         """
-        present = ask(np.zeros(len(self.keys)))
+        present = function(np.zeros(len(self.keys)))
         if not self.is_known:
             return [None] * len(present)
-        steps = [(ask(way), ask(-way)) for way in (self.root * self.factors[:, None]).T]
+        steps = [
+            (function(step), function(-step)) for step in (self.root * self.factors[:, None]).T
+        ]
         variance = np.sum((np.array(steps).reshape(-1, len(present)) - present) ** 2, axis=0) / 2.0
         return _root(variance).tolist()
 
     def remarks(self) -> Iterator[str]:
-        """Say what is not stated, and what the data did not determine."""
-        if unstated := [key for key in self.unknown if key not in self.undetermined]:
+        """List the errors whose uncertainty is unknown, and a lack of fit."""
+        unstated = [key for key in self.unknown if key not in self.undetermined]
+        if unstated:
             yield (
-                f"uncertainty not stated of {', '.join(unstated)}: it is unknown wherever they"
-                " act, not zero"
+                f"uncertainty of {', '.join(unstated)} is unknown; results that depend on it show"
+                " “± ?”"
             )
         if self.undetermined:
             names = ", ".join(self.undetermined)
-            yield f"the readings did not determine {names}: unknown wherever they act"
+            yield f"not estimable from the readings: {names}; results that depend on them show “± ?”"
         if self.lack_of_fit:
             yield (
-                f"the calibration missed something: its residuals were {self.lack_of_fit:.1f} times"
-                " what its readings scatter; U95 does not contain that"
+                f"lack of fit: the residuals of the calibration are {self.lack_of_fit:.1f} times the"
+                " scatter of its readings; U95 does not include that"
             )
 
 
 def scene_uncertainty(scene: Scene, loop: Loop = Loop.TOOL) -> ErrorUncertainty | None:
-    """Collect how sure the errors of a scene are; None where it says nothing of that."""
-    joint, alone = scene.covariance, scene.uncertainty
-    if joint is None and not alone:
+    """Collect the uncertainty of the errors of a scene; None where it states none."""
+    covariance, curves = scene.covariance or Covariance((), ()), scene.uncertainty
+    if scene.covariance is None and not curves:
         return None
-    axes, together = loop_axes(scene.model, loop), () if joint is None else joint.keys
-    first = {key: scene.errors.functions[key] for key in together if key in scene.errors}
+    axes, joint = loop_axes(scene.model, loop), covariance.keys
+    first = {key: scene.errors.functions[key] for key in joint if key in scene.errors}
     second: dict[str, ErrorFunction] = {}
-    for key, curve in alone.items():
-        first[key], *rest = _modes(key, curve)
-        second |= dict.fromkeys((key,), *rest) if rest else {}
-    keys = tuple(key for key in (*together, *alone) if parameter(key).axis in axes)
-    more = tuple(key for key in second if key in keys)
-    layers = (ErrorSet(first), keys), (ErrorSet(second), more)
-    width = [first[key].amplitude if key in alone else 0.0 for key in keys]
-    covariance = np.diag([one**2 for one in (*width, *(second[key].amplitude for key in more))])
-    freedoms = np.full(len(covariance), np.inf)
-    if joint is not None:
-        own = [key for key in keys if key in together]
-        rows, places = [keys.index(key) for key in own], [together.index(key) for key in own]
-        covariance[np.ix_(rows, rows)] = joint.matrix[np.ix_(places, places)]
-        freedoms[rows] = joint.dof
-    known = joint or Covariance((), ())
-    undetermined = tuple(key for key in known.undetermined if parameter(key).axis in axes)
-    acting = (
-        key for key in scene.errors if parameter(key).axis in axes and key not in undetermined
+    for key, curve in curves.items():
+        modes = _modes(key, curve)
+        first[key] = modes[0]
+        second |= dict.fromkeys((key,), *modes[1:]) if modes[1:] else {}
+    keys = tuple(key for key in (*joint, *curves) if parameter(key).axis in axes)
+    second_keys = tuple(key for key in second if key in keys)
+    layers = (ErrorSet(first), keys), (ErrorSet(second), second_keys)
+    widths = [first[key].amplitude if key in curves else 0.0 for key in keys]
+    widths += [second[key].amplitude for key in second_keys]
+    matrix = np.diag(np.square(widths))
+    dofs = np.full(len(matrix), np.inf)
+    if joint:
+        rows = [index for index, key in enumerate(keys) if key in joint]
+        places = [joint.index(keys[index]) for index in rows]
+        matrix[np.ix_(rows, rows)] = covariance.matrix[np.ix_(places, places)]
+        dofs[rows] = covariance.dof
+    undetermined = tuple(key for key in covariance.undetermined if parameter(key).axis in axes)
+    unstated = tuple(
+        key
+        for key in scene.errors
+        if parameter(key).axis in axes
+        and key not in (*undetermined, *keys)
+        and scene.errors.amplitude(key)
     )
-    unknown = tuple(k for k in acting if k not in keys and scene.errors.amplitude(k))
-    every = *unknown, *undetermined
-    return ErrorUncertainty(layers, covariance, freedoms, every, undetermined, known.lack_of_fit)
+    unknown = (*unstated, *undetermined)
+    return ErrorUncertainty(layers, matrix, dofs, unknown, undetermined, covariance.lack_of_fit)
 
 
 def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
-    """Give what an error varies by whose points along its axis are as sure as a curve says.
+    """Return the modes of an error whose standard uncertainty along its axis is a curve.
 
     u · cos φ and u · sin φ, φ from 0 at one end to 90° at the other: near points vary together, the
     ends by themselves, so that widths and differences along the axis are not sure either.
@@ -198,7 +204,7 @@ def _modes(key: str, curve: ErrorFunction) -> tuple[ErrorFunction, ...]:
         return (curve,)
     at = np.unique([*curve.kinks, *np.linspace(low, high, SAMPLES)])
     phase = 0.5 * np.pi * np.clip((at - low) / (high - low), 0.0, 1.0)
-    parts = (curve.evaluate(at) * way for way in (np.cos(phase), np.sin(phase)))
+    parts = (curve.evaluate(at) * weights for weights in (np.cos(phase), np.sin(phase)))
     return tuple(
         TableCurve(curve.span, tuple(zip(at.tolist(), u.tolist(), strict=True))) for u in parts
     )
@@ -210,7 +216,7 @@ def _root(variance: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class FieldUncertainty:
-    """How sure the errors of points are; `replace` error_um where only these change."""
+    """Uncertainty of the errors of points; `replace` error_um where only these change."""
 
     errors: ErrorUncertainty
     response: Array  # [K, ..., 3], of the position errors to what is not sure
@@ -263,30 +269,31 @@ class FieldUncertainty:
         return self.error_um / np.where(length > 0.0, length, 1.0)
 
     def _along(self, square: Array) -> Array:
-        way = self.direction
-        turned = np.einsum("...ij,...i->...j", square, way)
-        variance = np.einsum("...j,...j->...", turned, way)
-        if (none := self.norm_um == 0.0).any():
+        direction = self.direction
+        turned = np.einsum("...ij,...i->...j", square, direction)
+        variance = np.einsum("...j,...j->...", turned, direction)
+        none = self.norm_um == 0.0
+        if none.any():
             variance = np.where(none, np.trace(square, axis1=-2, axis2=-1), variance)
         return _root(variance)
 
-    def u95_along(self, point: int, way: Array) -> float | None:
-        """Give U95 of the error of a point by its number, along a unit vector, [3]."""
+    def u95_along(self, point: int, direction: Array) -> float | None:
+        """Compute U95 of the error of a point by its index, along a unit vector, [3]."""
         square = self.expanded_um2.reshape(-1, 3, 3)[point]
-        return float(_root(way @ square @ way)) if self.errors.is_known else None
+        return float(_root(direction @ square @ direction)) if self.errors.is_known else None
 
     def u95_at(self, point: int) -> float | None:
-        """Give U95 of |E| at a point by its number; None where it is unknown."""
+        """Return U95 of |E| at a point by its index; None where unknown."""
         return self.u95_norm_um.item(point) if self.errors.is_known else None
 
     def u95(self, gradient: Array) -> float:
-        """Give U95 of a number by its growth per unit of each amplitude, [K]."""
+        """Compute U95 of a number from its gradient in the amplitudes, [K]."""
         return float(_root(gradient @ self.errors.expanded @ gradient))
 
-    def propagate(self, ask: Callable[[Array], Array]) -> list[float | None]:
-        """Give U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
+    def propagate(self, function: Callable[[Array], Array]) -> list[float | None]:
+        """Compute U95 of numbers, [n], that are a function of the position errors, [..., 3]."""
         return self.errors.propagate(
-            lambda change: ask(self.error_um + np.tensordot(change, self.response, 1))
+            lambda change: function(self.error_um + np.tensordot(change, self.response, 1))
         )
 
     def variance_shares(self, gradient: Array) -> dict[str, float]:
@@ -295,15 +302,15 @@ class FieldUncertainty:
         They add up to one; a share is below zero where a correlation makes the variance smaller.
         """
         parts = gradient * (self.errors.covariance @ gradient)
-        found = dict.fromkeys(self.errors.keys, 0.0)
+        shares = dict.fromkeys(self.errors.keys, 0.0)
         for key, part in zip(
             self.errors.keys, (parts / (parts.sum() or 1.0)).tolist(), strict=True
         ):
-            found[key] += part
-        return dict(sorted(found.items(), key=lambda one: -abs(one[1])))
+            shares[key] += part
+        return dict(sorted(shares.items(), key=lambda item: -abs(item[1])))
 
-    def keeps(self, limit_um: float) -> Array:
-        """Give the probability that |E| is within a limit at each point, [...].
+    def conformance_probability(self, limit_um: float) -> Array:
+        """Compute the probability that |E| is within a limit at each point, [...].
 
         |E|² is a quadratic form; a gamma distribution of its mean and variance stands for it.
         """
@@ -318,21 +325,24 @@ class FieldUncertainty:
         return np.where(variance > 1e-12 * mean**2, gammainc(mean * per, limit_um**2 * per), sharp)
 
     def statistics(self) -> dict[str, float | None]:
-        """Give U95 of mean, RMS, P95 and max of |E| by their keys; None where it is unknown.
+        """Compute U95 of mean, RMS, P95 and max of |E| by key; None where unknown.
 
         Points without an error count by U95 of their vector.
         """
         if not self.errors.is_known:
             return dict.fromkeys(NAMES)
         u95 = [self.u95(gradient) for gradient in self.gradients]
-        if (none := self.norm_um.reshape(-1) == 0.0).any():
-            more = self.counts[:, none] @ self.u95_norm_um.reshape(-1)[none]
-            u95 = np.add(u95, more).tolist()
+        none = self.norm_um.reshape(-1) == 0.0
+        if none.any():
+            increase = self.counts[:, none] @ self.u95_norm_um.reshape(-1)[none]
+            u95 = np.add(u95, increase).tolist()
         return dict(zip(NAMES, u95, strict=True))
 
     def with_expanded_uncertainty(self, numbers: S) -> S:
-        """Say U95 beside statistics of the field."""
-        u95 = {f"u95_{name}": value for name, value in self.statistics().items()}
+        """Return statistics of the field with their expanded uncertainties."""
+        u95 = ExpandedUncertainty(
+            (f"u95_{name}", value) for name, value in self.statistics().items()
+        )
         return replace(numbers, expanded_uncertainty=u95)
 
     @cached_property
@@ -341,12 +351,12 @@ class FieldUncertainty:
         return np.full(size, 1.0 / size) if self.shares is None else self.shares.reshape(-1)
 
     def transform(self, linear: Callable[[Array], Array]) -> "FieldUncertainty":
-        """Give the same of what a linear function makes of position errors, [..., n, 3]."""
+        """Propagate through a linear function of the position errors, [..., n, 3]."""
         return combine(self.errors, linear(self.response), linear(self.error_um), self.shares)
 
     @cached_property
     def counts(self) -> Array:
-        """How much |E| of each point counts in mean, RMS, P95 and max, [4, N]."""
+        """Weight of |E| of each point in mean, RMS, P95 and max, [4, N]."""
         norm, weights = self.norm_um.reshape(-1), self.weights
         order = np.argsort(norm)
         place = np.cumsum(weights[order])
@@ -359,38 +369,41 @@ class FieldUncertainty:
 
     @cached_property
     def gradients(self) -> Array:
-        """Growth of mean, RMS, P95 and max of |E| per unit of each amplitude, [4, K]."""
-        response, found = self.response.reshape(-1, self.norm_um.size, 3), list[Array]()
-        way = self.direction.reshape(-1, 3)
+        """Gradients of mean, RMS, P95 and max of |E| in the amplitudes, [4, K]."""
+        response, gradients = self.response.reshape(-1, self.norm_um.size, 3), list[Array]()
+        direction = self.direction.reshape(-1, 3)
         for count in self.counts:
-            few = np.flatnonzero(count) if not count.all() else slice(None)  # tell P95 and max
-            own = (count[few, None] * way[few]).reshape(-1)
-            found.append(response[:, few].reshape(len(response), own.size) @ own)
-        return np.stack(found)
+            points = np.flatnonzero(count) if not count.all() else slice(None)  # tell P95 and max
+            weighted = (count[points, None] * direction[points]).reshape(-1)
+            gradients.append(response[:, points].reshape(len(response), weighted.size) @ weighted)
+        return np.stack(gradients)
 
     def probability_of_improvement(self, after: "FieldUncertainty", name: str) -> float | None:
-        """Give the probability that RMS or max of |E| is smaller with other errors of the points.
+        """Compute the probability that RMS or max of |E| is smaller after a change of the errors.
 
         Squares are compared: that of the RMS is linear in what is not sure, however large that is.
         """
         if not self.errors.is_known:
             return None
-        squares, ways = np.zeros(2), list[Array]()
-        for index, one in enumerate((self, after)):
-            square = one.norm_um.reshape(-1) ** 2
+        squares, gradients = np.zeros(2), list[Array]()
+        for index, field in enumerate((self, after)):
+            square = field.norm_um.reshape(-1) ** 2
             squares[index] = square.max() if name == "max_um" else self.weights @ square
-            ways.append(2.0 * squares[index] ** 0.5 * one.gradients[[*NAMES].index(name)])
-        way, fall = ways[1] - ways[0], float(squares[0] - squares[1])
-        return float(self.errors.probability_within(fall, self.u95(way), 0.0, np.inf))
+            gradients.append(2.0 * squares[index] ** 0.5 * field.gradients[[*NAMES].index(name)])
+        gradient, fall = gradients[1] - gradients[0], float(squares[0] - squares[1])
+        return float(self.errors.probability_within(fall, self.u95(gradient), 0.0, np.inf))
 
     def machines(self, count: int, seed: int) -> Iterator[Array]:
-        """Draw machines from the covariance: |E| of each at every point, [n, N], in pieces."""
+        """Draw machines from the covariance; yield |E| at every point, [n, N], in pieces."""
         rng, points = np.random.default_rng(seed), self.norm_um.size
         gains = np.moveaxis(self.response.reshape(-1, points, 3), -1, 0)
         present = self.error_um.reshape(points, 3).T
-        for start in range(0, count, step := max(1, MOST_DRAWN // points)):
+        step = max(1, MOST_DRAWN // points)
+        for start in range(0, count, step):
             change = self.errors.draw(rng, min(step, count - start))
-            parts = (change @ gain + own for gain, own in zip(gains, present, strict=True))
+            parts = (
+                change @ gain + component for gain, component in zip(gains, present, strict=True)
+            )
             yield np.sqrt(sum(part**2 for part in parts))
 
 
@@ -402,46 +415,45 @@ def field_uncertainty(
     point_mm: Array | None = None,
     shares: Array | None = None,
 ) -> FieldUncertainty | None:
-    """Say how sure a field of a scene is; None where the scene says nothing of that."""
-    doubt = scene_uncertainty(scene, view.loop)
-    return doubt and _field_doubt(doubt, scene.model, error_um, at, view, point_mm, shares)
+    """Propagate the uncertainty of a scene to a field; None where the scene states none."""
+    uncertainty = scene_uncertainty(scene, view.loop)
+    return uncertainty and _propagate_to_field(
+        uncertainty, scene.model, error_um, at, view, point_mm, shares
+    )
 
 
-def _field_doubt(
-    doubt: ErrorUncertainty, model: Model, error_um: Array, at: Coordinates, view: View,
+def _propagate_to_field(
+    errors: ErrorUncertainty, model: Model, error_um: Array, at: Coordinates, view: View,
     point_mm: Array | None, shares: Array | None = None,
 ) -> FieldUncertainty:  # fmt: skip
-    basis = doubt.respond(model, at, view, point_mm)
-    return replace(combine(doubt, basis.position, error_um, shares), turning=basis.orientation)
+    basis = errors.respond(model, at, view, point_mm)
+    return replace(combine(errors, basis.position, error_um, shares), turning=basis.orientation)
 
 
 def u95_columns(
     scene: Scene, field: ErrorField, at: Coordinates, view: View, point_mm: Array | None = None
-) -> dict[str, Array]:
-    """Give `FieldDoubt.columns` of points, [...], a piece at a time; none where not known."""
-    shape, found, doubt = (
-        field.norm_um.shape,
-        dict[str, Array](),
-        scene_uncertainty(scene, view.loop),
-    )
-    if doubt is None or not doubt.is_known:
-        return found
+) -> ExpandedUncertainty[Array]:
+    """Compute `FieldUncertainty.columns` of points, [...], in pieces; none where unknown."""
+    shape, columns = field.norm_um.shape, ExpandedUncertainty[Array]()
+    errors = scene_uncertainty(scene, view.loop)
+    if errors is None or not errors.is_known:
+        return columns
     point_mm = None if point_mm is None else np.broadcast_to(point_mm, (*shape, 3))
     for piece in pieces(shape):
-        here = {name: cut(np.asarray(values), piece) for name, values in at.items()}
+        axes = {name: cut(np.asarray(values), piece) for name, values in at.items()}
         point = None if point_mm is None else point_mm[piece]
-        one = _field_doubt(doubt, scene.model, field.error_um[piece], here, view, point)
-        for name, values in one.columns.items():
-            whole = found.setdefault(name, np.empty(shape + values.shape[len(shape) :]))
-            whole[piece] = values
-    return found
+        part = _propagate_to_field(errors, scene.model, field.error_um[piece], axes, view, point)
+        for name, values in part.columns.items():
+            column = columns.setdefault(name, np.empty(shape + values.shape[len(shape) :]))
+            column[piece] = values
+    return columns
 
 
 def combine(
-    doubt: ErrorUncertainty, response: Array, error_um: Array, shares: Array | None = None
+    errors: ErrorUncertainty, response: Array, error_um: Array, shares: Array | None = None
 ) -> FieldUncertainty:
-    """Carry how sure errors are to points, by the response of these, [K, ..., 3]."""
-    return FieldUncertainty(doubt, response, _carry(doubt.expanded, response), error_um, shares)
+    """Propagate the uncertainty of errors to points by their response, [K, ..., 3]."""
+    return FieldUncertainty(errors, response, _carry(errors.expanded, response), error_um, shares)
 
 
 def _carry(covariance: Array, response: Array) -> Array:
@@ -452,23 +464,23 @@ def _carry(covariance: Array, response: Array) -> Array:
 def volume_uncertainty(
     scene: Scene, view: View, nodes: int = DEFAULT_NODES
 ) -> FieldUncertainty | None:
-    """Say how sure the errors over the working volume are; None where a scene does not say."""
+    """Propagate the uncertainty of a scene to its working volume; None where it states none."""
     grid = build_grid(scene.model, scene.workspace, min(nodes, DEFAULT_NODES))
     error = evaluate_grid(scene, grid, view).error_um
     return field_uncertainty(scene, error, grid.coordinates, view, grid.point_mm, grid.weights)
 
 
-def u95_lines(doubt: ErrorUncertainty | None, named: Mapping[str, Summary]) -> Iterator[str]:
-    """Say U95 of mean, RMS, P95 and max by what they are of, and what is not stated."""
-    if doubt is None:
+def u95_lines(uncertainty: UncertaintySource | None, named: Mapping[str, Summary]) -> Iterator[str]:
+    """Format U95 of mean, RMS, P95 and max of named statistics, and the remarks."""
+    if uncertainty is None:
         return
-    for of, one in named.items():
+    for of, summary in named.items():
         each = (
-            f"{word} {plus_minus(one.expanded_uncertainty[f'u95_{name}'])}"
+            f"{word} {plus_minus(summary.expanded_uncertainty[f'u95_{name}'])}"
             for name, word in NAMES.items()
         )
-        yield f"  U95{of and f', {of}'} (k = {doubt.factor:.3g}): {', '.join(each)} µm"
-    yield from (f"  {words}" for words in doubt.remarks())
+        yield f"  U95{of and f', {of}'} (k = {uncertainty.factor:.3g}): {', '.join(each)} µm"
+    yield from (f"  {remark}" for remark in uncertainty.remarks())
 
 
 def plus_minus(u95: float | None, form: str = ".2f") -> str:

@@ -21,7 +21,7 @@ import rich
 import viser
 from markupsafe import Markup, escape
 
-from warpspace.analysis.note_tables import note_numbers, said_stale, spell_numbers, spell_place
+from warpspace.analysis.note_tables import note_numbers, stale_remark, spell_numbers, spell_place
 from warpspace.app.browser.html import EMPTY, join, linked, lowered, number, rows, tag
 from warpspace.app.browser.page import script_source
 from warpspace.app.documents import legend
@@ -113,7 +113,7 @@ def step_words(scene: Scene, notes: Sequence[Note], index: int, problem: str) ->
     note = notes[index]
     heads = (note.kind.capitalize(), note.author, f"{note.date:%Y-%m-%d}", note.status)
     stays = problem and f"The drawing of the step before stays: {problem}"
-    stale = said_stale(note, note_numbers(scene, [note])[0])
+    stale = stale_remark(note, note_numbers(scene, [note])[0])
     return join((
         tag("h2", f"{index + 1} of {len(notes)}"),
         tag("p", " · ".join(filter(None, heads)), class_="ws-quiet"),

@@ -185,7 +185,7 @@ def _measured(picture: LivePicture) -> Iterator[Label]:
     if (drawn := measured(picture)) is not None:
         found, _, (start, end, *corner) = drawn
         places = (*[(start + end) / 2.0] * 2, *corner)
-        for words, at in zip(found.words(), places, strict=True):
+        for words, at in zip(found.lines(), places, strict=True):
             yield Label(words, at, "measured")
 
 

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
-from warpspace.analysis.sampling.distribution import loop_axes
+from warpspace.analysis.loop_parameters import loop_axes
 from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_uncertainty
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.compare import compare_pictures

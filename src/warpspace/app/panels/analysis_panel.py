@@ -48,7 +48,7 @@ TITLES = {
     "uncertainty": "Uncertainty of the map",
     "form": "Flatness, straightness, squareness", "convert": "Another convention",
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
-    "allocate": "Tolerances", "concepts": "Machines side by side",
+    "adjust": "Adjustment", "allocate": "Tolerances", "concepts": "Machines side by side",
 }  # fmt: skip
 """What sections are called, where the name of the command does not do."""
 OF_STATE = frozenset({"loop", "placed"})
@@ -246,12 +246,12 @@ class AnalysisPanel(Section):
         elif word in ("preview", "apply") and (change := self._change(state, value)) is not None:
             what = self.title.lower()
             if word == "preview":
-                words = change.words if change.words.startswith("after ") else ""
-                words = words or f"after {what}: {change.words}"
+                words = change.label if change.label.startswith("after ") else ""
+                words = words or f"after {what}: {change.label}"
                 return with_proposal(state, change.scene, words)
             found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
-            done = change.words.removeprefix(f"after {what}: ")
+            done = change.label.removeprefix(f"after {what}: ")
             self.context.decided = state, f"{self.title}: {done}"
             return found
         return state
@@ -307,7 +307,7 @@ class AnalysisPanel(Section):
         words = error_words(error)
         if isinstance(error, OptionError):
             labels = {one.name: one.label for one in self.kind.options()}
-            words = error.said(lambda name: labels.get(name, name))
+            words = error.with_names(lambda name: labels.get(name, name))
         self._problem = (self._asked, words)
         self.renew()
 
@@ -342,7 +342,7 @@ def _change_html(state: AppState, change: Change) -> Markup:
         if abs(b - a) > SAME:
             said = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
             moved.append((-abs(b - a), said))
-    steps = [said for _, said in sorted(moved)] or [change.words]
+    steps = [said for _, said in sorted(moved)] or [change.label]
     lines = [tag("div", tag("b", said)) for said in steps[:MOST_STEPS]]
     if (more := len(steps) - MOST_STEPS) > 0:
         lines.append(tag("div", f"and {more} more", class_="ws-quiet"))

@@ -72,13 +72,13 @@ def spelt(sentence: str) -> str:
 
 
 def _is_wide(block: Block) -> bool:
-    return isinstance(block, Table) and len(block.shown) > WIDEST
+    return isinstance(block, Table) and len(block.visible_columns) > WIDEST
 
 
 def _turned(table: Table) -> Table:
     if not _is_wide(table) or not 0 < len(table.rows) < WIDEST:
         return table
-    (first, *names), *lines = zip(table.shown, *table.cells(), strict=True)
+    (first, *names), *lines = zip(table.visible_columns, *table.cells(), strict=True)
     form = "s" if all(one.is_number for one, *_ in lines) else ""
     columns = (Column(first.heading), *(Column(name, form) for name in names))
     lines = [(" ".join(filter(None, (one.heading, one.unit))), *cells) for one, *cells in lines]
@@ -177,7 +177,7 @@ def histogram_html(chart: Histogram) -> Markup:
         at = frame.place(chart.limit, 0.0)[0]
         bars.append(_line(f"M{at:.1f} {TOP}V{HIGH - BOTTOM}", "ws-limit"))
     told = join(tag("p", spelt(words), class_="ws-tiny" if index else "ws-told")
-                for index, words in enumerate(chart.told))  # fmt: skip
+                for index, words in enumerate(chart.captions))  # fmt: skip
     svg = _svg(frame.axes(chart.x_label, chart.y_label) + join(bars), chart.title)
     return tag("figure", told + svg + tag("figcaption", chart.subtitle, class_="ws-tiny"))
 

@@ -11,15 +11,10 @@ from markupsafe import Markup
 
 from warpspace.analysis.blocks import Histogram
 from warpspace.analysis.description import Analysis, Result
+from warpspace.analysis.loop_parameters import loop_keys
 from warpspace.analysis.options import Option, read_numbers
 from warpspace.analysis.sampling.cases import Case, Over, SamplingPlan
-from warpspace.analysis.sampling.distribution import (
-    Distribution,
-    Draws,
-    Probability,
-    Stream,
-    loop_keys,
-)
+from warpspace.analysis.sampling.distribution import Distribution, Draws, Probability, Stream
 from warpspace.analysis.sampling.tolerance_search import Ensemble, build_ensemble
 from warpspace.app.browser.html import (
     EMPTY,
@@ -361,6 +356,6 @@ class ConceptsPanel(AnalysisPanel):
         scenes, dark = tuple(self.scenes(state)), state.shown.dark
         self._make(
             "Drawing the machines",
-            lambda job: draw(scenes, asked.asked, dark, job),
+            lambda job: draw(scenes, asked.analysis, dark, job),
             partial(self.context.save_file, "concepts.png"),
         )  # fmt: skip

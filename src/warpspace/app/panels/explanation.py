@@ -155,7 +155,7 @@ def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
     named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]
     named = [(key, share) for key, share in named if share != "0 %"]
     said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
-    kept = f"|E| ≤ {limit_um:g} µm with {number(100.0 * float(sure.keeps(limit_um)), 1)} %"
+    kept = f"|E| ≤ {limit_um:g} µm with {number(100.0 * float(sure.conformance_probability(limit_um)), 1)} %"
     words = f"{kept}. U95{length_words(sure)} µm, share of its variance: {said}"
     rest = rows(named[FIRST:]) if len(named) > FIRST else EMPTY
     rest = rest and tag("details", tag("summary", "All shares") + rest, class_="ws-details",
@@ -217,7 +217,7 @@ class DistancePanel(AnalysisPanel):
             buttons.append(button("Clear", f"{self.name}:clear", kind="quiet",
                                   hint="Take the points out of the drawing"))  # fmt: skip
         if drawn:
-            buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].words()),
+            buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].lines()),
                                   hint="Write a note with these numbers"))  # fmt: skip
         said = tag("p", POINTS[point], role="status") if point else EMPTY
         return actions(*buttons) + said + tag("p", without_words(state), class_="ws-tiny")

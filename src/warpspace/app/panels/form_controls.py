@@ -29,7 +29,7 @@ def _control(name: str, one: Option, given: str | None, scene: Scene) -> Markup:
         return switch(name, one.label, hint=hint, on=(given or str(int(one.default))) == "1")
     if one.choices or typed == "AXIS":
         known = one.choices or tuple(scene.machine.axes)
-        words = {key: one.words.get(key, re.sub("[_-]", " ", key)) for key in known}
+        words = {key: one.choice_labels.get(key, re.sub("[_-]", " ", key)) for key in known}
         if not one.default:
             words = {OWN: default or "automatic", **words}
         control = choice(name, str(one.default or OWN) if given is None else given, words)

@@ -66,7 +66,10 @@ class Import(Analysis):
         " separated by blanks",
     )
     sign: Literal["error", "correction"] | None = option(
-        None, "Whether a table holds errors or corrections", unset="as the manual says", words=SIGNS
+        None,
+        "Whether a table holds errors or corrections",
+        unset="as the manual says",
+        choice_labels=SIGNS,
     )
     variant: str | None = option(None, "Published variant of the format", unset="usual one")
     sources: tuple[Source, ...] = ()
@@ -111,7 +114,7 @@ class ImportResult(Result):
             title, curves = f"{one.key} {row.name}", tuple(_curves(one))
             yield Lines("lines", title, f"{row.axis} [{place}]", f"[{row.unit}]", curves)
 
-    def doubts(self) -> Iterator[str]:
+    def caveats(self) -> Iterator[str]:
         found, kept = self.reading.found, f"kept from {self.before.name}:"
         for one in (*found.assumed, *found.notes, *self.made.notes):
             if not one.startswith("replaced: "):
@@ -164,7 +167,7 @@ class ImportPanel(FilesPanel):
         own = _recognised(files)
         first = own.title if own is not None else "none, choose one"
         found["format"] = replace(
-            found["format"], choices=tuple(names), words=names, unset=f"recognised: {first}"
+            found["format"], choices=tuple(names), choice_labels=names, unset=f"recognised: {first}"
         )
         chosen = self.values(state).get("format")
         kind = registry.find_format(chosen) if chosen in names else own

@@ -49,7 +49,7 @@ class RepairPanel(AnalysisPanel):
     at_once = True
 
     def options(self) -> Sequence[Option]:
-        words = {"default": None, "choices": ("all",), "words": {"all": "any error"}}
+        words = {"default": None, "choices": ("all",), "choice_labels": {"all": "any error"}}
         return [
             replace(one, **words) if one.name == "adjustable" else one for one in super().options()
         ]

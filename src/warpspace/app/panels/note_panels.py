@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from warpspace.analysis.note_tables import (
     note_numbers,
-    said_stale,
+    stale_remark,
     spell_change,
     spell_numbers,
     spell_place,
@@ -321,7 +321,7 @@ class NoteNumbersPanel(Panel):
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         review, scene = picture.state.review, picture.state.resulting_scene()
-        said = [*map(said_stale, review, note_numbers(scene, review))]
+        said = [*map(stale_remark, review, note_numbers(scene, review))]
         stale = [str(number) for number, words in enumerate(said, 1) if words]
         self.context.page.call("room.show", {"stale": stale})
         return {

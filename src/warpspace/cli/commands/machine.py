@@ -1,8 +1,7 @@
 """Commands about scenes and machines: what there is, what is right, what the thesis prints."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, replace
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -31,9 +30,9 @@ from warpspace.cli.tables import echo, print_table, print_text, progress, warn
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
+    from warpspace.analysis.publications import PrintedNumber
     from warpspace.analysis.tolerance_check import Check, Measured
     from warpspace.scene.model import Scene
-    from warpspace.thesis_example.rows import Row
 
 OWN = "own"
 CHECKED = ("id", "kind", "stale", "numbers", "now")  # what `check` tells of a note
@@ -131,7 +130,7 @@ def check(
     All problems of a file are reported at once, each with its key, its value and what was expected.
 
     With --against each error lies within its tolerance or outside it. Beside the predicted error
-    stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
+    stands the measured one where a publication prints it. The shear is that of the best
     affine fit to the predicted map: which plane became a rhombus.
     """
     from warpspace.analysis.description import to_json
@@ -156,7 +155,9 @@ def check(
                         "checks": [{**asdict(row), "passes": row.passes} for row in result.checks],
                         "predicted": to_json(result.predicted),
                         "statistics_nodes": to_json(result.predicted_nodes),
-                        "measured_um": laser_tracer_um(scene),
+                        "measured_um": next(
+                            (number.value_um for number in _measured_errors(scene)), None
+                        ),
                         "shear_urad": result.shear_urad,
                     }
                     for scene, result in pairs
@@ -343,13 +344,11 @@ def merge(first: str, second: str, output: str, *, force: bool) -> None:
         warn(f"the scenes differ beside their notes{said}; those of {first} are kept")
 
 
-def laser_tracer_um(scene: "Scene") -> float | None:
-    from warpspace.thesis_example.rows import MACHINES, printed_tables
+def _measured_errors(scene: "Scene") -> list["PrintedNumber"]:
+    from warpspace.analysis.publications import PUBLICATIONS
 
-    names = [f"dvf5000_{name}" for name in MACHINES]
-    if scene.name not in names:
-        return None
-    return float(printed_tables()["table_5_5"]["volumetric_um"][names.index(scene.name)])
+    printed = (publication.measured_error(scene) for publication in PUBLICATIONS.members())
+    return [number for number in printed if number is not None]
 
 
 def _against(scene: "Scene", result: "Measured") -> Iterator[Block]:
@@ -364,12 +363,11 @@ def _against(scene: "Scene", result: "Measured") -> Iterator[Block]:
     verdicts = {True: "within", False: "outside", None: "none"}
     rows = [(verdicts[one.passes], one.key, one.value, one.unit, one) for one in result.checks]
     yield Table(columns, rows)
-    measured_um = laser_tracer_um(scene)
-    beside = "" if measured_um is None else f"; LaserTRACER {measured_um:g} µm"
+    measured = "".join(f"; {number.quotation}" for number in _measured_errors(scene))
     yield (
         f"  predicted |E|: mean {result.predicted.mean_um:.2f}, RMS {result.predicted.rms_um:.2f},"
         f" max {result.predicted.max_um:.2f} µm over the volume;"
-        f" mean of the nodes {result.predicted_nodes.mean_um:.2f} µm{beside}"
+        f" mean of the nodes {result.predicted_nodes.mean_um:.2f} µm{measured}"
     )
     shears = ", ".join(f"{plane} {value:+.1f}" for plane, value in result.shear_urad.items())
     yield f"  shear of the volume: {shears} µrad"
@@ -392,61 +390,14 @@ def thesis(markdown: str | None, *, force: bool, as_json: bool) -> None:
     A number agrees where it lies within half of the last printed digit. Rows that do not agree say
     why. Nothing is tuned to agree.
     """
+    from warpspace.thesis_example.presentation import markdown_page, thesis_blocks, thesis_json
     from warpspace.thesis_example.rows import thesis as compare
 
     with progress("computing", silent=as_json):
         rows = compare()
     if markdown is not None:
-        write_text(markdown, thesis_markdown(rows), force=force)
+        write_text(markdown, markdown_page(rows), force=force)
     if as_json:
-        keys = ("source", "key", "printed", "computed", "agrees")
-        noted = [(*keys, "note") if row.note else keys for row in rows]
-        print_json({"rows": [{key: getattr(row, key) for key in own}
-                             for row, own in zip(rows, noted, strict=True)]})  # fmt: skip
+        print_json(thesis_json(rows))
         return
-    _print(rows)
-
-
-def _print(rows: "tuple[Row, ...]") -> None:
-    columns = (
-        Column(leads=True),
-        Column("quantity", wraps=True, leads=True),
-        Column("printed", "s", wraps=True),
-        Column("ours", "s", wraps=True, joins=True),
-        Column("unit"),
-    )
-    for source in dict.fromkeys(row.source for row in rows):
-        here = [row for row in rows if row.source == source]
-        print_text(f"{source}: {sum(row.agrees for row in here)} of {len(here)} agree")
-        cells = [
-            (
-                *("" if row.agrees else "≠", row.key),
-                *(spell(row, row.printed), spell(row, row.computed, more=1), row.unit),
-            )
-            for row in here
-        ]
-        print_table(columns, cells)
-        click.echo()
-    different = [row for row in rows if not row.agrees]
-    print_text(f"{len(rows) - len(different)} of {len(rows)} agree. The others:")
-    for row in different:
-        printed, computed = spell(row, row.printed), spell(row, row.computed, more=1)
-        print_text(f"  {row.source}: {row.key}: printed {printed}, ours {computed} {row.unit}")
-        print_text(f"      {row.note}")
-
-
-def spell(row: "Row", value: float | str, more: int = 0) -> str:
-    if isinstance(value, str):
-        return value
-    if value == int(value) and row.digits == 0:
-        return f"{value:.0f}"
-    return f"{value:.{row.digits + more}f}"
-
-
-def thesis_markdown(rows: "Sequence[Row]") -> str:
-    from jinja2 import StrictUndefined, Template
-
-    text = Path(__file__).with_name("thesis.md.j2").read_text("utf-8")
-    page = Template(text, undefined=StrictUndefined, keep_trailing_newline=True)
-    groups = {source: list(own) for source, own in groupby(rows, lambda row: row.source)}
-    return page.render(rows=rows, groups=groups, spell=spell)
+    print_blocks(thesis_blocks(rows))

@@ -81,7 +81,7 @@ def _read_sizes(text: str, _scene: Scene) -> tuple[int, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Compensate(Analysis):
-    """Write a table of compensation, and say what it leaves.
+    """Write a compensation table and report the residual error.
 
     The program reads its own file back and does with it what the controller does: it interpolates,
     rounds and clips, and adds the result to the commanded positions. What is left is evaluated with
@@ -136,7 +136,7 @@ class Compensate(Analysis):
     )
     stem: str = "compensation"  # name of the files
 
-    def written(self, stem: str | None) -> "Compensate":
+    def for_output(self, stem: str | None) -> "Compensate":
         if not self.sweep and (len(self.formats) != 1 or stem is None):
             raise OptionError(
                 "expected {formats} F and {output} FILE; {sweep} compares several tables"
@@ -227,7 +227,7 @@ class Compensation(BeforeAfter, Result):
     def bytes(self) -> int:
         return sum(len(text.encode()) for text in self.files.values())
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         return self.files
 
     def as_json(self) -> dict[str, Any]:
@@ -407,7 +407,7 @@ def _placed(
 class SweepStep:
     """One compensation of a sweep."""
 
-    keys: ClassVar[tuple[str, ...]] = (
+    json_keys: ClassVar[tuple[str, ...]] = (
         "format", "points", "pitch", "numbers", "bytes", "after", "worst_after_um",
     )  # fmt: skip
     format: str

@@ -20,7 +20,7 @@ _KINDS: Registry[CurveKind] = Registry(
     },
 )
 """By name, in the order of lists: simplest first."""
-curve_kinds, unregister_curve = _KINDS.every, _KINDS.unregister
+curve_kinds, unregister_curve = _KINDS.members, _KINDS.unregister
 
 
 def curve_kind(title: str) -> CurveKind:
@@ -36,8 +36,8 @@ def register_curve(kind: CurveKind) -> None:
         keys = {form[0] for form in kind.forms} & {form[0] for form in other.forms}
         if keys or kind.title == other.title:
             raise OptionError(
-                f"kind of curve {kind.name!r}: {other.name!r} is there already with the same title"
-                " or key"
+                f"kind of curve {kind.name!r}: {other.name!r} is already registered with the same"
+                " title or key"
             )
     _KINDS.register(kind)
 

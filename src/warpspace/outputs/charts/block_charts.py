@@ -111,7 +111,7 @@ def chart_figure(chart: Bars | Lines | Histogram) -> Figure:
         return charts_sheet([replace(chart, title="")], "", "")
     if isinstance(chart, Bars):
         return bars_chart(replace(chart, title="", subtitle=""))
-    return histogram_chart(replace(chart, title="", subtitle="", told=()))
+    return histogram_chart(replace(chart, title="", subtitle="", captions=()))
 
 
 def charts_sheet(
@@ -423,7 +423,8 @@ def histogram_chart(histogram: Histogram) -> Figure:
         marks = [*histogram.marks, *([] if limit is None else [("limit", limit)])]
         _mark(axes, [(name, at, *styles.get(name, (ground().ink, "-"))) for name, at in marks])
         large = 0.95, TEXT + 2.0, "bold", ground().ink
-        styled = zip(histogram.told, (large, (0.83, SMALL, "normal", ground().muted)), strict=False)
+        captions = (large, (0.83, SMALL, "normal", ground().muted))
+        styled = zip(histogram.captions, captions, strict=False)
         for line, (height, size, weight, colour) in styled:
             axes.text(
                 0.985, height, line, transform=axes.transAxes, ha="right", va="top", size=size,

@@ -31,7 +31,7 @@ class ExportFormat:
 
 _PACKAGE = "warpspace.outputs.exports"
 _FORMATS: Registry[ExportFormat] = Registry("export format", {}, key="ending")
-export_formats, register_format = _FORMATS.every, _FORMATS.register
+export_formats, register_format = _FORMATS.members, _FORMATS.register
 unregister_format = _FORMATS.unregister
 for _form in (
     ExportFormat(".glb", "3-D viewers, CAD", f"{_PACKAGE}.meshes:write_glb"),

@@ -40,7 +40,7 @@ _KINDS = Registry(
     "figure", {name: FigureKind(name, **row) for name, row in tomllib.loads(_TABLE).items()}
 )
 _KINDS["concepts"] = replace(_KINDS["concepts"], most_scenes=MOST_CONCEPTS)
-figure_kinds = _KINDS.every
+figure_kinds = _KINDS.members
 register_figure, unregister_figure = _KINDS.register, _KINDS.unregister
 
 

@@ -201,14 +201,14 @@ def _as_data(block: Block, folder: Path) -> dict[str, Any]:
 
 
 def _table(block: Table) -> dict[str, Any]:
-    heads = [column.head.replace("\n", " ") for column in block.shown]
+    heads = [column.head.replace("\n", " ") for column in block.visible_columns]
     rows = block.cells()
     longest = [max(map(len, cells)) for cells in zip(heads, *rows, strict=True)]
     longest_words = [max(map(len, head.split()), default=0) for head in heads]
     return {
         "caption": block.title,
         "heads": heads,
-        "numbers": [column.is_number for column in block.shown],
+        "numbers": [column.is_number for column in block.visible_columns],
         # shares of the page: as wide as its cells, within reason
         "widths": [
             min(max(cells if cells < 16 else 16 + 0.4 * (cells - 16), word), 32) + 2

@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear, minimize
 
 from warpspace.analysis import adjustment_search
 from warpspace.analysis.adjustment_search import Objective, least_rms
-from warpspace.analysis.commands.adjust import Adjust, repaired
+from warpspace.analysis.commands.adjust import Adjust, apply_adjustments
 from warpspace.analysis.statistics import volume_statistics
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import build_grid
@@ -49,7 +49,7 @@ def response(keys, scene=FIRST):
     present = errors(scene.errors)
     columns = []
     for key in keys:
-        raised = repaired(scene, {key: scene.errors.amplitude(key) + 1.0})
+        raised = apply_adjustments(scene, {key: scene.errors.amplitude(key) + 1.0})
         columns.append(errors(raised.errors) - present)
     return np.array(columns).T, present, np.repeat(grid.weights.reshape(-1), 3)
 
@@ -86,7 +86,7 @@ def test_leaving_one_out_is_what_direct_evaluation_gives():
             errors=ErrorSet({k: f for k, f in FIRST.errors.functions.items() if k != effect.key}),
         )
         assert numbers(effect.left_out) == pytest.approx(outcome_of(without), abs=1e-9)
-        best = repaired(FIRST, {effect.key: effect.best.value})
+        best = apply_adjustments(FIRST, {effect.key: effect.best.value})
         assert numbers(effect.best) == pytest.approx(outcome_of(best), abs=1e-9)
 
 
@@ -143,7 +143,9 @@ def test_max_is_what_a_second_solver_finds(keys, limit):
     )
     found = plan.run(FIRST).adjustments[-1]
     assert found.max_um == pytest.approx(least_max(keys, -limit, limit), abs=1e-3)
-    assert outcome_of(repaired(FIRST, found.adjust))[3] == pytest.approx(found.max_um, abs=1e-9)
+    assert outcome_of(apply_adjustments(FIRST, found.adjust))[3] == pytest.approx(
+        found.max_um, abs=1e-9
+    )
     for key, value in found.adjust.items():
         assert abs(value - FIRST.errors.amplitude(key)) <= limit + 1e-9
 
