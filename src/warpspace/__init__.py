@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from warpspace.analysis.registry import Verb
     from warpspace.analysis.tolerance_check import measured
     from warpspace.bench.base import run_test
-    from warpspace.bench.kinds.circular import ballbar
     from warpspace.calibration.calibrate import calibrate
     from warpspace.exceptions import SceneError, WarpspaceError
     from warpspace.field.evaluate import ErrorField
@@ -36,7 +35,6 @@ _HOME = {
     "SceneError": "warpspace.exceptions",
     "WarpspaceError": "warpspace.exceptions",
     "evaluate": "warpspace.scene.model",
-    "ballbar": "warpspace.bench.kinds.circular",
     "calibrate": "warpspace.calibration.calibrate",
     "measured": "warpspace.analysis.tolerance_check",
     "run_test": "warpspace.bench.base",
@@ -55,7 +53,6 @@ __all__ = [
     "WarpspaceError",
     "__version__",
     "allocate",
-    "ballbar",
     "calibrate",
     "contributions",
     "evaluate",

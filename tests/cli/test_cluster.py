@@ -29,7 +29,7 @@ def dask_cluster(workers, folder):
 
 distributed = pytest.importorskip("distributed")
 RUN = (
-    *("montecarlo", "dvf5000_general", "--over", "max", "--spec-um", "90", "--seed", "4", "--json"),
+    *("montecarlo", "dvf5000_general", "--over", "max", "--limit", "90", "--seed", "4", "--json"),
 )
 
 
@@ -54,8 +54,8 @@ def test_a_cluster_gives_the_same_numbers_to_the_last_bit(warpspace, scheduler, 
 
 
 def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
-    sweep = ("sweep", "dvf5000_general", "dvf5000_proposed", "--samples", "5000")
-    steps = ("--tolerance", "rotation=10:30:3", "--limit-um", "40", "--json")
+    sweep = ("montecarlo", "--rows", "dvf5000_general", "dvf5000_proposed", "--samples", "5000")
+    steps = ("--tolerance", "rotation=10:30:3", "--limit", "40", "--json")
     here, there = warpspace(*sweep, *steps), warpspace(*sweep, *steps, "--scheduler", scheduler)
     assert there.status == 0, there.err
     assert here.out == there.out

@@ -10,7 +10,7 @@ SCENES = (
 )
 TOLERANCED = "dvf5000_general"
 FEW = "--samples 2000 --seed 7"
-LIMIT = f"--limit-um 60 --probability 0.9 {FEW}"
+LIMIT = f"--limit 60 --probability 0.9 {FEW}"
 
 _EACH = {
     "check": "check {scene}",
@@ -28,31 +28,30 @@ _EACH = {
     "test-diagonals": "test diagonals {scene} --json",
 }
 _ONCE = {
-    "scenes": "scenes",
-    "scenes-json": "scenes --json",
+    "scenes": "list scenes",
+    "scenes-json": "list scenes --json",
     "check-json": "check dvf5000_first --json",
-    "machines-json": "machines --json",
-    "formats-json": "formats --json",
+    "machines-json": "list machines --json",
+    "formats-json": "import --formats --json",
     "tests": "test --list",
     "thesis-json": "thesis --json",
-    "template": "template X -o {out}/template.csv",
+    "template": "import --template X -o {out}/template.csv",
     "new-machine": "new-machine wCAYFXZt -o {out}/new.toml",
     "compare-json": "compare dvf5000_first dvf5000_second --grid 3 --json",
     "compare-text": "compare dvf5000_first dvf5000_second --grid 3",
-    "measured-json": "measured dvf5000_first dvf5000_second --json",
-    "measured-text": "measured dvf5000_first",
+    "against-json": "check --against own dvf5000_first dvf5000_second --json",
+    "against-text": "check --against own dvf5000_first",
     "contributions-json": f"contributions {TOLERANCED} --json",
     "contributions-text": f"contributions {TOLERANCED}",
     "montecarlo-json": f"montecarlo {TOLERANCED} {FEW} --json",
     "montecarlo-text": f"montecarlo {TOLERANCED} {FEW}",
     "montecarlo-max": f"montecarlo {TOLERANCED} {FEW} --over max --grid 3 --json",
-    "sweep-json": f"sweep {TOLERANCED} {FEW} --tolerance EXX=5,10 --json",
-    "sweep-text": f"sweep {TOLERANCED} {FEW} --tolerance EXX=5,10",
+    "montecarlo-rows-json": f"montecarlo {TOLERANCED} {FEW} --rows --tolerance EXX=5,10 --json",
+    "montecarlo-rows-text": f"montecarlo {TOLERANCED} {FEW} --rows --tolerance EXX=5,10",
     "allocate-json": f"allocate {TOLERANCED} {LIMIT} --json",
     "allocate-text": f"allocate {TOLERANCED} {LIMIT} -o {{out}}/allocated.toml",
     "concepts-json": f"concepts {TOLERANCED} dvf5000_proposed {FEW} --json",
     "concepts-text": f"concepts {TOLERANCED} dvf5000_proposed {FEW}",
-    "ballbar-json": "ballbar dvf5000_first --plane XY --radius 150 --json",
     "circular-text": "test circular dvf5000_first",
     "positioning": "test positioning dvf5000_first --json",
     "rotary": "test rotary-axis dvf5000_first --json",
@@ -73,7 +72,7 @@ _ONCE = {
             "ball-plate",
             "circular",
             "cone-frustum",
-            "sphere",
+            "r-test",
             "squareness",
             "straightness",
         )

@@ -72,7 +72,6 @@ class BenchTest(Analysis):
         (),
         "Where axes stand that the test does not move",
         unset="what the scene says",
-        former=("--center", "--centre"),
     )
     tool_extension_mm: float = option(
         0.0, "How much longer than the scene's the tool or probe is", unit="mm", low=-1e4, high=1e4
@@ -271,9 +270,9 @@ def run_test(
     Examples
     --------
     >>> import warpspace
-    >>> from warpspace.bench.kinds.rotary_axis import Sphere
+    >>> from warpspace.bench.kinds.rotary_axis import RTest
     >>> scene = warpspace.load_scene("dvf5000_first")
-    >>> result = warpspace.run_test(scene, Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    >>> result = warpspace.run_test(scene, RTest(axis="C", ball=(100.0, 0.0, 60.0)))
     >>> round(result.model.outcome["z_um"], 1)
     21.5
     """
@@ -338,14 +337,12 @@ _TESTS: Registry[type[BenchTest] | str] = Registry(
         "straightness": f"{_HERE}.straightness:Straightness",
         "squareness": f"{_HERE}.straightness:Squareness",
         "rotary-axis": f"{_HERE}.rotary_axis:RotaryAxis",
-        "sphere": f"{_HERE}.rotary_axis:RTest",
+        "r-test": f"{_HERE}.rotary_axis:RTest",
         "ball-plate": f"{_HERE}.ball_plate:BallPlate",
         "cone-frustum": f"{_HERE}.cone_frustum:ConeFrustum",
     },
 )
 register_test, unregister_test = _TESTS.register, _TESTS.unregister
-FORMER = {"ballbar": f"{_HERE}.circular:FormerBallbar"}
-"""Tests under a former name: understood, not listed."""
 
 
 def bench_names() -> tuple[str, ...]:
@@ -354,5 +351,5 @@ def bench_names() -> tuple[str, ...]:
 
 
 def find_test(name: str) -> type[BenchTest]:
-    found = FORMER[name] if name in FORMER else _TESTS.find(name)
-    return resolve_name(found) if isinstance(found, str) else found
+    test = _TESTS.find(name)
+    return resolve_name(test) if isinstance(test, str) else test

@@ -12,7 +12,6 @@ from warpspace.cli.file_arguments import DataFile, check_files, flag_of
 from warpspace.cli.sampling_output import MORE
 from warpspace.cli.shared_options import (
     SCENES,
-    RenamedOption,
     csv_option,
     force_option,
     json_option,
@@ -61,7 +60,7 @@ def _click_option(one: Option) -> Callable[..., Any]:
         metavar = one.grammar.metavar if one.required else f"[{one.grammar.metavar}]"
         kind = DataFile() if one.grammar.is_file else str
         return click.argument(one.name, type=kind, nargs=-1, required=one.required, metavar=metavar)
-    traits: dict[str, Any] = {"cls": RenamedOption, "former": one.former, "help": one.help}
+    traits: dict[str, Any] = {"help": one.help}
     if one.kind is bool:
         traits |= {"is_flag": True}
     elif one.grammar is not None:

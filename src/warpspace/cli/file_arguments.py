@@ -116,8 +116,7 @@ def flag_of(name: str) -> str:
 class Commands(MutableMapping[str, click.Command]):
     """Commands by name, each built when it is first asked for and guarded.
 
-    One command therefore does not pay for the imports of all others. What is built need not be
-    listed: former names of tests are understood only.
+    One command therefore does not pay for the imports of all others.
     """
 
     def __init__(

@@ -45,19 +45,6 @@ BUNDLED: "dict[Task, str]" = {
     "machine": "check notes merge list new-machine thesis",
 }
 """Commands that are made from no analysis, by their task; `warpspace.cli.commands` has them."""
-FORMER = {
-    "animate": "draw",
-    "ballbar": "test ballbar",
-    "formats": "import --formats",
-    "import-machine": "import --format urdf",
-    "measured": "check --against own",
-    "machines": "list machines",
-    "scenes": "list scenes",
-    "snapshot": "draw",
-    "sweep": "montecarlo --rows",
-    "template": "import --template",
-}
-"""Former name of a command: its present name, and the arguments it stands for."""
 
 
 def task_of(name: str) -> "Task":
@@ -91,12 +78,6 @@ def register_command(command: click.Command) -> None:
 
 class TaskGroup(click.Group):
     """The commands under headings by task; analyses are listed without being imported."""
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        now = FORMER[args[0]].split() if args[0] in FORMER else args[:1]
-        return super().resolve_command(ctx, [*now, *args[1:]])
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         sentences = {entry.name: entry.sentence for entry in entries()}

@@ -21,22 +21,6 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
 
-class RenamedOption(click.Option):
-    """An option with the flags it had before, which no help text lists."""
-
-    def __init__(self, *declared: Any, former: tuple[str, ...] = (), **traits: Any) -> None:
-        super().__init__(*declared, **traits)
-        self.former = former
-
-    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
-        listed = self.opts
-        self.opts = [*listed, *self.former]
-        try:
-            super().add_to_parser(parser, ctx)
-        finally:
-            self.opts = listed
-
-
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 LOOPS = ("tool", "workpiece", "relative")
 DIRECTIONS = ("mean", "forward", "backward", "difference")

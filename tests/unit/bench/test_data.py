@@ -9,7 +9,7 @@ from warpspace.bench.data import parse_table, unit_notes
 
 
 def test_columns_may_stand_in_any_order_among_others():
-    columns = find_test("sphere").columns
+    columns = find_test("r-test").columns
     table = parse_table("note,z_um,y_um,x_um,angle_deg\na,3,2,1,0\n", columns, "x.csv")
     assert table["x_um"][0] == 1.0
     assert table["z_um"][0] == 3.0

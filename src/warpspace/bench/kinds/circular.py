@@ -2,23 +2,21 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Curve, Lines
-from warpspace.analysis.description import ProgressCallback
 from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchResult, BenchRun, BenchTest, run_test
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, DIRECTION, DataColumn, ReadingsFile
-from warpspace.bench.plan import RELATIVE, BenchPlan, BenchQuantity, Outcome, build_plan, simulate
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import Workspace
 from warpspace.machine.axes import is_linear
-from warpspace.scene.model import Scene, second_order
+from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM_URAD, Array
 
 DEFAULT_POINTS, MIN_POINTS, MAX_POINTS = 360, 8, 100_000
@@ -328,129 +326,3 @@ def check_circle(
         )
         hint = f"; largest radius about this centre: {room:g} mm" if full and room > 0.0 else ""
         raise OptionError(f"the circle leaves the working volume: {'; '.join(problems)}{hint}")
-
-
-@dataclass(frozen=True, slots=True)
-class Ballbar:
-    """Result of a circular test."""
-
-    plane: str  # "XY", "XZ" or "YZ"
-    radius_mm: float
-    centre: Mapping[str, float]  # mm or degrees; axis positions of the centre
-    angle_deg: Array  # [n]; from the first axis of the plane towards the second, counter-clockwise
-    # [n]; radial deviation from the nominal circle about the least-squares centre, run counter-
-    # clockwise
-    radial_um: Array
-    # [n]; the same of the clockwise run, in the order it is run. It differs only where errors
-    # depend on the direction of travel: a rigid-body model has no following errors.
-    clockwise_um: Array
-    # G of ISO 230-4: largest minus smallest radial deviation, both runs together
-    circular_deviation_um: float
-    # out of the sin 2φ part of the trace, in the sign of `squareness_key`: what a ball bar calls
-    # squareness, angular errors that look like it included
-    squareness_urad: float
-    squareness_key: str  # parameter it stands for
-    given_urad: float  # value of that parameter in the error set
-    centre_um: tuple[float, float]  # position of the least-squares centre against the commanded one
-    radius_um: float  # mean radius minus nominal radius
-    # amplitude of the cos 2φ part: the first axis runs longer than the second
-    scale_difference_um: float
-
-    @property
-    def clockwise_there_um(self) -> Array:
-        """The clockwise run at the angles of the other one, µm."""
-        return np.roll(self.clockwise_um[::-1], 1)
-
-    @property
-    def hysteresis_um(self) -> float:
-        """H of ISO 230-4: largest difference of the runs at one angle, µm."""
-        return float(np.abs(self.radial_um - self.clockwise_there_um).max())
-
-
-def ballbar(
-    scene: Scene,
-    *,
-    plane: str,
-    radius_mm: float,
-    centre: Mapping[str, float] | None = None,
-    points: int = DEFAULT_POINTS,
-) -> Ballbar:
-    """Run the circular test of ISO 230-4 on the errors of a scene, to first order.
-
-    Parameters
-    ----------
-    scene : Scene
-    plane : str
-        "XY", "XZ" or "YZ".
-    radius_mm : float, mm
-    centre : mapping of str to float, mm or degrees, optional
-        Axis positions; the middle of the working volume where absent.
-    points : int, optional
-
-    Returns
-    -------
-    Ballbar
-
-    Raises
-    ------
-    OptionError, UnknownNameError
-        If the circle cannot be run in the working volume of the scene.
-
-    Examples
-    --------
-    >>> import warpspace
-    >>> scene = warpspace.load_scene("dvf5000_first")
-    >>> result = warpspace.ballbar(scene, plane="XY", radius_mm=150)
-    >>> round(result.circular_deviation_um, 2), round(result.squareness_urad, 2)
-    (6.86, 2.94)
-    """
-    key = placing.plane_axes(scene.machine, plane)[2]
-    at = tuple((centre or {}).items())
-    test = Circular(plane=cast("Any", plane), radius_mm=radius_mm, at=at, points=points)
-    plan = test.plan(scene)
-    readings = simulate(scene, plan, exact=False)
-    fit, outcome = fit_circle_readings(plan, readings), test.evaluate(plan, readings)
-    stand = test.stand(scene)
-    middle = evaluate_first_order(scene.model, scene.errors, stand, RELATIVE).error_um
-    found = placing.find_plane(scene.model, stand, plane)
-    there = [float(middle @ vector) for vector in (found.along, found.up)]
-    return Ballbar(
-        plane,
-        radius_mm,
-        {name: float(value) for name, value in stand.items()},
-        plan.marks["angle_deg"][:points],
-        fit.radial_um[:points],
-        np.roll(fit.radial_um[points:], 1),
-        fit.deviation_um,
-        outcome["squareness_urad"],
-        key,
-        scene.errors.amplitude(key),
-        (fit.centre_um[0] + there[0], fit.centre_um[1] + there[1]),
-        fit.radius_um,
-        fit.scale_difference_um,
-    )
-
-
-@dataclass(frozen=True)
-class FormerResult(BenchResult):
-    """What the former command `ballbar` gives."""
-
-    def as_json(self) -> dict[str, Any]:
-        found = self.model.outcome
-        sense = self.model.plan.marks["sense"]
-        return {
-            "circular_deviation_um": found["circular_deviation_um"],
-            "squareness_urad": found["squareness_urad"],
-            "radial_um": np.asarray(found.details["radial_um"])[sense > 0.0].tolist(),
-            "second_order_um": self.second_order.um if self.second_order else None,
-        }
-
-
-@dataclass(frozen=True, kw_only=True)
-class FormerBallbar(Circular):
-    """The circular test as the former command `ballbar` has it: to first order."""
-
-    def run(self, scene: Scene, _watch: ProgressCallback, /) -> FormerResult:
-        found = run_test(scene, self, self.data, exact=False)
-        left_out = second_order(scene, RELATIVE.loop)
-        return FormerResult(found.test, found.scene, found.runs, found.notes, second_order=left_out)

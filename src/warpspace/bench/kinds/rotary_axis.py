@@ -215,7 +215,7 @@ AXES = ("x", "y", "z")
 class RTest(BenchTest):
     """R-test with the controller's compensation of the tool centre point on."""
 
-    name = "sphere"
+    name = "r-test"
     title = "R-test with a ball"
     standard = "ISO 10791-6, tests AK, BK, CK"
     words = (

@@ -13,7 +13,6 @@ from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import OutputFile, SceneName
 from warpspace.cli.shared_options import (
     SCENES,
-    RenamedOption,
     force_option,
     grid_option,
     json_option,
@@ -113,8 +112,6 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
 @scene_argument("scenes", nargs=-1, required=True)
 @click.option(
     "--against",
-    cls=RenamedOption,
-    former=("--tolerances",),
     type=SceneName(),
     metavar="SCENE|own",
     help="Set each error against the tolerances of this scene, for instance dvf5000_proposed, or of"

@@ -30,9 +30,9 @@ def _test_names() -> tuple[str, ...]:
 
 
 def _build_test(name: str) -> click.Command:
-    from warpspace.bench.base import FORMER, find_test
+    from warpspace.bench.base import find_test
 
-    if name not in _test_names() and name not in FORMER:
+    if name not in _test_names():
         raise KeyError(name)
     test = find_test(name)
     command = command_of(test)

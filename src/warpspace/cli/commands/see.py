@@ -13,7 +13,6 @@ from warpspace.cli.file_arguments import SceneName
 from warpspace.cli.services import build_services, embed_view, tell_story
 from warpspace.cli.shared_options import (
     FIGURES,
-    RenamedOption,
     component_option,
     direction_option,
     draw_figure_file,
@@ -320,8 +319,6 @@ def export(
 @click.option(
     "--limit",
     "spec_um",
-    cls=RenamedOption,
-    former=("--spec-um",),
     type=float,
     help="Of |E| in µm, to say whether it is kept, and how likely a machine keeps it; otherwise"
     " that of SCENE.",
