@@ -34,7 +34,7 @@ def as_csv(test, model):
     names = [column.name for column in test.columns]
     channels = [name for name in names if name.endswith(("_um", "_urad"))]
     marks |= zip(channels, model.readings.reshape(len(channels), -1), strict=True)
-    signs = marks.get("way", marks.get("sense"))
+    signs = marks.get("travel_sign", marks.get("sense"))
 
     def cell(column, row, run):
         if column.name == "run":

@@ -182,7 +182,7 @@ class TestsPanel(FilesPanel):
         told = tag("p", "A difference of two machines cannot be tested: show A or B.",
                    class_="ws-problem", role="alert")  # fmt: skip
         columns = ",".join(column.name for column in kind.columns)
-        about = join(tag("p", one) for one in (kind.words, f"Columns of a file: {columns}"))
+        about = join(tag("p", one) for one in (kind.description, f"Columns of a file: {columns}"))
         return join((
             chosen, told if picture.is_difference else self._body(state), self.files_html(),
             EMPTY if self._files else self.upload_html("Measured readings …"),
