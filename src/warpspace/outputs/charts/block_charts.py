@@ -338,7 +338,7 @@ def _lines(axes: Axes, chart: Lines, size: float) -> None:
         axes.set_aspect("equal", adjustable="datalim")
     else:
         values = np.concatenate([curve.y for curve in chart.curves])
-        if np.ptp(values) < SMALLEST_DEVIATION and not chart.bands:  # nothing but rounding: no chart of noise
+        if np.ptp(values) < SMALLEST_DEVIATION and not chart.bands:  # rounding only
             middle = float(np.round(values.mean(), 6))
             axes.set_ylim(middle - 1.0, middle + 1.0)
     if chart.log:
