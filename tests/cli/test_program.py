@@ -15,7 +15,7 @@ from trimesh import Trimesh, creation
 import warpspace as api
 from warpspace import evaluate, load_scene
 from warpspace.cli import register_command
-from warpspace.cli.commands.understand import POINTS_AT_ONCE
+from warpspace.cli.field_output import POINTS_AT_ONCE
 from warpspace.cli.main import BUNDLED, COMMANDS, cli
 from warpspace.cli.shared_options import spell_json
 from warpspace.exceptions import SceneError

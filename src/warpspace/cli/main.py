@@ -1,5 +1,6 @@
 """The command `warpspace`: its group, its commands, and the place where errors become messages."""
 
+import builtins
 import io
 import logging
 import os
@@ -10,14 +11,16 @@ import time
 import traceback
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
-from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
+from pkgutil import resolve_name
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from warpspace.analysis.registry import TASKS, entries
+from warpspace.cli.analyses import command_of
 from warpspace.cli.file_arguments import Commands
 from warpspace.cli.tables import echo, plain
 from warpspace.exceptions import WarpspaceError, shorten
@@ -47,26 +50,28 @@ BUNDLED: "dict[Task, str]" = {
 """Commands that are made from no analysis, by their task; `warpspace.cli.commands` has them."""
 
 
+TASK_OF_BUNDLED: "dict[str, Task]" = {
+    name: task for task, names in BUNDLED.items() for name in names.split()
+}
+
+
 def task_of(name: str) -> "Task":
-    tasks: dict[str, Task] = {entry.name: entry.task for entry in entries()}
-    tasks |= {one: task for task, names in BUNDLED.items() for one in names.split()}
+    tasks = TASK_OF_BUNDLED | {entry.name: entry.task for entry in entries()}
     return tasks.get(name, "machine")
 
 
 def _build(name: str) -> click.Command:
     for entry in entries():
         if entry.name == name:
-            from warpspace.cli.analyses import command_of
-
             return command_of(entry.load())
-    home = import_module(f"warpspace.cli.commands.{task_of(name)}")
-    found = [thing for thing in vars(home).values() if isinstance(thing, click.Command)]
-    return {command.name: command for command in found}[name]
+    task = TASK_OF_BUNDLED[name]
+    function = name.replace("-", "_")
+    if iskeyword(function) or hasattr(builtins, function):
+        function += "_"
+    return resolve_name(f"warpspace.cli.commands.{task}:{function}")
 
 
-COMMANDS = Commands(
-    lambda: (*" ".join(BUNDLED.values()).split(), *(entry.name for entry in entries())), _build
-)
+COMMANDS = Commands(lambda: (*TASK_OF_BUNDLED, *(entry.name for entry in entries())), _build)
 
 
 def register_command(command: click.Command) -> None:

@@ -1,34 +1,54 @@
-"""What the app and the outputs do for each other: figures, exports, pages of scenes."""
+"""Services of the outputs to the app: figures, exports, reports, offline pages."""
 
 import threading
 from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from warpspace.analysis.commands.concepts import Concepts
+from warpspace.analysis.description import Result
+from warpspace.app.documents import offline_page
+from warpspace.app.documents.legend import (
+    look_words,
+    marked,
+    numbers_words,
+    picture_conditions,
+    range_conditions,
+    seen_words,
+    state_conditions,
+)
+from warpspace.app.documents.output_services import CancelledError, Services
+from warpspace.app.documents.scene_file import kept_views, reopened
+from warpspace.app.documents.transfers import shown_sides
+from warpspace.app.drawing.camera import CameraMemory
+from warpspace.app.evaluation.live_model import LiveModel
+from warpspace.app.evaluation.live_picture import LivePicture
+from warpspace.app.state.app_state import START_NODES, start_state
 from warpspace.cli.shared_options import write_text
 from warpspace.exceptions import OptionError, WarpspaceError
-from warpspace.outputs.exports.formats import ExportFormat, export_formats, register_format
+from warpspace.formats.compensation.compensate import Compensation
+from warpspace.kinematics.model import Loop
+from warpspace.machine.limits import MAX_PAGE_BYTES
+from warpspace.outputs.drawing.settings import FigureSettings
+from warpspace.outputs.exports.formats import export_formats
 from warpspace.outputs.exports.formats import write_export as write
 from warpspace.outputs.figures.registry import figure_kinds
+from warpspace.outputs.file_output import temporary_folder
+from warpspace.outputs.processes import FigureWorker
+from warpspace.picture.comparison import conditions_of_both, scene_change
+from warpspace.picture.model import VIEW_WORDS, VIEWS, ScenePicture, evaluate_picture
+from warpspace.scene.model import Scene
+from warpspace.scene.notes import story
+from warpspace.units import spell
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from warpspace.analysis.commands.concepts import Concepts
-    from warpspace.analysis.description import Result
-    from warpspace.app.documents.output_services import Services
-    from warpspace.app.drawing.camera import CameraMemory
-    from warpspace.app.evaluation.live_picture import LivePicture
-    from warpspace.formats.compensation.compensate import Compensation
-    from warpspace.outputs.drawing.settings import FigureSettings
-    from warpspace.outputs.processes import FigureWorker
     from warpspace.outputs.report.sections import Step
-    from warpspace.picture.model import ScenePicture
-    from warpspace.scene.model import Scene
 
 MOST_RENDERERS = 2  # figures drawn at the same time for all tabs together
 POLL_S = 0.1
@@ -37,7 +57,6 @@ _renderers = threading.Semaphore(MOST_RENDERERS)
 
 
 def build_services() -> "Services":
-    from warpspace.app.documents.output_services import Services
 
     return Services(
         draw_figure,
@@ -63,11 +82,6 @@ def _figure_of(
 
     Where tilts are coloured it is the orientation map; a comparison is always of position errors.
     """
-    from warpspace.app.documents.legend import state_conditions
-    from warpspace.app.documents.transfers import shown_sides
-    from warpspace.outputs.drawing.settings import FigureSettings
-    from warpspace.picture.comparison import conditions_of_both
-
     sides = shown_sides(picture, sheet=not figure)
     loops = [side.loop for side in sides]
     if figure and len(sides) == 2:
@@ -106,9 +120,7 @@ def draw_view(
     cancelled: threading.Event,
 ) -> bytes:
     """Draw what a page has drawn as a PNG that says what it shows."""
-    from warpspace.app.documents.legend import look_words, marked, seen_words
     from warpspace.outputs.view import draw_view as draw
-    from warpspace.units import spell
 
     found = picture.statistics
     numbers = {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
@@ -125,7 +137,6 @@ def draw_view(
 def draw_concepts(
     scenes: "Sequence[Scene]", plan: "Concepts", dark: bool, cancelled: threading.Event
 ) -> bytes:
-    from warpspace.outputs.drawing.settings import FigureSettings
 
     settings = FigureSettings(dark=dark, loop=str(plan.loop), concepts=plan)
     return _render("concepts", scenes, settings, cancelled)
@@ -148,10 +159,6 @@ def _render(
 def _drawn(
     begin: "Callable[[FigureWorker], Callable[[], bytes]]", cancelled: threading.Event
 ) -> bytes:
-    from concurrent.futures import ThreadPoolExecutor, wait
-
-    from warpspace.app.documents.output_services import CancelledError
-    from warpspace.outputs.processes import FigureWorker
 
     with _turn(cancelled), FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
         drawn = caller.submit(begin(worker))
@@ -165,7 +172,6 @@ def _drawn(
 
 @contextmanager
 def _turn(cancelled: threading.Event) -> Generator[None]:
-    from warpspace.app.documents.output_services import CancelledError
 
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
@@ -178,12 +184,6 @@ def _turn(cancelled: threading.Event) -> Generator[None]:
 
 def write_export(picture: "LivePicture", ending: str) -> bytes:
     """Write an export of what a page shows."""
-    from warpspace.app.documents.legend import range_conditions, state_conditions
-    from warpspace.app.documents.transfers import shown_sides
-    from warpspace.outputs.file_output import temporary_folder
-    from warpspace.picture.comparison import scene_change
-    from warpspace.picture.model import evaluate_picture
-
     found, *subtracted = (
         evaluate_picture(
             side.active_scene(),
@@ -214,11 +214,8 @@ def write_report(
     cancelled: threading.Event,
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; give the file, and which figures are missing."""
-    from warpspace.app.documents.scene_file import kept_views
-    from warpspace.app.documents.transfers import shown_sides
-    from warpspace.outputs.file_output import temporary_folder
     from warpspace.outputs.report import ReportSettings
-    from warpspace.outputs.report import write_report as write
+    from warpspace.outputs.report import write_report as write_review
 
     state, sides = picture.state, shown_sides(picture, sheet=True)
     settings = ReportSettings(
@@ -229,7 +226,7 @@ def write_report(
     scenes = [replace(one.active_scene(), review=kept_views(one)) for one in alike]
     with _turn(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
-        written = write(
+        written = write_review(
             scenes, target, settings, embed=embed_view, tell=tell_story, results=results
         )
         return target.read_bytes(), written.missing
@@ -239,8 +236,6 @@ BYTES_PER_RESPONSE = 48  # position and orientation error of one node to one par
 
 
 def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> None:
-    from warpspace.app.documents import offline_page
-    from warpspace.scene.notes import story
 
     _check_size(picture)
     live = offline_page.offline_picture(
@@ -258,7 +253,6 @@ def write_page(picture: "ScenePicture", target: "Path", *, overwrite: bool) -> N
 
 
 def _check_size(picture: "ScenePicture") -> None:
-    from warpspace.machine.limits import MAX_PAGE_BYTES
 
     nodes, keys = picture.values.size, len(picture.scene.parameter_keys)
     needed = nodes * keys * BYTES_PER_RESPONSE
@@ -272,37 +266,18 @@ def _check_size(picture: "ScenePicture") -> None:
         )
 
 
-register_format(
-    ExportFormat(
-        ".html", "the interactive scene, one file that needs no network", write_page, in_app=False
-    )
-)
-
-
 def embed_view(
     scene: "Scene", *, exaggeration: float, nodes: int, loop: str, largest: float
 ) -> str:
-    from warpspace.app.documents.offline_page import build_offline_html, offline_picture
-    from warpspace.kinematics.model import Loop
 
-    live = offline_picture(
+    live = offline_page.offline_picture(
         scene, exaggeration=exaggeration, nodes=nodes, loop=Loop(loop), largest=largest
     )
-    return build_offline_html(live)
+    return offline_page.build_offline_html(live)
 
 
 def tell_story(scene: "Scene", nodes: int) -> "list[Step]":
     """Give the steps of a story for a report; colours of the same thing end alike."""
-    import numpy as np
-
-    from warpspace.app.documents.legend import look_words, numbers_words, picture_conditions
-    from warpspace.app.documents.scene_file import reopened
-    from warpspace.app.evaluation.live_model import LiveModel
-    from warpspace.app.state.app_state import START_NODES, start_state
-    from warpspace.kinematics.model import Loop
-    from warpspace.picture.model import VIEW_WORDS, VIEWS
-    from warpspace.scene.notes import story
-
     notes, live = story(scene.review), LiveModel()
     steps: list[Step] = []
     ends: dict[tuple[str, str], float] = {}

@@ -3,7 +3,9 @@
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from datetime import datetime
+from functools import wraps
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
@@ -31,6 +33,27 @@ COMPONENTS = ("norm", "x", "y", "z")
 
 def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:
     return click.argument(name, type=SceneName(), **kwargs)
+
+
+def deferred(place: str) -> Callable[..., Any]:
+    """Return a function that imports the one at `place`, "module:function", when it is called.
+
+    Modules of commands thus import at the top what they use, and help does not load them.
+    """
+
+    def call(*args: Any, **options: Any) -> Any:
+        return resolve_name(place)(*args, **options)
+
+    return call
+
+
+def run_by(place: str) -> Callable[[Callable[[], None]], Callable[..., None]]:
+    """Run a declared command by the function at `place`, which is imported then."""
+
+    def decorate(declared: Callable[[], None]) -> Callable[..., None]:
+        return wraps(declared)(deferred(place))
+
+    return decorate
 
 
 json_option = click.option(

@@ -1,10 +1,10 @@
 """Commands about scenes and machines: what there is, what is right, what the thesis prints."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -18,15 +18,14 @@ from warpspace.cli.shared_options import (
     json_option,
     loop_option,
     output_option,
-    parse_point,
     print_json,
+    run_by,
     say_first_order,
     say_second_order,
     scene_argument,
-    warn_outside_travel,
     write_text,
 )
-from warpspace.cli.tables import echo, print_table, print_text, progress, warn
+from warpspace.cli.tables import print_table, print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
     from warpspace.thesis_example.rows import Row
 
+NOTES = "warpspace.cli.note_editing"
 OWN = "own"
 CHECKED = ("id", "kind", "stale", "numbers", "now")  # what `check` tells of a note
 Kind = Literal["scenes", "machines"]
@@ -168,6 +168,7 @@ def check(
 def _check(scene: "Scene", *, as_json: bool) -> None:
     from warpspace.analysis.note_tables import notes_table
     from warpspace.bodies.own_meshes import check_meshes
+    from warpspace.cli.note_editing import notes_json
     from warpspace.scene.model import second_order
 
     remarks = (*scene.notes, *check_meshes(scene.machine))
@@ -202,22 +203,6 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts), *review))
 
 
-def notes_json(scene: "Scene") -> list[dict[str, Any]]:
-    """List the notes of a scene as its file has them, and what their numbers are now."""
-    from warpspace.analysis.note_tables import note_numbers
-    from warpspace.scene.notes import note_to_toml, told
-
-    return [
-        {
-            **note_to_toml(note),
-            "stale": told(note.numbers, now) != "",
-            "numbers": note.numbers,
-            "now": {name: now[name] for name in note.numbers if name in now},
-        }
-        for note, now in zip(scene.review, note_numbers(scene, scene.review), strict=True)
-    ]
-
-
 @click.command()
 @scene_argument()
 @click.option("--add", "text", metavar="TEXT", help="Add a note with this text.")
@@ -245,68 +230,12 @@ def notes_json(scene: "Scene") -> list[dict[str, Any]]:
 @loop_option
 @force_option
 @json_option
-def notes(
-    scene: str,
-    text: str | None,
-    point: str | None,
-    output: str | None,
-    *,
-    force: bool,
-    as_json: bool,
-    **about: Any,
-) -> None:
+@run_by(f"{NOTES}:edit_notes")
+def notes() -> None:
     """List the review notes of SCENE, or add one.
 
     A note whose numbers no longer hold is marked "changed" with its number then and now.
     """
-    from warpspace.analysis.blocks import table_markdown
-    from warpspace.analysis.note_tables import notes_table
-    from warpspace.scene.library import load_scene
-    from warpspace.scene.text_files import spell_row
-
-    if text is not None:
-        loaded = _add_note(scene, output or scene, point, force=force, text=text, **about)
-        output = None
-    else:
-        loaded = load_scene(scene)
-    if text is None and (point is not None or (output or "").endswith(".toml")):
-        raise OptionError("--at and an .toml file belong to --add; there is no text to add")
-    title = f"{loaded.name}: {loaded.title}"
-    if output is not None:
-        table = notes_table(loaded, title)
-        rows = table.csv_rows()
-        text = table_markdown(table) if output.endswith(".md") else "".join(map(spell_row, rows))
-        write_text(output, text, force=force)
-    if as_json:
-        print_json({"notes": notes_json(loaded)})
-    elif output is None:
-        print_blocks([notes_table(loaded, title)])
-
-
-def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: Any) -> "Scene":
-    from warpspace.analysis.note_tables import note_numbers
-    from warpspace.machine.limits import MAX_SCENE_BYTES
-    from warpspace.scene.library import load_scene, parse_scene, scene_path
-    from warpspace.scene.notes import Note
-    from warpspace.scene.scene_writer import spell_note
-    from warpspace.scene.text_files import lock_file, read_bytes, read_text
-
-    file = scene_path(name)
-    with lock_file(file):
-        original, scene = read_bytes(file, MAX_SCENE_BYTES), load_scene(file)
-        at = {} if point is None else parse_point(point, scene.machine.axes)
-        if not path.endswith(".toml"):
-            expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
-            raise OptionError(f"{path}: {expected}")
-        note = Note(at=at, **about)
-        warn_outside_travel(scene.machine, note.at)
-        note = replace(note, numbers=note_numbers(scene, [note])[0])
-        text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_note(note)}"
-        added = parse_scene(text, scene.name, path, Path(path).parent)
-        same = file == Path(path)
-        write_text(path, text, force=force or same, original=original if same else None)
-    echo(f"{path}: {note.kind} {note.id} added", err=True)
-    return added
 
 
 @click.command()
@@ -314,30 +243,13 @@ def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: 
 @scene_argument("second")
 @output_option("Scene file to write: .toml.", *SCENES)
 @force_option
-def merge(first: str, second: str, output: str, *, force: bool) -> None:
+@run_by(f"{NOTES}:merge_scenes")
+def merge() -> None:
     """Unite the review notes of two copies of a scene.
 
     Notes are matched by their id and replies united. A note that both have edited is kept in both
     versions, side by side. Everything else of the scene is that of FIRST.
     """
-    from warpspace.scene.library import load_scene, parse_scene
-    from warpspace.scene.notes import merge_notes
-    from warpspace.scene.scene_writer import scene_to_toml
-
-    a, b = load_scene(first), load_scene(second)
-    merged = merge_notes(a.review, b.review)
-    text = scene_to_toml(replace(a, review=merged))
-    parse_scene(text, a.name, output, None)  # a note of SECOND may name an axis FIRST has not
-    write_text(output, text, force=force)
-    print_text(f"{output}: {len(merged)} notes of {len(a.review)} and {len(b.review)}")
-    for note in merged:
-        if note.versions:
-            print_text(f"  {note.id}: {1 + len(note.versions)} versions kept side by side")
-    if replace(b, name=a.name, review=a.review) != a:
-        functions, others = a.errors.functions, b.errors.functions
-        keys = [key for key in {**functions, **others} if functions.get(key) != others.get(key)]
-        said = f", among them the errors {', '.join(keys)}" if keys else ""
-        warn(f"the scenes differ beside their notes{said}; those of {first} are kept")
 
 
 def laser_tracer_um(scene: "Scene") -> float | None:

@@ -1,26 +1,22 @@
 """Commands about measurements: standard tests, and measured errors into a scene."""
 
-from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import click
 
 from warpspace.analysis.blocks import Column
-from warpspace.cli.analyses import command_of, print_blocks
-from warpspace.cli.file_arguments import Commands, InputFile, SceneName, check_files
+from warpspace.cli.analyses import command_of
+from warpspace.cli.file_arguments import Commands, InputFile, SceneName
 from warpspace.cli.shared_options import (
     SCENES,
     force_option,
     json_option,
     output_option,
-    print_json,
+    run_by,
     write_text,
 )
-from warpspace.cli.tables import echo, print_table, print_text, progress
-from warpspace.exceptions import OptionError
+from warpspace.cli.tables import echo, print_table
 from warpspace.machine.limits import MAX_LENGTH_MM
-from warpspace.scene.text_files import one_line, parse_number
 
 
 def _test_names() -> tuple[str, ...]:
@@ -34,16 +30,16 @@ def _build_test(name: str) -> click.Command:
 
     if name not in _test_names():
         raise KeyError(name)
-    test = find_test(name)
-    command = command_of(test)
-    command.short_help = test.title
+    test_kind = find_test(name)
+    command = command_of(test_kind)
+    command.short_help = test_kind.title
     return command
 
 
 @click.group(name="test", commands=Commands(_test_names, _build_test), invoke_without_command=True)
 @click.option("--list", "listing", is_flag=True, help="List the tests: name, standard, what it is.")
 @click.pass_context
-def test_(context: click.Context, *, listing: bool) -> None:
+def test(context: click.Context, *, listing: bool) -> None:
     """Run a standard test of machine tools on SCENE.
 
     Each test prints its standard's numbers and draws its customary figure; with --data measured
@@ -69,11 +65,6 @@ def _list() -> None:
     )
     tests = [find_test(name) for name in _test_names()]
     print_table(columns, [(test.name, test.standard, test.title) for test in tests], indent=0)
-
-
-ROBOT = "urdf"
-SHOWN = 30  # remarks on a robot that are printed; all of them stand in the file
-MOST_ROWS = 100_000  # rows of a table to fill in
 
 
 @click.command("import")
@@ -141,26 +132,8 @@ MOST_ROWS = 100_000  # rows of a table to fill in
 @click.option("--formats", is_flag=True, help="List the formats, and what each holds.")
 @force_option
 @json_option
-def import_(
-    files: tuple[Path, ...],
-    output: str | None,
-    machine: str | None,
-    format_name: str | None,
-    axes: tuple[str, ...],
-    sign: str | None,
-    variant: str | None,
-    title: str | None,
-    tool: str | None,
-    workpiece: str | None,
-    mesh_root: Path | None,
-    positions: str | None,
-    over: str | None,
-    *,
-    template: bool,
-    formats: bool,
-    force: bool,
-    as_json: bool,
-) -> None:
+@run_by("warpspace.cli.measurement_import:import_files")
+def import_() -> None:
     """Read measured errors, or a machine in URDF, into a scene.
 
     What was recognised, in which units the numbers are, and whatever the files do not say and is
@@ -171,209 +144,6 @@ def import_(
     their origins offsets and rotations, their shapes one mesh for each axis, written beside the
     scene. What has no place is named, here and at the top of the scene.
     """
-    from warpspace.outputs.file_output import check_target
-
-    if formats:
-        _list_formats(as_json=as_json)
-        return
-    if not files:
-        raise click.UsageError("Missing argument 'FILES...'.")
-    for given, name in ((positions, "--positions"), (over, "--over")):
-        if given is not None and not template:
-            raise OptionError(f"{name} {given!r} belongs to --template")
-    if template:
-        if output is not None:
-            check_target(output, (".csv",), overwrite=force)
-        _write_template(files, output, positions, over, force=force)
-        return
-    robot = format_name == ROBOT or (format_name is None and files[0].suffix.lower() == ".urdf")
-    for given, name in ((tool, "--tool"), (workpiece, "--workpiece"), (mesh_root, "--mesh-root")):
-        if given is not None and not robot:
-            raise OptionError(f"{name} {str(given)!r} belongs to a URDF file")
-    if output is None:
-        raise click.UsageError("Missing option '-o' / '--output'.")
-    check_target(output, SCENES, overwrite=force)
-    if robot:
-        _import_robot(files, output, tool or "", workpiece or "", mesh_root, force=force)
-        return
-
-    from warpspace.analysis.description import to_json
-    from warpspace.formats.measured import summaries, summary_table
-    from warpspace.formats.registry import ReadOptions, open_files, parse_axis_options, read_errors
-    from warpspace.formats.to_scene import base_scene, into_scene
-    from warpspace.scene.machine_library import machine_names
-
-    scenes = [machine] if machine and machine not in machine_names() else []
-    axis, names = parse_axis_options(axes)
-    with progress("reading", silent=as_json):
-        base = base_scene(machine) if machine else None
-        options = ReadOptions(
-            base.machine if base else None, axis, names, sign or "", variant or ""
-        )
-        reading = read_errors(open_files(files), options, format_name or "")
-        what = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
-        if base is not None and (title or not scenes):
-            base = replace(base, title=one_line(title or files[0].stem), name=Path(output).stem)
-        made = into_scene(reading, base, title or files[0].stem, what)
-    kind = reading.format
-    how = "recognised" if reading.recognised else "as told"
-    echo(f"warpspace: {kind.name}, {kind.title} ({how})", err=True)
-    write_text(output, made.text, force=force)
-    notes = [*reading.found.notes, *made.notes]
-    if as_json:
-        print_json(
-            {
-                "format": kind.name,
-                "recognised": reading.recognised,
-                "machine": made.scene.machine.name,
-                "chain": str(made.scene.machine.chain),
-                "units": list(reading.found.units),
-                "errors": to_json(summaries(reading.found)),
-                "assumed": list(reading.found.assumed),
-                "notes": notes,
-                "output": str(output),
-            }
-        )
-        return
-    print_text(f"{output}: {kind.title}, {made.scene.machine.chain}")
-    print_text(f"  units: {', '.join(reading.found.units)}")
-    print_blocks([summary_table(reading.found)])
-    for text in reading.found.assumed:
-        print_text(f"  assumed: {text}")
-    for text in notes:
-        print_text(f"  {text}")
-
-
-def _import_robot(
-    files: tuple[Path, ...],
-    output: str,
-    tool: str,
-    workpiece: str,
-    mesh_root: Path | None,
-    *,
-    force: bool,
-) -> None:
-    from warpspace.bodies.own_meshes import frame_meshes
-    from warpspace.outputs.file_output import mesh_files, write_with_meshes
-    from warpspace.scene.library import parse_scene
-    from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
-
-    target, robot = Path(output), files[0]
-    if len(files) > 1:
-        raise OptionError(f"{files[1]}: expected one URDF file, found {len(files)}")
-    loaded, others = read_robot(robot)
-    found = place_robot(loaded, str(robot), tool, workpiece)
-    meshes, unread, read = frame_meshes(loaded, found.frame_of, robot.parent, mesh_root)
-    written = mesh_files(target, meshes, overwrite=force, inputs=read)
-    check_files(click.get_current_context(), written.values())
-    notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
-    names = {frame: file.name for frame, file in written.items()}
-    text = imported_text(found.machine, robot.name, notes, names)
-    scene = parse_scene(text, target.stem, output)
-    write_with_meshes(target, text.encode(), written, meshes, overwrite=force)
-    axes = len(scene.machine.axes)
-    print_text(f"{output}: {scene.machine.chain}, {axes} {'axis' if axes == 1 else 'axes'}")
-    if written:
-        print_text(f"  meshes: {', '.join(file.name for file in written.values())}")
-    for note in notes[:SHOWN]:
-        print_text(f"  {note}")
-    if len(notes) > SHOWN:
-        print_text(f"  and {len(notes) - SHOWN} more remarks, at the top of {output}")
-
-
-def _write_template(
-    files: tuple[Path, ...],
-    output: str | None,
-    positions: str | None,
-    over: str | None,
-    *,
-    force: bool,
-) -> None:
-    from warpspace.formats.kinds.csv_own import surface_template, usual_places
-    from warpspace.formats.kinds.csv_own import template as spelled
-    from warpspace.machine.axes import is_axis_name
-
-    axis = str(files[0])
-    name = axis.strip().upper()
-    if len(files) > 1 or not is_axis_name(name):
-        raise OptionError(
-            f"axis {' '.join(map(str, files))!r}; expected one name such as X, C or C2"
-        )
-    places = _positions(positions, "--positions")
-    if over is None:
-        text = spelled(name, places)
-    else:
-        second, equals, given = over.partition("=")
-        other = second.strip().upper()
-        if not is_axis_name(other) or other == name:
-            raise OptionError(
-                f"--over {over!r}; expected another axis than {name}, such as Z=0,100"
-            )
-        beside = _positions(given if equals else None, "--over")
-        at = (places or usual_places(name), beside or usual_places(other))
-        if len(at[0]) * len(at[1]) > MOST_ROWS:
-            found = f"{len(at[0])} × {len(at[1])} points"
-            raise OptionError(f"{found}; expected at most {MOST_ROWS:,} rows")
-        text = surface_template((name, other), at)
-    if output is None:
-        click.echo(text, nl=False)
-        return
-    write_text(output, text, force=force)
-    echo(f"wrote {output}")
-
-
-def _positions(text: str | None, option: str) -> tuple[float, ...]:
-    if text is None:
-        return ()
-    try:
-        found = tuple(parse_number(part) for part in text.split(","))
-    except ValueError:
-        found = ()
-    if not 2 <= len(found) <= 1000 or not all(abs(q) <= 1e5 for q in found):
-        raise OptionError(f"{option} {text!r}; expected 2 to 1000 numbers with commas between")
-    if any(high <= low for low, high in pairwise(found)):
-        raise OptionError(f"{option} {text!r}; expected ascending positions")
-    return found
-
-
-def _list_formats(*, as_json: bool) -> None:
-    from warpspace.formats.registry import formats as all_formats
-
-    found = all_formats()
-    if as_json:
-        said = (
-            "holds", "units", "grid", "limits", "points", "most_points", "orientation", "variants",
-            "endings", "source",
-        )  # fmt: skip
-        listed = [
-            {
-                "name": one.name,
-                "title": one.title,
-                "reads": True,
-                "writes": one.can_write,
-                "controller": one.tables is not None,
-                **{name: getattr(one, name) for name in said},
-            }
-            for one in found
-        ]
-        print_json({"formats": listed})
-        return
-    rows: list[tuple[str, str, str]] = []
-    for one in found:
-        rows.append((one.name, "read, write" if one.can_write else "read", one.title))
-        rows += [
-            ("", "", f"{word}: {text}")
-            for word, text in (
-                ("holds", one.holds),
-                ("units", one.units),
-                ("grid", one.grid),
-                ("limits", one.limits),
-                ("variants", ", ".join(one.variants)),
-                ("published", one.source),
-            )
-            if text
-        ]
-    print_table((Column(leads=True), Column(), Column(wraps=True)), rows, indent=0)
 
 
 @click.command("test-piece")

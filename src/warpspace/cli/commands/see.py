@@ -10,10 +10,10 @@ import click
 
 from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import SceneName
-from warpspace.cli.services import build_services, embed_view, tell_story
 from warpspace.cli.shared_options import (
     FIGURES,
     component_option,
+    deferred,
     direction_option,
     draw_figure_file,
     exaggeration_option,
@@ -32,16 +32,30 @@ from warpspace.cli.shared_options import (
 )
 from warpspace.cli.tables import echo, print_text, progress
 from warpspace.exceptions import OptionError, RenderError, UnknownNameError
-from warpspace.outputs.exports.formats import export_formats, write_export
+from warpspace.outputs.exports.formats import (
+    ExportFormat,
+    export_formats,
+    register_format,
+    write_export,
+)
 from warpspace.outputs.figures.registry import figure_command, figure_names
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Analysis
 
 
+SERVICES = "warpspace.cli.services"
 MOVING = (".gif", ".webp", ".mp4")
 SIZE, MOVING_SIZE = (1600, 1200), (960, 720)
 FRAMES, FPS = 48, 15.0
+register_format(
+    ExportFormat(
+        ".html",
+        "the interactive scene, one file that needs no network",
+        f"{SERVICES}:write_page",
+        in_app=False,
+    )
+)
 
 
 @click.command()
@@ -96,6 +110,7 @@ def view(
     from warpspace.app.server.request_policy import Access
     from warpspace.app.server.viewer import run_viewer
     from warpspace.bodies.own_meshes import check_meshes
+    from warpspace.cli.services import build_services
     from warpspace.scene.library import load_scene, scene_names, scene_path
 
     path = scene_path(scene)
@@ -389,8 +404,8 @@ def report(
             loaded,
             output,
             settings,
-            embed=embed_view,
-            tell=tell_story,
+            embed=deferred(f"{SERVICES}:embed_view"),
+            tell=deferred(f"{SERVICES}:tell_story"),
             concepts=beside,
             results={
                 f"{heading}: {scene.title}": analysis.run(scene, ignore_progress)
