@@ -51,13 +51,12 @@ def print_field(
     placed: bool,
     as_json: bool,
 ) -> None:
-
     if points and grid is not None:
-        raise OptionError("--at and --grid exclude each other; give one of them")
+        raise OptionError("--at and --grid exclude each other; use one of them")
     if points and output is not None and output.lower().endswith(".vts"):
-        others = ", ".join(ending for ending in FIELDS if ending != ".vts")
+        endings = ", ".join(ending for ending in FIELDS if ending != ".vts")
         raise OptionError(
-            f"{output}: a .vts file holds a grid, --at gives points; expected {others}"
+            f"{output}: a .vts file holds a grid, --at defines points; expected {endings}"
         )
     files = [path for path in (csv_path, output) if path is not None]
     loaded = shared_options.load_placed(scene, direction, loop, placed=placed)
@@ -68,17 +67,20 @@ def print_field(
         said = (
             {} if exact else shared_options.say_second_order(second_order(loaded, loop, at=places))
         )
-        even = statistics(result, axes)
+        node_statistics = statistics(result, axes)
         u95 = {}
         if nodes is None:
-            over, summary = field_uncertainty(loaded, result.error_um, axes, view), even
-            u95 = over.columns if over and over.errors.is_known else {}
+            uncertainty, summary = (
+                field_uncertainty(loaded, result.error_um, axes, view),
+                node_statistics,
+            )
+            u95 = uncertainty.columns if uncertainty and uncertainty.errors.is_known else {}
         else:
-            over = volume_uncertainty(loaded, view, max(nodes.shape))
+            uncertainty = volume_uncertainty(loaded, view, max(nodes.shape))
             summary = volume_statistics(result, nodes)
             if files or as_json:
                 u95 = u95_columns(loaded, result, axes, view, nodes.point_mm)
-        summary = over.with_expanded_uncertainty(summary) if over else summary
+        summary = uncertainty.with_expanded_uncertainty(summary) if uncertainty else summary
     if files:
         from warpspace.outputs.exports.fields import FieldRecord, write_field
         from warpspace.picture.model import field_remarks
@@ -88,25 +90,33 @@ def print_field(
             for path in files:
                 write_field(FieldRecord(axes, result, about, u95), path, overwrite=force)
     if as_json:
-        found: dict[str, object] = {"loop": loop, "frame": frame}
-        found["statistics"] = to_json(summary)
-        found |= {} if view.placed_over is None else {"placement": "fitted out"}
-        found |= said if view.reference is None else {**said, "reference": dict(view.reference)}
+        document: dict[str, object] = {"loop": loop, "frame": frame}
+        document["statistics"] = to_json(summary)
+        document |= {} if view.placed_over is None else {"placement": "fitted out"}
+        document |= said if view.reference is None else {**said, "reference": dict(view.reference)}
         if nodes is not None:
-            found["statistics_nodes"] = to_json(even)
+            document["statistics_nodes"] = to_json(node_statistics)
         if output is not None:
             size = {"output": output, "points_written": result.norm_um.size}
-            click.echo(shared_options.spell_json({**size, **found}))
+            click.echo(shared_options.spell_json({**size, **document}))
             return
-        found |= {"unknown": over.errors.unknown} if over and over.errors.unknown else {}
-        if nodes is None and over and u95:
-            u95["covariance_um2"] = over.covariance_um2
-            u95 |= {} if loaded.limit_um is None else {"probability": over.keeps(loaded.limit_um)}
-        _print_json(axes, result, found, u95)
+        document |= (
+            {"unknown": uncertainty.errors.unknown}
+            if uncertainty and uncertainty.errors.unknown
+            else {}
+        )
+        if nodes is None and uncertainty and u95:
+            u95["covariance_um2"] = uncertainty.covariance_um2
+            u95 |= (
+                {}
+                if loaded.limit_um is None
+                else {"probability": uncertainty.keeps(loaded.limit_um)}
+            )
+        _print_json(axes, result, document, u95)
         return
-    told = (*direction_words(loaded), *placed_words(view))
-    words = (f"{loop} loop", *told, "exact" if exact else "first order")
-    print_text(" · ".join((loaded.title, *words)))
+    conditions = (*direction_words(loaded), *placed_words(view))
+    headings = (f"{loop} loop", *conditions, "exact" if exact else "first order")
+    print_text(" · ".join((loaded.title, *headings)))
     if points:
         units = [loaded.machine.axes[name].unit for name in axes]
         _list_points(axes, result, units, u95)
@@ -115,10 +125,10 @@ def print_field(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
-    for said in u95_lines(over and over.errors, {"": summary}):
+    for said in u95_lines(uncertainty and uncertainty.errors, {"": summary}):
         print_text(said)
     if nodes is not None:
-        print_text(f"  each node counted once: mean {even.mean_um:.2f} µm")
+        print_text(f"  each node counted once: mean {node_statistics.mean_um:.2f} µm")
     worst = own_axes(loaded, summary.max_at_axes)
     print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
     print_text(f"  --at {spell_at(worst)}")
@@ -127,8 +137,8 @@ def print_field(
 
 
 def _evaluate(
-    scene: "Scene", points: tuple[str, ...], grid: int | None, view: "View", *, exact: bool
-) -> "tuple[Mapping[str, Array], ErrorField, Grid | None]":
+    scene: Scene, points: tuple[str, ...], grid: int | None, view: View, *, exact: bool
+) -> tuple[Mapping[str, Array], ErrorField, Grid | None]:
 
     if points:
         typed = [shared_options.parse_point(text, scene.machine.axes) for text in points]
@@ -136,22 +146,26 @@ def _evaluate(
             complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
         ]
         axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
-        found = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
+        error_field = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
         for point in typed:
             shared_options.warn_outside_travel(scene.machine, point)
-        return axes, found, None
+        return axes, error_field, None
     nodes = DEFAULT_NODES if grid is None else grid
-    built = build_grid(scene.model, scene.workspace, nodes)
-    return built.coordinates, evaluate_grid(scene, built, view, exact=exact), built
+    sampled_grid = build_grid(scene.model, scene.workspace, nodes)
+    return (
+        sampled_grid.coordinates,
+        evaluate_grid(scene, sampled_grid, view, exact=exact),
+        sampled_grid,
+    )
 
 
 def _print_json(
-    axes: "Mapping[str, Array]",
-    result: "ErrorField",
-    found: "Mapping[str, object]",
-    u95: "Mapping[str, Array]",
+    axes: Mapping[str, Array],
+    result: ErrorField,
+    document: Mapping[str, object],
+    u95: Mapping[str, Array],
 ) -> None:
-    """Print the JSON object piece by piece: a million points are never held as one text."""
+    """Print the JSON object in pieces: the text of a million points would not fit."""
     columns = {
         "nominal_mm": result.nominal_mm,
         "error_um": result.error_um,
@@ -159,7 +173,7 @@ def _print_json(
         "orientation_urad": result.orientation_urad,
     }
     if not all(np.isfinite(values).all() for values in columns.values()):
-        raise OptionError("the field has points whose error is no number; JSON cannot hold them")
+        raise OptionError("errors of the field are not finite; JSON cannot represent them")
     columns |= u95
     shape, size = result.norm_um.shape, result.norm_um.size
     positions = [np.broadcast_to(values, shape).reshape(-1) for values in axes.values()]
@@ -176,16 +190,18 @@ def _print_json(
         click.echo((", " if start else "") + shared_options.spell_json(rows)[1:-1], nl=False)
     click.echo(
         "]"
-        + "".join(f', "{name}": {shared_options.spell_json(part)}' for name, part in found.items())
+        + "".join(
+            f', "{name}": {shared_options.spell_json(part)}' for name, part in document.items()
+        )
         + "}"
     )
 
 
 def _list_points(
-    axes: "Mapping[str, Array]",
-    result: "ErrorField",
-    units: "Sequence[str]",
-    u95: "Mapping[str, Array]",
+    axes: Mapping[str, Array],
+    result: ErrorField,
+    units: Sequence[str],
+    u95: Mapping[str, Array],
 ) -> None:
     columns = (
         Column("point", "d", leads=True),

@@ -30,8 +30,8 @@ from warpspace.scene.machine_library import machine_names
 from warpspace.scene.text_files import one_line, parse_number
 
 ROBOT = "urdf"
-SHOWN = 30  # remarks on a robot that are printed; all of them stand in the file
-MOST_ROWS = 100_000  # rows of a table to fill in
+MAX_REMARKS = 30  # printed remarks on a robot; the file has all
+MAX_ROWS = 100_000  # rows of a table to fill in
 
 
 def import_files(
@@ -54,24 +54,27 @@ def import_files(
     force: bool,
     as_json: bool,
 ) -> None:
-
     if formats:
         _list_formats(as_json=as_json)
         return
     if not files:
         raise click.UsageError("Missing argument 'FILES...'.")
-    for given, name in ((positions, "--positions"), (over, "--over")):
-        if given is not None and not template:
-            raise OptionError(f"{name} {given!r} belongs to --template")
+    for argument, name in ((positions, "--positions"), (over, "--over")):
+        if argument is not None and not template:
+            raise OptionError(f"{name} {argument!r} belongs to --template")
     if template:
         if output is not None:
             check_target(output, (".csv",), overwrite=force)
         _write_template(files, output, positions, over, force=force)
         return
     robot = format_name == ROBOT or (format_name is None and files[0].suffix.lower() == ".urdf")
-    for given, name in ((tool, "--tool"), (workpiece, "--workpiece"), (mesh_root, "--mesh-root")):
-        if given is not None and not robot:
-            raise OptionError(f"{name} {str(given)!r} belongs to a URDF file")
+    for argument, name in (
+        (tool, "--tool"),
+        (workpiece, "--workpiece"),
+        (mesh_root, "--mesh-root"),
+    ):
+        if argument is not None and not robot:
+            raise OptionError(f"{name} {str(argument)!r} belongs to a URDF file")
     if output is None:
         raise click.UsageError("Missing option '-o' / '--output'.")
     check_target(output, SCENES, overwrite=force)
@@ -87,13 +90,13 @@ def import_files(
             base.machine if base else None, axis, names, sign or "", variant or ""
         )
         reading = read_errors(open_files(files), options, format_name or "")
-        what = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
+        source = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
         if base is not None and (title or not scenes):
             base = replace(base, title=one_line(title or files[0].stem), name=Path(output).stem)
-        made = into_scene(reading, base, title or files[0].stem, what)
+        made = into_scene(reading, base, title or files[0].stem, source)
     kind = reading.format
-    how = "recognised" if reading.recognised else "as told"
-    echo(f"warpspace: {kind.name}, {kind.title} ({how})", err=True)
+    recognition = "recognised" if reading.recognised else "by --format"
+    echo(f"warpspace: {kind.name}, {kind.title} ({recognition})", err=True)
     write_text(output, made.text, force=force)
     notes = [*reading.found.notes, *made.notes]
     if as_json:
@@ -129,63 +132,62 @@ def _import_robot(
     *,
     force: bool,
 ) -> None:
-
     from warpspace.bodies.own_meshes import frame_meshes
     from warpspace.scene.urdf import imported_text, left_out, place_robot, read_robot
 
     target, robot = Path(output), files[0]
     if len(files) > 1:
         raise OptionError(f"{files[1]}: expected one URDF file, found {len(files)}")
-    loaded, others = read_robot(robot)
-    found = place_robot(loaded, str(robot), tool, workpiece)
-    meshes, unread, read = frame_meshes(loaded, found.frame_of, robot.parent, mesh_root)
-    written = mesh_files(target, meshes, overwrite=force, inputs=read)
-    check_files(click.get_current_context(), written.values())
-    notes = [*found.notes, *unread, *left_out(loaded, others, found.frame_of)]
-    names = {frame: file.name for frame, file in written.items()}
-    text = imported_text(found.machine, robot.name, notes, names)
+    loaded, other_files = read_robot(robot)
+    placed = place_robot(loaded, str(robot), tool, workpiece)
+    meshes, unread, read = frame_meshes(loaded, placed.frame_of, robot.parent, mesh_root)
+    mesh_paths = mesh_files(target, meshes, overwrite=force, inputs=read)
+    check_files(click.get_current_context(), mesh_paths.values())
+    notes = [*placed.notes, *unread, *left_out(loaded, other_files, placed.frame_of)]
+    names = {frame: file.name for frame, file in mesh_paths.items()}
+    text = imported_text(placed.machine, robot.name, notes, names)
     scene = parse_scene(text, target.stem, output)
-    write_with_meshes(target, text.encode(), written, meshes, overwrite=force)
+    write_with_meshes(target, text.encode(), mesh_paths, meshes, overwrite=force)
     axes = len(scene.machine.axes)
     print_text(f"{output}: {scene.machine.chain}, {axes} {'axis' if axes == 1 else 'axes'}")
-    if written:
-        print_text(f"  meshes: {', '.join(file.name for file in written.values())}")
-    for note in notes[:SHOWN]:
+    if mesh_paths:
+        print_text(f"  meshes: {', '.join(file.name for file in mesh_paths.values())}")
+    for note in notes[:MAX_REMARKS]:
         print_text(f"  {note}")
-    if len(notes) > SHOWN:
-        print_text(f"  and {len(notes) - SHOWN} more remarks, at the top of {output}")
+    if len(notes) > MAX_REMARKS:
+        print_text(f"  and {len(notes) - MAX_REMARKS} more remarks, at the top of {output}")
 
 
 def _write_template(
     files: tuple[Path, ...],
     output: str | None,
     positions: str | None,
-    over: str | None,
+    second_axis: str | None,
     *,
     force: bool,
 ) -> None:
-
     axis = str(files[0])
     name = axis.strip().upper()
     if len(files) > 1 or not is_axis_name(name):
         raise OptionError(
-            f"axis {' '.join(map(str, files))!r}; expected one name such as X, C or C2"
+            f"axis {' '.join(map(str, files))!r}; expected one axis such as X, C or C2"
         )
     places = _positions(positions, "--positions")
-    if over is None:
+    if second_axis is None:
         text = csv_own.template(name, places)
     else:
-        second, equals, given = over.partition("=")
+        second, equals, values_text = second_axis.partition("=")
         other = second.strip().upper()
         if not is_axis_name(other) or other == name:
             raise OptionError(
-                f"--over {over!r}; expected another axis than {name}, such as Z=0,100"
+                f"--over {second_axis!r}; expected another axis than {name}, such as Z=0,100"
             )
-        beside = _positions(given if equals else None, "--over")
-        at = (places or csv_own.usual_places(name), beside or csv_own.usual_places(other))
-        if len(at[0]) * len(at[1]) > MOST_ROWS:
-            found = f"{len(at[0])} × {len(at[1])} points"
-            raise OptionError(f"{found}; expected at most {MOST_ROWS:,} rows")
+        second_positions = _positions(values_text if equals else None, "--over")
+        at = (places or csv_own.usual_places(name), second_positions or csv_own.usual_places(other))
+        if len(at[0]) * len(at[1]) > MAX_ROWS:
+            raise OptionError(
+                f"{len(at[0])} × {len(at[1])} points; expected at most {MAX_ROWS:,} rows"
+            )
         text = csv_own.surface_template((name, other), at)
     if output is None:
         click.echo(text, nl=False)
@@ -198,49 +200,48 @@ def _positions(text: str | None, option: str) -> tuple[float, ...]:
     if text is None:
         return ()
     try:
-        found = tuple(parse_number(part) for part in text.split(","))
+        numbers = tuple(parse_number(part) for part in text.split(","))
     except ValueError:
-        found = ()
-    if not 2 <= len(found) <= 1000 or not all(abs(q) <= 1e5 for q in found):
+        numbers = ()
+    if not 2 <= len(numbers) <= 1000 or not all(abs(q) <= 1e5 for q in numbers):
         raise OptionError(f"{option} {text!r}; expected 2 to 1000 numbers with commas between")
-    if any(high <= low for low, high in pairwise(found)):
+    if any(high <= low for low, high in pairwise(numbers)):
         raise OptionError(f"{option} {text!r}; expected ascending positions")
-    return found
+    return numbers
 
 
 def _list_formats(*, as_json: bool) -> None:
-
-    found = all_formats()
+    known_formats = all_formats()
     if as_json:
-        said = (
+        keys = (
             "holds", "units", "grid", "limits", "points", "most_points", "orientation", "variants",
             "endings", "source",
         )  # fmt: skip
         listed = [
             {
-                "name": one.name,
-                "title": one.title,
+                "name": format_.name,
+                "title": format_.title,
                 "reads": True,
-                "writes": one.can_write,
-                "controller": one.tables is not None,
-                **{name: getattr(one, name) for name in said},
+                "writes": format_.can_write,
+                "controller": format_.tables is not None,
+                **{name: getattr(format_, name) for name in keys},
             }
-            for one in found
+            for format_ in known_formats
         ]
         print_json({"formats": listed})
         return
     rows: list[tuple[str, str, str]] = []
-    for one in found:
-        rows.append((one.name, "read, write" if one.can_write else "read", one.title))
+    for format_ in known_formats:
+        rows.append((format_.name, "read, write" if format_.can_write else "read", format_.title))
         rows += [
             ("", "", f"{word}: {text}")
             for word, text in (
-                ("holds", one.holds),
-                ("units", one.units),
-                ("grid", one.grid),
-                ("limits", one.limits),
-                ("variants", ", ".join(one.variants)),
-                ("published", one.source),
+                ("holds", format_.holds),
+                ("units", format_.units),
+                ("grid", format_.grid),
+                ("limits", format_.limits),
+                ("variants", ", ".join(format_.variants)),
+                ("published", format_.source),
             )
             if text
         ]

@@ -18,8 +18,8 @@ from warpspace.scene.scene_writer import scene_to_toml, spell_note
 from warpspace.scene.text_files import lock_file, read_bytes, read_text, spell_row
 
 
-def notes_json(scene: "Scene") -> list[dict[str, Any]]:
-    """List the notes of a scene as its file has them, and what their numbers are now."""
+def notes_json(scene: Scene) -> list[dict[str, Any]]:
+    """List the notes of a scene as in its file, with their present numbers."""
     return [
         {
             **note_to_toml(note),
@@ -41,14 +41,13 @@ def edit_notes(
     as_json: bool,
     **about: Any,
 ) -> None:
-
     if text is not None:
         loaded = _add_note(scene, output or scene, point, force=force, text=text, **about)
         output = None
     else:
         loaded = load_scene(scene)
     if text is None and (point is not None or (output or "").endswith(".toml")):
-        raise OptionError("--at and an .toml file belong to --add; there is no text to add")
+        raise OptionError("--at and a .toml file need --add with the text of the note")
     title = f"{loaded.name}: {loaded.title}"
     if output is not None:
         table = notes_table(loaded, title)
@@ -61,28 +60,27 @@ def edit_notes(
         print_blocks([notes_table(loaded, title)])
 
 
-def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: Any) -> "Scene":
+def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: Any) -> Scene:
 
     file = scene_path(name)
     with lock_file(file):
         original, scene = read_bytes(file, MAX_SCENE_BYTES), load_scene(file)
         at = {} if point is None else parse_point(point, scene.machine.axes)
         if not path.endswith(".toml"):
-            expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
+            expected = "expected a .toml file (-o FILE.toml); bundled scenes are not changed"
             raise OptionError(f"{path}: {expected}")
         note = Note(at=at, **about)
         warn_outside_travel(scene.machine, note.at)
         note = replace(note, numbers=note_numbers(scene, [note])[0])
         text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_note(note)}"
-        added = parse_scene(text, scene.name, path, Path(path).parent)
+        scene_with_note = parse_scene(text, scene.name, path, Path(path).parent)
         same = file == Path(path)
         write_text(path, text, force=force or same, original=original if same else None)
     echo(f"{path}: {note.kind} {note.id} added", err=True)
-    return added
+    return scene_with_note
 
 
 def merge_scenes(first: str, second: str, output: str, *, force: bool) -> None:
-
     a, b = load_scene(first), load_scene(second)
     merged = merge_notes(a.review, b.review)
     text = scene_to_toml(replace(a, review=merged))
@@ -91,9 +89,13 @@ def merge_scenes(first: str, second: str, output: str, *, force: bool) -> None:
     print_text(f"{output}: {len(merged)} notes of {len(a.review)} and {len(b.review)}")
     for note in merged:
         if note.versions:
-            print_text(f"  {note.id}: {1 + len(note.versions)} versions kept side by side")
+            print_text(f"  {note.id}: {1 + len(note.versions)} versions, both retained")
     if replace(b, name=a.name, review=a.review) != a:
-        functions, others = a.errors.functions, b.errors.functions
-        keys = [key for key in {**functions, **others} if functions.get(key) != others.get(key)]
-        said = f", among them the errors {', '.join(keys)}" if keys else ""
-        warn(f"the scenes differ beside their notes{said}; those of {first} are kept")
+        functions, other_functions = a.errors.functions, b.errors.functions
+        keys = [
+            key
+            for key in {**functions, **other_functions}
+            if functions.get(key) != other_functions.get(key)
+        ]
+        differences = f", among them the errors {', '.join(keys)}" if keys else ""
+        warn(f"the scenes differ in more than their notes{differences}; {first} is used")

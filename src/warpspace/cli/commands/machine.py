@@ -1,4 +1,4 @@
-"""Commands about scenes and machines: what there is, what is right, what the thesis prints."""
+"""Commands about scenes and machines: list, create, validate, annotate, merge."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from warpspace.thesis_example.rows import Row
 
 NOTES = "warpspace.cli.note_editing"
-OWN = "own"
-CHECKED = ("id", "kind", "stale", "numbers", "now")  # what `check` tells of a note
+OWN_TOLERANCES = "own"
+CHECKED = ("id", "kind", "stale", "numbers", "now")  # keys of a note in the output of `check`
 Kind = Literal["scenes", "machines"]
 
 
@@ -45,15 +45,19 @@ Kind = Literal["scenes", "machines"]
 def list_(kind: Kind | None, *, as_json: bool) -> None:
     """List the bundled scenes and machines, or one of both.
 
-    A scene takes a machine by its name, machine = "scara"; machine_NAME is the scene that shows it.
+    A scene refers to a machine by name, machine = "scara"; the scene machine_NAME shows it.
     """
-    found = {one: _found(one) for one in ("scenes", "machines") if kind in (None, one)}
+    listing = {
+        kind_name: _found(kind_name)
+        for kind_name in ("scenes", "machines")
+        if kind in (None, kind_name)
+    }
     if as_json:
-        print_json(found)
+        print_json(listing)
         return
-    for one, rows in found.items():
+    for kind_name, rows in listing.items():
         if kind is None:
-            print_text(one)
+            print_text(kind_name)
         lines = [line for row in rows for line in _lines(row)]
         print_table((Column(leads=True), Column(), Column(wraps=True)), lines, indent=0)
 
@@ -79,14 +83,14 @@ def _found(kind: Kind) -> list[dict[str, str | None]]:
 
 def _lines(row: dict[str, str | None]) -> list[tuple[str, str, str]]:
     first = (row["name"] or "", row.get("chain") or "", row["title"] or "")
-    more = [text for text in (row.get("source"), row.get("picture")) if text]
-    return [first, *(("", "", text) for text in more)]
+    details = [text for text in (row.get("source"), row.get("picture")) if text]
+    return [first, *(("", "", text) for text in details)]
 
 
 @click.command("new-machine")
 @click.argument("chain")
 @output_option("Scene file to write: .toml.", *SCENES)
-@click.option("--title", default="", help="Of the machine and the scene.  [the chain]")
+@click.option("--title", default="", help="Title of the machine and the scene.  [the chain]")
 @force_option
 def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
     """Write a scene for a machine with the axes of CHAIN.
@@ -114,8 +118,8 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
     "--against",
     type=SceneName(),
     metavar="SCENE|own",
-    help="Set each error against the tolerances of this scene, for instance dvf5000_proposed, or of"
-    " its own, and say what the model predicts. Then several SCENES may be named.",
+    help="Compare each error with the tolerances of this scene, for instance dvf5000_proposed, or"
+    " of SCENE itself (own), and report the predicted map. Allows several SCENES.",
 )
 @loop_option
 @grid_option(11, "of the predicted map, with --against")
@@ -123,13 +127,13 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
 def check(
     scenes: tuple[str, ...], against: str | None, loop: str, grid: int, *, as_json: bool
 ) -> None:
-    """Validate SCENE and say what it holds.
+    """Validate SCENE and summarise its content.
 
-    All problems of a file are reported at once, each with its key, its value and what was expected.
+    All problems of a file are reported together, each with key, value and expected value.
 
-    With --against each error lies within its tolerance or outside it. Beside the predicted error
-    stands what the LaserTRACER gave, for the machines of the thesis. The shear is that of the best
-    affine fit to the predicted map: which plane became a rhombus.
+    With --against, each error is within or outside its tolerance. For the machines of the thesis,
+    the LaserTRACER measurement is printed next to the predicted error. The shear of each plane is
+    that of the best affine fit to the predicted map.
     """
     from warpspace.analysis.description import to_json
     from warpspace.analysis.tolerance_check import measured
@@ -141,7 +145,7 @@ def check(
             raise OptionError(f"{len(scenes)} scenes; expected one, or --against")
         _check(*loaded, as_json=as_json)
         return
-    limits = None if against == OWN else load_scene(against).tolerances
+    limits = None if against == OWN_TOLERANCES else load_scene(against).tolerances
     pairs = [(one, measured(one, tolerances=limits, loop=loop, grid=grid)) for one in loaded]
     say_first_order(loop, *loaded)
     if as_json:
@@ -172,8 +176,8 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     from warpspace.scene.model import second_order
 
     remarks = (*scene.notes, *check_meshes(scene.machine))
-    found = second_order(scene)
-    say_second_order(found)
+    estimate = second_order(scene)
+    say_second_order(estimate)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
     if as_json:
         print_json(
@@ -184,7 +188,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
                 "chain": str(scene.machine.chain),
                 "parameters": len(scene.parameter_keys),
                 "non_zero": non_zero,
-                "linearisation_error_um": found.um,
+                "linearisation_error_um": estimate.um,
                 "remarks": list(remarks),
                 "notes": [{key: one[key] for key in CHECKED} for one in notes_json(scene)],
             }
@@ -196,7 +200,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
         facts.append((name, f"{span} {scene.machine.axes[name].unit}"))
     count = f"{len(non_zero)} of {len(scene.parameter_keys)} parameters not zero"
     facts.append(("errors", count + (f": {', '.join(non_zero)}" if non_zero else "")))
-    facts.append(("first order", f"differs from the exact chain by at most {found.um:.2g} µm"))
+    facts.append(("first order", f"differs from the exact chain by at most {estimate.um:.2g} µm"))
     facts.extend(("remark", remark) for remark in remarks)
     columns = (Column(leads=True), Column(wraps=True))
     review = [notes_table(scene, "notes")] if scene.review else []
@@ -210,18 +214,18 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
     "--at",
     "point",
     metavar="X=..,Y=..",
-    help="Where the new note is pinned: axis positions in mm and degrees.  [the whole]",
+    help="Position of the new note: axis positions in mm and degrees.  [none]",
 )
 @click.option(
     "--kind",
     type=click.Choice(("note", "question", "decision")),
     default="note",
     show_default=True,
-    help="What the new note is.",
+    help="Kind of the new note.",
 )
-@click.option("--author", default="", help="Who adds it.")
+@click.option("--author", default="", help="Author of the new note.")
 @click.option(
-    "--step", type=int, default=0, help="Its place in the story; 0 for none.", show_default=True
+    "--step", type=int, default=0, help="Position in the story; 0 for none.", show_default=True
 )
 @output_option(
     "File to write: the notes as .csv or .md, or with --add the scene as .toml.  [SCENE]",
@@ -234,7 +238,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 def notes() -> None:
     """List the review notes of SCENE, or add one.
 
-    A note whose numbers no longer hold is marked "changed" with its number then and now.
+    A note whose numbers have changed is marked "changed", with the stored and the present number.
     """
 
 
@@ -245,10 +249,10 @@ def notes() -> None:
 @force_option
 @run_by(f"{NOTES}:merge_scenes")
 def merge() -> None:
-    """Unite the review notes of two copies of a scene.
+    """Merge the review notes of two copies of a scene.
 
-    Notes are matched by their id and replies united. A note that both have edited is kept in both
-    versions, side by side. Everything else of the scene is that of FIRST.
+    Notes are matched by id, and replies merged. Of a note edited in both copies, both versions are
+    retained. All else is taken from FIRST.
     """
 
 
@@ -271,14 +275,17 @@ def _against(scene: "Scene", result: "Measured") -> Iterator[Block]:
         Column("tolerance", _limits),
     )
     verdicts = {True: "within", False: "outside", None: "none"}
-    rows = [(verdicts[one.passes], one.key, one.value, one.unit, one) for one in result.checks]
+    rows = [
+        (verdicts[check_row.passes], check_row.key, check_row.value, check_row.unit, check_row)
+        for check_row in result.checks
+    ]
     yield Table(columns, rows)
     measured_um = laser_tracer_um(scene)
-    beside = "" if measured_um is None else f"; LaserTRACER {measured_um:g} µm"
+    reference = "" if measured_um is None else f"; LaserTRACER {measured_um:g} µm"
     yield (
         f"  predicted |E|: mean {result.predicted.mean_um:.2f}, RMS {result.predicted.rms_um:.2f},"
         f" max {result.predicted.max_um:.2f} µm over the volume;"
-        f" mean of the nodes {result.predicted_nodes.mean_um:.2f} µm{beside}"
+        f" mean of the nodes {result.predicted_nodes.mean_um:.2f} µm{reference}"
     )
     shears = ", ".join(f"{plane} {value:+.1f}" for plane, value in result.shear_urad.items())
     yield f"  shear of the volume: {shears} µrad"

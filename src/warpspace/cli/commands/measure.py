@@ -1,4 +1,4 @@
-"""Commands about measurements: standard tests, and measured errors into a scene."""
+"""Commands about measurements: standard tests, import of errors, sample workpieces."""
 
 from pathlib import Path
 
@@ -37,20 +37,20 @@ def _build_test(name: str) -> click.Command:
 
 
 @click.group(name="test", commands=Commands(_test_names, _build_test), invoke_without_command=True)
-@click.option("--list", "listing", is_flag=True, help="List the tests: name, standard, what it is.")
+@click.option("--list", "listing", is_flag=True, help="List the tests: name, standard, title.")
 @click.pass_context
 def test(context: click.Context, *, listing: bool) -> None:
     """Run a standard test of machine tools on SCENE.
 
-    Each test prints its standard's numbers and draws its customary figure; with --data measured
-    readings are evaluated by the same formulas and drawn over the model's. Readings come from the
-    exact chain, along the path that the test has on the machine. `warpspace test NAME --help` has
-    the options of a test.
+    Each test prints the quantities of its standard and draws its customary figure; with --data,
+    measured readings are evaluated by the same formulas and drawn over those of the model. The
+    model uses the exact chain along the path of the test on the machine. `warpspace test NAME
+    --help` lists the options of a test.
     """
     if context.invoked_subcommand is None:
         if not listing:
             raise click.UsageError(
-                "Missing argument 'NAME'; `warpspace test --list` has the names."
+                "Missing argument 'NAME'; `warpspace test --list` lists the tests."
             )
         _list()
 
@@ -61,7 +61,7 @@ def _list() -> None:
     columns = (
         Column("name", leads=True),
         Column("standard", wraps=True),
-        Column("what", wraps=True),
+        Column("title", wraps=True),
     )
     tests = [find_test(name) for name in _test_names()]
     print_table(columns, [(test.name, test.standard, test.title) for test in tests], indent=0)
@@ -74,7 +74,7 @@ def _list() -> None:
     "--machine",
     type=SceneName(),
     metavar="M",
-    help="Machine of the errors: a bundled name, or a scene whose other errors stay."
+    help="Machine of the errors: a bundled name, or a scene whose other errors are retained."
     "  [X, Y and Z with the travels of the data]",
 )
 @click.option(
@@ -88,13 +88,13 @@ def _list() -> None:
     "axes",
     multiple=True,
     metavar="AXIS|NAME=AXIS",
-    help="Axis of files that name none (X), or what a name in them means (AX1=X). Repeatable.",
+    help="Axis of files that name none (X), or the axis of a name in them (AX1=X). Repeatable.",
 )
 @click.option(
     "--sign",
     type=click.Choice(("error", "correction")),
-    help="What the numbers of a controller's table are: the error, which it takes back, or what it"
-    " adds.  [what the manual says]",
+    help="Meaning of the numbers of a controller's table: the error, or the correction that is"
+    " added.  [as in the manual]",
 )
 @click.option(
     "--variant",
@@ -106,13 +106,13 @@ def _list() -> None:
 @click.option(
     "--workpiece",
     metavar="LINK",
-    help="URDF: link of the workpiece.  [by its name, else the link that hangs on nothing]",
+    help="URDF: link of the workpiece.  [by its name, else the root link]",
 )
 @click.option(
     "--mesh-root",
     type=InputFile(exists=True, file_okay=False, path_type=Path),
     metavar="FOLDER",
-    help="URDF: folder out of which no mesh is read.  [that of the file]",
+    help="URDF: only meshes in this folder are read.  [that of the file]",
 )
 @click.option(
     "--template",
@@ -129,20 +129,20 @@ def _list() -> None:
     metavar="AXIS|AXIS=Q1,Q2,…",
     help="Second axis that the errors of --template depend on, with its positions.",
 )
-@click.option("--formats", is_flag=True, help="List the formats, and what each holds.")
+@click.option("--formats", is_flag=True, help="List the formats and their content.")
 @force_option
 @json_option
 @run_by("warpspace.cli.measurement_import:import_files")
 def import_() -> None:
     """Read measured errors, or a machine in URDF, into a scene.
 
-    What was recognised, in which units the numbers are, and whatever the files do not say and is
-    assumed stands in the output and in the description of the scene. A file that cannot be read
-    rightly is refused with its line; nothing is written then.
+    The output and the description of the scene state the recognised format, the units, and every
+    assumption. A file that cannot be read correctly is refused with its line, and nothing is
+    written.
 
     The joints of a robot (.urdf) between workpiece and tool become axes, their limits travels,
-    their origins offsets and rotations, their shapes one mesh for each axis, written beside the
-    scene. What has no place is named, here and at the top of the scene.
+    their origins offsets and rotations, their shapes one mesh per axis, written next to the scene.
+    Content that cannot be represented is listed, here and at the top of the scene.
     """
 
 
@@ -154,15 +154,15 @@ def import_() -> None:
 @click.option(
     "--size",
     type=click.FloatRange(1.0, MAX_LENGTH_MM),
-    help="Its length or diameter across, mm.  [100 to 240, by piece]",
+    help="Length or diameter, mm.  [100 to 240, by workpiece]",
 )
 @force_option
 def test_piece(name: str, output: str, size: float | None, *, force: bool) -> None:
-    """Write a piece to start with: mesh, program or features.
+    """Write a sample workpiece: mesh, program or features.
 
     contour is a circle on a diamond on a square (after ISO 10791-7), cone a frustum (after NAS
-    979), plate one of nine holes. The frame of all files has its zero in the middle of the lower
-    side: --place of the mesh, and work offset of the program.
+    979), plate has nine holes. The origin of all files is the middle of the lower side: --place of
+    the mesh, and work offset of the program.
     """
     from warpspace.parts.sample_pieces import build_piece
 

@@ -1,4 +1,4 @@
-"""Commands by which errors are understood: the field, at points or over the working volume."""
+"""The command `field`: errors at points or over the working volume."""
 
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,11 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
 @shared_options.loop_option
 @shared_options.placed_option
 @shared_options.direction_option
-@click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
+@click.option(
+    "--exact",
+    is_flag=True,
+    help="Exact kinematic chain with full rotations, in place of the first order.",
+)
 @click.option(
     "--frame",
     type=click.Choice(("machine", "workpiece")),
@@ -40,6 +44,6 @@ def field() -> None:
     """Evaluate the errors of SCENE at points or over a grid.
 
     Errors are actual − nominal, in µm; the orientation error is the rotation vector of the tool
-    axis, in µrad. Without --at the grid of the working volume is evaluated. Where SCENE states how
-    sure its errors are, U95 of each point stands beside them, in files too.
+    axis, in µrad. Without --at the grid of the working volume is evaluated. If SCENE states
+    the uncertainty of its errors, U95 is reported for each point, in files too.
     """
