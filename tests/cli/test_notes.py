@@ -162,7 +162,7 @@ def test_two_files_are_merged_and_what_both_edited_is_said(warpspace, tmp_path):
     merged = warpspace("merge", mine, yours, "-o", tmp_path / "both.toml")
     assert merged.status == 0
     assert "2 notes of 1 and 2" in " ".join(merged.out.split())
-    assert "a1: 2 versions kept side by side" in " ".join(merged.out.split())
+    assert "a1: 2 versions, both retained" in " ".join(merged.out.split())
     assert merged.err == ""
     first, second = load_scene(tmp_path / "both.toml").review
     assert {first.text, first.versions[0].text} == {"mine", "yours"}

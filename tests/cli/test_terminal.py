@@ -92,7 +92,7 @@ def test_a_working_folder_that_is_gone(tmp_path):
     folder.mkdir()
     code = f"import os; os.rmdir({str(folder)!r}); {MAIN}"
     done = run("check", "dvf5000_first", code=code, cwd=folder)
-    is_refusal(done, "the working folder does not exist any more")
+    is_refusal(done, "the working folder no longer exists")
 
 
 def limit_addresses():

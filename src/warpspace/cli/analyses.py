@@ -109,8 +109,8 @@ def _runner(kind: "type[Analysis]", run_analysis: Callable[..., Any] | None) -> 
                     analysis, loaded, bar.reach, names=names, **files, **extra_options
                 )
         warn(*result.caveats())
-        if second_order := result.second_order:
-            warn(*second_order_words(second_order))
+        if result.second_order:
+            warn(*second_order_words(result.second_order))
         chart, file = plot if kind.has_chart else None, None if run_analysis else output
         written_files = write_result(result, csv_path, chart, file, force=force)
         if as_json:

@@ -64,16 +64,14 @@ def print_field(
     with progress("evaluating", silent=as_json):
         axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
         places = axes if nodes is None else None
-        said = (
-            {} if exact else shared_options.say_second_order(second_order(loaded, loop, at=places))
-        )
+        estimate: dict[str, float] = {}
+        if not exact:
+            estimate = shared_options.warn_second_order(second_order(loaded, loop, at=places))
         node_statistics = statistics(result, axes)
         u95 = {}
         if nodes is None:
-            uncertainty, summary = (
-                field_uncertainty(loaded, result.error_um, axes, view),
-                node_statistics,
-            )
+            uncertainty = field_uncertainty(loaded, result.error_um, axes, view)
+            summary = node_statistics
             u95 = uncertainty.columns if uncertainty and uncertainty.errors.is_known else {}
         else:
             uncertainty = volume_uncertainty(loaded, view, max(nodes.shape))
@@ -93,7 +91,8 @@ def print_field(
         document: dict[str, object] = {"loop": loop, "frame": frame}
         document["statistics"] = to_json(summary)
         document |= {} if view.placed_over is None else {"placement": "fitted out"}
-        document |= said if view.reference is None else {**said, "reference": dict(view.reference)}
+        document |= estimate
+        document |= {} if view.reference is None else {"reference": dict(view.reference)}
         if nodes is not None:
             document["statistics_nodes"] = to_json(node_statistics)
         if output is not None:
@@ -125,8 +124,8 @@ def print_field(
         f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
         f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
     )
-    for said in u95_lines(uncertainty and uncertainty.errors, {"": summary}):
-        print_text(said)
+    for line in u95_lines(uncertainty and uncertainty.errors, {"": summary}):
+        print_text(line)
     if nodes is not None:
         print_text(f"  each node counted once: mean {node_statistics.mean_um:.2f} µm")
     worst = own_axes(loaded, summary.max_at_axes)

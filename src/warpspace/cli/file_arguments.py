@@ -184,7 +184,7 @@ def check_files(context: click.Context, companions: Iterable[Path] = ()) -> None
         )
         check_target(path, endings, overwrite=force, inputs=inputs)
         for earlier_option, earlier_path, _ in outputs[:index]:
-            if _is_one(path, earlier_path):
+            if _is_same_file(path, earlier_path):
                 raise OutputError(
                     f"{path}: {earlier_option} and {option} name the same file; expected"
                     " different names"
@@ -197,7 +197,7 @@ def _each(value: object) -> tuple[Any, ...]:
     return () if value is None else (value,)
 
 
-def _is_one(first: Path, second: Path) -> bool:
+def _is_same_file(first: Path, second: Path) -> bool:
     if str(first.resolve()).casefold() == str(second.resolve()).casefold():
         return True
     return first.exists() and second.exists() and first.samefile(second)

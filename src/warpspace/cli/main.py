@@ -257,8 +257,8 @@ class Ending:
             return
         # loaded only by commands that draw
         processes = sys.modules.get("warpspace.outputs.processes")
-        if kill_pools := getattr(processes, "kill_pools", None):
-            kill_pools()
+        if processes is not None:
+            processes.kill_pools()
         raise Ended
 
     def _again(self) -> None:

@@ -47,7 +47,7 @@ def import_files(
     workpiece: str | None,
     mesh_root: Path | None,
     positions: str | None,
-    over: str | None,
+    second_axis: str | None,
     *,
     template: bool,
     formats: bool,
@@ -59,13 +59,13 @@ def import_files(
         return
     if not files:
         raise click.UsageError("Missing argument 'FILES...'.")
-    for argument, name in ((positions, "--positions"), (over, "--over")):
+    for argument, name in ((positions, "--positions"), (second_axis, "--over")):
         if argument is not None and not template:
             raise OptionError(f"{name} {argument!r} belongs to --template")
     if template:
         if output is not None:
             check_target(output, (".csv",), overwrite=force)
-        _write_template(files, output, positions, over, force=force)
+        _write_template(files, output, positions, second_axis, force=force)
         return
     robot = format_name == ROBOT or (format_name is None and files[0].suffix.lower() == ".urdf")
     for argument, name in (

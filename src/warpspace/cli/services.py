@@ -131,7 +131,7 @@ def draw_view(
         None if px_per_mm is None else (px_per_mm, picture.exaggeration), caption,
         picture.state.shown.dark,
     )  # fmt: skip
-    return _drawn(lambda worker: worker.call("picture", draw, *arguments), cancelled)
+    return _run_worker(lambda worker: worker.call("picture", draw, *arguments), cancelled)
 
 
 def draw_concepts(
@@ -144,7 +144,7 @@ def draw_concepts(
 def draw_compensation(
     compensation: "Compensation", dark: bool, narrow: bool, cancelled: threading.Event
 ) -> bytes:
-    return _drawn(
+    return _run_worker(
         lambda worker: worker.begin_chart("maps", MAPS, "png", compensation, dark, narrow),
         cancelled,
     )
@@ -153,13 +153,13 @@ def draw_compensation(
 def _render(
     name: str, scenes: "Sequence[Scene]", settings: "FigureSettings", cancelled: threading.Event
 ) -> bytes:
-    return _drawn(lambda worker: worker.begin(name, scenes, settings, "png"), cancelled)
+    return _run_worker(lambda worker: worker.begin(name, scenes, settings, "png"), cancelled)
 
 
-def _drawn(
+def _run_worker(
     begin: "Callable[[FigureWorker], Callable[[], bytes]]", cancelled: threading.Event
 ) -> bytes:
-    with _turn(cancelled), FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
+    with _renderer_slot(cancelled), FigureWorker() as worker, ThreadPoolExecutor(1) as caller:
         drawn = caller.submit(begin(worker))
         while not wait([drawn], POLL_S).done:
             if cancelled.is_set():
@@ -170,7 +170,7 @@ def _drawn(
 
 
 @contextmanager
-def _turn(cancelled: threading.Event) -> Generator[None]:
+def _renderer_slot(cancelled: threading.Event) -> Generator[None]:
 
     while not _renderers.acquire(timeout=POLL_S):
         if cancelled.is_set():
@@ -223,10 +223,10 @@ def write_report(
     )  # fmt: skip
     same_loop = [one for one in sides if one.loop == sides[0].loop]
     scenes = [replace(one.active_scene(), review=kept_views(one)) for one in same_loop]
-    with _turn(cancelled), temporary_folder() as folder:
+    with _renderer_slot(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
         review = write_review(
-            scenes, target, settings, embed=embed_view, tell=tell_story, results=results
+            scenes, target, settings, embed=embed_view, tell=build_story, results=results
         )
         return target.read_bytes(), review.missing
 
@@ -273,7 +273,7 @@ def embed_view(
     return offline_page.build_offline_html(live)
 
 
-def tell_story(scene: "Scene", nodes: int) -> "list[Step]":
+def build_story(scene: "Scene", nodes: int) -> "list[Step]":
     """Build the steps of a story for a report; equal maps share a colour range."""
     notes, live = story(scene.review), LiveModel()
     steps: list[Step] = []

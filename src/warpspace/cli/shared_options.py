@@ -162,13 +162,13 @@ def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = F
     return placed_in(in_direction(load_scene(name), direction), loop, placed=placed)
 
 
-def say_first_order(loop: str, *scenes: "Scene") -> None:
+def warn_first_order(loop: str, *scenes: "Scene") -> None:
     from warpspace.scene.model import second_order
 
-    say_second_order(*(second_order(scene, loop) for scene in scenes))
+    warn_second_order(*(second_order(scene, loop) for scene in scenes))
 
 
-def say_second_order(*estimates: "SecondOrder") -> dict[str, float]:
+def warn_second_order(*estimates: "SecondOrder") -> dict[str, float]:
     """Warn if first-order numbers are not accurate enough; JSON always reports the estimate."""
     from warpspace.field.evaluate import second_order_words
 

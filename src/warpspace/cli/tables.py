@@ -185,17 +185,17 @@ DELAY_S = 1.0  # before a progress bar appears
 class ProgressBar:
     """Progress of some work, shown in a bar unless output is silent."""
 
-    def __init__(self, shown: "Progress | None" = None) -> None:
-        self._shown = shown
+    def __init__(self, bar: "Progress | None" = None) -> None:
+        self._bar = bar
 
     def advance(self, steps: float) -> None:
-        if self._shown is not None:
-            self._shown.advance(self._shown.task_ids[0], steps)
+        if self._bar is not None:
+            self._bar.advance(self._bar.task_ids[0], steps)
 
     def reach(self, share: float) -> None:
         """Set the share of the work that is done, 0 to 1."""
-        if self._shown is not None:
-            self._shown.update(self._shown.task_ids[0], completed=share)
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], completed=share)
 
 
 @contextmanager

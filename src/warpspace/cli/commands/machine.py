@@ -20,9 +20,9 @@ from warpspace.cli.shared_options import (
     output_option,
     print_json,
     run_by,
-    say_first_order,
-    say_second_order,
     scene_argument,
+    warn_first_order,
+    warn_second_order,
     write_text,
 )
 from warpspace.cli.tables import print_table, print_text, progress
@@ -48,7 +48,7 @@ def list_(kind: Kind | None, *, as_json: bool) -> None:
     A scene refers to a machine by name, machine = "scara"; the scene machine_NAME shows it.
     """
     listing = {
-        kind_name: _found(kind_name)
+        kind_name: _list_kind(kind_name)
         for kind_name in ("scenes", "machines")
         if kind in (None, kind_name)
     }
@@ -62,7 +62,7 @@ def list_(kind: Kind | None, *, as_json: bool) -> None:
         print_table((Column(leads=True), Column(), Column(wraps=True)), lines, indent=0)
 
 
-def _found(kind: Kind) -> list[dict[str, str | None]]:
+def _list_kind(kind: Kind) -> list[dict[str, str | None]]:
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.machine_library import load_machine, machine_names, machine_picture
 
@@ -147,7 +147,7 @@ def check(
         return
     limits = None if against == OWN_TOLERANCES else load_scene(against).tolerances
     pairs = [(one, measured(one, tolerances=limits, loop=loop, grid=grid)) for one in loaded]
-    say_first_order(loop, *loaded)
+    warn_first_order(loop, *loaded)
     if as_json:
         print_json(
             {
@@ -177,7 +177,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
 
     remarks = (*scene.notes, *check_meshes(scene.machine))
     estimate = second_order(scene)
-    say_second_order(estimate)
+    warn_second_order(estimate)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
     if as_json:
         print_json(

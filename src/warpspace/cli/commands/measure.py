@@ -126,6 +126,7 @@ def _list() -> None:
 )
 @click.option(
     "--over",
+    "second_axis",
     metavar="AXIS|AXIS=Q1,Q2,…",
     help="Second axis that the errors of --template depend on, with its positions.",
 )

@@ -26,9 +26,9 @@ from warpspace.cli.shared_options import (
     loop_option,
     output_option,
     print_json,
-    say_first_order,
     scene_argument,
     size_text,
+    warn_first_order,
 )
 from warpspace.cli.tables import echo, print_text, progress
 from warpspace.exceptions import OptionError, RenderError, UnknownNameError
@@ -202,7 +202,7 @@ def draw(
             settings,
         )
     loaded = load_placed(scene, direction, settings.loop, placed=placed)
-    say_first_order(settings.loop, loaded)
+    warn_first_order(settings.loop, loaded)
     if moving is None:
         draw_figure_file(name, [loaded], settings, output, force=force)
         echo(f"wrote {output}")
@@ -250,7 +250,7 @@ def compare(
     with progress("evaluating", silent=as_json):
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
     compared = [*pictures, scene_change(pictures[0], pictures[1])]
-    say_first_order(settings.loop, *scenes)
+    warn_first_order(settings.loop, *scenes)
     uncertainties = [
         *(volume_uncertainty(one.scene, one.view, settings.grid) for one in pictures),
         None,
@@ -271,8 +271,8 @@ def compare(
     for letter, scene in zip("AB", scenes, strict=True):
         print_text(f"{letter}  {scene.name}: {scene.title}")
     print_blocks(statistics_blocks(scenes[0], "AB", summaries))
-    for letter, one, numbers in zip("AB", uncertainties, summaries, strict=False):
-        print_blocks(u95_lines(one and one.errors, {letter: numbers}))
+    for letter, uncertainty, summary in zip("AB", uncertainties, summaries, strict=False):
+        print_blocks(u95_lines(uncertainty and uncertainty.errors, {letter: summary}))
     if output is not None:
         echo(f"wrote {output}")
 
@@ -313,7 +313,7 @@ def export(
         echo(f"{output}: {picture.scene.machine.title}, {size_text(output)}")
         print_text(f"  {kind.left_out}")
         return
-    say_first_order(loop, picture.scene)
+    warn_first_order(loop, picture.scene)
     echo(
         f"{output}: {picture.scene.title}, displacement drawn ×{picture.exaggeration:g},"
         f" {size_text(output)}"
@@ -405,14 +405,14 @@ def report(
     loaded = [load_scene(scene) for scene in scenes]
     concept_scenes = [load_scene(scene) for scene in concepts]
     analyses = {name: _build_analysis(name) for name in appendices}
-    say_first_order(settings.loop, *loaded)
+    warn_first_order(settings.loop, *loaded)
     with progress("writing the review", total=1.0) as bar:
         review = write_report(
             loaded,
             output,
             settings,
             embed=deferred(f"{SERVICES}:embed_view"),
-            tell=deferred(f"{SERVICES}:tell_story"),
+            tell=deferred(f"{SERVICES}:build_story"),
             concepts=concept_scenes,
             results={
                 f"{heading}: {scene.title}": analysis.run(scene, ignore_progress)
