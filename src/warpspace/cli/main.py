@@ -256,9 +256,9 @@ class Ending:
             self._again()
             return
         # loaded only by commands that draw
-        processes = sys.modules.get("warpspace.outputs.processes")
-        if processes is not None:
-            processes.kill_pools()
+        kill_pools = getattr(sys.modules.get("warpspace.outputs.processes"), "kill_pools", None)
+        if kill_pools:
+            kill_pools()
         raise Ended
 
     def _again(self) -> None:
