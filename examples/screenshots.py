@@ -148,7 +148,7 @@ def tested(page: Page) -> None:
     """Run the R-test on the model."""
     open_task(page, "Measure")
     unfold(page, "Standard tests")
-    page.get_by_label("Standard test", exact=True).select_option("sphere")
+    page.get_by_label("Standard test", exact=True).select_option("r-test")
 
 
 def improved(page: Page) -> None:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from warpspace.analysis.tolerance_check import measured
     from warpspace.app.documents.notebook import show
     from warpspace.bench.base import run_test
-    from warpspace.bench.kinds.circular import ballbar
     from warpspace.calibration.calibrate import calibrate
     from warpspace.exceptions import SceneError, WarpspaceError
     from warpspace.field.evaluate import ErrorField
@@ -37,7 +36,6 @@ _HOME = {
     "SceneError": "warpspace.exceptions",
     "WarpspaceError": "warpspace.exceptions",
     "evaluate": "warpspace.scene.model",
-    "ballbar": "warpspace.bench.kinds.circular",
     "calibrate": "warpspace.calibration.calibrate",
     "measured": "warpspace.analysis.tolerance_check",
     "run_test": "warpspace.bench.base",
@@ -57,7 +55,6 @@ __all__ = [
     "WarpspaceError",
     "__version__",
     "allocate",
-    "ballbar",
     "calibrate",
     "contributions",
     "evaluate",

@@ -129,7 +129,7 @@ def test_a_link_reads_as_it_has_always_been_spelt():
         "EXX=2.5&B=-30.0&exaggeration=2000.0&component=x&loop=relative&placed=1&nodes=11"
         "&shown.dark=1&look.surface=cut&look.slices_mm.X=10.0&machine.linear_mm.X=20.0"
         "&specification.limit_um=25.0&specification.fixed=EXX&rotary.off=1&rotary.own=1.0,2.0,3.5"
-        "&rotary.held.B=-15.0,0.0&test=sphere&test.path=0&test.points=9&excluded=EXX&only=EAX,EBX"
+        "&rotary.held.B=-15.0,0.0&test=r-test&test.path=0&test.points=9&excluded=EXX&only=EAX,EBX"
         "&why.trace=tool,1.0,2.0,3.0&why.X=1.5&why.B=-10.0&lever=EAX"
     )
     back = with_settings(START, line)
@@ -304,7 +304,7 @@ def opened(way, line):
     """Open what a line adds to a link, or to a file."""
     if way == "link":
         return open_link(f"scene=dvf5000_first&{line}", KNOWN_SCENES)[0]
-    return open_text(f"# warpspace-compare: {line}\n{state_to_toml(START)}", "x", "x.toml")[0]
+    return open_text(f"# warpspace-view: {line}\n{state_to_toml(START)}", "x", "x.toml")[0]
 
 
 def compared(**given):

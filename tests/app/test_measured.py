@@ -113,7 +113,7 @@ def test_figure_and_path_follow_the_errors(name):
         ("circular", {"radius_mm": "much"}, "Radius 'much'; expected a number"),
         ("circular", {"radius_mm": "900"}, "leaves the working volume"),
         ("circular", {"points": "20000"}, "expected at most 20,000 in the app"),
-        ("sphere", {"at": "Q=1"}, "At 'Q=1': unknown axis Q; expected one of"),
+        ("r-test", {"at": "Q=1"}, "At 'Q=1': unknown axis Q; expected one of"),
     ],
 )
 def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
@@ -129,12 +129,12 @@ def test_what_cannot_be_run_is_said_in_its_place(name, options, message):
 
 
 def test_a_test_runs_where_the_tables_stand_or_says_why_it_cannot():
-    turned = put(replace(STATE, forms={"test": "sphere"}), "positions.B", "-20.0")
+    turned = put(replace(STATE, forms={"test": "r-test"}), "positions.B", "-20.0")
     column = Column(TestsPanel, turned)
     column.settle()
     assert column.part._answer.found.model.plan.coordinates["B"][0] == -20.0
     column = Column(TestsPanel, start_state(load_scene("machine_c_frame_mill"), nodes=3))
-    column.do("choose", "sphere")
+    column.do("choose", "r-test")
     assert "no rotary axis" in column.settle()
 
 

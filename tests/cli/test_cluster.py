@@ -54,7 +54,7 @@ def test_a_cluster_gives_the_same_numbers_to_the_last_bit(warpspace, scheduler, 
 
 
 def test_a_sweep_of_a_fleet_on_a_cluster(warpspace, scheduler):
-    sweep = ("sweep", "dvf5000_general", "dvf5000_proposed", "--samples", "5000")
+    sweep = ("montecarlo", "--rows", "dvf5000_general", "dvf5000_proposed", "--samples", "5000")
     steps = ("--tolerance", "rotation=10:30:3", "--limit", "40", "--json")
     here, there = warpspace(*sweep, *steps), warpspace(*sweep, *steps, "--scheduler", scheduler)
     assert there.status == 0, there.err

@@ -253,3 +253,10 @@ def test_meshes_stay_within_the_folder_of_the_robot_or_that_of_the_option(warpsp
         result = warpspace("import", robot, "-o", tmp_path / "last.toml", "--force")
         assert "leads out of" in " ".join(result.out.split())
         assert not (tmp_path / "last_Z.stl").exists()
+
+
+@pytest.mark.parametrize(("name", "flag"), [("allocate", "--limit"), ("convert", "--to")])
+def test_a_report_refuses_an_appendix_that_needs_options(warpspace, tmp_path, name, flag):
+    report = ("report", "dvf5000_nominal", "--grid", "3", "-o", tmp_path / "r.html", "--with")
+    warpspace(*report, name).refused(f"--with {name}: needs {flag}; run `warpspace {name}` instead")
+    assert not [*tmp_path.iterdir()]

@@ -138,7 +138,7 @@ def test_no_two_outputs_are_one_file(name, first, second, other, tmp_path, monke
     }[other]
     if other == "link":
         Path(spelled).symlink_to(target.name)
-    with pytest.raises(OutputError, match="name one file"):
+    with pytest.raises(OutputError, match="name the same file"):
         run(name, {first: str(target), second: spelled})
     assert not target.exists()
 

@@ -92,5 +92,5 @@ def test_elsewhere_the_program_has_the_scenes_it_was_installed_with(installation
     folders = [Path(line) for line in installation.python("-c", code).splitlines()]
     assert all(folder.is_relative_to(installation.root.resolve()) for folder in folders)
     assert all(folder.is_dir() for folder in folders)
-    assert "dvf5000_first" in installation.python("-m", "warpspace", "scenes")
+    assert "dvf5000_first" in installation.python("-m", "warpspace", "list")
     installation.warpspace("check", "dvf5000_first")

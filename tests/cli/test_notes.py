@@ -9,7 +9,7 @@ import tomllib
 import pytest
 
 from warpspace import load_scene
-from warpspace.analysis import note_tables
+from warpspace.cli import note_editing
 from warpspace.scene.library import scene_path
 
 CORNER = {"X": 275.0, "Y": -225.0, "Z": -480.0}
@@ -86,8 +86,8 @@ def test_an_output_that_does_not_belong_is_refused(warpspace, mine, tmp_path):
     add = ("notes", "dvf5000_first", "--add", "x")
     warpspace(*add).refused("bundled", "-o FILE.toml")
     warpspace(*add, "-o", tmp_path / "notes.csv").refused("expected a .toml file")
-    warpspace("notes", mine, "-o", tmp_path / "new.toml").refused("belong to --add")
-    warpspace("notes", mine, "--at", "X=1").refused("belong to --add")
+    warpspace("notes", mine, "-o", tmp_path / "new.toml").refused("need --add")
+    warpspace("notes", mine, "--at", "X=1").refused("need --add")
     assert warpspace(*add, "-o", tmp_path / "new.toml").status == 0
     warpspace(*add, "-o", tmp_path / "new.toml").refused("--force")
 
@@ -162,7 +162,7 @@ def test_two_files_are_merged_and_what_both_edited_is_said(warpspace, tmp_path):
     merged = warpspace("merge", mine, yours, "-o", tmp_path / "both.toml")
     assert merged.status == 0
     assert "2 notes of 1 and 2" in " ".join(merged.out.split())
-    assert "a1: 2 versions kept side by side" in " ".join(merged.out.split())
+    assert "a1: 2 versions, both retained" in " ".join(merged.out.split())
     assert merged.err == ""
     first, second = load_scene(tmp_path / "both.toml").review
     assert {first.text, first.versions[0].text} == {"mine", "yours"}
@@ -205,13 +205,13 @@ def test_a_note_replaces_no_edit_made_while_it_was_computed_and_no_link(
     link.symlink_to(mine)
     assert warpspace("notes", link, "--add", "first").status == 0
     assert link.is_symlink()
-    compute = note_tables.note_numbers
+    compute = note_editing.note_numbers
 
     def edit_meanwhile(scene, review):
         mine.write_text(mine.read_text("utf-8") + "# edited\n", encoding="utf-8")
         return compute(scene, review)
 
-    monkeypatch.setattr(note_tables, "note_numbers", edit_meanwhile)
+    monkeypatch.setattr(note_editing, "note_numbers", edit_meanwhile)
     warpspace("notes", mine, "--add", "second").refused("has changed since it was read")
     assert mine.read_text("utf-8").endswith("# edited\n")
     assert [note.text for note in load_scene(mine).review] == ["first"]

@@ -66,10 +66,9 @@ COMMANDS = {
     "field at": ("--at", "X=275,Y=225,Z=-480"),
     "compare": ("dvf5000_first", "--grid", "5"),
     "adjust": ("--grid", "5"),
-    "measured": (),
-    "ballbar": ("--plane", "XY", "--radius", "100"),
+    "check against": ("--against", "own"),
     "montecarlo": QUICK,
-    "sweep": ("--tolerance", "EC0Y=10,3000", *QUICK),
+    "montecarlo rows": ("--rows", "--tolerance", "EC0Y=10,3000", *QUICK),
     "concepts": ("dvf5000_first", *QUICK),
     "allocate": ("--limit", "4000", *QUICK),
 }
@@ -97,7 +96,7 @@ def test_three_milliradians_are_said_with_the_number_in_the_json_object(warpspac
     assert loud.err.count(SAID) == 1
     found = loud.json["second_order_um"]
     assert found > 1.0
-    if name in {"check", "field", "compare", "measured"}:
+    if name in {"check", "check against", "field", "compare"}:
         assert exact_minus_first_um() <= found <= exact_minus_first_um() * 3**0.5
 
 
@@ -186,11 +185,12 @@ def test_missing_tolerances_are_said(warpspace, machines):
 
 
 FEW = ("--samples", "3000")
+ROWS = ("montecarlo", "--rows")
 
 
 def test_a_row_is_what_montecarlo_gives_for_the_same_scene(warpspace, tmp_path):
     steps = ("--tolerance", "EAX=5:20:2", "--tolerance", "translation=4,8")
-    found = warpspace("sweep", "dvf5000_general", *steps, "--limit", "40", *FEW, "--json").json
+    found = warpspace(*ROWS, "dvf5000_general", *steps, "--limit", "40", *FEW, "--json").json
     assert found["tolerances"] == {"EAX": [5.0, 20.0], "translation": [4.0, 8.0]}
     rows = found["rows"]
     assert [(row["EAX"], row["translation"]) for row in rows] == [
@@ -215,7 +215,7 @@ def test_a_fleet_of_a_folder(warpspace, tmp_path):
             f"default = {{ translation = {width}, rotation = {width}, squareness = {width} }}\n"
         )
     target = tmp_path / "fleet.csv"
-    printed = warpspace("sweep", tmp_path, *FEW, "-o", target)
+    printed = warpspace(*ROWS, tmp_path, *FEW, "-o", target)
     assert printed.status == 0, printed.err
     rows = list(csv.DictReader(target.read_text("utf-8").splitlines()))
     assert [row["scene"] for row in rows] == ["a", "b"]
@@ -225,7 +225,7 @@ def test_a_fleet_of_a_folder(warpspace, tmp_path):
     assert [float(row["mean_um"]) for row in rows] == [one["mean_um"] for one in both]
     table = warpspace("montecarlo", tmp_path, *FEW)
     assert table.out.count("\n  a ") == 1
-    warpspace("sweep", tmp_path, *FEW, "-o", target).refused("--force")
+    warpspace(*ROWS, tmp_path, *FEW, "-o", target).refused("--force")
 
 
 def test_every_machine_is_written(warpspace, tmp_path):
@@ -245,7 +245,7 @@ def test_every_machine_is_written(warpspace, tmp_path):
 
 def test_a_folder_with_a_scene_that_is_none_is_refused(warpspace, tmp_path):
     (tmp_path / "bad.toml").write_text("machine = 3")
-    warpspace("sweep", "dvf5000_general", tmp_path).refused("bad.toml")
+    warpspace(*ROWS, "dvf5000_general", tmp_path).refused("bad.toml")
 
 
 def test_the_same_from_python():

@@ -15,7 +15,7 @@ from trimesh import Trimesh, creation
 import warpspace as api
 from warpspace import evaluate, load_scene
 from warpspace.cli import register_command
-from warpspace.cli.commands.understand import POINTS_AT_ONCE
+from warpspace.cli.field_output import POINTS_AT_ONCE
 from warpspace.cli.main import BUNDLED, COMMANDS, cli
 from warpspace.cli.shared_options import spell_json
 from warpspace.exceptions import SceneError
@@ -109,21 +109,6 @@ def test_one_task_imports_no_other_and_help_imports_no_tables():
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     lines = found.stdout.splitlines()
     assert (lines[0], lines[-1]) == ("['machine'] False", "False False")
-
-
-@pytest.mark.parametrize(
-    ("former", "now"),
-    [
-        ("scenes --json", "list scenes --json"),
-        ("machines --json", "list machines --json"),
-        ("formats --json", "import --formats --json"),
-        ("template X", "import --template X"),
-        ("import-machine -h", "import -h"),
-    ],
-)
-def test_a_former_name_is_understood_and_not_listed(warpspace, former, now):
-    assert warpspace(*former.split()).out == warpspace(*now.split()).out
-    assert f"\n  {former.split()[0]} " not in warpspace("--help").out
 
 
 FIELD = ("field", "dvf5000_first", "--at", "X=0,Y=-225,Z=-480,B=0,C=0")

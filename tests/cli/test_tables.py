@@ -19,19 +19,19 @@ from warpspace.thesis_example import rows as thesis_rows
 
 AT = ("--at", "X=0,Y=-225,Z=-480", "--at", "X=10.5,B=-30.123456")
 COMMANDS = {
-    "scenes": ("scenes",),
+    "scenes": ("list", "scenes"),
     "check": ("check", "dvf5000_first"),
     "field": ("field", "dvf5000_first", *AT),
     "field over the grid": ("field", "dvf5000_first", "--grid", "5"),
     "gains": ("gains", "dvf5000_first"),
     "gains over the travel": ("gains", "dvf5000_general", "--max", "--loop", "workpiece"),
     "compare": ("compare", "dvf5000_first", "dvf5000_second", "--grid", "5"),
-    "measured": ("measured", "dvf5000_first", "--tolerances", "dvf5000_proposed", "--grid", "5"),
+    "against": ("check", "dvf5000_first", "--against", "dvf5000_proposed", "--grid", "5"),
     "contributions": ("contributions", "dvf5000_general"),
     "sobol": ("contributions", "dvf5000_proposed", "--sobol", "32"),
     "montecarlo": ("montecarlo", "dvf5000_proposed", "--samples", "500", "--limit", "40"),
     "allocate": ("allocate", "dvf5000_first", "--limit", "40", "--samples", "2000"),
-    "ballbar": ("ballbar", "dvf5000_first", "--plane", "XY", "--radius", "50"),
+    "circular": ("test", "circular", "dvf5000_first", "--radius", "50"),
     "test": ("test", "positioning", "dvf5000_first"),
     "list of tests": ("test", "--list"),
     "thesis": ("thesis",),
@@ -197,7 +197,7 @@ def test_a_table_fits_a_real_terminal_or_the_columns_that_are_wanted(width, colu
 
 
 def test_no_color_means_no_colour():
-    status, out = in_terminal(80, "measured", "dvf5000_first", "--grid", "3", NO_COLOR="1")
+    status, out = in_terminal(80, "gains", "dvf5000_first", NO_COLOR="1")
     assert status == 0
     assert not re.search(r"\x1b\[[\d;]*(3|4|9|10)\d", out)
 

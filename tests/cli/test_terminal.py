@@ -48,8 +48,8 @@ def test_steering_characters_are_spelt_out():
         ("check", "--json"),
         ("field", "--at", "X=0"),
         ("gains",),
-        ("ballbar", "--plane", "XY", "--radius", "100"),
-        ("measured",),
+        ("test circular", "--radius", "100"),
+        ("check", "--against", "own"),
         ("montecarlo", "--samples", "100"),
     ],
     ids=lambda command: " ".join(command[:2]),
@@ -60,7 +60,7 @@ def test_a_title_reaches_the_terminal_harmless(command, tmp_path, warpspace):
     half_widths = "default = { translation = 10, rotation = 20, squareness = 25 }"
     text = f'title = {title}\nmachine = "dvf5000"\n[errors]\nEC0Y = 5\n[tolerances]\n{half_widths}'
     path.write_text(text, "utf-8")
-    result = warpspace(command[0], path, *command[1:])
+    result = warpspace(*command[0].split(), path, *command[1:])
     assert result.status == 0, result.err
     assert not any(character in result.out + result.err for character in STEERING)
 
@@ -92,7 +92,7 @@ def test_a_working_folder_that_is_gone(tmp_path):
     folder.mkdir()
     code = f"import os; os.rmdir({str(folder)!r}); {MAIN}"
     done = run("check", "dvf5000_first", code=code, cwd=folder)
-    is_refusal(done, "the working folder does not exist any more")
+    is_refusal(done, "the working folder no longer exists")
 
 
 def limit_addresses():

@@ -29,9 +29,8 @@ WRITERS = {
     "gains plot": (("gains", "{scene}", "--plot"), "x.svg"),
     "montecarlo": (("montecarlo", "{scene}", "--samples", "200", "--plot"), "x.svg"),
     "machines sampled": (("montecarlo", "{scene}", "--samples", "200", "-o"), "x.csv"),
-    "sweep": (("sweep", "{scene}", "--samples", "200", "-o"), "x.parquet"),
+    "rows": (("montecarlo", "{scene}", "--rows", "--samples", "200", "-o"), "x.parquet"),
     "contributions": (("contributions", "{scene}", "--plot"), "x.svg"),
-    "ballbar": (("ballbar", "{scene}", "--plane", "XY", "--radius", "100", "--plot"), "x.svg"),
     "test": (("test", "straightness", "{scene}", "--plot"), "x.svg"),
     "draw": (("draw", "{scene}", "-o"), "x.svg"),
     "compare": (("compare", "{scene}", "{scene}", "-o"), "x.svg"),
@@ -145,8 +144,8 @@ PLOTS = {
     "contributions": ("contributions", "dvf5000_general"),
     "tables": ("compensate", "dvf5000_first", "--sweep", "3,5", "--format", "sinumerik-enc"),
     "sobol": ("contributions", "dvf5000_proposed", "--sobol", "64"),
-    "ballbar": ("ballbar", "dvf5000_first", "--plane", "YZ", "--radius", "150"),
-    "ballbar without errors": ("ballbar", "dvf5000_nominal", "--plane", "XY", "--radius", "50"),
+    "circular": ("test", "circular", "dvf5000_first", "--plane", "YZ", "--radius", "150"),
+    "circular without errors": ("test", "circular", "dvf5000_nominal", "--radius", "50"),
 }
 
 

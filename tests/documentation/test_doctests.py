@@ -36,6 +36,6 @@ def test_docstrings(path):
 def test_the_public_verbs_have_examples():
     import warpspace
 
-    for name in ("load_scene", "evaluate", "ballbar", "calibrate"):
+    for name in ("load_scene", "evaluate", "run_test", "calibrate"):
         assert ">>> " in (getattr(warpspace, name).__doc__ or ""), name
     assert [page.name for page in WITH_BLOCKS]

@@ -14,7 +14,7 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import scene_side
 from warpspace.app.state.app_state import Comparison, start_state
 from warpspace.app.state.tree import put
-from warpspace.cli.services import tell_story
+from warpspace.cli.services import build_story
 from warpspace.outputs.report import ReportSettings, build_report
 from warpspace.outputs.report.review import build_review, first_page
 from warpspace.outputs.report.templating import ReportFigure, render_html, render_pdf
@@ -66,7 +66,7 @@ def test_a_step_shows_errors_component_loop_and_view_as_they_were():
                 "exclusions.excluded", "EAY")  # fmt: skip
     changed = replace(SCENE, errors=SCENE.errors.with_amplitude("EXX", 9.0, (0.0, 1.0)))
     story = [note(view=view_of(state, ABOVE), step=1), note(view=view_of(START, ABOVE), step=2)]
-    (said, name, (scene,), settings), (_, _, (other,), _) = tell_story(
+    (said, name, (scene,), settings), (_, _, (other,), _) = build_story(
         replace(changed, review=story), 5
     )
     assert (name, settings.component, settings.loop, settings.view) == (
@@ -87,7 +87,7 @@ def test_a_packed_scene_and_a_comparison_are_restored_and_what_cannot_be_read_is
     views = [view_of(replace(start_state(second), loaded=SCENE), None), view_of(compared, None),
              "file=AAAA", "EXX=nan", "EXX=1e99", "B=much", "scene=gone"]  # fmt: skip
     story = [note(view=view, step=1 + number) for number, view in enumerate(views)]
-    (_, _, (packed,), own), both, *unread = tell_story(noted(*story), 5)
+    (_, _, (packed,), own), both, *unread = build_story(noted(*story), 5)
     expected = evaluate(second, grid=3).error_um
     assert evaluate(packed, grid=3).error_um == pytest.approx(expected, abs=1e-9)
     assert both[1] == "comparison"
@@ -104,7 +104,7 @@ def test_findings_are_in_page_and_paper_escaped(renderer):
     story = [note(hostile, step=2), note("First.", step=1, view=view_of(START, ABOVE))]
     scene = noted(*story, note(hostile, kind="question", replies=(Reply(hostile, hostile, WHEN),)))
     shares: list[float] = []
-    report = build_report([scene], FAST, story_steps=tell_story, watch=shares.append)
+    report = build_report([scene], FAST, story_steps=build_story, watch=shares.append)
     assert shares == sorted(shares)
     assert len(shares) > 2 * len(story)
     assert [part.heading for part in report.sections[:2]] == ["", "Findings and decisions"]

@@ -141,12 +141,12 @@ class Corner(BenchTest):
     name: ClassVar[str] = "corner"
     title: ClassVar[str] = "Corner"
     standard: ClassVar[str] = "our own"
-    words: ClassVar[str] = "A dial gauge looks along x."
+    description: ClassVar[str] = "A dial gauge looks along x."
     columns: ClassVar[tuple[DataColumn, ...]] = (DataColumn("x_um"),)
     repeats: int = option(2, "Readings")
 
     def plan(self, scene):
-        stand = self.stand(scene)
+        stand = self.axis_positions(scene)
         point = nominal_point(self.model(scene), Loop.TOOL, stand)
         points = np.broadcast_to(point, (self.repeats, 3))
         return build_plan(stand, points, np.eye(3)[0], place="in the middle")
@@ -159,7 +159,7 @@ class Corner(BenchTest):
 
     def charts(self, runs):
         curves = tuple(
-            Curve(run.named("x"), np.arange(len(run.readings)) * 1.0, run.readings) for run in runs
+            Curve(run.label("x"), np.arange(len(run.readings)) * 1.0, run.readings) for run in runs
         )
         return (Lines("lines", "Readings", "number", "x [µm]", curves),)
 

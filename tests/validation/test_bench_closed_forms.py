@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-import warpspace
 from bench_scenes import scene_with
 from warpspace.bench.base import BenchRun, run_test
 from warpspace.bench.kinds.ball_plate import BallPlate
@@ -74,28 +73,27 @@ def test_squareness_is_an_ellipse_at_45_degrees(plane, key):
     assert angle[np.argmax(np.abs(found.readings))] % 90.0 == pytest.approx(45.0)
 
 
-@pytest.mark.parametrize("plane", ["XY", "XZ", "YZ"])
-def test_a_ball_bar_tells_the_squareness_of_its_plane_from_other_errors(plane):
+@pytest.mark.parametrize(("plane", "key"), [("XY", "EC0Y"), ("XZ", "EB0Z"), ("YZ", "EA0Z")])
+def test_a_ball_bar_separates_the_squareness_of_its_plane_from_other_errors(plane, key):
     errors = {"EC0Y": 10.0, "EB0Z": 20.0, "EA0Z": -30.0, "EXX": 4.0, "EYY": -3.0, "EZZ": 2.0}
-    found = warpspace.ballbar(scene_with(**errors), plane=plane, radius_mm=150)
-    assert found.squareness_urad == pytest.approx(found.given_urad, abs=0.1)
+    outcome = run(scene_with(**errors), Circular(plane=plane, radius_mm=150.0)).outcome
+    assert outcome["squareness_urad"] == pytest.approx(errors[key], abs=0.1)
 
 
 def test_a_long_x_axis_is_an_ellipse_along_x():
-    found = warpspace.ballbar(scene_with(EXX=("ramp", 11.0)), plane="XY", radius_mm=200)
+    outcome = run(scene_with(EXX=("ramp", 11.0)), Circular(radius_mm=200.0)).outcome
     # 11 µm over 550 mm: 4 µm more at +x and −4 at −x, so 4 cos²φ = 2 + 2 cos 2φ
-    assert found.radius_um == pytest.approx(2.0)
-    assert found.scale_difference_um == pytest.approx(2.0)
-    assert found.circular_deviation_um == pytest.approx(4.0)
-    assert found.squareness_urad == pytest.approx(0.0, abs=1e-9)
+    assert outcome["radius_um"] == pytest.approx(2.0)
+    assert outcome["scale_difference_um"] == pytest.approx(2.0)
+    assert outcome["circular_deviation_um"] == pytest.approx(4.0)
+    assert outcome["squareness_urad"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_both_directions_trace_the_same_on_a_circle_that_touches_the_limits():
-    found = warpspace.ballbar(scene_with(EC0Y=23.1, EXX=4.0), plane="XY", radius_mm=225)
-    assert found.hysteresis_um < 1e-3
-    assert found.radial_um.shape == (360,)
-    np.testing.assert_allclose(found.clockwise_um[1:], found.radial_um[1:][::-1])
-    assert found.clockwise_um[0] == found.radial_um[0]
+    circle = run(scene_with(EC0Y=23.1, EXX=4.0), Circular(radius_mm=225.0))
+    assert circle.outcome["hysteresis_um"] < 1e-3
+    forward, backward = np.split(circle.readings, 2)
+    np.testing.assert_allclose(backward[::-1], forward)
 
 
 LAYOUTS = {

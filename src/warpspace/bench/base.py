@@ -1,4 +1,4 @@
-"""What every test is: a frozen set of options with a path, an evaluation and a figure."""
+"""Base classes of standard tests: options, path, evaluation by the standard, figure."""
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
@@ -29,73 +29,73 @@ SHARED = 3  # options that every test has, the first fields of the base class
 
 @dataclass(frozen=True, slots=True)
 class BenchRun:
-    """Readings of a test and what they come to."""
+    """Readings of a test and their evaluation."""
 
-    who: str  # "model" or "measured"
+    source: str  # "model" or "measured"
     plan: BenchPlan
     readings: Array  # [m], µm or µrad
     outcome: Outcome
 
     @property
     def is_measured(self) -> bool:
-        return self.who == "measured"
+        return self.source == "measured"
 
     @property
     def values(self) -> dict[str, float]:
-        return {one.key: one.value for one in self.outcome.quantities}
+        return {quantity.key: quantity.value for quantity in self.outcome.quantities}
 
-    def named(self, words: str) -> str:
-        """Name a curve; the model has the plain words."""
-        return f"{words}, measured" if self.is_measured else words
+    def label(self, name: str) -> str:
+        """Return the legend entry of a curve; measured curves are marked."""
+        return f"{name}, measured" if self.is_measured else name
 
     def curve(
-        self, words: str, x: Array, y: Array, colour: int = 0, *, once_round: bool = False
+        self, name: str, x: Array, y: Array, colour: int = 0, *, once_round: bool = False
     ) -> Curve:
-        """Give a curve of a chart: dots of what was measured, closed where it goes once round."""
+        """Build a curve of a chart: dots for measured readings, a closed line for a full turn."""
         if once_round and not self.is_measured:
             x, y = np.append(x, x[0] + 360.0), np.append(y, y[0])
-        return Curve(self.named(words), x, y, colour, "dots" if self.is_measured else "line")
+        return Curve(self.label(name), x, y, colour, "dots" if self.is_measured else "line")
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchTest(Analysis):
-    """A test with its options. A subclass is a kind of test, its fields are its options."""
+    """A standard test. A subclass is a kind of test, its fields are its options."""
 
     task = "measure"
     has_chart = True
     chart_help = "figure of the test"
-    title: ClassVar[str]  # what it is
-    standard: ClassVar[str]  # where its formulas come from
-    words: ClassVar[str]  # what is done and what comes out, a few sentences
+    title: ClassVar[str]
+    standard: ClassVar[str]  # source of its formulas
+    description: ClassVar[str]  # procedure and evaluated quantities, a few sentences
     columns: ClassVar[tuple[DataColumn, ...]]  # of a file of readings
     at: Place = option(
         (),
-        "Where axes stand that the test does not move",
-        unset="what the scene says",
+        "Positions of the axes that the test does not move",
+        unset="those of the scene",
     )
     tool_extension_mm: float = option(
-        0.0, "How much longer than the scene's the tool or probe is", unit="mm", low=-1e4, high=1e4
+        0.0, "Length of the tool or probe beyond that of the scene", unit="mm", low=-1e4, high=1e4
     )
     data: File = option(None, "Measured readings, CSV with the columns above")
 
     @classmethod
     def options(cls) -> tuple[Option, ...]:
-        """List them, its own before those that every test has."""
-        found = options_of(cls)
-        return (*found[SHARED:], *found[:SHARED])
+        """List the options of the test before those that all tests share."""
+        options = options_of(cls)
+        return (*options[SHARED:], *options[:SHARED])
 
     @classmethod
     def settings(cls) -> tuple[Option, ...]:
-        return tuple(one for one in cls.options() if one.name != "data")
+        return tuple(option_ for option_ in cls.options() if option_.name != "data")
 
     @classmethod
     def explained(cls) -> str:
         columns = ",".join(column.name for column in cls.columns)
         title = f"{cls.title} on SCENE ({cls.standard})."
-        return f"{title}\n\n{cls.words}\n\nColumns of --data: {columns}."
+        return f"{title}\n\n{cls.description}\n\nColumns of --data: {columns}."
 
     def warnings(self, scene: Scene) -> tuple[str, ...]:  # noqa: ARG002
-        """Say nothing: a path beyond the travel is refused."""
+        """Return no warnings: a path beyond the travel is refused."""
         return ()
 
     def run(self, scene: Scene, _watch: ProgressCallback, /) -> "BenchResult":
@@ -103,22 +103,22 @@ class BenchTest(Analysis):
 
     @abstractmethod
     def plan(self, scene: Scene) -> BenchPlan:
-        """Lay the path of the test on a machine.
+        """Build the path of the test on the machine of a scene.
 
         Raises
         ------
         OptionError, UnknownNameError
-            If it cannot be run on the machine.
+            If the machine cannot run the test.
         """
 
     @abstractmethod
     def plan_data(self, scene: Scene, table: DataTable) -> tuple[BenchPlan, Array]:
-        """Lay the path along which readings were taken, and give these in its order, [m].
+        """Build the path of measured readings and return the readings in its order, [m].
 
         Raises
         ------
         SceneError
-            If readings are missing: names what was expected.
+            If readings are missing; the message states what was expected.
         """
 
     @abstractmethod
@@ -127,18 +127,18 @@ class BenchTest(Analysis):
 
     @abstractmethod
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
-        """Lay out the customary figure of runs, the model first."""
+        """Build the customary figure of the runs, the model first."""
 
-    def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:  # noqa: ARG002 - for others
-        """Give the columns of a file of readings."""
+    def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:  # noqa: ARG002 - for subclasses
+        """Return the columns of a file of readings."""
         return self.columns
 
-    def data_notes(self, table: DataTable) -> tuple[str, ...]:  # noqa: ARG002 - for others
-        """Say where a file of readings is not of the test that is set."""
+    def data_notes(self, table: DataTable) -> tuple[str, ...]:  # noqa: ARG002 - for subclasses
+        """List the differences between a file of readings and the options of the test."""
         return ()
 
-    def stand(self, scene: Scene) -> dict[str, Array]:
-        """Give where all axes stand before the test moves any, scalars, mm or degrees."""
+    def axis_positions(self, scene: Scene) -> dict[str, Array]:
+        """Return the positions of all axes before the test starts, scalars, mm or degrees."""
         positions = scene.workspace.positions
         return complete_coordinates(scene.machine, {**positions, **dict(self.at)}, positions)
 
@@ -148,8 +148,8 @@ class BenchTest(Analysis):
         x, y, z = scene.model.tool_point_mm
         return replace(scene.model, tool_point_mm=(x, y, z - self.tool_extension_mm))
 
-    def place_words(self, scene: Scene, moving: Sequence[str]) -> str:
-        stand = self.stand(scene)
+    def place_text(self, scene: Scene, moving: Sequence[str]) -> str:
+        stand = self.axis_positions(scene)
         still = [f"{name} {float(stand[name]):g}" for name in stand if name not in moving]
         tool = f"tool {self.tool_extension_mm:+g} mm" if self.tool_extension_mm else ""
         return " · ".join(part for part in (", ".join(still), tool) if part)
@@ -157,13 +157,13 @@ class BenchTest(Analysis):
 
 @dataclass(frozen=True)
 class BenchResult(Result):
-    """A test that was run."""
+    """Result of a test: the model, and measured readings if there are any."""
 
     drawn_by: ClassVar[str] = "warpspace.outputs.charts.result_charts:bench_chart"
     test: BenchTest
     scene: Scene
-    runs: tuple[BenchRun, ...]  # the model; behind it what was measured, if anything
-    notes: tuple[str, ...] = ()  # what a reader should doubt
+    runs: tuple[BenchRun, ...]  # the model, then the measured readings
+    notes: tuple[str, ...] = ()  # caveats about the readings
 
     @property
     def model(self) -> BenchRun:
@@ -175,7 +175,7 @@ class BenchResult(Result):
 
     @property
     def rms_difference(self) -> float | None:
-        """RMS of measured − model, once the unknowns of the set-up are fitted, µm or µrad."""
+        """RMS of measured − model after the set-up is fitted, µm or µrad."""
         if self.measured is None:
             return None
         difference = self.measured.readings - self.model.readings
@@ -183,21 +183,26 @@ class BenchResult(Result):
 
     @cached_property
     def u95(self) -> dict[str, float | None]:
-        """Give U95 of what the model comes to; empty where a scene does not say how sure it is."""
-        run, scene, doubt = self.model, self.scene, scene_uncertainty(self.scene, Loop.RELATIVE)
-        if doubt is None:
-            return {}
-        each = (
-            respond(replace(scene, errors=errors), run.plan, keys) for errors, keys in doubt.layers
+        """U95 of the quantities of the model by key; empty if the scene states no uncertainty."""
+        run, scene, uncertainty = (
+            self.model,
+            self.scene,
+            scene_uncertainty(self.scene, Loop.RELATIVE),
         )
-        gains = np.hstack([*each])
+        if uncertainty is None:
+            return {}
+        responses = (
+            respond(replace(scene, errors=errors), run.plan, keys)
+            for errors, keys in uncertainty.layers
+        )
+        gains = np.hstack([*responses])
 
-        def ask(change: Array) -> Array:
-            found = self.test.evaluate(run.plan, run.readings + gains @ change)
-            return np.array([one.value for one in found.quantities])
+        def evaluate_change(change: Array) -> Array:
+            outcome = self.test.evaluate(run.plan, run.readings + gains @ change)
+            return np.array([one.value for one in outcome.quantities])
 
         keys = (one.key for one in run.outcome.quantities)
-        return dict(zip(keys, doubt.propagate(ask), strict=True))
+        return dict(zip(keys, uncertainty.propagate(evaluate_change), strict=True))
 
     @property
     def charts(self) -> tuple[Lines, ...]:
@@ -207,32 +212,34 @@ class BenchResult(Result):
         return self.notes
 
     def as_json(self) -> dict[str, Any]:
-        """Spell it: the numbers of what was measured at the top, else those of the model."""
-        shown = self.measured or self.model
+        """Return the quantities of the measured readings, or of the model if there are none."""
+        run = self.measured or self.model
         u95 = {f"u95_{key}": value for key, value in self.u95.items()}
-        found: dict[str, Any] = {
+        document: dict[str, Any] = {
             "test": self.test.name,
             "scene": self.scene.name,
-            "of": shown.who,
-            "place": shown.plan.place,
-            **shown.values,
-            **({} if shown.is_measured else u95),
-            **shown.outcome.details,
+            "of": run.source,
+            "place": run.plan.place,
+            **run.values,
+            **({} if run.is_measured else u95),
+            **run.outcome.details,
         }
         if self.measured is not None:
-            found["model"] = {**self.model.values, **u95}
-            found["rms_difference"] = self.rms_difference
-        return found | {"notes": list(self.notes)}
+            document["model"] = {**self.model.values, **u95}
+            document["rms_difference"] = self.rms_difference
+        return document | {"notes": list(self.notes)}
 
     def blocks(self) -> Iterator[Block]:
         yield f"{self.test.title} ({self.test.standard}) · {self.scene.title}"
         yield f"  {self.model.plan.place} · {self.model.plan.readings} readings"
         rows: dict[str, list[Any]] = {}
         for index, run in enumerate(self.runs):
-            for one in run.outcome.quantities:
-                row = rows.setdefault(one.key, [one.name, *[None] * len(self.runs), one.unit])
-                row[1 + index] = 0.0 if abs(one.value) < PRINTED else one.value
-        numbers = (Column(run.who, ".3f") for run in self.runs)
+            for quantity in run.outcome.quantities:
+                row = rows.setdefault(
+                    quantity.key, [quantity.name, *[None] * len(self.runs), quantity.unit]
+                )
+                row[1 + index] = 0.0 if abs(quantity.value) < PRINTED else quantity.value
+        numbers = (Column(run.source, ".3f") for run in self.runs)
         columns = (Column("", leads=True, wraps=True), *numbers, Column("unit"))
         if self.u95:
             columns = (*columns, Column("U95 of the model"))
@@ -244,15 +251,15 @@ class BenchResult(Result):
 def run_test(
     scene: Scene, test: BenchTest, data: str | Path | DataTable | None = None, *, exact: bool = True
 ) -> BenchResult:
-    """Run a test on the model of a scene, and evaluate measured readings beside it.
+    """Run a test on the model of a scene and evaluate measured readings by the same formulas.
 
     Parameters
     ----------
     scene : Scene
     test : BenchTest
     data : str, Path or Table, optional
-        CSV file with the columns of the test, or what was read of one. The model is then run
-        through the same poses.
+        CSV file with the columns of the test, or its content. The model then runs through the
+        same poses.
     exact : bool, optional
         The exact chain; else the first order.
 
@@ -263,16 +270,16 @@ def run_test(
     Raises
     ------
     OptionError, UnknownNameError
-        If the test cannot be run on the machine.
+        If the machine cannot run the test.
     SceneError
-        If the file cannot be used.
+        If the file cannot be read.
 
     Examples
     --------
     >>> import warpspace
-    >>> from warpspace.bench.kinds.rotary_axis import Sphere
+    >>> from warpspace.bench.kinds.rotary_axis import RTest
     >>> scene = warpspace.load_scene("dvf5000_first")
-    >>> result = warpspace.run_test(scene, Sphere(axis="C", ball=(100.0, 0.0, 60.0)))
+    >>> result = warpspace.run_test(scene, RTest(axis="C", ball=(100.0, 0.0, 60.0)))
     >>> round(result.model.outcome["z_um"], 1)
     21.5
     """
@@ -298,8 +305,8 @@ def run_test(
 
 BASE = 0.62  # radius of the circle of no deviation; the plot reaches to 1
 RINGS = 2  # rings of round deviations on either side of it
-REACH = 0.36  # room that these take on either side
-LEAST = 1e-3  # A nanometre: charts draw smaller deviations, µm or µrad, as none
+RING_WIDTH = 0.36  # width that these take on either side
+SMALLEST_DEVIATION = 1e-3  # a nanometre: charts draw smaller deviations, µm or µrad, as zero
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,8 +322,8 @@ class PolarLayout:
 
 def lay_polar(chart: Lines) -> PolarLayout:
     largest = max((float(np.abs(curve.y).max()) for curve in chart.curves), default=0.0)
-    ring = round_width(largest / RINGS * (1.0 - 1e-6)) if largest > LEAST else 1.0
-    per_unit = REACH / (RINGS * ring)
+    ring = round_width(largest / RINGS * (1.0 - 1e-6)) if largest > SMALLEST_DEVIATION else 1.0
+    per_unit = RING_WIDTH / (RINGS * ring)
     curves: list[Array] = []
     for curve in chart.curves:
         theta = np.deg2rad(curve.x)
@@ -327,24 +334,22 @@ def lay_polar(chart: Lines) -> PolarLayout:
     return PolarLayout(ring, unit, rings, tuple(curves))
 
 
-_HERE = "warpspace.bench.kinds"
+_KINDS = "warpspace.bench.kinds"
 _TESTS: Registry[type[BenchTest] | str] = Registry(
     "test",
     {
-        "positioning": f"{_HERE}.positioning:Positioning",
-        "circular": f"{_HERE}.circular:Circular",
-        "diagonals": f"{_HERE}.diagonals:Diagonals",
-        "straightness": f"{_HERE}.straightness:Straightness",
-        "squareness": f"{_HERE}.straightness:Squareness",
-        "rotary-axis": f"{_HERE}.rotary_axis:RotaryAxis",
-        "sphere": f"{_HERE}.rotary_axis:RTest",
-        "ball-plate": f"{_HERE}.ball_plate:BallPlate",
-        "cone-frustum": f"{_HERE}.cone_frustum:ConeFrustum",
+        "positioning": f"{_KINDS}.positioning:Positioning",
+        "circular": f"{_KINDS}.circular:Circular",
+        "diagonals": f"{_KINDS}.diagonals:Diagonals",
+        "straightness": f"{_KINDS}.straightness:Straightness",
+        "squareness": f"{_KINDS}.straightness:Squareness",
+        "rotary-axis": f"{_KINDS}.rotary_axis:RotaryAxis",
+        "r-test": f"{_KINDS}.rotary_axis:RTest",
+        "ball-plate": f"{_KINDS}.ball_plate:BallPlate",
+        "cone-frustum": f"{_KINDS}.cone_frustum:ConeFrustum",
     },
 )
 register_test, unregister_test = _TESTS.register, _TESTS.unregister
-FORMER = {"ballbar": f"{_HERE}.circular:FormerBallbar"}
-"""Tests under a former name: understood, not listed."""
 
 
 def bench_names() -> tuple[str, ...]:
@@ -353,5 +358,5 @@ def bench_names() -> tuple[str, ...]:
 
 
 def find_test(name: str) -> type[BenchTest]:
-    found = FORMER[name] if name in FORMER else _TESTS.find(name)
-    return resolve_name(found) if isinstance(found, str) else found
+    test = _TESTS.find(name)
+    return resolve_name(test) if isinstance(test, str) else test

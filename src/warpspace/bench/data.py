@@ -28,8 +28,8 @@ class DataColumn:
     name: str  # in the header, with its unit
     # "reading" for measured values in µm or µrad, "number" for positions, "sign" for + or −
     kind: ColumnKind = "reading"
-    names: tuple[str, ...] = ()  # words that are allowed; any where empty
-    default: float | str | None = None  # where the file has no such column; None where it must
+    names: tuple[str, ...] = ()  # allowed names; any if empty
+    default: float | str | None = None  # if the file lacks the column; None: required
 
 
 DIRECTION, ANGLE = DataColumn("direction", "sign", default="+"), DataColumn("angle_deg", "number")
@@ -39,11 +39,11 @@ XYZ = tuple(DataColumn(f"{letter}_um") for letter in "xyz")
 
 @dataclass(frozen=True)
 class ReadingsFile:
-    """What a file of readings holds."""
+    """Content of a file of readings."""
 
     source: str  # of messages
     columns: Mapping[str, Array]  # [n]; numbers
-    words: Mapping[str, tuple[str, ...]]  # (n,); columns of names as written
+    labels: Mapping[str, tuple[str, ...]]  # (n,); columns of names as written
     lines: Array  # [n]; where each row stands
     notes: tuple[str, ...] = ()  # what a reader should doubt
 
@@ -56,22 +56,22 @@ class ReadingsFile:
     def refuse(self, *problems: str) -> SceneError:
         return SceneError(self.source, problems)
 
-    def check_angles(self, least: int, way: str, what: str = "positions") -> None:
+    def check_angles(self, least: int, path: str, noun: str = "positions") -> None:
         if len(self) < least:
-            raise self.refuse(f"has {len(self)} {what}; expected at least {least}")
+            raise self.refuse(f"has {len(self)} {noun}; expected at least {least}")
         if np.ptp(self["angle_deg"]) < 1.0:
-            raise self.refuse(f"all readings are at one angle; expected angles along the {way}")
+            raise self.refuse(f"all readings are at one angle; expected angles along the {path}")
 
-    def unknown_words(self, name: str, known: Sequence[str], expected: str) -> list[str]:
+    def unknown_labels(self, name: str, allowed: Sequence[str], expected: str) -> list[str]:
         return [
-            f"line {int(line)}, {name}: {word!r}; expected {expected}"
-            for line, word in zip(self.lines, self.words[name], strict=True)
-            if word not in known
+            f"line {int(line)}, {name}: {label!r}; expected {expected}"
+            for line, label in zip(self.lines, self.labels[name], strict=True)
+            if label not in allowed
         ]
 
 
 def read_table(path: str | Path, columns: Sequence[DataColumn]) -> ReadingsFile:
-    """Read a file of readings; columns that are not asked for are left aside."""
+    """Read a file of readings; further columns are ignored."""
     source = str(path)
     text = text_files.read_text(Path(path), MAX_CSV_BYTES, source)
     return parse_table(text, columns, source)
@@ -83,28 +83,30 @@ def parse_table(text: str, columns: Sequence[DataColumn], source: str) -> Readin
         raise SceneError(source, ["is empty; expected a header " + _header(columns)])
     header = [text_files.plain_heading(name) for name in rows.header]
     _check_header(header, rows.line, columns, source)
-    there = [(one, header.index(one.name)) for one in columns if one.name in header]
-    values: dict[str, list[float]] = {one.name: [] for one in columns if one.kind != "name"}
-    words: dict[str, list[str]] = {one.name: [] for one in columns if one.kind == "name"}
+    present = [(column, header.index(column.name)) for column in columns if column.name in header]
+    values: dict[str, list[float]] = {
+        column.name: [] for column in columns if column.kind != "name"
+    }
+    labels: dict[str, list[str]] = {column.name: [] for column in columns if column.kind == "name"}
     lines: list[int] = []
     for line, row in rows:
         lines.append(line)
-        for one, index in there:
-            if one.kind == "name":
-                words[one.name].append(_word(one, line, row[index], rows))
+        for column, index in present:
+            if column.kind == "name":
+                labels[column.name].append(_word(column, line, row[index], rows))
             else:
-                values[one.name].append(_value(one, line, row[index], rows))
+                values[column.name].append(_value(column, line, row[index], rows))
     rows.check()
     if not lines:
         raise SceneError(source, ["has no readings below its header"])
-    for one in columns:
-        if one.name not in header and one.kind != "name":
-            default = SIGNS.get(str(one.default), one.default)
-            values[one.name] = [float(default or 0.0)] * len(lines)
+    for column in columns:
+        if column.name not in header and column.kind != "name":
+            default = SIGNS.get(str(column.default), column.default)
+            values[column.name] = [float(default or 0.0)] * len(lines)
     return ReadingsFile(
         source,
         {name: np.array(column) for name, column in values.items()},
-        {name: tuple(column) for name, column in words.items()},
+        {name: tuple(column) for name, column in labels.items()},
         np.array(lines, dtype=float),
         (*rows.notes, *text_files.radian_notes(values)),
     )
@@ -144,25 +146,25 @@ def _value(column: DataColumn, line: int, text: str, rows: text_files.CsvRows) -
 def _word(column: DataColumn, line: int, text: str, rows: text_files.CsvRows) -> str:
     text = text_files.unguard_cell(text)
     if column.names and text not in column.names:
-        known = near_miss(text, column.names)
-        rows.note(f"line {line}, {column.name}: {text_files.spell_value(text)}{known}")
+        hint = near_miss(text, column.names)
+        rows.note(f"line {line}, {column.name}: {text_files.spell_value(text)}{hint}")
     return text
 
 
 def unit_notes(measured: Array, model: Array, unit: str) -> tuple[str, ...]:
-    """Say where readings are likely to be in another unit than µm or µrad."""
+    """Return a note if readings are probably in another unit than µm or µrad."""
     spread, expected = float(np.ptp(measured)), float(np.ptp(model))
     coarser, finer = ("mm", "nm") if unit == "µm" else ("mrad", "nrad")
     if 0.0 < spread < LEAST_UM:
-        said, other = f"differ by {spread:.3g} {unit} at most", coarser
+        finding, likely_unit = f"differ by {spread:.3g} {unit} at most", coarser
     elif expected > LEAST_UM and spread > FACTOR * expected:
-        said = (
+        finding = (
             f"spread over {spread:.4g} {unit}, {spread / expected:,.0f} times what the model gives"
         )
-        said, other = f"{said} ({expected:.3g} {unit})", finer
+        finding, likely_unit = f"{finding} ({expected:.3g} {unit})", finer
     elif spread > 0.0 and expected > FACTOR * spread:
         times = f"{expected / spread:,.0f} times as much ({expected:.3g} {unit})"
-        said, other = f"spread over {spread:.3g} {unit}, the model gives {times}", coarser
+        finding, likely_unit = f"spread over {spread:.3g} {unit}, the model gives {times}", coarser
     else:
         return ()
-    return (f"the readings {said}: are they in {other}? expected {unit}",)
+    return (f"the readings {finding}: are they in {likely_unit}? expected {unit}",)

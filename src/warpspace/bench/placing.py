@@ -1,4 +1,4 @@
-"""Where axes have to stand: directions of motion, axes of rotation, the tool held on a point."""
+"""Poses of tests: directions of motion, axes of rotation, tool held on a point."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 FLAT = 1e-9  # determinant of three directions of motion below which they lie in a plane
-SLACK = 1e-6  # mm or degrees by which a path may seem to leave a range: rounding
+SLACK = 1e-6  # mm or degrees; rounding by which a path may exceed a range
 
 
 @dataclass(frozen=True, slots=True)
 class AxisLine:
-    """Where a rotary axis lies."""
+    """Position and directions of a rotary axis."""
 
     origin_mm: Array  # [..., 3]; of its frame, in R
     # [..., 3]; unit vector that positive errors turn about, by the right-hand rule
@@ -31,50 +31,52 @@ class AxisLine:
     # [..., 3]; the two following directions of its frame before the motion: x and y for C
     across: Array
     upright: Array
-    # +1 where it carries the tool, −1 where the workpiece: what turns the tool against the
-    # workpiece the other way
+    # +1 if it carries the tool, −1 if the workpiece: the tool then turns relative to the workpiece
+    # in the opposite sense
     sign: float
 
 
 def linear_axis(machine: Machine, name: str) -> str:
-    """Give the name of a linear axis; the first one for an empty name."""
-    known = [axis.name for axis in machine.axes.values() if axis.is_linear]
-    return _named(machine, name, known, "linear")
+    """Return the name of a linear axis; the first one for an empty name."""
+    candidates = [axis.name for axis in machine.axes.values() if axis.is_linear]
+    return _named(machine, name, candidates, "linear")
 
 
 def rotary_axis(machine: Machine, name: str) -> str:
-    """Give the name of a rotary axis; the last one in the list (C before B) for an empty name."""
-    known = [axis.name for axis in machine.axes.values() if not axis.is_linear]
-    return _named(machine, name, known[::-1], "rotary")
+    """Return the name of a rotary axis; the last of the list (C before B) for an empty name."""
+    candidates = [axis.name for axis in machine.axes.values() if not axis.is_linear]
+    return _named(machine, name, candidates[::-1], "rotary")
 
 
-def _named(machine: Machine, name: str, known: list[str], kind: str) -> str:
-    if not known:
+def _named(machine: Machine, name: str, candidates: list[str], kind: str) -> str:
+    if not candidates:
         raise OptionError(f"the machine {machine.chain} has no {kind} axis")
     if not name:
-        return known[0]
+        return candidates[0]
     if name not in machine.axes:
         raise UnknownNameError("axis", name, machine.axes)
-    if name not in known:
-        raise OptionError(f"axis {name} is not {kind}; expected one of {', '.join(sorted(known))}")
+    if name not in candidates:
+        raise OptionError(
+            f"axis {name} is not {kind}; expected one of {', '.join(sorted(candidates))}"
+        )
     return name
 
 
 def relative_point(model: Model, coordinates: Coordinates) -> Array:
-    """Nominal tool point minus the origin of the workpiece frame, in R, [..., 3], mm."""
+    """Compute nominal tool point − origin of the workpiece frame, in R, [..., 3], mm."""
     tool = nominal_point(model, Loop.TOOL, coordinates)
     return tool - branch_pose(model, "workpiece", coordinates)[..., :3, 3]
 
 
 def tool_points(model: Model, coordinates: Coordinates, count: int) -> Array:
-    """Nominal tool points in R, one a site, [count, 3], mm."""
+    """Compute the nominal tool points in R, one per site, [count, 3], mm."""
     return np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (count, 3))
 
 
 def motion_direction(model: Model, coordinates: Coordinates, axis: str) -> Array:
-    """Direction in which a linear axis moves the tool against the workpiece, [..., 3], per unit."""
-    further = {**coordinates, axis: coordinates[axis] + 1.0}
-    return relative_point(model, further) - relative_point(model, coordinates)
+    """Compute the motion of the tool relative to the workpiece per unit of an axis, [..., 3]."""
+    advanced = {**coordinates, axis: coordinates[axis] + 1.0}
+    return relative_point(model, advanced) - relative_point(model, coordinates)
 
 
 def axis_line(model: Model, coordinates: Coordinates, axis: str) -> AxisLine:
@@ -93,21 +95,21 @@ def _frames_of(model: Model, coordinates: Coordinates, axis: str) -> tuple[AxisF
 
 
 def following_axes(model: Model) -> tuple[str, str, str]:
-    """Give the three linear axes that hold the tool on a point: the first along each direction."""
-    found: dict[int, str] = {}
+    """Return the three linear axes that hold the tool on a point: the first per direction."""
+    axes: dict[int, str] = {}
     for axis in model.machine.axes.values():
         if axis.is_linear:
-            found.setdefault(direction_index(axis.name), axis.name)
-    if len(found) != 3:
+            axes.setdefault(direction_index(axis.name), axis.name)
+    if len(axes) != 3:
         raise OptionError(
-            f"the machine {model.machine.chain} has not three linear axes; expected one along each"
+            f"the machine {model.machine.chain} lacks three linear axes; expected one along each"
             " of x, y and z"
         )
-    return found[0], found[1], found[2]
+    return axes[0], axes[1], axes[2]
 
 
 def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> dict[str, Array]:
-    """Hold the nominal tool point on points of the workpiece frame, [..., 3], as TCP does."""
+    """Compute the positions that hold the tool point on points of the workpiece, [..., 3]."""
     names, shape = following_axes(model), batch_shape(coordinates)
     start = {name: np.broadcast_to(values, shape) for name, values in coordinates.items()}
 
@@ -120,21 +122,21 @@ def follow(model: Model, coordinates: Mapping[str, Array], target_mm: Array) -> 
         raise OptionError(
             f"{', '.join(names)} move in one plane in some pose and cannot follow the point"
         )
-    back: Array = np.asarray(np.linalg.inv(moves), dtype=np.float64)
-    steps = -transforms.rotate(back, gap(start))
+    inverse_moves: Array = np.asarray(np.linalg.inv(moves), dtype=np.float64)
+    steps = -transforms.rotate(inverse_moves, gap(start))
     for index, name in enumerate(names):
         start[name] = start[name] + steps[..., index]
     return start
 
 
 def ball_point(model: Model, coordinates: Coordinates) -> Array:
-    """Give where the nominal tool point is on the workpiece, in its frame, [..., 3], mm."""
+    """Compute the nominal tool point in the frame of the workpiece, [..., 3], mm."""
     pose = branch_pose(model, "workpiece", coordinates)
     return transforms.apply(transforms.inverse(pose), nominal_point(model, Loop.TOOL, coordinates))
 
 
 def within_travel(machine: Machine, coordinates: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Tell at which sites all axes are within their travel, [n]; a full turn has no end."""
+    """Check at which sites all axes are within their travel, [n]; a full turn has no end."""
     inside = np.ones((), dtype=bool)
     for name, values in coordinates.items():
         low, high = machine.axes[name].travel
@@ -148,10 +150,10 @@ def check_travel(scene: Scene, coordinates: Mapping[str, Array], what: str) -> N
     for name, values in coordinates.items():
         axis = scene.machine.axes[name]
         low, high = axis.travel
-        least, most = float(np.min(values)), float(np.max(values))
-        if least < low - SLACK or most > high + SLACK:
+        lowest, highest = float(np.min(values)), float(np.max(values))
+        if lowest < low - SLACK or highest > high + SLACK:
             problems.append(
-                f"{name} would run {least:g} … {most:g} {axis.unit}, it has {low:g} … {high:g}"
+                f"{name} would run {lowest:g} … {highest:g} {axis.unit}, it has {low:g} … {high:g}"
             )
     if problems:
         raise OptionError(f"{what} leaves the travel: {'; '.join(problems)}")
@@ -162,29 +164,26 @@ PLANES: Mapping[str, tuple[str, str, str]] = {
     "XZ": ("X", "Z", "EB0Z"),
     "YZ": ("Y", "Z", "EA0Z"),
 }
-"""Its axes, and the squareness between them."""
+"""Axes of a plane, and the squareness between them."""
 
 
 @dataclass(frozen=True)
 class AxisPlane:
-    """A plane of two axes where a machine stands."""
+    """A plane of two axes in one pose of a machine."""
 
     first: str  # axes
     second: str
     key: str  # squareness between them: it turns the second axis
-    along: Array  # [3]; unit vectors in R: positive directions of the frames of both axes
-    up: Array
+    first_direction: Array  # [3]; unit vectors in R: positive directions of the frames of both axes
+    second_direction: Array
     # sign of the distance that a positive squareness moves the second axis along the first one, per
     # distance along the second: −1 for Y about z (towards −x), +1 for Z about y (towards +x), −1
     # for Z about x (towards −y)
     sign: float
-    # +1, or −1 where an axis moves the tool against the workpiece the other way than its frame
-    # points: a table, or a direction of −1
-    ways: tuple[float, float]
 
 
 def axis_vector(model: Model, coordinates: Coordinates, axis: str, letter: str = "") -> Array:
-    """Give the direction of the frame of an axis in R, [..., 3]."""
+    """Return the direction of the frame of an axis in R, [..., 3]."""
     frames, _ = _frames_of(model, coordinates, axis)
     index = "XYZABC".index(letter) % 3 if letter else frames.axis.index
     return np.asarray(frames.before)[..., :3, index]
@@ -204,24 +203,20 @@ def find_plane(model: Model, stand: Coordinates, plane: str) -> AxisPlane:
     along, up = axis_vector(model, stand, first), axis_vector(model, stand, second)
     about = axis_vector(model, stand, parameter(key).axis, key[1])
     sign = float(np.sign(np.cross(about, up) @ along))
-    ways = tuple(
-        float(np.sign(motion_direction(model, stand, name) @ vector))
-        for name, vector in ((first, along), (second, up))
-    )
-    return AxisPlane(first, second, key, along, up, sign, (ways[0], ways[1]))
+    return AxisPlane(first, second, key, along, up, sign)
 
 
-BAR_MM = 100.0  # length of a bar beside a rotary axis: what across it does is of second order
-SHARE = 0.3  # radius that is chosen: share of the shortest edge of the working volume
+BAR_MM = 100.0  # length of a bar at a rotary axis: motion across it is of second order
+SHARE = 0.3  # default radius as a share of the shortest edge of the working volume
 
 
 def default_ball(
     scene: Scene, model: Model, axis: str, stand: Mapping[str, Array], radius_mm: float | None
 ) -> Array:
-    """Choose where a ball stands, in the workpiece frame, [3], mm."""
+    """Choose the position of a ball in the workpiece frame, [3], mm."""
     middle = np.asarray(ball_point(model, stand))
     line = axis_line(model, stand, axis)
-    if line.sign > 0.0:  # the workpiece stands still: the tool swivels about the ball
+    if line.sign > 0.0:  # the tool swivels about the ball
         return middle
     pose = np.asarray(branch_pose(model, "workpiece", stand))
     tool = transforms.apply(pose, middle)
@@ -234,12 +229,12 @@ def default_ball(
     radius = radius_mm if radius_mm is not None else SHARE * min(edges, default=100.0)
     turn = scene.machine.axes[axis].direction * float(stand[axis])
     theta = np.deg2rad(turn)
-    placed = line.origin_mm + height * line.direction
-    placed = placed + radius * (np.cos(theta) * line.across + np.sin(theta) * line.upright)
-    return transforms.apply(transforms.inverse(pose), placed)
+    ball = line.origin_mm + height * line.direction
+    ball = ball + radius * (np.cos(theta) * line.across + np.sin(theta) * line.upright)
+    return transforms.apply(transforms.inverse(pose), ball)
 
 
-def followed(
+def follow_ball(
     scene: Scene, model: Model, axis: str, angle_deg: Array, ball_mm: Array, stand: Coordinates
 ) -> dict[str, Array]:
     coordinates = follow(model, {**stand, axis: angle_deg}, ball_mm)
@@ -247,7 +242,7 @@ def followed(
     return coordinates
 
 
-def reachable(
+def reachable_positions(
     scene: Scene,
     model: Model,
     axis: str,
@@ -257,28 +252,28 @@ def reachable(
     end: float | None,
     points: int,
 ) -> Array:
-    """Choose the positions of a rotary axis, [points], degrees."""
+    """Choose positions of a rotary axis that the linear axes can follow, [points], degrees."""
     low, high = scene.machine.axes[axis].travel
-    here = float(np.clip(stand[axis], low, high))
+    present = float(np.clip(stand[axis], low, high))
     if high - low > 360.0:
-        low = max(low, min(here - 180.0, high - 360.0))
+        low = max(low, min(present - 180.0, high - 360.0))
         high = low + 360.0
     if start is not None or end is not None:
         first, last = low if start is None else start, high if end is None else end
         if not first < last:
             raise OptionError(f"{axis} from {first:g} to {last:g}°; expected start below end")
         return np.linspace(first, last, points)
-    fine = np.unique(np.append(np.linspace(low, high, 721), here))
+    fine = np.unique(np.append(np.linspace(low, high, 721), present))
     inside = within_travel(scene.machine, follow(model, {**stand, axis: fine}, ball_mm))
-    at_here = int(np.searchsorted(fine, here))
-    if not inside[at_here]:
-        spelled = ", ".join(f"{value:.4g}" for value in ball_mm)
+    present_index = int(np.searchsorted(fine, present))
+    if not inside[present_index]:
+        ball_text = ", ".join(f"{value:.4g}" for value in ball_mm)
         raise OptionError(
-            f"the tool cannot reach the ball at ({spelled}) mm of the workpiece with"
-            f" {axis} = {here:g}; give {{ball}} x,y,z within the travel"
+            f"the tool cannot reach the ball at ({ball_text}) mm of the workpiece with"
+            f" {axis} = {present:g}; give {{ball}} x,y,z within the travel"
         )
     outside = np.flatnonzero(~inside)
-    before, after = outside[outside < at_here], outside[outside > at_here]
+    before, after = outside[outside < present_index], outside[outside > present_index]
     first = float(fine[before[-1] + 1] if len(before) else fine[0])
     last = float(fine[after[0] - 1] if len(after) else fine[-1])
     if last - first < 1.0:
@@ -304,7 +299,7 @@ def circle_directions(
     return {"radial": radial, "tangential": tangential, "axial": axial}
 
 
-def lay_followed(
+def plan_followed_circle(
     scene: Scene,
     model: Model,
     name: str,
@@ -316,7 +311,7 @@ def lay_followed(
 ) -> BenchPlan:
     axis = rotary_axis(scene.machine, name)
     ball = default_ball(scene, model, axis, stand, radius_mm)
-    coordinates = followed(scene, model, axis, angle_deg, ball, stand)
+    coordinates = follow_ball(scene, model, axis, angle_deg, ball, stand)
     count = len(angle_deg)
     point = tool_points(model, coordinates, count)
     direction = circle_directions(model, axis, coordinates, point)[bar]
@@ -334,20 +329,20 @@ def lay_followed(
             "as_read": np.ones(count),
         },
         length_mm=BAR_MM,
-        travel=travels(coordinates, sense),
+        travel=travel_directions(coordinates, sense),
         setup={
-            **ball_columns(model, coordinates, direction), "bar_um": np.ones(count),
+            **ball_setup(model, coordinates, direction), "bar_um": np.ones(count),
         },
     )  # fmt: skip
 
 
-def ball_columns(
+def ball_setup(
     model: Model, coordinates: Mapping[str, Array], direction: Array
 ) -> dict[str, Array]:
-    """Give how readings move with the ball's place along x, y, z of the workpiece, [m] each.
+    """Compute the readings per unit of the ball's position along x, y, z of the workpiece, [m].
 
-    A ball that stands further along x is missed by as much: the tool against it moves along −x. The
-    directions are those of all poses, [n, 3], once or several times over.
+    A ball displaced along +x reads as a displacement of the tool along −x. The directions are those
+    of all poses, [n, 3], once or repeated.
     """
     count = np.broadcast_shapes(*(np.shape(values) for values in coordinates.values()))
     pose = np.broadcast_to(branch_pose(model, "workpiece", coordinates), (*count, 4, 4))
@@ -356,9 +351,9 @@ def ball_columns(
     return {f"ball_{name}_um": moved[:, index] for index, name in enumerate("xyz")}
 
 
-def travels(coordinates: Mapping[str, Array], sense: Array) -> dict[str, Array]:
-    """Give the direction in which each axis has come along a path, [n], stretch by stretch."""
-    found: dict[str, Array] = {}
+def travel_directions(coordinates: Mapping[str, Array], sense: Array) -> dict[str, Array]:
+    """Compute the direction of travel of each axis along a path, [n], per stretch."""
+    directions: dict[str, Array] = {}
     starts = np.flatnonzero(np.diff(sense, prepend=np.nan) != 0.0)
     for name, values in coordinates.items():
         step = np.diff(values, prepend=np.nan)
@@ -367,5 +362,5 @@ def travels(coordinates: Mapping[str, Array], sense: Array) -> dict[str, Array]:
             step[start] = step[start + 1] if start + 1 < len(step) else 0.0
         step = np.where(np.abs(np.nan_to_num(step)) < 1e-9, 0.0, np.nan_to_num(step))
         if step.any():
-            found[name] = np.sign(step)
-    return found
+            directions[name] = np.sign(step)
+    return directions

@@ -1,4 +1,4 @@
-"""What a test runs through and comes to: poses, what is sensed there, readings on the model."""
+"""Plan and outcome of a test: poses, sensed directions, readings on the model."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,37 +14,37 @@ from warpspace.machine.errors import ErrorFunction, ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
-Whole = NDArray[np.intp]
-NONE = -1  # in place of the site that a reading is taken against: none
+IndexArray = NDArray[np.intp]
+NONE = -1  # site of reference of a reading without one
 DEPENDENT = 1e-9
-"""Share of a column of the set-up that others do not give, below which it is left out."""
+"""Independent share of a column of the set-up below which it is omitted."""
 
 
 @dataclass(frozen=True)
 class BenchPlan:
     """Path and sensing of a test on one machine.
 
-    A site is a pose and a point that counts there. The error of a site is that of the tool against
-    the workpiece (loop `relative`) at that point; a reading senses it in one direction, as it is or
-    against that of another site.
+    A site is a pose with its functional point. The error of a site is that of the tool relative to
+    the workpiece (loop `relative`) at that point; a reading senses it in one direction, by itself
+    or relative to another site.
     """
 
     coordinates: Mapping[str, Array]  # [n], mm or degrees; of all axes at each site, commanded
     point_mm: Array  # [n, 3]; nominal points in R
-    travel: Mapping[str, Array]  # [n]; ±1: direction in which an axis has come, 0 where it stands
-    site: Whole  # [m]; of each reading
-    direction: Array  # [m, 3]; unit vectors in R that are sensed along
-    against: Whole  # [m]; site whose error is subtracted, or `NONE`
+    travel: Mapping[str, Array]  # [n]; ±1: direction of travel of an axis, 0 if it does not move
+    site: IndexArray  # [m]; of each reading
+    direction: Array  # [m, 3]; sensed unit vectors in R
+    against: IndexArray  # [m]; site whose error is subtracted, or `NONE`
     gain: Array  # [m]; 1 for readings in µm, 1000 / lever in mm for angles in µrad
-    # [m]; of a bar whose change is read; infinite where a sensor looks in a fixed direction
+    # [m]; of a bar whose change is read; infinite for a sensor of fixed direction
     length_mm: Array
-    # [m]; what tells readings apart: targets, angles, runs, directions, channels
+    # [m]; labels of readings: targets, angles, runs, directions, channels
     marks: Mapping[str, Array]
-    # [m]; readings that one unit (µm, or µrad where the name says so) of an unknown of the set-up
-    # gives: the zero of a scale, the place of a ball. They are no errors of the machine.
+    # [m]; readings per unit (µm, or µrad by the name) of an unknown of the set-up: the zero of a
+    # scale, the position of a ball. They are no errors of the machine.
     setup: Mapping[str, Array]
-    place: str  # where it stands, in words
-    path: tuple[Whole, ...] = ()  # sites of each stretch of the path, in order, for drawings
+    place: str  # description of the position on the machine
+    path: tuple[IndexArray, ...] = ()  # sites of each stretch of the path, in order, for drawings
 
     @property
     def readings(self) -> int:
@@ -58,15 +58,15 @@ def build_plan(
     *,
     place: str,
     marks: Mapping[str, Array] | None = None,
-    site: Whole | None = None,
-    against: Whole | None = None,
+    site: IndexArray | None = None,
+    against: IndexArray | None = None,
     gain: Array | float = 1.0,
     length_mm: Array | float = np.inf,
     travel: Mapping[str, Array] | None = None,
     setup: Mapping[str, Array] | None = None,
-    path: tuple[Whole, ...] | None = None,
+    path: tuple[IndexArray, ...] | None = None,
 ) -> BenchPlan:
-    """Put a plan together; by default each site gives one reading of a fixed direction."""
+    """Build a plan; by default each site yields one reading of a fixed direction."""
     sites = len(point_mm)
     rows = np.arange(sites) if site is None else site
     count = len(rows)
@@ -88,35 +88,35 @@ def build_plan(
 
 
 def _independent(setup: Mapping[str, Array]) -> dict[str, Array]:
-    kept: dict[str, Array] = {}
+    independent: dict[str, Array] = {}
     basis: list[Array] = []
     for name, column in setup.items():
-        rest = column.astype(float)
+        remainder = column.astype(float)
         for vector in basis:
-            rest = rest - (vector @ rest) * vector
-        size = float(np.linalg.norm(rest))
+            remainder = remainder - (vector @ remainder) * vector
+        size = float(np.linalg.norm(remainder))
         if size > DEPENDENT * np.sqrt(len(column)):
-            kept[name] = column
-            basis.append(rest / size)
-    return kept
+            independent[name] = column
+            basis.append(remainder / size)
+    return independent
 
 
 @dataclass(frozen=True, slots=True)
 class BenchQuantity:
-    """One number of a standard."""
+    """One quantity of a standard."""
 
     key: str  # in JSON; ends in its unit
-    name: str  # in words
+    name: str
     value: float
     unit: str
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What readings come to."""
+    """Quantities evaluated from readings."""
 
     quantities: tuple[BenchQuantity, ...]  # the most important first
-    # what else JSON has: lists of numbers, ready to be spelled
+    # further JSON keys: lists of numbers
     details: Mapping[str, object] = field(default_factory=dict[str, object])
 
     def __getitem__(self, key: str) -> float:
@@ -127,21 +127,21 @@ RELATIVE = View(Loop.RELATIVE)
 
 
 def simulate(scene: Scene, plan: BenchPlan, *, exact: bool = True) -> Array:
-    """Take the readings of a plan on the model of a scene, [m], µm (angles: µrad)."""
+    """Compute the readings of a plan on the model of a scene, [m], µm (angles: µrad)."""
     if not exact:
         amplitudes = [scene.errors.amplitude(key) for key in scene.parameter_keys]
         return respond(scene, plan, scene.parameter_keys) @ np.array(amplitudes, dtype=float)
-    found = np.zeros((len(plan.point_mm), 3))
-    model = _both_ways(scene)
+    error_um = np.zeros((len(plan.point_mm), 3))
+    model = _mean_of_directions(scene)
     for rows, errors in _by_travel(scene.errors, plan):
         coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
         field = evaluate_exact(model, errors, coordinates, RELATIVE, plan.point_mm[rows])
-        found[rows] = field.error_um
-    return sense(plan, found)
+        error_um[rows] = field.error_um
+    return sense(plan, error_um)
 
 
 def sense(plan: BenchPlan, error_um: Array) -> Array:
-    """Give what the sensors of a plan read, [m], of the errors of its sites, [n, 3], µm."""
+    """Compute the readings of a plan, [m], from the errors of its sites, [n, 3], µm."""
     shift = _differences(plan, error_um)
     along = np.sum(shift * plan.direction, axis=-1)
     bars = np.isfinite(plan.length_mm)
@@ -154,7 +154,7 @@ def sense(plan: BenchPlan, error_um: Array) -> Array:
 
 
 def respond(scene: Scene, plan: BenchPlan, keys: Sequence[str]) -> Array:
-    """Give the readings of a plan as a linear function of errors, [m, K], µm or µrad per unit.
+    """Compute the readings of a plan per unit of each error, [m, K], µm or µrad.
 
     The curve of each parameter along its axis is folded in, as in an `ErrorBasis`.
     """
@@ -164,9 +164,9 @@ def respond(scene: Scene, plan: BenchPlan, keys: Sequence[str]) -> Array:
 
 
 def respond_sites(scene: Scene, plan: BenchPlan, keys: Sequence[str]) -> Array:
-    """Give the errors of all sites as a linear function of errors, [K, n, 3], µm per unit."""
+    """Compute the errors of all sites per unit of each parameter, [K, n, 3], µm."""
     position = np.zeros((len(keys), len(plan.point_mm), 3))
-    model = _both_ways(scene)
+    model = _mean_of_directions(scene)
     for rows, errors in _by_travel(scene.errors, plan):
         coordinates = {name: values[rows] for name, values in plan.coordinates.items()}
         basis = build_basis(model, errors, keys, coordinates, RELATIVE, plan.point_mm[rows])
@@ -176,45 +176,47 @@ def respond_sites(scene: Scene, plan: BenchPlan, keys: Sequence[str]) -> Array:
 
 
 def fit_setup(plan: BenchPlan, readings: Array) -> tuple[Array, Array]:
-    """Fit the unknowns of the set-up; give them and what is left of the readings, [m]."""
+    """Fit the unknowns of the set-up; return them and the residual readings, [m]."""
     if not plan.setup:
         return np.zeros(0), readings
     design = np.stack(list(plan.setup.values()), -1)
-    found: Array = np.asarray(np.linalg.lstsq(design, readings, rcond=None)[0], dtype=float)
-    return found, readings - design @ found
+    unknowns: Array = np.asarray(np.linalg.lstsq(design, readings, rcond=None)[0], dtype=float)
+    return unknowns, readings - design @ unknowns
 
 
 def _differences(plan: BenchPlan, values: Array) -> Array:
     shift = values[..., plan.site, :].copy()
-    held = plan.against != NONE
-    shift[..., held, :] -= values[..., plan.against[held], :]
+    is_relative = plan.against != NONE
+    shift[..., is_relative, :] -= values[..., plan.against[is_relative], :]
     return shift
 
 
-def _by_travel(errors: ErrorSet, plan: BenchPlan) -> Iterator[tuple[Whole, ErrorSet]]:
-    every = np.arange(len(plan.point_mm))
+def _by_travel(errors: ErrorSet, plan: BenchPlan) -> Iterator[tuple[IndexArray, ErrorSet]]:
+    sites = np.arange(len(plan.point_mm))
     functions = errors.functions.items()
-    directional = {parameter(key).axis for key, one in functions if isinstance(one, Directional)}
+    directional = {
+        parameter(key).axis for key, function in functions if isinstance(function, Directional)
+    }
     axes = [axis for axis in plan.travel if axis in directional]
     if not axes:
-        yield every, errors
+        yield sites, errors
         return
-    ways = np.stack([np.sign(plan.travel[axis]) for axis in axes], axis=-1)
-    found, number = np.unique(ways, axis=0, return_inverse=True)
-    for index, way in enumerate(found):
+    signs = np.stack([np.sign(plan.travel[axis]) for axis in axes], axis=-1)
+    combinations, number = np.unique(signs, axis=0, return_inverse=True)
+    for index, combination in enumerate(combinations):
         yield (
-            every[number.reshape(-1) == index],
-            _travelling(errors, dict(zip(axes, way, strict=True))),
+            sites[number.reshape(-1) == index],
+            _travelling(errors, dict(zip(axes, combination, strict=True))),
         )
 
 
-def _both_ways(scene: Scene) -> Model:
+def _mean_of_directions(scene: Scene) -> Model:
     return replace(scene.model, direction=TravelDirection.MEAN)
 
 
-def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:
+def _travelling(errors: ErrorSet, travel: Mapping[str, float]) -> ErrorSet:
     def chosen(key: str, function: ErrorFunction) -> ErrorFunction:
-        sign = way.get(parameter(key).axis, 0.0)
+        sign = travel.get(parameter(key).axis, 0.0)
         if not sign or not isinstance(function, Directional):
             return function
         return function.forward if sign > 0.0 else function.backward
@@ -222,9 +224,9 @@ def _travelling(errors: ErrorSet, way: Mapping[str, float]) -> ErrorSet:
     return ErrorSet({key: chosen(key, function) for key, function in errors.functions.items()})
 
 
-def _share(errors: ErrorSet, acting: ErrorSet, key: str) -> float:
-    whole, part = errors.functions.get(key), acting.functions.get(key)
-    if whole is None or part is None or whole is part:
+def _share(errors: ErrorSet, active: ErrorSet, key: str) -> float:
+    amplitude_of, active_function = errors.functions.get(key), active.functions.get(key)
+    if amplitude_of is None or active_function is None or amplitude_of is active_function:
         return 1.0
-    amplitude = whole.amplitude
-    return part.amplitude / amplitude if amplitude else 1.0
+    amplitude = amplitude_of.amplitude
+    return active_function.amplitude / amplitude if amplitude else 1.0

@@ -103,7 +103,7 @@ class Calibrate(Analysis):
     kinds: Annotated[tuple[str, ...], Grammar("KIND", typed_word, each=True)] = option(
         (),
         "points, tracker, sphere, sphere-tcp, lengths, or a test with its options such as"
-        " circular:plane=XZ:radius=150 (`warpspace test --list`; its test sphere is r-test here)."
+        " circular:plane=XZ:radius=150 (`warpspace test --list`)."
         " Once for all files, or once for each, --data before --predict",
         flag="--kind",
         unset="recognised from the columns of each file",

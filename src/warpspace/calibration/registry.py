@@ -21,14 +21,6 @@ from warpspace.scene.model import Scene
 from warpspace.scene.text_files import parse_number
 from warpspace.units import MM_PER_UM, Array
 
-RENAMED = {"r-test": "sphere"}
-"""The test `sphere` reads deviations at sphere poses; the kind of that name reads centres."""
-NAMES = {RENAMED[name]: name for name in RENAMED}
-
-
-def test_kinds() -> tuple[str, ...]:
-    return tuple(NAMES.get(name, name) for name in bench_names())
-
 
 class TestReadings(MeasurementKind):
     """Readings of one test with its options, for instance ``circular:plane=XZ:radius=150``."""
@@ -40,7 +32,7 @@ class TestReadings(MeasurementKind):
 
     def __init__(self, text: str) -> None:
         given, *options = text.split(":")
-        kind = find_test(RENAMED.get(given, given))
+        kind = find_test(given)
         known = {option.flag.removeprefix("--"): option for option in kind.settings()}
         values: dict[str, Any] = {}
         for part in options:
@@ -138,7 +130,7 @@ def find_kind(name: str) -> MeasurementKind:
     """Look up a kind: one of this table, or a test with its options (``circular:plane=XZ``)."""
     if name in KINDS:
         return KINDS[name]
-    tests = test_kinds()
+    tests = bench_names()
     if name.partition(":")[0] not in tests:
         raise UnknownNameError("kind of measurement", name, (*KINDS, *tests))
     return _test_kind(name)

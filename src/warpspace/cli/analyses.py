@@ -1,4 +1,4 @@
-"""Commands made from analyses: options from their fields, output from what their results say."""
+"""Commands of analyses: options from their fields, output from the blocks of their results."""
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ import click
 
 from warpspace.analysis.options import Option, options_of
 from warpspace.cli.file_arguments import DataFile, check_files, flag_of
-from warpspace.cli.sampling_output import MORE
+from warpspace.cli.sampling_output import EXTRA_OPTIONS
 from warpspace.cli.shared_options import (
     SCENES,
     csv_option,
@@ -32,11 +32,13 @@ if TYPE_CHECKING:
 
 
 def command_of(kind: "type[Analysis]") -> click.Command:
-    options, run_it = MORE.get(kind.name, ((), None))
-    command: Callable[..., None] = _runner(kind, run_it)
+    options, run_analysis = EXTRA_OPTIONS.get(kind.name, ((), None))
+    command: Callable[..., None] = _runner(kind, run_analysis)
     command.__doc__ = kind.explained()
-    is_one = kind.scenes == (1, 1)
-    argument = scene_argument() if is_one else scene_argument("scenes", nargs=-1, required=True)
+    takes_one_scene = kind.scenes == (1, 1)
+    argument = (
+        scene_argument() if takes_one_scene else scene_argument("scenes", nargs=-1, required=True)
+    )
     decorators = [argument, *map(_click_option, kind.options())]
     if kind.has_table:
         decorators.append(csv_option)
@@ -55,28 +57,30 @@ def command_of(kind: "type[Analysis]") -> click.Command:
     return click.command(name=kind.name)(command)
 
 
-def _click_option(one: Option) -> Callable[..., Any]:
-    if one.positional and one.grammar is not None:
-        metavar = one.grammar.metavar if one.required else f"[{one.grammar.metavar}]"
-        kind = DataFile() if one.grammar.is_file else str
-        return click.argument(one.name, type=kind, nargs=-1, required=one.required, metavar=metavar)
-    traits: dict[str, Any] = {"help": one.help}
-    if one.kind is bool:
+def _click_option(option: Option) -> Callable[..., Any]:
+    if option.positional and option.grammar is not None:
+        metavar = option.grammar.metavar if option.required else f"[{option.grammar.metavar}]"
+        kind = DataFile() if option.grammar.is_file else str
+        return click.argument(
+            option.name, type=kind, nargs=-1, required=option.required, metavar=metavar
+        )
+    traits: dict[str, Any] = {"help": option.help}
+    if option.kind is bool:
         traits |= {"is_flag": True}
-    elif one.grammar is not None:
-        traits |= {"metavar": one.grammar.metavar, "multiple": True, "required": one.required}
-        traits["type"] = DataFile() if one.grammar.is_file else str
-        traits["help"] += " Repeatable." if one.grammar.many or one.grammar.each else ""
-    elif one.choices:
-        default = None if one.default is None else str(one.default)
-        traits |= {"type": click.Choice(one.choices), "default": default}
+    elif option.grammar is not None:
+        traits |= {"metavar": option.grammar.metavar, "multiple": True, "required": option.required}
+        traits["type"] = DataFile() if option.grammar.is_file else str
+        traits["help"] += " Repeatable." if option.grammar.many or option.grammar.each else ""
+    elif option.choices:
+        default = None if option.default is None else str(option.default)
+        traits |= {"type": click.Choice(option.choices), "default": default}
     else:
-        traits |= {"type": one.kind, "required": one.required}
-        traits |= {} if one.required else {"default": one.default}
-    return click.option(one.flag, one.name, **traits)
+        traits |= {"type": option.kind, "required": option.required}
+        traits |= {} if option.required else {"default": option.default}
+    return click.option(option.flag, option.name, **traits)
 
 
-def _runner(kind: "type[Analysis]", run_it: Callable[..., Any] | None) -> Callable[..., None]:
+def _runner(kind: "type[Analysis]", run_analysis: Callable[..., Any] | None) -> Callable[..., None]:
     def run(
         *,
         as_json: bool,
@@ -90,49 +94,55 @@ def _runner(kind: "type[Analysis]", run_it: Callable[..., Any] | None) -> Callab
     ) -> None:
         from warpspace.field.evaluate import second_order_words
 
-        own = {one.name for one in options_of(kind)}
+        option_names = {one.name for one in options_of(kind)}
         names, loaded = load_scenes(scenes or (scene,), kind.scenes)
-        asked = read_options(kind, values, loaded[0])
-        asked = asked.for_output(Path(output).stem if output else None)
-        warn(*(OptionError(words).with_names(flag_of) for words in asked.warnings(loaded[0])))
+        analysis = read_options(kind, values, loaded[0])
+        analysis = analysis.for_output(Path(output).stem if output else None)
+        warn(
+            *(OptionError(warning).with_names(flag_of) for warning in analysis.warnings(loaded[0]))
+        )
         with progress(kind.doing, total=1.0, silent=as_json) as bar:
-            if run_it is None:
-                found = asked.run_all(loaded, bar.reach)
+            if run_analysis is None:
+                result = analysis.run_all(loaded, bar.reach)
             else:
-                its_own = {key: values[key] for key in values if key not in own}
+                extra_options = {key: values[key] for key in values if key not in option_names}
                 files = {"plot": plot, "output": output, "force": force}
-                found = run_it(asked, loaded, bar.reach, names=names, **files, **its_own)
-        warn(*found.caveats())
-        if left_out := found.second_order:
-            warn(*second_order_words(left_out))
-        chart, file = plot if kind.has_chart else None, None if run_it else output
-        wrote = write_result(found, csv_path, chart, file, force=force)
+                result = run_analysis(
+                    analysis, loaded, bar.reach, names=names, **files, **extra_options
+                )
+        warn(*result.caveats())
+        if result.second_order:
+            warn(*second_order_words(result.second_order))
+        chart, file = plot if kind.has_chart else None, None if run_analysis else output
+        written_files = write_result(result, csv_path, chart, file, force=force)
         if as_json:
-            spelled = found.as_json()
-            print_json(spelled | ({"files": wrote} if "files" in spelled else {}))
+            document = result.as_json()
+            print_json(document | ({"files": written_files} if "files" in document else {}))
             return
-        print_blocks(found.blocks())
-        for path in filter(None, (*(wrote or [output]), csv_path, plot)):
+        print_blocks(result.blocks())
+        for path in filter(None, (*(written_files or [output]), csv_path, plot)):
             echo(f"wrote {path}")
 
     return run
 
 
 def read_options(kind: "type[Analysis]", values: dict[str, Any], scene: "Scene") -> "Analysis":
-    given: dict[str, Any] = {}
-    for one in options_of(kind):
-        value = values[one.name]
-        if one.grammar is not None:
-            if one.grammar.each:
-                given[one.name] = tuple(one.read(text, scene) for text in value) or one.default
+    arguments: dict[str, Any] = {}
+    for option in options_of(kind):
+        value = values[option.name]
+        if option.grammar is not None:
+            if option.grammar.each:
+                arguments[option.name] = (
+                    tuple(option.read(text, scene) for text in value) or option.default
+                )
                 continue
-            if len(value) > 1 and not one.grammar.many:
-                raise OptionError(f"{{{one.name}}} is given {len(value)} times; expected one")
-            value = one.read(",".join(value), scene) if value else one.default
-        elif one.enum is not None and value is not None:
-            value = one.enum(value)
-        given[one.name] = value
-    return kind(**given)
+            if len(value) > 1 and not option.grammar.many:
+                raise OptionError(f"{{{option.name}}} occurs {len(value)} times; expected one")
+            value = option.read(",".join(value), scene) if value else option.default
+        elif option.enum is not None and value is not None:
+            value = option.enum(value)
+        arguments[option.name] = value
+    return kind(**arguments)
 
 
 def print_blocks(blocks: "Iterable[Block]") -> None:
@@ -153,52 +163,51 @@ def print_blocks(blocks: "Iterable[Block]") -> None:
 
 
 def write_result(
-    found: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
+    result: "Result", csv_path: str | None, plot: str | None, output: str | None, *, force: bool
 ) -> list[str]:
-    """Write all files of a result, or none; return those of its output, the one asked for first."""
+    """Write all files of a result, or none; return those of -o, the file named first."""
     from warpspace.scene.text_files import spell_row
 
     files: dict[str | Path, str | bytes] = {}
-    wrote: list[str] = []
+    written_files: list[str] = []
     if output is not None:
         from warpspace.scene.scene_writer import scene_files
 
-        path, changes = Path(output), found.changes()
-        output_files = found.output_files(path.suffix.lower())
+        path, changes = Path(output), result.changes()
+        output_files = result.output_files(path.suffix.lower())
         if not output_files and changes:
             output_files = scene_files(changes[-1].scene, path.stem)
         if not output_files:
-            raise OptionError(f"-o {output}: {found.no_change}, so no scene is written")
-        beside = {
+            raise OptionError(f"-o {output}: {result.no_change}, so no scene is written")
+        companions = {
             path.with_name(f"{path.stem}{add}"): output_files[add] for add in output_files if add
         }
-        check_files(click.get_current_context(), beside)
-        files |= beside
+        check_files(click.get_current_context(), companions)
+        files |= companions
         if "" in output_files:  # last, since it names the others
             files[output] = output_files[""]
-        wrote = [output] * ("" in output_files) + [str(target) for target in beside]
+        written_files = [output] * ("" in output_files) + [str(target) for target in companions]
     if csv_path is not None:
-        table = found.file_table()
+        table = result.file_table()
         rows = () if table is None else table.csv_rows()
         files[csv_path] = "".join(map(spell_row, rows))
     if plot is not None:
         from warpspace.outputs.charts.result_charts import result_chart
         from warpspace.outputs.figure_files import encode_figure
 
-        draw = resolve_name(found.drawn_by) if found.drawn_by else result_chart
-        files[plot] = encode_figure(draw(found), Path(plot).suffix.lower().lstrip("."))
+        draw = resolve_name(result.drawn_by) if result.drawn_by else result_chart
+        files[plot] = encode_figure(draw(result), Path(plot).suffix.lower().lstrip("."))
     write_texts(files, force=force)
-    return wrote
+    return written_files
 
 
-FEW = 32  # scenes that are held in memory together
+MAX_LOADED = 32  # scenes kept in memory at a time
 
 
 class Fleet(Sequence["Scene"]):
-    """Many scenes, each loaded when it is asked for, so that they need not fit into the memory.
+    """Scenes that are loaded when accessed, since all together may not fit into memory.
 
-    All are loaded once before the first is given, so that a mistake in the last one is said at
-    once and not after hours.
+    Each is loaded once at the start, so that an invalid scene is reported immediately.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -218,25 +227,27 @@ class Fleet(Sequence["Scene"]):
 def load_scenes(
     names: Sequence[str], expected: tuple[int, int | None]
 ) -> "tuple[Sequence[str], Sequence[Scene]]":
-    """Load what arguments stand for; of any number of scenes a folder stands for those in it."""
+    """Load the scenes of the arguments; a folder stands for its scenes if any number is allowed."""
     from warpspace.scene.library import load_scene
 
-    least, most = expected
-    names = find_scenes(names) if most is None else names
-    if not least <= len(names) <= (most or SWEEP_CASES):
-        known = f"at most {most or SWEEP_CASES:,}" if len(names) > least else f"at least {least}"
-        raise OptionError(f"{len(names):,} scenes; expected {known}")
-    return names, [load_scene(name) for name in names] if len(names) <= FEW else Fleet(names)
+    minimum, maximum = expected
+    names = find_scenes(names) if maximum is None else names
+    if not minimum <= len(names) <= (maximum or SWEEP_CASES):
+        bound = (
+            f"at most {maximum or SWEEP_CASES:,}" if len(names) > minimum else f"at least {minimum}"
+        )
+        raise OptionError(f"{len(names):,} scenes; expected {bound}")
+    return names, [load_scene(name) for name in names] if len(names) <= MAX_LOADED else Fleet(names)
 
 
 def find_scenes(names: Sequence[str]) -> list[str]:
-    found: list[str] = []
+    scene_paths: list[str] = []
     for name in names:
         if Path(name).is_dir():
-            inside = sorted(str(path) for path in Path(name).glob("*.toml"))
-            if not inside:
+            toml_files = sorted(str(path) for path in Path(name).glob("*.toml"))
+            if not toml_files:
                 raise OptionError(f"{name}: a folder without .toml files; expected scenes")
-            found += inside
+            scene_paths += toml_files
         else:
-            found.append(name)
-    return found
+            scene_paths.append(name)
+    return scene_paths

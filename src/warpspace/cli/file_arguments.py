@@ -1,4 +1,4 @@
-"""What a command reads and writes: no output is a file that is read, or another output's file."""
+"""Files that commands read and write: no output replaces an input or another output."""
 
 from collections.abc import Callable, Iterable, Iterator, MutableMapping
 from contextlib import suppress
@@ -35,7 +35,7 @@ class DataFile(InputFile):
 
 
 class SceneName(click.ParamType[str]):
-    """A bundled scene or machine, or a path; the shell completes both."""
+    """Name of a bundled scene or machine, or a path; the shell completes both."""
 
     name = "scene"
 
@@ -51,7 +51,7 @@ class SceneName(click.ParamType[str]):
         return [CompletionItem(name) for name in names] or [CompletionItem(incomplete, type="file")]
 
     def files(self, value: str | Path) -> Iterable[Path]:
-        """Find the scene, or those of a folder, and the machine, CSV files and meshes they name."""
+        """Find the files of a scene, or of those in a folder: machine, CSV files and meshes."""
         from warpspace.machine.limits import MAX_SCENE_BYTES
         from warpspace.scene.library import scene_path
         from warpspace.scene.machine_library import machine_names
@@ -71,9 +71,9 @@ class SceneName(click.ParamType[str]):
 
 
 class OutputFile(click.Path):
-    """A file that a command writes; its ending is one of those given, or any.
+    """A file that a command writes, with one of some endings, or any.
 
-    They may be given by a function, where a plug-in adds to them.
+    `added` returns further endings, since plug-ins may add some.
     """
 
     def __init__(self, *endings: str, added: Callable[[], Iterable[str]] = tuple) -> None:
@@ -86,7 +86,7 @@ class OutputFile(click.Path):
 
 
 def guarded(command: click.Command) -> click.Command:
-    """Have the files of a command looked at before it begins, and its numbers read strictly."""
+    """Check the files of a command before it runs, and parse its numbers strictly."""
     command.context_settings.setdefault("help_option_names", ["-h", "--help"])
     for param in command.params:
         if isinstance(param.type, NUMBERS):
@@ -108,16 +108,15 @@ def guarded(command: click.Command) -> click.Command:
 
 
 def flag_of(name: str) -> str:
-    """Give what an option of the command that runs is called on the command line."""
+    """Return the flag of an option of the running command."""
     params = click.get_current_context().command.params
     return {param.name: param.opts[0] for param in params}.get(name, name)
 
 
 class Commands(MutableMapping[str, click.Command]):
-    """Commands by name, each built when it is first asked for and guarded.
+    """Commands by name, each built and guarded when it is first used.
 
-    One command therefore does not pay for the imports of all others. What is built need not be
-    listed: former names of tests are understood only.
+    A command therefore does not pay for the imports of the others.
     """
 
     def __init__(
@@ -127,7 +126,7 @@ class Commands(MutableMapping[str, click.Command]):
         self._added: dict[str, click.Command] = {}
 
     def __getitem__(self, name: str) -> click.Command:
-        """Build the command if it is not there yet; a `KeyError` where there is none."""
+        """Return a command, built on first use; `KeyError` if there is none."""
         return self._added.get(name) or self._build(name)
 
     def __setitem__(self, name: str, command: click.Command) -> None:
@@ -160,8 +159,8 @@ def _strict(kind: "click.ParamType[Any]") -> "click.ParamType[Any]":
     return strict
 
 
-def check_files(context: click.Context, beside: Iterable[Path] = ()) -> None:
-    """Refuse what a command must not write."""
+def check_files(context: click.Context, companions: Iterable[Path] = ()) -> None:
+    """Raise an error if an output of a command must not be written."""
     from warpspace.outputs.file_output import check_target
 
     values = [
@@ -174,7 +173,7 @@ def check_files(context: click.Context, beside: Iterable[Path] = ()) -> None:
         for param, value in values
         if isinstance(param.type, OutputFile)
     ]
-    outputs += [("a file beside it", path, ()) for path in beside]
+    outputs += [("a companion file", path, ()) for path in companions]
     force = bool(context.params.get("force"))
     for index, (option, path, endings) in enumerate(outputs):
         inputs = (
@@ -184,10 +183,11 @@ def check_files(context: click.Context, beside: Iterable[Path] = ()) -> None:
             for file in param.type.files(value)
         )
         check_target(path, endings, overwrite=force, inputs=inputs)
-        for other, written, _ in outputs[:index]:
-            if _is_one(path, written):
+        for earlier_option, earlier_path, _ in outputs[:index]:
+            if _is_same_file(path, earlier_path):
                 raise OutputError(
-                    f"{path}: {other} and {option} name one file; expected a name for each"
+                    f"{path}: {earlier_option} and {option} name the same file; expected"
+                    " different names"
                 )
 
 
@@ -197,7 +197,7 @@ def _each(value: object) -> tuple[Any, ...]:
     return () if value is None else (value,)
 
 
-def _is_one(first: Path, second: Path) -> bool:
+def _is_same_file(first: Path, second: Path) -> bool:
     if str(first.resolve()).casefold() == str(second.resolve()).casefold():
         return True
     return first.exists() and second.exists() and first.samefile(second)

@@ -1,5 +1,6 @@
-"""The command `warpspace`: its group, its commands, and the place where errors become messages."""
+"""The command `warpspace`: its group, its commands, errors as messages, signals."""
 
+import builtins
 import io
 import logging
 import os
@@ -10,14 +11,16 @@ import time
 import traceback
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
-from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
+from pkgutil import resolve_name
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 from warpspace.analysis.registry import TASKS, entries
+from warpspace.cli.analyses import command_of
 from warpspace.cli.file_arguments import Commands
 from warpspace.cli.tables import echo, plain
 from warpspace.exceptions import WarpspaceError, shorten
@@ -29,7 +32,7 @@ if TYPE_CHECKING:
 BAD_INPUT = 2
 NO_MEMORY = "not enough memory for this; try a smaller grid"
 SIGNS_OF_NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
-"""How libraries that cannot be loaded, and threads that cannot be started, say so."""
+"""Messages of libraries that cannot be loaded and of threads that cannot be started."""
 
 COMPLETION_HELP = """
 \b
@@ -44,59 +47,42 @@ BUNDLED: "dict[Task, str]" = {
     "measure": "test import test-piece",
     "machine": "check notes merge list new-machine thesis",
 }
-"""Commands that are made from no analysis, by their task; `warpspace.cli.commands` has them."""
-FORMER = {
-    "animate": "draw",
-    "ballbar": "test ballbar",
-    "formats": "import --formats",
-    "import-machine": "import --format urdf",
-    "measured": "check --against own",
-    "machines": "list machines",
-    "scenes": "list scenes",
-    "snapshot": "draw",
-    "sweep": "montecarlo --rows",
-    "template": "import --template",
+"""Commands that are no analyses, by task, in the module of `warpspace.cli.commands`."""
+
+
+TASK_OF_BUNDLED: "dict[str, Task]" = {
+    name: task for task, names in BUNDLED.items() for name in names.split()
 }
-"""Former name of a command: its present name, and the arguments it stands for."""
 
 
 def task_of(name: str) -> "Task":
     tasks: dict[str, Task] = {entry.name: entry.task for entry in entries()}
-    tasks |= {one: task for task, names in BUNDLED.items() for one in names.split()}
-    return tasks.get(name, "machine")
+    return (TASK_OF_BUNDLED | tasks).get(name, "machine")
 
 
 def _build(name: str) -> click.Command:
     for entry in entries():
         if entry.name == name:
-            from warpspace.cli.analyses import command_of
-
             return command_of(entry.load())
-    home = import_module(f"warpspace.cli.commands.{task_of(name)}")
-    found = [thing for thing in vars(home).values() if isinstance(thing, click.Command)]
-    return {command.name: command for command in found}[name]
+    task = TASK_OF_BUNDLED[name]
+    function = name.replace("-", "_")
+    if iskeyword(function) or hasattr(builtins, function):
+        function += "_"
+    return resolve_name(f"warpspace.cli.commands.{task}:{function}")
 
 
-COMMANDS = Commands(
-    lambda: (*" ".join(BUNDLED.values()).split(), *(entry.name for entry in entries())), _build
-)
+COMMANDS = Commands(lambda: (*TASK_OF_BUNDLED, *(entry.name for entry in entries())), _build)
 
 
 def register_command(command: click.Command) -> None:
     """Add a command of a plug-in; it appears in ``warpspace --help`` beside the bundled ones."""
     if not command.name or command.name in COMMANDS:
-        raise ValueError(f"a command {command.name!r} cannot be added: expected a name of its own")
+        raise ValueError(f"a command {command.name!r} exists already; expected another name")
     COMMANDS[command.name] = command
 
 
 class TaskGroup(click.Group):
     """The commands under headings by task; analyses are listed without being imported."""
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        now = FORMER[args[0]].split() if args[0] in FORMER else args[:1]
-        return super().resolve_command(ctx, [*now, *args[1:]])
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         sentences = {entry.name: entry.sentence for entry in entries()}
@@ -120,7 +106,7 @@ class TaskGroup(click.Group):
 )
 @click.version_option(__version__, prog_name="warpspace")
 def cli() -> None:
-    """See and steer how a machine tool's geometric errors bend the space it works in.
+    """Visualise how the geometric errors of a machine tool deform its working volume.
 
     SCENE is a bundled name (see `warpspace list`) or the path of a TOML file. Lengths are mm,
     errors µm, small angles µrad, rotary positions degrees.
@@ -128,14 +114,14 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Run the command line; every foreseen error is one message on stderr and exit status 2."""
+    """Run the command line; expected errors are one message on stderr and exit status 2."""
     _open_standard_streams()
     _silence_libraries()
     with handle_signals() as ending:
         try:
-            Path.cwd()  # a folder that is gone breaks libraries in ways nobody could read
+            Path.cwd()  # libraries fail obscurely in a deleted folder
             cli.main(standalone_mode=False)
-            if ending.number:  # what ended the app; threads may still work within libraries in C
+            if ending.number:  # threads may still run in C libraries
                 sys.stdout.flush()
                 os._exit(0)
         except click.exceptions.Exit as stop:
@@ -147,12 +133,12 @@ def main() -> None:
         except (click.exceptions.Abort, KeyboardInterrupt):
             _end(ending)
         except WarpspaceError as error:
-            if ending.number:  # because its renderer was ended
+            if ending.number:  # its renderer was terminated
                 _end(ending)
             _refuse(str(error))
         except OSError as error:
-            if _is_nowhere():
-                _refuse("the working folder does not exist any more; change to another one")
+            if _working_folder_is_deleted():
+                _refuse("the working folder no longer exists; change to another one")
             _refuse(f"{error.filename or 'output'}: {error.strerror or error}")
         except MemoryError:
             _refuse(NO_MEMORY)
@@ -163,14 +149,14 @@ def main() -> None:
 
 
 class PlainFormatter(logging.Formatter):
-    """Lines of the log without characters that would steer the terminal."""
+    """Log lines without control characters."""
 
     def format(self, record: logging.LogRecord) -> str:
         return plain(super().format(record))
 
 
 def _open_standard_streams() -> None:
-    """Connect closed streams to the null device: files opened later would take their numbers."""
+    """Connect closed streams to the null device: files opened later would get their numbers."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             number = os.open(os.devnull, os.O_RDWR)
@@ -181,9 +167,9 @@ def _open_standard_streams() -> None:
 
 
 def _silence_libraries() -> None:
-    """Show no warnings of libraries on the terminal; show the log and tracebacks as plain text.
+    """Hide warnings of libraries; print the log and tracebacks as plain text.
 
-    The option -W of Python and the variable PYTHONWARNINGS show warnings all the same.
+    The option -W of Python and the variable PYTHONWARNINGS still show warnings.
     """
     if not sys.warnoptions:
         logging.captureWarnings(True)
@@ -192,11 +178,11 @@ def _silence_libraries() -> None:
     if terminal is not None:
         terminal.setFormatter(PlainFormatter())
         terminal.addFilter(_is_for_users)
-        logging.getLogger().addHandler(terminal)  # a library then adds none
+        logging.getLogger().addHandler(terminal)  # libraries then add none
 
 
 def _is_for_users(record: logging.LogRecord) -> bool:
-    """Tell whether a message is of this package, or of its server."""
+    """Check whether a message comes from this package or its server."""
     return record.name.partition(".")[0] in {"warpspace", "asyncio", "websockets"}
 
 
@@ -205,20 +191,20 @@ def _refuse(message: str) -> NoReturn:
 
 
 def _exit(text: str) -> NoReturn:
-    with suppress(OSError):  # nobody reads it
+    with suppress(OSError):  # stderr is closed
         echo(text, err=True)
     sys.exit(BAD_INPUT)
 
 
 def _end(ending: "Ending") -> NoReturn:
-    """Say which signal it was; at once, since libraries in C may crash while threads still work."""
+    """Print the signal and exit at once: C libraries may crash while threads still run."""
     echo(f"warpspace: {ending.word}", err=True)
     if ending.number:
         os._exit(ending.status)
     sys.exit(ending.status)
 
 
-def _is_nowhere() -> bool:
+def _working_folder_is_deleted() -> bool:
     try:
         Path.cwd()
     except OSError:
@@ -228,20 +214,20 @@ def _is_nowhere() -> bool:
 
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 _PATIENCE_S = 1.0
-"""A signal that comes again sooner is taken for the same one: some programs send it twice."""
+"""Repetitions within this time are ignored: some programs send a signal twice."""
 _LONGEST_IMPORT_S = 5.0  # how long a signal waits for the end of an import
 
 
 class Ended(KeyboardInterrupt):
     """A signal that ends the program.
 
-    A class of its own: where a plain KeyboardInterrupt has passed through `exec`, as it does while
-    packages are imported, Python ends itself with SIGINT at last, whatever the exit status said.
+    A subclass, since after a plain KeyboardInterrupt has passed through `exec`, as during imports,
+    Python finally ends itself with SIGINT regardless of the exit status.
     """
 
 
 class Ending:
-    """What a signal asked for."""
+    """State of the termination by a signal."""
 
     def __init__(self) -> None:
         self.number = 0
@@ -251,7 +237,7 @@ class Ending:
 
     @property
     def status(self) -> int:
-        """Exit status of a process that a signal ended, as shells count."""
+        """Exit status after a signal, as in shells."""
         return 128 + (self.number or signal.SIGINT)
 
     @property
@@ -269,9 +255,9 @@ class Ending:
         if _is_importing(frame) and now - self._first < _LONGEST_IMPORT_S:
             self._again()
             return
-        # a command that draws nothing need not load it
-        processes = sys.modules.get("warpspace.outputs.processes")
-        if kill_pools := getattr(processes, "kill_pools", None):
+        # loaded only by commands that draw
+        kill_pools = getattr(sys.modules.get("warpspace.outputs.processes"), "kill_pools", None)
+        if kill_pools:
             kill_pools()
         raise Ended
 
@@ -280,7 +266,7 @@ class Ending:
         threading.Timer(0.01, os.kill, [os.getpid(), self.number]).start()
 
     def handle_lost(self, about: "sys.UnraisableHookArgs") -> None:
-        """Raise `Ended` again where Python has dropped it: in finalizers and callbacks."""
+        """Raise `Ended` again after Python dropped it in a finalizer or a callback."""
         if isinstance(about.exc_value, Ended):
             self._again()
         else:
@@ -288,7 +274,7 @@ class Ending:
 
 
 def _is_importing(frame: FrameType | None) -> bool:
-    """Tell whether a package is being imported: VTK crashes where that is broken off."""
+    """Check whether a package is being imported: VTK crashes if that is interrupted."""
     while frame is not None:
         if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
             return True
@@ -303,7 +289,7 @@ def handle_signals() -> Generator[Ending]:
     if threading.current_thread() is threading.main_thread():
         for name in _SIGNALS:
             number = getattr(signal, name, None)
-            # nohup, and shells in front of a command in the background, have one ignored
+            # nohup and shells ignore some signals of background commands
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
                 before[number] = signal.signal(number, ending.handle)
     sys.unraisablehook, hook = ending.handle_lost, sys.unraisablehook

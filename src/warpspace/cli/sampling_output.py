@@ -1,4 +1,4 @@
-"""What `concepts` and `montecarlo` have on the command line only."""
+"""Options and output of `concepts` and `montecarlo` that only the command line has."""
 
 import os
 from collections.abc import Callable, Generator, Sequence
@@ -28,41 +28,41 @@ if TYPE_CHECKING:
     from warpspace.units import Array
 
     Workers = tuple[Executor | None, int | None]
-    """Who does the work, none for threads, and how many tasks are worked on at a time."""
+    """Executor, None for threads, and the number of concurrent tasks."""
 
 WORTH_A_POOL = 2_000_000
-"""Machines: what takes about 10 s. Below, starting processes costs more than it saves."""
-LOSSES = 5  # how many worker processes a command may lose: each is replaced and its task done again
-RETRIES = 3  # how often a cluster does a task again that has lost its worker
+"""Machines that take about 10 s; below, starting processes costs more than it saves."""
+LOSSES = 5  # worker processes that a command may lose; each is replaced and its task repeated
+RETRIES = 3  # of a task whose cluster worker was lost
 CONNECT_S = 10
 MOST_CSV_ROWS = 10_000_000
 NAMED = ("scene", "title")
 COUNTED = ("samples", "seed")
 
 
-def draw_beside(
-    asked: "Concepts",
+def run_concepts(
+    concepts: "Concepts",
     scenes: "Sequence[Scene]",
     watch: "ProgressCallback",
     *,
     size: tuple[int, int],
     plot: str | None,
     force: bool,
-    **_others: object,
+    **_names: object,
 ) -> "ConceptsResult":
     from warpspace.outputs.drawing.settings import FigureSettings
 
-    settings = FigureSettings(size=size, loop=str(asked.loop), concepts=asked)
+    settings = FigureSettings(size=size, loop=str(concepts.loop), concepts=concepts)
     if plot is not None and len(scenes) < 2:
-        raise OptionError("--plot sets machines side by side; expected two scenes or more")
-    found = asked.run_all(scenes, watch)
+        raise OptionError("--plot draws machines side by side; expected two scenes or more")
+    comparison = concepts.run_all(scenes, watch)
     if plot is not None:
         draw_figure_file("concepts", scenes, settings, plot, force=force, silent=True)
-    return found
+    return comparison
 
 
-def sample(
-    asked: "MonteCarlo",
+def run_montecarlo(
+    montecarlo: "MonteCarlo",
     scenes: "Sequence[Scene]",
     watch: "ProgressCallback",
     *,
@@ -73,12 +73,12 @@ def sample(
     plot: str | None,
     force: bool,
 ) -> "MonteCarloResult":
-    """Sample on whatever does the work; write |E| of machines as they are sampled, or the rows."""
-    asked.check_against(len(scenes))
-    if plot is not None and (len(scenes) > 1 or asked.in_rows):
+    """Sample on threads, processes or a cluster; write |E| of each machine, or the rows."""
+    montecarlo.check_against(len(scenes))
+    if plot is not None and (len(scenes) > 1 or montecarlo.in_rows):
         raise OptionError("--plot draws one machine; expected one scene")
-    machines = asked.machines(len(scenes))
-    streamed = None if asked.in_rows else output
+    machines = montecarlo.machines(len(scenes))
+    streamed = None if montecarlo.in_rows else output
     if streamed is not None and streamed.lower().endswith(".csv") and machines > MOST_CSV_ROWS:
         raise OptionError(
             f"{streamed}: {machines:,} rows; expected at most {MOST_CSV_ROWS:,} in a CSV file"
@@ -88,8 +88,8 @@ def sample(
         find_workers(scheduler, workers, machines) as (executor, number),
         _machine_table(streamed, names, force=force) as take,
     ):
-        result = asked.run_all(scenes, watch, executor=executor, workers=number, take=take)
-    if output is not None and asked.in_rows:
+        result = montecarlo.run_all(scenes, watch, executor=executor, workers=number, take=take)
+    if output is not None and montecarlo.in_rows:
         from warpspace.outputs.exports.fields import write_rows
 
         kinds = {
@@ -108,8 +108,8 @@ def find_workers(scheduler: str | None, workers: int | None, machines: int) -> "
             raise OptionError(
                 "--workers and --scheduler exclude each other: a cluster has its own workers"
             )
-        with _cluster(scheduler) as found:
-            yield found
+        with _cluster(scheduler) as cluster_workers:
+            yield cluster_workers
         return
     if workers is not None and not LOCAL_WORKERS[0] <= workers <= LOCAL_WORKERS[1]:
         low, high = LOCAL_WORKERS
@@ -184,23 +184,26 @@ def _machine_table(
         yield take
 
 
-MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
+EXTRA_OPTIONS: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
     "concepts": (
-        (plot_option("machines side by side"), size_option("1600x1200", "Of the picture, px.")),
-        draw_beside,
+        (
+            plot_option("machines side by side"),
+            size_option("1600x1200", "Width and height of the picture in px."),
+        ),
+        run_concepts,
     ),
     "montecarlo": (
         (
             click.option(
                 "--workers",
                 type=int,
-                help="Processes, from 2 million machines on; below, threads. The numbers do not"
-                " depend on it.  [one per core]",
+                help="Number of processes, from 2 million machines on; below, threads. It does not"
+                " affect the numbers.  [one per core]",
             ),
             click.option(
                 "--scheduler",
                 metavar="ADDRESS",
-                help="Let the workers of a Dask cluster do the work, for instance tcp://host:8786."
+                help="Run on the workers of a Dask cluster, for instance tcp://host:8786."
                 " Needs the extra `cluster`.",
             ),
             output_option(
@@ -210,6 +213,6 @@ MORE: dict[str, tuple[tuple[Callable[..., Any], ...], Callable[..., Any]]] = {
                 required=False,
             ),
         ),
-        sample,
+        run_montecarlo,
     ),
 }

@@ -3,7 +3,9 @@
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from datetime import datetime
+from functools import wraps
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal
 
 import click
@@ -21,32 +23,37 @@ if TYPE_CHECKING:
     from warpspace.scene.model import Scene
 
 
-class RenamedOption(click.Option):
-    """An option with the flags it had before, which no help text lists."""
-
-    def __init__(self, *declared: Any, former: tuple[str, ...] = (), **traits: Any) -> None:
-        super().__init__(*declared, **traits)
-        self.former = former
-
-    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
-        listed = self.opts
-        self.opts = [*listed, *self.former]
-        try:
-            super().add_to_parser(parser, ctx)
-        finally:
-            self.opts = listed
-
-
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 LOOPS = ("tool", "workpiece", "relative")
 DIRECTIONS = ("mean", "forward", "backward", "difference")
 SECOND_ORDER = "warpspace.second_order"
-"""Where the context of a command keeps what its JSON object says of the second order."""
+"""Key of the second-order estimate in the context of a command, for its JSON object."""
 COMPONENTS = ("norm", "x", "y", "z")
 
 
 def scene_argument(name: str = "scene", **kwargs: Any) -> Decorator:
     return click.argument(name, type=SceneName(), **kwargs)
+
+
+def deferred(place: str) -> Callable[..., Any]:
+    """Return a function that imports the one at `place`, "module:function", when it is called.
+
+    Modules of commands thus import at the top what they use, and help does not load them.
+    """
+
+    def call(*args: Any, **options: Any) -> Any:
+        return resolve_name(place)(*args, **options)
+
+    return call
+
+
+def run_by(place: str) -> Callable[[Callable[[], None]], Callable[..., None]]:
+    """Run a declared command by the function at `place`, imported when the command runs."""
+
+    def decorate(declared: Callable[[], None]) -> Callable[..., None]:
+        return wraps(declared)(deferred(place))
+
+    return decorate
 
 
 json_option = click.option(
@@ -55,17 +62,17 @@ json_option = click.option(
 
 
 def placed_loop(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
-    """Look at the relative loop where the placement is fitted out and no loop was given."""
-    given = ctx.get_parameter_source(param.name or "") is not ParameterSource.DEFAULT
-    return "relative" if ctx.params.get("placed") and not given else value
+    """Choose the relative loop with --placed, unless a loop is set."""
+    is_set = ctx.get_parameter_source(param.name or "") is not ParameterSource.DEFAULT
+    return "relative" if ctx.params.get("placed") and not is_set else value
 
 
 placed_option = click.option(
     "--placed",
     is_flag=True,
     is_eager=True,
-    help="Leave out where the workpiece lies: three shifts and three small rotations of it, fitted"
-    " for the least RMS over the working volume. Looks at the relative loop.",
+    help="Remove the best-fit placement of the workpiece: three shifts and three small rotations"
+    " that minimise the RMS error over the working volume. Uses the relative loop.",
 )
 loop_option = click.option(
     "--loop",
@@ -79,14 +86,14 @@ direction_option = click.option(
     "--direction",
     type=click.Choice(DIRECTIONS),
     help="Direction of travel for errors that depend on it: their mean, forward, backward, or the"
-    " difference forward − backward, which maps the reversal.  [what the scene says]",
+    " difference forward − backward, which maps the reversal.  [that of the scene]",
 )
 component_option = click.option(
     "--component",
     type=click.Choice(COMPONENTS),
     default="norm",
     show_default=True,
-    help="What the colours show: the length |E| of the error, or one signed component, in µm.",
+    help="Coloured quantity: the length |E| of the error, or one signed component, in µm.",
 )
 
 
@@ -108,16 +115,16 @@ exaggeration_option = click.option(
     "--exaggeration",
     metavar="auto|N",
     callback=read_exaggeration,
-    help="Display factor of displacements: a number, or auto for a round one that suits the scene."
-    "  [what the scene says]",
+    help="Display factor of displacements: a number, or auto for a round number that suits the"
+    " scene.  [that of the scene]",
 )
 at_option = click.option(
     "--at",
     "points",
     multiple=True,
     metavar="X=..,Y=..",
-    help="Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480. Repeatable. Axes left"
-    " out stand at their place in the scene (the middle of a range).",
+    help="Axis positions in mm and degrees, for instance X=0,Y=-225,Z=-480. Repeatable. Other"
+    " axes keep their position in the scene (the middle of a range).",
 )
 
 
@@ -148,38 +155,38 @@ def warn_outside_travel(machine: "Machine", point: Mapping[str, float]) -> None:
 
 
 def load_placed(name: str, direction: str | None, loop: str, *, placed: bool = False) -> "Scene":
-    """Load a scene as it is looked at: for a direction of travel, the workpiece placed or not."""
+    """Load a scene for a direction of travel, its best-fit placement removed or not."""
     from warpspace.scene.library import load_scene
     from warpspace.scene.model import with_direction, with_placement
 
     return with_placement(with_direction(load_scene(name), direction), loop, placed=placed)
 
 
-def say_first_order(loop: str, *scenes: "Scene") -> None:
+def warn_first_order(loop: str, *scenes: "Scene") -> None:
     from warpspace.scene.model import second_order
 
-    say_second_order(*(second_order(scene, loop) for scene in scenes))
+    warn_second_order(*(second_order(scene, loop) for scene in scenes))
 
 
-def say_second_order(*found: "SecondOrder") -> dict[str, float]:
-    """Warn where first-order numbers are not enough; the JSON object carries it in any case."""
+def warn_second_order(*estimates: "SecondOrder") -> dict[str, float]:
+    """Warn if first-order numbers are not accurate enough; JSON always reports the estimate."""
     from warpspace.field.evaluate import second_order_words
 
-    warn(*second_order_words(*found))
-    said = click.get_current_context().meta[SECOND_ORDER] = {
-        "second_order_um": max(one.um for one in found)
+    warn(*second_order_words(*estimates))
+    document = click.get_current_context().meta[SECOND_ORDER] = {
+        "second_order_um": max(one.um for one in estimates)
     }
-    return said
+    return document
 
 
 def print_json(value: Mapping[str, object]) -> None:
-    """Print one JSON object; numbers that are not finite are refused rather than misspelt."""
+    """Print one JSON object; raise an error for numbers that are not finite."""
     context = click.get_current_context(silent=True)
     click.echo(spell_json({**value, **(context.meta.get(SECOND_ORDER, {}) if context else {})}))
 
 
 def spell_json(value: object) -> str:
-    """Spell a value as JSON; numbers that are not finite are refused rather than misspelt."""
+    """Format a value as JSON; raise an error for numbers that are not finite."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, default=datetime.isoformat)
     return escape_json(text)
 
@@ -188,7 +195,7 @@ FIGURES = (".png", ".svg", ".pdf")
 ROWS = (".parquet", ".csv")
 SCENES = (".toml",)
 
-force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
+force_option = click.option("--force", is_flag=True, help="Replace FILE if it exists.")
 csv_option = click.option(
     "--csv", "csv_path", type=OutputFile(".csv"), help="Write the numbers to this CSV file."
 )
@@ -200,7 +207,7 @@ def output_option(
     added: Callable[[], Iterable[str]] = tuple,
     required: bool = True,
 ) -> Decorator:
-    """Add the option --output, of a file with one of some endings, or any."""
+    """Build the option --output for a file with one of some endings, or any."""
     kind = OutputFile(*endings, added=added)
     return click.option(
         "-o", "--output", metavar="FILE", required=required, type=kind, help=help_text
@@ -266,14 +273,14 @@ def figure_options(size: str | None = "1600x1200", sizes: str = "") -> Decorator
             type=click.Choice(VIEWS),
             default="iso",
             show_default=True,
-            help="Where the camera stands.",
+            help="Position of the camera.",
         ),
         size_option(size, f"Width and height of the picture in px.{sizes}"),
         loop_option,
         placed_option,
         direction_option,
         grid_option(),
-        click.option("--dark", is_flag=True, help="Light ink on a dark ground."),
+        click.option("--dark", is_flag=True, help="Light drawing on a dark background."),
         force_option,
     )
 

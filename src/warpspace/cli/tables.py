@@ -1,10 +1,9 @@
-"""What the commands say to people: tables and sentences that fit the terminal, and progress.
+"""Output for people: tables and sentences that fit the terminal, and progress bars.
 
-The width is that of the terminal, or what the variable COLUMNS says; 80 where the output goes into
-a file or another program. Only words wrap. A table with more columns than fit goes on below, with
-its first columns repeated, so that no number is cut and nothing is left out. A long table has its
-headings again every forty rows. Progress of what takes longer than a second stands on stderr; none
-where that is no terminal, or where a program reads the output (``--json``).
+The width is that of the terminal or of the variable COLUMNS; 80 if the output goes into a file or
+another program. Only words wrap. A table with more columns than fit continues below with its first
+columns repeated, so that no number is cut. Headings repeat every forty rows. Work of more than a
+second shows its progress on stderr, unless that is no terminal or the output is ``--json``.
 """
 
 import io
@@ -22,12 +21,12 @@ if TYPE_CHECKING:
 
     from warpspace.analysis.blocks import Column
 
-WIDTH_ELSEWHERE = 80  # characters in a line where the output is no terminal
-READABLE = 20  # characters in a line that a column of words has before others go on below
-REPEATED = 40  # rows after which a long table has its headings again
+WIDTH_ELSEWHERE = 80  # characters per line if the output is no terminal
+READABLE = 20  # characters per line of a text column before other columns move below
+REPEATED = 40  # rows after which headings repeat
 Row = Sequence[str]
-_TOGETHER = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
-"""Blanks that no line ends with: between a number and its unit, an axis and its position."""
+_UNBROKEN_SPACES = re.compile(r"(?<=\d) (?=[µm°%])|(?<= [A-Z]) (?=[-+\d])")
+"""Spaces without a line break: number and unit, axis and position."""
 
 
 def output_width() -> int:
@@ -42,7 +41,7 @@ def print_text(text: str) -> None:
     text = plain(text)
     indent = text[: len(text) - len(text.lstrip(" "))]
     lines = textwrap.wrap(
-        _TOGETHER.sub("\N{NO-BREAK SPACE}", text.strip()),
+        _UNBROKEN_SPACES.sub("\N{NO-BREAK SPACE}", text.strip()),
         max(output_width(), 20),
         initial_indent=indent,
         subsequent_indent=f"{indent}  ",
@@ -73,7 +72,7 @@ def print_table(columns: "Sequence[Column]", rows: Sequence[Row], indent: int = 
 
 
 class _Size(NamedTuple):
-    """Widths of a column, in characters: none of its words cut, pleasant to read, none wrapped."""
+    """Widths of a column, in characters: no word cut, comfortable, no line wrapped."""
 
     least: int
     readable: int
@@ -103,10 +102,10 @@ def _split(columns: "Sequence[Column]", widths: Sequence[int], room: int) -> lis
     for group in groups:
         if group[0] in leading:
             continue
-        wanted = [*parts[-1], *group]
-        fits = sum(widths[index] for index in wanted) + len(wanted) - 1 <= room
+        candidate = [*parts[-1], *group]
+        fits = sum(widths[index] for index in candidate) + len(candidate) - 1 <= room
         if fits or parts[-1] == leading:
-            parts[-1] = wanted
+            parts[-1] = candidate
         else:
             parts.append([*leading, *group])
     return parts
@@ -153,24 +152,24 @@ _STEERING = re.compile(
 
 
 def plain(text: str) -> str:
-    r"""Spell out the characters that would steer a terminal, for instance ``\x1b``."""
-    return _STEERING.sub(lambda found: _spell(found[0]), text)
+    r"""Escape control characters, for instance as ``\x1b``."""
+    return _STEERING.sub(lambda match: _spell(match[0]), text)
 
 
 def escape_json(text: str) -> str:
-    r"""Spell out the same characters in JSON text, as ``\u001b``; it means the same as before."""
-    return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+    r"""Escape control characters in JSON text as ``\u001b``; its content stays the same."""
+    return _STEERING.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
 
 def echo(text: str = "", *, err: bool = False, **style: Any) -> None:
-    """Print a text without characters that would steer the terminal."""
+    """Print a text without control characters."""
     click.secho(plain(text), err=err, **style)
 
 
 def warn(*sentences: str) -> None:
-    """Say on stderr what a reader should doubt."""
-    for words in sentences:
-        echo(f"warpspace: warning: {words}", err=True, fg="yellow")
+    """Print warnings on stderr."""
+    for sentence in sentences:
+        echo(f"warpspace: warning: {sentence}", err=True, fg="yellow")
 
 
 def _spell(character: str) -> str:
@@ -180,30 +179,30 @@ def _spell(character: str) -> str:
     return f"\\x{code:02x}" if code <= 0xFF else f"\\u{code:04x}"
 
 
-DELAY_S = 1.0  # what is done sooner shows nothing
+DELAY_S = 1.0  # before a progress bar appears
 
 
 class ProgressBar:
-    """What is done, counted in the bar that is shown, if one is."""
+    """Progress of some work, shown in a bar unless output is silent."""
 
-    def __init__(self, shown: "Progress | None" = None) -> None:
-        self._shown = shown
+    def __init__(self, bar: "Progress | None" = None) -> None:
+        self._bar = bar
 
     def advance(self, steps: float) -> None:
-        if self._shown is not None:
-            self._shown.advance(self._shown.task_ids[0], steps)
+        if self._bar is not None:
+            self._bar.advance(self._bar.task_ids[0], steps)
 
     def reach(self, share: float) -> None:
-        """Say how much of the work is done, as an analysis counts it: 0 to 1."""
-        if self._shown is not None:
-            self._shown.update(self._shown.task_ids[0], completed=share)
+        """Set the share of the work that is done, 0 to 1."""
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], completed=share)
 
 
 @contextmanager
 def progress(
     doing: str, total: float | None = None, unit: str = "", *, silent: bool = False
 ) -> Generator[ProgressBar]:
-    """Show how far some work is, in a bar that appears once it has taken a while."""
+    """Show the progress of some work in a bar that appears after a delay."""
     if silent or not sys.stderr.isatty():
         yield ProgressBar()
         return
@@ -211,7 +210,7 @@ def progress(
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     counted = "{task.completed:,.0f} of {task.total:,.0f} " + unit
-    shown = Progress(
+    bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=None),
         *([TextColumn(counted, markup=False)] if total is not None and unit else []),
@@ -222,19 +221,19 @@ def progress(
         redirect_stdout=False,
         redirect_stderr=False,
     )
-    task = shown.add_task(doing, total=total, start=False)
+    task = bar.add_task(doing, total=total, start=False)
 
     def show() -> None:
-        shown.start_task(task)
-        shown.start()
+        bar.start_task(task)
+        bar.start()
 
     timer = Timer(DELAY_S, show)
     timer.daemon = True
     timer.start()
     try:
-        yield ProgressBar(shown)
+        yield ProgressBar(bar)
     finally:
         timer.cancel()
         timer.join()
-        if shown.live.is_started:
-            shown.stop()
+        if bar.live.is_started:
+            bar.stop()

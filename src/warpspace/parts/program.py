@@ -228,7 +228,9 @@ class PathPoint:
     axes: Mapping[str, float]  # mm or degrees
     error_um: Array  # [3]
     budget: Mapping[str, float]  # contributions to |E| by parameter, µm, largest first
-    expanded_uncertainty: ExpandedUncertainty[float | None]  # u95_um of |E|; empty if none is stated
+    expanded_uncertainty: ExpandedUncertainty[
+        float | None
+    ]  # u95_um of |E|; empty if none is stated
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from warpspace.bench.data import parse_table, unit_notes
 
 
 def test_columns_may_stand_in_any_order_among_others():
-    columns = find_test("sphere").columns
+    columns = find_test("r-test").columns
     table = parse_table("note,z_um,y_um,x_um,angle_deg\na,3,2,1,0\n", columns, "x.csv")
     assert table["x_um"][0] == 1.0
     assert table["z_um"][0] == 3.0
@@ -34,7 +34,7 @@ def as_csv(test, model):
     names = [column.name for column in test.columns]
     channels = [name for name in names if name.endswith(("_um", "_urad"))]
     marks |= zip(channels, model.readings.reshape(len(channels), -1), strict=True)
-    signs = marks.get("way", marks.get("sense"))
+    signs = marks.get("travel_sign", marks.get("sense"))
 
     def cell(column, row, run):
         if column.name == "run":

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from bench_scenes import scene_with
 from warpspace import load_scene
-from warpspace.bench.kinds.ball_plate import BallPlate, left_over
+from warpspace.bench.kinds.ball_plate import BallPlate, plate_residuals
 from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import simulate
 from warpspace.exceptions import SceneError
@@ -263,7 +263,7 @@ def test_a_plate_of_holes_is_the_ball_plate_of_the_bench():
     plan = test.plan(scene)
     sites = {name: np.broadcast_to(at, 9) for name, at in plan.coordinates.items()}
     made = evaluate_points(scene, ball_point(scene.model, sites))
-    balls = left_over(plan, simulate(scene, plan, exact=False))
+    balls = plate_residuals(plan, simulate(scene, plan, exact=False))
     assert np.abs(subtract_best_fit(made.point_mm, made.error_um) - balls).max() < 1e-6
 
 

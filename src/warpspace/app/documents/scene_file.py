@@ -42,8 +42,7 @@ MAX_LINE = 400_000  # characters of a line of settings in a file
 MAX_FIELDS = 400
 SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
-# what was compared had a line of its own in files of earlier versions
-_LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
+_LINES = re.compile(r"^# warpspace-view: (\S*)\s*$", re.MULTILINE)
 Known = Sequence[Scene] | None
 """Scenes that whoever opens a file or a link also has; None for those of the program."""
 Opened = tuple[AppState, CameraMemory | None]

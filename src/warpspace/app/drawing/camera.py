@@ -246,4 +246,4 @@ class TabCamera:
         camera = self._camera
         camera.up_direction, camera.fov = place.up, place.fov_rad
         camera.position = place.position
-        camera.look_at = place.look_at  # the former takes it along
+        camera.look_at = place.look_at  # since setting the position moves it

@@ -19,7 +19,7 @@ from warpspace.analysis.blocks import (
     blocks_html,
 )
 from warpspace.app.browser.html import EMPTY, fill, join, number, tag
-from warpspace.bench.base import LEAST, lay_polar
+from warpspace.bench.base import SMALLEST_DEVIATION, lay_polar
 from warpspace.geometry.colour import tick_values
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 
@@ -228,5 +228,5 @@ def _path(points: Array, digits: int = 1, *, dots: bool = False) -> str:
 
 def _ends(values: Array) -> tuple[float, float]:
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    room = 0.04 * (high - low) if high - low >= LEAST else 1.0
+    room = 0.04 * (high - low) if high - low >= SMALLEST_DEVIATION else 1.0
     return low - room, high + room

@@ -43,7 +43,7 @@ from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
 from warpspace.calibration.calibration_result import Calibration
 from warpspace.calibration.readings import bundled_data, find_data, parse_readings, parse_table
-from warpspace.calibration.registry import KINDS, RENAMED, test_kinds
+from warpspace.calibration.registry import KINDS
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
@@ -182,7 +182,7 @@ class TestsPanel(FilesPanel):
         told = tag("p", "A difference of two machines cannot be tested: show A or B.",
                    class_="ws-problem", role="alert")  # fmt: skip
         columns = ",".join(column.name for column in kind.columns)
-        about = join(tag("p", one) for one in (kind.words, f"Columns of a file: {columns}"))
+        about = join(tag("p", one) for one in (kind.description, f"Columns of a file: {columns}"))
         return join((
             chosen, told if picture.is_difference else self._body(state), self.files_html(),
             EMPTY if self._files else self.upload_html("Measured readings …"),
@@ -282,7 +282,7 @@ class CalibratePanel(FilesPanel):
         words = "CSV files of readings give the errors of this machine."
         bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
         kinds = {"": "recognised from its columns"}
-        kinds |= {name: _kind_words(name) for name in (*KINDS, *test_kinds())}
+        kinds |= {name: _kind_words(name) for name in (*KINDS, *bench_names())}
         name, _, options = self._kind_of_next.partition(":")
         return join((
             self.files_html(), EMPTY if self._files else tag("p", words, class_="ws-quiet"),
@@ -291,7 +291,7 @@ class CalibratePanel(FilesPanel):
             labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
                      hint="Kind of readings that are added next"),
             text_box("calibrate:test-options", options, label="Options of the test",
-                     placeholder="plane=XZ:radius=150") if name in test_kinds() else EMPTY,
+                     placeholder="plane=XZ:radius=150") if name in bench_names() else EMPTY,
         ))  # fmt: skip
 
     def headline(self, found: Result) -> Markup:
@@ -322,7 +322,7 @@ class CalibratePanel(FilesPanel):
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
         if word == "kind":
-            self._kind_of_next = value if value in (*KINDS, *test_kinds()) else ""
+            self._kind_of_next = value if value in (*KINDS, *bench_names()) else ""
         elif word == "test-options":
             name = self._kind_of_next.partition(":")[0]
             self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
@@ -377,4 +377,4 @@ def _kind_words(kind: str) -> str:
     name, _, _ = kind.partition(":")
     if name in KINDS:
         return KINDS[name].words
-    return find_test(RENAMED.get(name, name)).title if name in test_kinds() else name
+    return find_test(name).title if name in bench_names() else name

@@ -166,7 +166,9 @@ class ProgramPanel(InBoxPanel):
 
         *rest, worst = (one for one in found.blocks() if isinstance(one, Table))
         line, *others = worst.columns
-        others = (replace(one, shows=one.heading in ("|E|", "largest contributions")) for one in others)
+        others = (
+            replace(one, shows=one.heading in ("|E|", "largest contributions")) for one in others
+        )
         narrow = replace(worst, columns=(replace(line, form=link), *others))
         return block_html(narrow) + details_html((*rest, worst))
 

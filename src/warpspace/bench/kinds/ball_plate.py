@@ -17,7 +17,7 @@ from warpspace.geometry.surfaces import round_down
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
 
-SHOWN = 0.35  # share of the pitch that the largest deviation is drawn with, at most
+DRAWN_SHARE = 0.35  # of the pitch: length of the largest deviation as drawn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,18 +27,18 @@ class BallPlate(BenchTest):
     name = "ball-plate"
     title = "Ball plate"
     standard = "ISO 10360-2, ASME B89.4.10360.2 (artefact)"
-    words = (
+    description = (
         "A plate with a grid of balls (or holes) lies in a plane of the machine and is measured"
-        " in several positions along the third axis. In each the six ways in which the plate can"
-        " lie are fitted; what is left are errors of the machine. An affine fit gives the scales"
-        " of both axes and their squareness; the largest error of a distance between any two balls"
-        " is what acceptance tests ask for."
+        " in several positions along the third axis. In each the six degrees of freedom of the"
+        " plate are fitted; the residuals are errors of the machine. An affine fit gives the"
+        " scales of both axes and their squareness; the largest error of a distance between any"
+        " two balls is the quantity of acceptance tests."
     )
     columns = (*(DataColumn(name, "number") for name in ("position", "row", "column")), *XYZ)
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the plate")
     balls: int = option(5, "Balls along each side", low=2, high=20)
     pitch_mm: float | None = option(
-        None, "Distance of the balls", unset="the plate fills the range", unit="mm"
+        None, "Distance of the balls", unset="to fill the range", unit="mm"
     )
     positions: int = option(3, "Positions of the plate along the third axis", low=1, high=10)
 
@@ -49,34 +49,34 @@ class BallPlate(BenchTest):
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         problems: list[str] = []
-        given: dict[str, Array] = {}
-        for name, most in (
+        indices: dict[str, Array] = {}
+        for name, largest in (
             ("position", self.positions),
             ("row", self.balls),
             ("column", self.balls),
         ):
             values = table[name]
-            wrong = (values != np.round(values)) | (values < 1) | (values > most)
+            wrong = (values != np.round(values)) | (values < 1) | (values > largest)
             problems += [
-                f"line {int(line)}, {name}: {value:g}; expected a whole number from 1 to {most}"
-                f" (--{'positions' if name == 'position' else 'balls'} {most})"
+                f"line {int(line)}, {name}: {value:g}; expected a whole number from 1 to {largest}"
+                f" (--{'positions' if name == 'position' else 'balls'} {largest})"
                 for line, value in zip(table.lines[wrong], values[wrong], strict=True)
             ]
-            given[name] = values - 1.0
-        for index in np.unique(given["position"]):
-            balls = int((given["position"] == index).sum())
+            indices[name] = values - 1.0
+        for index in np.unique(indices["position"]):
+            balls = int((indices["position"] == index).sum())
             if balls < 4 and not problems:
                 problems.append(f"position {index + 1:g}: {balls} balls; expected at least 4")
         if problems:
             raise table.refuse(*problems)
         readings = np.concatenate([table["x_um"], table["y_um"], table["z_um"]])
-        return self._lay(scene, given["position"], given["row"], given["column"]), readings
+        return self._lay(scene, indices["position"], indices["row"], indices["column"]), readings
 
     def _lay(self, scene: Scene, number: Array, row: Array, column: Array) -> BenchPlan:
         first, second, _ = placing.plane_axes(scene.machine, self.plane)
         names = placing.following_axes(scene.model)
         third = next(name for name in names if name not in (first, second))
-        stand, model = self.stand(scene), self.model(scene)
+        stand, model = self.axis_positions(scene), self.model(scene)
         low, high = scene.workspace.ranges[third]
         heights = np.linspace(low, high, self.positions)
         if self.positions == 1:
@@ -90,21 +90,21 @@ class BallPlate(BenchTest):
         count = len(number)
         point = placing.tool_points(model, coordinates, count)
         axes = np.stack([placing.axis_vector(model, stand, name) for name in names], -1)
-        seen = np.broadcast_to(placing.relative_point(model, coordinates), (count, 3)) @ axes
+        nominal = np.broadcast_to(placing.relative_point(model, coordinates), (count, 3)) @ axes
         sign = placing.find_plane(model, stand, self.plane).sign
         marks = {"position": number, "row": row, "column": column}
         marks["gain_sign"] = np.full(count, sign)
-        marks |= {f"seen_{axis}_mm": seen[:, index] for index, axis in enumerate("xyz")}
+        marks |= {f"seen_{axis}_mm": nominal[:, index] for index, axis in enumerate("xyz")}
         return build_plan(
             coordinates,
             point,
             np.repeat(axes.T, count, axis=0),
             place=f"plate in {self.plane} · {third} "
             + ", ".join(f"{value:g}" for value in heights)
-            + f" · {self.place_words(scene, names)}",
+            + f" · {self.place_text(scene, names)}",
             marks={name: np.tile(values, 3) for name, values in marks.items()},
             site=np.tile(np.arange(count), 3),
-            setup=_lying(number, seen),
+            setup=_plate_setup(number, nominal),
             path=tuple(np.flatnonzero(number == index) for index in np.unique(number)),
         )
 
@@ -121,26 +121,28 @@ class BallPlate(BenchTest):
         return (low + high) / 2.0 + pitch * (index - (self.balls - 1) / 2.0)
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        rest = left_over(plan, readings)
+        residual_um = plate_residuals(plan, readings)
         first, second, key = placing.PLANES[self.plane]
         sign = float(plan.marks["gain_sign"][0])
-        seen = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[: len(rest)]
-        number = plan.marks["position"][: len(rest)]
+        nominal = np.stack([plan.marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[
+            : len(residual_um)
+        ]
+        number = plan.marks["position"][: len(residual_um)]
         columns = ["XYZ".index(name) for name in (first, second)]
         rows: list[dict[str, object]] = []
         for index in np.unique(number):
             chosen = number == index
-            part, place = rest[chosen], seen[chosen][:, columns]
-            scale_1, scale_2, angle = _affine(place, part[:, columns])
+            deviation, position = residual_um[chosen], nominal[chosen][:, columns]
+            scale_1, scale_2, angle = _affine(position, deviation[:, columns])
             rows.append(
                 {
                     "position": int(index) + 1,
-                    "rms_um": float(np.sqrt(np.mean(np.sum(part**2, axis=-1)))),
+                    "rms_um": float(np.sqrt(np.mean(np.sum(deviation**2, axis=-1)))),
                     f"scale_{first}_um_per_m": scale_1,
                     f"scale_{second}_um_per_m": scale_2,
                     "squareness_urad": sign * angle,
-                    "flatness_um": float(np.ptp(part[:, 3 - sum(columns)])),
-                    "length_error_um": _length_error(seen[chosen], part),
+                    "flatness_um": float(np.ptp(deviation[:, 3 - sum(columns)])),
+                    "length_error_um": _length_error(nominal[chosen], deviation),
                 }
             )
 
@@ -169,24 +171,24 @@ class BallPlate(BenchTest):
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         first, second = placing.PLANES[self.plane][:2]
         columns = ["XYZ".index(name) for name in (first, second)]
-        largest = max(float(np.abs(left_over(run.plan, run.readings)).max()) for run in runs)
+        largest = max(float(np.abs(plate_residuals(run.plan, run.readings)).max()) for run in runs)
         marks = runs[0].plan.marks
         count = runs[0].plan.readings // 3
-        seen = np.stack([marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[:count][:, columns]
-        pitch = float(np.ptp(seen, axis=0).min()) / max(self.balls - 1, 1)
-        wanted = SHOWN * pitch * UM_PER_MM / largest if largest > 1e-6 else 1.0
-        factor = round_down(wanted) if wanted > 0.0 else 1.0
+        nominal = np.stack([marks[f"seen_{axis}_mm"] for axis in "xyz"], -1)[:count][:, columns]
+        pitch = float(np.ptp(nominal, axis=0).min()) / max(self.balls - 1, 1)
+        exact_factor = DRAWN_SHARE * pitch * UM_PER_MM / largest if largest > 1e-6 else 1.0
+        factor = round_down(exact_factor) if exact_factor > 0.0 else 1.0
         charts: list[Lines] = []
         for index in np.unique(marks["position"]):
             chosen = marks["position"][:count] == index
             ball_row = marks["row"][:count][chosen]
             ball_column = marks["column"][:count][chosen]
-            curves = list(_net("nominal", seen[chosen], ball_row, ball_column, 5, "thin"))
+            curves = list(_net("nominal", nominal[chosen], ball_row, ball_column, 5, "thin"))
             for run in runs:
-                rest = left_over(run.plan, run.readings)[chosen][:, columns]
-                moved = seen[chosen] + factor * rest / UM_PER_MM
+                residual_um = plate_residuals(run.plan, run.readings)[chosen][:, columns]
+                moved = nominal[chosen] + factor * residual_um / UM_PER_MM
                 style = "dots" if run.is_measured else "line"
-                curves += _net(run.named("actual"), moved, ball_row, ball_column, 0, style)
+                curves += _net(run.label("actual"), moved, ball_row, ball_column, 0, style)
             charts.append(
                 Lines(
                     "plane", f"Position {int(index) + 1}", f"{first.lower()} [mm]",
@@ -197,24 +199,24 @@ class BallPlate(BenchTest):
         return tuple(charts)
 
 
-def left_over(plan: BenchPlan, readings: Array) -> Array:
-    """Give the deviations of the balls once the place of the plate is fitted, [b, 3], µm."""
+def plate_residuals(plan: BenchPlan, readings: Array) -> Array:
+    """Compute the deviations of the balls after a best fit of the plate, [b, 3], µm."""
     return fit_setup(plan, readings)[1].reshape(3, -1).T
 
 
-def _lying(number: Array, seen: Array) -> dict[str, Array]:
-    found: dict[str, Array] = {}
+def _plate_setup(number: Array, nominal: Array) -> dict[str, Array]:
+    columns: dict[str, Array] = {}
     for index in np.unique(number):
         inside = (number == index).astype(float)
-        middle = seen[number == index].mean(axis=0)
-        arm = (seen - middle) * inside[:, None] * 1e-3
+        middle = nominal[number == index].mean(axis=0)
+        arm = (nominal - middle) * inside[:, None] * 1e-3
         for axis, letter in enumerate("xyz"):
-            shift = np.zeros((len(seen), 3))
+            shift = np.zeros((len(nominal), 3))
             shift[:, axis] = inside
             turn = np.cross(np.eye(3)[axis], arm)
-            found[f"position_{int(index) + 1}_{letter}_um"] = shift.T.reshape(-1)
-            found[f"position_{int(index) + 1}_about_{letter}_urad"] = turn.T.reshape(-1)
-    return found
+            columns[f"position_{int(index) + 1}_{letter}_um"] = shift.T.reshape(-1)
+            columns[f"position_{int(index) + 1}_about_{letter}_urad"] = turn.T.reshape(-1)
+    return columns
 
 
 def _affine(place: Array, deviation: Array) -> tuple[float, float, float]:
@@ -225,11 +227,11 @@ def _affine(place: Array, deviation: Array) -> tuple[float, float, float]:
     return float(first[1] * 1e3), float(second[2] * 1e3), float((first[2] + second[1]) * 1e3)
 
 
-def _length_error(seen: Array, deviation: Array) -> float:
-    one, other = np.triu_indices(len(seen), 1)
-    apart = seen[one] - seen[other]
+def _length_error(nominal: Array, deviation: Array) -> float:
+    first, second = np.triu_indices(len(nominal), 1)
+    apart = nominal[first] - nominal[second]
     length = np.linalg.norm(apart, axis=-1)
-    error = np.sum((deviation[one] - deviation[other]) * apart, axis=-1) / length
+    error = np.sum((deviation[first] - deviation[second]) * apart, axis=-1) / length
     return float(error[np.argmax(np.abs(error))])
 
 

@@ -2,28 +2,26 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, cast
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpspace.analysis.blocks import Curve, Lines
-from warpspace.analysis.description import ProgressCallback
 from warpspace.analysis.options import Axis, option
 from warpspace.bench import placing
-from warpspace.bench.base import BenchResult, BenchRun, BenchTest, run_test
+from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ANGLE, DIRECTION, DataColumn, ReadingsFile
-from warpspace.bench.plan import RELATIVE, BenchPlan, BenchQuantity, Outcome, build_plan, simulate
+from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, build_plan
 from warpspace.exceptions import OptionError
-from warpspace.field.evaluate import evaluate_first_order
 from warpspace.field.grid import Workspace
 from warpspace.machine.axes import is_linear
-from warpspace.scene.model import Scene, second_order
+from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM_URAD, Array
 
 DEFAULT_POINTS, MIN_POINTS, MAX_POINTS = 360, 8, 100_000
 TURN = 360.0
-LEEWAY_DEG = 5.0  # by which the ends of an arc may differ, unsaid
+LEEWAY_DEG = 5.0  # difference of the ends of an arc that is not reported
 ALIKE_UM = 1e-6  # runs that differ by less are drawn as one
 SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
 
@@ -31,13 +29,13 @@ SENSES = {1.0: "counter-clockwise", -1.0: "clockwise"}
 # Centre, radius, ellipse, hysteresis (ISO 230-4).
 
 FULL_DEG = 314.0
-"""Arcs that reach so far round count as full circles: eight points have gaps of 45°."""
-HALF_DEG = 180.0  # an ellipse is told from a displaced centre from half a circle upwards
+"""Arcs from which a circle counts as full: eight points have gaps of 45°."""
+HALF_DEG = 180.0  # shorter arcs cannot separate an ellipse from a displaced centre
 
 
 @dataclass(frozen=True)
 class CircleFit:
-    """Parts of a trace of radial readings."""
+    """Components of a trace of radial readings."""
 
     radial_um: Array  # [m]; readings about the least-squares centre
     centre_um: tuple[float, float]
@@ -57,7 +55,7 @@ class CircleFit:
 
 
 def covered_deg(angle_deg: Array) -> float:
-    """Tell how far round angles reach: the turn less the largest gap, degrees."""
+    """Compute the arc that angles cover: the turn less the largest gap, degrees."""
     sorted_deg = np.unique(np.round(np.mod(angle_deg, 360.0), 6))
     gaps = np.diff(np.append(sorted_deg, sorted_deg[0] + 360.0))
     return 360.0 - float(gaps.max())
@@ -71,15 +69,15 @@ def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
     """Fit centre, radius and ellipse to the readings, [m], µm, of a circular plan.
 
     Its marks are angle_deg, sense, along and up (the direction of the bar along the two axes of the
-    plane). With the mark as_read the centre is an error of the machine,
-    not of the set-up, and stays in: the ball beside a rotary axis turns with it.
+    plane). With the mark as_read the centre is an error of the machine
+    and stays in: a ball beside a rotary axis turns with it.
 
     Notes
     -----
     Least squares of ``1, cos φ, sin φ, cos 2φ, sin 2φ``; of the first three where the arc is
     shorter than half a circle. A squareness γ gives ∓γ·R/2·sin 2φ. G and G(b) are ranges about the
     least-squares centre, never less than the width of the narrowest ring about the path; which of
-    the two ISO 230-4 means could not be seen.
+    the two ISO 230-4 means is not verified.
     """
     marks = plan.marks
     along, up, sense = marks["along"], marks["up"], marks["sense"]
@@ -90,21 +88,21 @@ def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
         elliptic = covered_deg(marks["angle_deg"][rows]) >= HALF_DEG - 1e-6
         part = design[rows, : 5 if elliptic else 3]
         fit = np.asarray(np.linalg.lstsq(part, readings[rows], rcond=None)[0], dtype=np.float64)
-        kept = readings[rows]
-        return fit, kept if as_read else kept - part[:, 1:3] @ fit[1:3]
+        values = readings[rows]
+        return fit, values if as_read else values - part[:, 1:3] @ fit[1:3]
 
     fit, radial = centred(np.ones(len(readings), dtype=bool))
     elliptic = len(fit) == 5
     senses = [sign for sign in (1.0, -1.0) if (sense == sign).any()]
-    both = len(senses) == 2
+    both_senses = len(senses) == 2
     return CircleFit(
         radial,
         (float(fit[1]), float(fit[2])),
         float(fit[0]),
         float(np.ptp(radial)),
         {sign: float(np.ptp(centred(sense == sign)[1])) for sign in senses},
-        float(np.linalg.lstsq(design[:, :3], readings, rcond=None)[0][0]) if both else None,
-        _hysteresis(marks["angle_deg"], sense, radial) if both else None,
+        float(np.linalg.lstsq(design[:, :3], readings, rcond=None)[0][0]) if both_senses else None,
+        _hysteresis(marks["angle_deg"], sense, radial) if both_senses else None,
         float(fit[4]) if elliptic else None,
         float(fit[3]) if elliptic else 0.0,
     )
@@ -112,10 +110,12 @@ def fit_circle_readings(plan: BenchPlan, readings: Array) -> CircleFit:
 
 def _hysteresis(angle_deg: Array, sense: Array, radial: Array) -> float:
     turned = np.mod(angle_deg, 360.0)
-    one, other = sense > 0.0, sense < 0.0
-    order = np.argsort(turned[other], kind="stable")
-    there = np.interp(turned[one], turned[other][order], radial[other][order], period=360.0)
-    return float(np.abs(radial[one] - there).max())
+    forward, backward = sense > 0.0, sense < 0.0
+    order = np.argsort(turned[backward], kind="stable")
+    interpolated = np.interp(
+        turned[forward], turned[backward][order], radial[backward][order], period=360.0
+    )
+    return float(np.abs(radial[forward] - interpolated).max())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,25 +125,27 @@ class Circular(BenchTest):
     name = "circular"
     title = "Circular test"
     standard = "ISO 230-4"
-    words = (
+    description = (
         "A ball bar reads the distance of the tool from a ball on the table while two axes run a"
         " circle or an arc, counter-clockwise and back. Circular deviation is the largest minus"
         " the smallest radial deviation about the least-squares centre: G of one sense about its"
         " own, G(b) of both about the common one. Radial deviations Fmax and Fmin are as read,"
         " about the centre of the instrument. An ellipse at 45° is squareness, one along the axes"
-        " a difference of their scales, a step where an axis turns back its reversal. With"
-        " --rotary the linear axes follow a ball on a rotary axis, and the bar stands in the"
-        " radial, tangential or axial direction of its circle; these readings count as they are."
+        " a difference of their scales, a step where an axis reverses its backlash. With --rotary"
+        " the linear axes follow a ball on a rotary axis, and the bar stands in the radial,"
+        " tangential or axial direction of its circle; these readings are evaluated as read."
     )
     columns = (DIRECTION, ANGLE, DataColumn("radial_um"))
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the circle")
     radius_mm: float = option(100.0, "Radius of the circle", unit="mm")
     start_deg: float = option(
-        0.0, "Where an arc begins, from the first axis towards the second", unit="°"
+        0.0, "Start of the arc, from the first axis towards the second", unit="°"
     )
-    end_deg: float = option(TURN, "Where it ends; 360 for a full circle", unit="°")
+    end_deg: float = option(TURN, "End of the arc; 360 for a full circle", unit="°")
     points: int = option(DEFAULT_POINTS, "Points of the circle", low=MIN_POINTS, high=MAX_POINTS)
-    rotary: Axis = option("", "Rotary axis that the linear axes follow instead")
+    rotary: Axis = option(
+        "", "Rotary axis that the linear axes follow, in place of the circle in a plane"
+    )
     bar: Literal["radial", "tangential", "axial"] = option(
         "radial", "Direction of the bar, with --rotary"
     )
@@ -179,12 +181,12 @@ class Circular(BenchTest):
 
     def _lay(self, scene: Scene, angle_deg: Array, sense: Array) -> BenchPlan:
         if self.rotary:
-            how = self.rotary, self.radius_mm, self.bar, self.stand(scene)
-            return placing.lay_followed(scene, self.model(scene), *how, angle_deg, sense)
+            how = self.rotary, self.radius_mm, self.bar, self.axis_positions(scene)
+            return placing.plan_followed_circle(scene, self.model(scene), *how, angle_deg, sense)
         first, second, _ = placing.plane_axes(scene.machine, self.plane)
         if not 0.0 < self.radius_mm < np.inf:
             raise OptionError(f"radius: {self.radius_mm:g} mm; expected above 0")
-        model, stand = self.model(scene), self.stand(scene)
+        model, stand = self.model(scene), self.axis_positions(scene)
         middle = {name: float(value) for name, value in stand.items()}
         check_circle(scene.workspace, middle, (first, second), self.radius_mm, angle_deg)
         plane = placing.find_plane(model, stand, self.plane)
@@ -194,10 +196,10 @@ class Circular(BenchTest):
             first: middle[first] + self.radius_mm * np.append(np.cos(theta), 0.0),
             second: middle[second] + self.radius_mm * np.append(np.sin(theta), 0.0),
         }
-        seen = placing.relative_point(model, coordinates)
-        outward = seen[:-1] - seen[-1]
+        relative = placing.relative_point(model, coordinates)
+        outward = relative[:-1] - relative[-1]
         outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
-        # A little further on: at a point of reversal an axis is about to move.
+        # slightly ahead: at a point of reversal an axis is about to move
         ahead = theta + sense * 1e-6
         return build_plan(
             coordinates,
@@ -207,7 +209,7 @@ class Circular(BenchTest):
             + ", ".join(f"{name} {value:g}" for name, value in middle.items()),
             marks={
                 "angle_deg": angle_deg, "sense": sense,
-                "along": outward @ plane.along, "up": outward @ plane.up,
+                "along": outward @ plane.first_direction, "up": outward @ plane.second_direction,
                 "gain_sign": np.full(count, plane.sign),
             },
             site=np.arange(count), against=np.full(count, count), length_mm=self.radius_mm,
@@ -216,8 +218,8 @@ class Circular(BenchTest):
                 second: np.append(np.cos(ahead) * sense, 0.0),
             },
             setup={
-                f"centre_{first}_um": outward @ plane.along,
-                f"centre_{second}_um": outward @ plane.up,
+                f"centre_{first}_um": outward @ plane.first_direction,
+                f"centre_{second}_um": outward @ plane.second_direction,
                 "bar_um": np.ones(count),
             },
             path=(np.arange(count),),
@@ -235,11 +237,11 @@ class Circular(BenchTest):
             quantities.append(
                 BenchQuantity(f"circular_deviation_{word}_um", f"G, {SENSES[sense]}", value, "µm")
             )
-        most, least = float(readings.max()), float(readings.min())
+        largest, smallest = float(readings.max()), float(readings.min())
         bar = self.bar if self.rotary else "radial"
         quantities += [
-            BenchQuantity("radial_deviation_max_um", f"{bar} deviation Fmax", most, "µm"),
-            BenchQuantity("radial_deviation_min_um", f"{bar} deviation Fmin", least, "µm"),
+            BenchQuantity("radial_deviation_max_um", f"{bar} deviation Fmax", largest, "µm"),
+            BenchQuantity("radial_deviation_min_um", f"{bar} deviation Fmin", smallest, "µm"),
         ]
         if fit.mean_radial_um is not None and fit.hysteresis_um is not None:
             label = f"mean bi-directional {bar} deviation D"
@@ -279,14 +281,14 @@ class Circular(BenchTest):
                     continue
                 order = np.argsort(angle[chosen], kind="stable")
                 x, y = angle[chosen][order], fit.radial_um[chosen][order]
-                words, full = "both ways round" if alike else word, is_full(x)
-                curves.append(run.curve(words, x, y, row, once_round=full))
+                name, full = "both directions" if alike else word, is_full(x)
+                curves.append(run.curve(name, x, y, row, once_round=full))
         fit = fit_circle_readings(runs[0].plan, runs[0].readings)
         if fit.shear_um is not None and not self.rotary:
             turn = np.linspace(0.0, TURN, 181)
-            alone = fit.radius_um + fit.shear_um * np.sin(2.0 * np.deg2rad(turn))
-            words = "mean radius and squareness alone"
-            curves.append(Curve(words, turn, alone, 2, "dashed"))
+            ellipse = fit.radius_um + fit.shear_um * np.sin(2.0 * np.deg2rad(turn))
+            name = "mean radius and squareness only"
+            curves.append(Curve(name, turn, ellipse, 2, "dashed"))
         title = f"{self.bar} deviation along the circle about {self.rotary}"
         if not self.rotary:
             title = f"{self.plane} plane, 0° at +{self.plane[0]}, 90° at +{self.plane[1]}"
@@ -315,8 +317,8 @@ def check_circle(
                 problems.append(f"{name} = {value:g} lies outside {low:g} … {high:g} mm")
             continue
         reach = (np.cos, np.sin)[axes.index(name)](ends)
-        least, most = (-1.0, 1.0) if full else (float(reach.min()), float(reach.max()))
-        first, last = value + radius_mm * least, value + radius_mm * most
+        lowest, highest = (-1.0, 1.0) if full else (float(reach.min()), float(reach.max()))
+        first, last = value + radius_mm * lowest, value + radius_mm * highest
         if first < low or last > high:
             problems.append(
                 f"{name} would run {first:g} … {last:g} mm, the volume has {low:g} … {high:g} mm"
@@ -328,129 +330,3 @@ def check_circle(
         )
         hint = f"; largest radius about this centre: {room:g} mm" if full and room > 0.0 else ""
         raise OptionError(f"the circle leaves the working volume: {'; '.join(problems)}{hint}")
-
-
-@dataclass(frozen=True, slots=True)
-class Ballbar:
-    """Result of a circular test."""
-
-    plane: str  # "XY", "XZ" or "YZ"
-    radius_mm: float
-    centre: Mapping[str, float]  # mm or degrees; axis positions of the centre
-    angle_deg: Array  # [n]; from the first axis of the plane towards the second, counter-clockwise
-    # [n]; radial deviation from the nominal circle about the least-squares centre, run counter-
-    # clockwise
-    radial_um: Array
-    # [n]; the same of the clockwise run, in the order it is run. It differs only where errors
-    # depend on the direction of travel: a rigid-body model has no following errors.
-    clockwise_um: Array
-    # G of ISO 230-4: largest minus smallest radial deviation, both runs together
-    circular_deviation_um: float
-    # out of the sin 2φ part of the trace, in the sign of `squareness_key`: what a ball bar calls
-    # squareness, angular errors that look like it included
-    squareness_urad: float
-    squareness_key: str  # parameter it stands for
-    given_urad: float  # value of that parameter in the error set
-    centre_um: tuple[float, float]  # position of the least-squares centre against the commanded one
-    radius_um: float  # mean radius minus nominal radius
-    # amplitude of the cos 2φ part: the first axis runs longer than the second
-    scale_difference_um: float
-
-    @property
-    def clockwise_there_um(self) -> Array:
-        """The clockwise run at the angles of the other one, µm."""
-        return np.roll(self.clockwise_um[::-1], 1)
-
-    @property
-    def hysteresis_um(self) -> float:
-        """H of ISO 230-4: largest difference of the runs at one angle, µm."""
-        return float(np.abs(self.radial_um - self.clockwise_there_um).max())
-
-
-def ballbar(
-    scene: Scene,
-    *,
-    plane: str,
-    radius_mm: float,
-    centre: Mapping[str, float] | None = None,
-    points: int = DEFAULT_POINTS,
-) -> Ballbar:
-    """Run the circular test of ISO 230-4 on the errors of a scene, to first order.
-
-    Parameters
-    ----------
-    scene : Scene
-    plane : str
-        "XY", "XZ" or "YZ".
-    radius_mm : float, mm
-    centre : mapping of str to float, mm or degrees, optional
-        Axis positions; the middle of the working volume where absent.
-    points : int, optional
-
-    Returns
-    -------
-    Ballbar
-
-    Raises
-    ------
-    OptionError, UnknownNameError
-        If the circle cannot be run in the working volume of the scene.
-
-    Examples
-    --------
-    >>> import warpspace
-    >>> scene = warpspace.load_scene("dvf5000_first")
-    >>> result = warpspace.ballbar(scene, plane="XY", radius_mm=150)
-    >>> round(result.circular_deviation_um, 2), round(result.squareness_urad, 2)
-    (6.86, 2.94)
-    """
-    key = placing.plane_axes(scene.machine, plane)[2]
-    at = tuple((centre or {}).items())
-    test = Circular(plane=cast("Any", plane), radius_mm=radius_mm, at=at, points=points)
-    plan = test.plan(scene)
-    readings = simulate(scene, plan, exact=False)
-    fit, outcome = fit_circle_readings(plan, readings), test.evaluate(plan, readings)
-    stand = test.stand(scene)
-    middle = evaluate_first_order(scene.model, scene.errors, stand, RELATIVE).error_um
-    found = placing.find_plane(scene.model, stand, plane)
-    there = [float(middle @ vector) for vector in (found.along, found.up)]
-    return Ballbar(
-        plane,
-        radius_mm,
-        {name: float(value) for name, value in stand.items()},
-        plan.marks["angle_deg"][:points],
-        fit.radial_um[:points],
-        np.roll(fit.radial_um[points:], 1),
-        fit.deviation_um,
-        outcome["squareness_urad"],
-        key,
-        scene.errors.amplitude(key),
-        (fit.centre_um[0] + there[0], fit.centre_um[1] + there[1]),
-        fit.radius_um,
-        fit.scale_difference_um,
-    )
-
-
-@dataclass(frozen=True)
-class FormerResult(BenchResult):
-    """What the former command `ballbar` gives."""
-
-    def as_json(self) -> dict[str, Any]:
-        found = self.model.outcome
-        sense = self.model.plan.marks["sense"]
-        return {
-            "circular_deviation_um": found["circular_deviation_um"],
-            "squareness_urad": found["squareness_urad"],
-            "radial_um": np.asarray(found.details["radial_um"])[sense > 0.0].tolist(),
-            "second_order_um": self.second_order.um if self.second_order else None,
-        }
-
-
-@dataclass(frozen=True, kw_only=True)
-class FormerBallbar(Circular):
-    """The circular test as the former command `ballbar` has it: to first order."""
-
-    def run(self, scene: Scene, _watch: ProgressCallback, /) -> FormerResult:
-        found = run_test(scene, self, self.data, exact=False)
-        left_out = second_order(scene, RELATIVE.loop)
-        return FormerResult(found.test, found.scene, found.runs, found.notes, second_order=left_out)

@@ -20,14 +20,14 @@ from warpspace.machine.definition import Machine
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-SEEDS = 73  # positions of each rotary axis at which a start is looked for
+SEEDS = 73  # positions of each rotary axis tried as a start
 STEPS = 30
-CLOSE = 1e-9  # length of what is left of the direction: a thousandth of a microradian
-PENALTY = 0.02  # of a way of one radian from the position before, where several positions fit
+CLOSE = 1e-9  # residual of the direction: a thousandth of a microradian
+PENALTY = 0.02  # per radian from the start, to choose among several solutions
 
 
 def orient(
-    machine: Machine, model: Model, stand: Mapping[str, Array], wanted: Array
+    machine: Machine, model: Model, stand: Mapping[str, Array], tool_axes: Array
 ) -> dict[str, Array]:
     names = [axis.name for axis in machine.axes.values() if not axis.is_linear]
     if len(names) < 2:
@@ -50,25 +50,25 @@ def orient(
         ),
         -1,
     ).reshape(-1, 2)
-    reached = direction(seeds)
-    here = np.array([float(stand[name]) for name in names])
-    cost = np.linalg.norm(reached - wanted[0], axis=-1)
-    cost = cost + PENALTY * np.abs(np.deg2rad(seeds - here)).sum(axis=-1)
+    directions = direction(seeds)
+    start = np.array([float(stand[name]) for name in names])
+    cost = np.linalg.norm(directions - tool_axes[0], axis=-1)
+    cost = cost + PENALTY * np.abs(np.deg2rad(seeds - start)).sum(axis=-1)
     angles = seeds[int(np.argmin(cost))]
-    found = np.empty((len(wanted), 2))
-    for row, target in enumerate(wanted):
+    solution = np.empty((len(tool_axes), 2))
+    for row, target in enumerate(tool_axes):
         angles = _newton(direction, angles, target)
-        missed = float(np.linalg.norm(direction(angles) - target))
-        if missed > 1e-6:
+        gap = float(np.linalg.norm(direction(angles) - target))
+        if gap > 1e-6:
             raise OptionError(
                 f"{names[0]} and {names[1]} cannot turn the tool along the cone:"
-                f" {np.rad2deg(missed):.2g}° are missing at point {row + 1}"
+                f" {np.rad2deg(gap):.2g}° are missing at point {row + 1}"
             )
-        found[row] = angles
+        solution[row] = angles
     for column, (low, high) in enumerate(limits):
         if high - low >= 360.0 - 1e-9:
-            found[:, column] = low + np.mod(found[:, column] - low, 360.0)
-    return {**stand, names[0]: found[:, 0], names[1]: found[:, 1]}
+            solution[:, column] = low + np.mod(solution[:, column] - low, 360.0)
+    return {**stand, names[0]: solution[:, 0], names[1]: solution[:, 1]}
 
 
 def _newton(direction: Callable[[Array], Array], start: Array, target: Array) -> Array:
@@ -86,7 +86,7 @@ def _newton(direction: Callable[[Array], Array], start: Array, target: Array) ->
     return angles
 
 
-MOST = 3_600  # readings of one file: the rotary axes are found for one after the other
+MAX_READINGS = 3_600  # of one file: the rotary axes are solved for each
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +96,7 @@ class ConeFrustum(BenchTest):
     name = "cone-frustum"
     title = "Cone frustum"
     standard = "ISO 10791-7, M3"
-    words = (
+    description = (
         "The tool runs round a cone that stands tilted on the table, its axis along the flank, so"
         " that three linear and two rotary axes move at once. A ball bar from the middle of the"
         " circle, or the roundness of the machined cone, gives the radial deviation: circularity"
@@ -118,8 +118,8 @@ class ConeFrustum(BenchTest):
         return self._lay(scene, np.linspace(0.0, 360.0, self.points, endpoint=False))
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
-        if len(table) > MOST:
-            raise table.refuse(f"has {len(table):,} readings; expected at most {MOST:,}")
+        if len(table) > MAX_READINGS:
+            raise table.refuse(f"has {len(table):,} readings; expected at most {MAX_READINGS:,}")
         table.check_angles(8, "circle", "readings")
         order = np.argsort(table["angle_deg"], kind="stable")
         return self._lay(scene, table["angle_deg"][order]), table["radial_um"][order]
@@ -132,7 +132,7 @@ class ConeFrustum(BenchTest):
                 f"{{half_apex_deg}} {self.half_apex_deg:g}, {{tilt_deg}} {self.tilt_deg:g};"
                 " expected 0 to 90 and -90 to 90 degrees"
             )
-        model, stand = self.model(scene), self.stand(scene)
+        model, stand = self.model(scene), self.axis_positions(scene)
         middle = (
             np.asarray(placing.ball_point(model, stand))
             if self.centre is None
@@ -151,21 +151,21 @@ class ConeFrustum(BenchTest):
         direction = transforms.rotate(
             np.broadcast_to(pose, (len(theta), 4, 4))[..., :3, :3], outward
         )
-        spelled = ", ".join(f"{value:.4g}" for value in middle)
+        centre_text = ", ".join(f"{value:.4g}" for value in middle)
         return build_plan(
             coordinates,
             placing.tool_points(model, coordinates, len(theta)),
             direction,
             place=f"cone {2 * self.half_apex_deg:g}° tilted by {self.tilt_deg:g}° · radius"
-            f" {self.radius_mm:g} mm about ({spelled}) mm",
+            f" {self.radius_mm:g} mm about ({centre_text}) mm",
             marks={
                 "angle_deg": angle_deg, "sense": np.ones(len(theta)),
                 "along": np.cos(theta), "up": np.sin(theta),
             },
             length_mm=self.radius_mm,
-            travel=placing.travels(coordinates, np.ones(len(theta))),
+            travel=placing.travel_directions(coordinates, np.ones(len(theta))),
             setup={
-                **placing.ball_columns(model, coordinates, direction),
+                **placing.ball_setup(model, coordinates, direction),
                 "bar_um": np.ones(len(theta)),
             },
         )  # fmt: skip

@@ -12,45 +12,45 @@ from warpspace.bench.base import BenchRun, BenchTest
 from warpspace.bench.data import ALONG, DataColumn, ReadingsFile
 from warpspace.bench.kinds.positioning import target_statistics
 from warpspace.bench.placing import PLANES, find_plane, following_axes, relative_point, tool_points
-from warpspace.bench.plan import BenchPlan, BenchQuantity, Outcome, Whole, build_plan
+from warpspace.bench.plan import BenchPlan, BenchQuantity, IndexArray, Outcome, build_plan
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-BODY = ("PPP", "NPP", "PNP", "PPN")  # which way x, y and z run: P upwards, N downwards
-FACES = tuple(f"{plane}:{way}" for plane in PLANES for way in ("PP", "NP"))
+BODY = ("PPP", "NPP", "PNP", "PPN")  # senses of x, y and z: P upwards, N downwards
+FACES = tuple(f"{plane}:{senses}" for plane in PLANES for senses in ("PP", "NP"))
 
 
 def diagonal_signs(names: Sequence[str]) -> Array:
-    """Give which way x, y and z run along diagonals, [d, 3]: +1, −1, or 0 where one stands."""
+    """Return the senses of x, y and z along diagonals, [d, 3]: +1, −1, or 0 if at rest."""
     signs = np.zeros((len(names), 3))
     for row, name in enumerate(names):
         first, _, second = name.partition(":")
-        for axis, way in zip(first if second else "XYZ", second or first, strict=True):
-            signs[row, "XYZ".index(axis)] = 1.0 if way == "P" else -1.0
+        for axis, letter in zip(first if second else "XYZ", second or first, strict=True):
+            signs[row, "XYZ".index(axis)] = 1.0 if letter == "P" else -1.0
     return signs
 
 
-def means_along(position: Array, way: Array, readings: Array) -> dict[str, Array]:
-    """Take the mean at each position: of each direction, of both, and their difference."""
+def means_along(position: Array, travel_sign: Array, readings: Array) -> dict[str, Array]:
+    """Compute the means at each position: per direction, of both, and their difference."""
     position = np.round(position, 3)
-    both = target_statistics(position, way, readings).mean
-    ways = both[np.isfinite(both).all(axis=1)]
-    if not len(ways):
-        ways = target_statistics(position, np.ones(len(way)), readings).mean[:1]
-    found = {"all": ways, "mean": ways.mean(axis=0)}
-    if len(ways) == 2:
-        found["reversal"] = ways[0] - ways[1]
-    return found
+    by_direction = target_statistics(position, travel_sign, readings).mean
+    complete = by_direction[np.isfinite(by_direction).all(axis=1)]
+    if not len(complete):
+        complete = target_statistics(position, np.ones(len(travel_sign)), readings).mean[:1]
+    means = {"all": complete, "mean": complete.mean(axis=0)}
+    if len(complete) == 2:
+        means["reversal"] = complete[0] - complete[1]
+    return means
 
 
 def squareness_of_diagonals(
     plan: BenchPlan, names: Sequence[str], lengths: Array
 ) -> dict[str, float]:
-    """Squareness errors that the lengths of diagonals look like, µrad.
+    """Fit the squareness errors that explain the lengths of diagonals, µrad.
 
     A squareness of γ between axes of lengths a and b changes a diagonal of length L by ±γ·a·b/L;
-    what all diagonals have in common is scale.
+    the common part of all diagonals is scale.
     """
     start = {name: np.flatnonzero(plan.marks["diagonal"] == i) for i, name in enumerate(names)}
     if any(len(rows) == 0 for rows in start.values()):
@@ -75,15 +75,15 @@ class Diagonals(BenchTest):
     name = "diagonals"
     title = "Diagonal displacement"
     standard = "ISO 230-6"
-    words = (
-        "A laser interferometer looks along the four body diagonals of the working volume, or the"
-        " two diagonals of each face through its middle; the tool runs along them and back."
+    description = (
+        "A laser interferometer measures along the four body diagonals of the working volume, or"
+        " the two diagonals of each face through its middle; the tool runs along them and back."
         " Displacements count from the start. E, M and B are those of ISO 230-2 along each"
-        " diagonal; diagonals of different length betray squareness errors. Step diagonals move"
-        " one axis after the other, so that the part of each axis can be told."
+        " diagonal; diagonals of different length indicate squareness errors. Step diagonals move"
+        " one axis after the other, which separates the contributions of the axes."
     )
     columns = (DataColumn("diagonal", "name"), *ALONG)
-    kind: Literal["body", "face", "step"] = option("body", "Which diagonals")
+    kind: Literal["body", "face", "step"] = option("body", "Kind of diagonals")
     targets: int = option(11, "Targets along each diagonal", low=2, high=500)
 
     @property
@@ -104,10 +104,10 @@ class Diagonals(BenchTest):
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         names = self.names
-        problems = table.unknown_words("diagonal", names, f"one of {', '.join(names)}")
+        problems = table.unknown_labels("diagonal", names, f"one of {', '.join(names)}")
         if problems:
             raise table.refuse(*problems)
-        number = np.array([names.index(word) for word in table.words["diagonal"]], dtype=float)
+        number = np.array([names.index(word) for word in table.labels["diagonal"]], dtype=float)
         if self.kind == "step":
             return self._step_data(scene, table, number)
         start, end = self._ends(scene)
@@ -138,17 +138,17 @@ class Diagonals(BenchTest):
             raise OptionError(
                 f"diagonals need a range of {', '.join(flat)} in [workspace]; expected [low, high]"
             )
-        stand = self.stand(scene)
-        here = np.array([float(stand[name]) for name in axes])
-        start = np.where(signs > 0.0, low, np.where(signs < 0.0, high, here))
-        end = np.where(signs > 0.0, high, np.where(signs < 0.0, low, here))
+        stand = self.axis_positions(scene)
+        positions = np.array([float(stand[name]) for name in axes])
+        start = np.where(signs > 0.0, low, np.where(signs < 0.0, high, positions))
+        end = np.where(signs > 0.0, high, np.where(signs < 0.0, low, positions))
         return start, end
 
-    def _lay(self, scene: Scene, number: Array, way: Array, share: Array) -> BenchPlan:
+    def _lay(self, scene: Scene, number: Array, travel_sign: Array, share: Array) -> BenchPlan:
         start, end = self._ends(scene)
         index = number.astype(np.intp)
         positions = start[index] + share[:, None] * (end - start)[index]
-        return self._plan(scene, positions, index, {"diagonal": number, "way": way})
+        return self._plan(scene, positions, index, {"diagonal": number, "travel_sign": travel_sign})
 
     def _steps(self, scene: Scene) -> BenchPlan:
         start, end = self._ends(scene)
@@ -162,7 +162,7 @@ class Diagonals(BenchTest):
         moved = np.concatenate([[-1.0], np.tile([0.0, 1.0, 2.0], steps)])  # the start by none
         marks = {
             "diagonal": index.astype(float),
-            "way": np.ones(len(index)),
+            "travel_sign": np.ones(len(index)),
             "axis": np.tile(moved, len(BODY)),
         }
         return self._plan(scene, positions, index, marks)
@@ -184,48 +184,53 @@ class Diagonals(BenchTest):
         return plan, np.concatenate(values)
 
     def _plan(
-        self, scene: Scene, positions: Array, index: Whole, marks: dict[str, Array]
+        self, scene: Scene, positions: Array, index: IndexArray, marks: dict[str, Array]
     ) -> BenchPlan:
         model, axes = self.model(scene), following_axes(scene.model)
         start, end = self._ends(scene)
         signs = diagonal_signs(self.names)
-        ways = np.concatenate([signs[index] * marks["way"][:, None], signs])
+        travel_signs = np.concatenate([signs[index] * marks["travel_sign"][:, None], signs])
 
-        def standing(at: Array) -> dict[str, Array]:
-            return {**self.stand(scene), **dict(zip(axes, at.T, strict=True))}
+        def positions_at(at: Array) -> dict[str, Array]:
+            return {**self.axis_positions(scene), **dict(zip(axes, at.T, strict=True))}
 
-        def seen(at: Array) -> Array:
-            return np.asarray(relative_point(model, standing(at)))
+        def relative_points(at: Array) -> Array:
+            return np.asarray(relative_point(model, positions_at(at)))
 
-        along = seen(end) - seen(start)
+        along = relative_points(end) - relative_points(start)
         along = along / np.linalg.norm(along, axis=-1, keepdims=True)
-        rows, coordinates = np.arange(len(positions)), standing(np.concatenate([positions, start]))
-        distance = np.sum((seen(positions) - seen(start)[index]) * along[index], axis=-1)
+        rows, coordinates = (
+            np.arange(len(positions)),
+            positions_at(np.concatenate([positions, start])),
+        )
+        distance = np.sum(
+            (relative_points(positions) - relative_points(start)[index]) * along[index], axis=-1
+        )
         zero = {
             f"zero_{name}_um": (index == number).astype(float)
             for number, name in enumerate(self.names)
         }
         for plane, (_, _, key) in PLANES.items():
-            found = find_plane(model, self.stand(scene), plane)
-            product = (along @ found.along) * (along @ found.up)
-            marks[key] = 1e-3 * found.sign * product[index]
+            axis_plane = find_plane(model, self.axis_positions(scene), plane)
+            product = (along @ axis_plane.first_direction) * (along @ axis_plane.second_direction)
+            marks[key] = 1e-3 * axis_plane.sign * product[index]
         ends = np.flatnonzero(np.diff(index, append=-1) != 0) + 1
         return build_plan(
             coordinates,
             tool_points(model, coordinates, len(positions) + len(start)),
             along[index],
-            place=f"{self.kind} diagonals · {self.place_words(scene, axes)}",
+            place=f"{self.kind} diagonals · {self.place_text(scene, axes)}",
             marks={**marks, "position_mm": distance},
             site=rows,
             against=len(positions) + index,
-            travel=dict(zip(axes, ways.T, strict=True)),
+            travel=dict(zip(axes, travel_signs.T, strict=True)),
             setup=zero,
             path=tuple(np.split(rows, ends[:-1])),
         )  # fmt: skip
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         names = self.names
-        number, way = plan.marks["diagonal"], plan.marks["way"]
+        number, travel_sign = plan.marks["diagonal"], plan.marks["travel_sign"]
         position = plan.marks["position_mm"]
         rows: list[dict[str, object]] = []
         lengths = np.full(len(names), np.nan)
@@ -233,19 +238,19 @@ class Diagonals(BenchTest):
             chosen = number == index
             if not chosen.any():
                 continue
-            there = means_along(position[chosen], way[chosen], readings[chosen])
-            lengths[index] = there["mean"][-1] - there["mean"][0]
+            means = means_along(position[chosen], travel_sign[chosen], readings[chosen])
+            lengths[index] = means["mean"][-1] - means["mean"][0]
             row: dict[str, object] = {
                 "diagonal": name,
                 "length_mm": float(np.ptp(position[chosen])),
                 "length_deviation_um": float(lengths[index]),
-                "E_um": float(np.ptp(there["all"])),
-                "M_um": float(np.ptp(there["mean"])),
+                "E_um": float(np.ptp(means["all"])),
+                "M_um": float(np.ptp(means["mean"])),
             }
-            if "reversal" in there:
-                row["B_um"] = float(np.abs(there["reversal"]).max())
+            if "reversal" in means:
+                row["B_um"] = float(np.abs(means["reversal"]).max())
             if self.kind == "step":
-                # what the steps of each axis contribute
+                # contribution of the steps of each axis
                 steps = np.diff(readings[chosen], prepend=readings[chosen][:1])
                 axis = plan.marks["axis"][chosen]
                 row["by_axis_um"] = {x: float(steps[axis == i].sum()) for i, x in enumerate("XYZ")}
@@ -262,9 +267,9 @@ class Diagonals(BenchTest):
                 BenchQuantity("B_um", "largest reversal B", _largest(rows, "B_um"), "µm")
             )
         squareness = squareness_of_diagonals(plan, names, lengths)
-        words = "squareness {} that it looks like"
+        name_format = "equivalent squareness {}"
         quantities += [
-            BenchQuantity(f"squareness_{key}_urad", words.format(key), value, "µrad")
+            BenchQuantity(f"squareness_{key}_urad", name_format.format(key), value, "µrad")
             for key, value in squareness.items()
         ]
         return Outcome(tuple(quantities), {"diagonals": rows})
@@ -274,15 +279,17 @@ class Diagonals(BenchTest):
         for run in runs:
             marks = run.plan.marks
             for index, name in enumerate(self.names):
-                for way, word in ((1.0, ""), (-1.0, " back")):
-                    chosen = (marks["diagonal"] == index) & (marks["way"] == way)
+                for travel_sign, suffix in ((1.0, ""), (-1.0, " back")):
+                    chosen = (marks["diagonal"] == index) & (marks["travel_sign"] == travel_sign)
                     if not chosen.any() or (
-                        way < 0.0 and not run.is_measured and _alike(run, index)
+                        travel_sign < 0.0 and not run.is_measured and _alike(run, index)
                     ):
                         continue
-                    style = "dots" if run.is_measured else ("line" if way > 0.0 else "dashed")
+                    style = (
+                        "dots" if run.is_measured else ("line" if travel_sign > 0.0 else "dashed")
+                    )
                     x, y = marks["position_mm"][chosen], run.readings[chosen]
-                    curves.append(Curve(run.named(name + word), x, y, index, style))
+                    curves.append(Curve(run.label(name + suffix), x, y, index, style))
         return (
             Lines(
                 "lines", f"Along the {self.kind} diagonals", "distance from the start [mm]",
@@ -294,10 +301,13 @@ class Diagonals(BenchTest):
 
 def _alike(run: BenchRun, index: int) -> bool:
     marks = run.plan.marks
-    there, back = (
-        run.readings[(marks["diagonal"] == index) & (marks["way"] == way)] for way in (1.0, -1.0)
+    forward, backward = (
+        run.readings[(marks["diagonal"] == index) & (marks["travel_sign"] == travel_sign)]
+        for travel_sign in (1.0, -1.0)
     )
-    return len(there) == len(back) and bool(np.abs(there - back[::-1]).max(initial=0.0) < 1e-9)
+    return len(forward) == len(backward) and bool(
+        np.abs(forward - backward[::-1]).max(initial=0.0) < 1e-9
+    )
 
 
 def _largest(rows: Sequence[dict[str, object]], key: str) -> float:

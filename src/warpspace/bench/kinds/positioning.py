@@ -24,7 +24,7 @@ ALIKE = 1e-6  # means that differ by less, µm or µrad, are drawn as one
 
 @dataclass(frozen=True)
 class TargetStatistics:
-    """Means and standard deviations at the targets, NaN where an axis did not come that way."""
+    """Means and standard deviations at the targets, NaN for a direction without readings."""
 
     target: Array  # [t], mm or degrees
     mean: Array  # [2, t], µm or µrad; forward and backward
@@ -32,19 +32,23 @@ class TargetStatistics:
     deviation: Array
 
 
-def target_statistics(target: Array, way: Array, readings: Array) -> TargetStatistics:
-    """Take the mean and the standard deviation of the readings at each target in each direction."""
+def target_statistics(target: Array, travel_sign: Array, readings: Array) -> TargetStatistics:
+    """Compute mean and standard deviation of the readings per target and direction."""
     targets, index = np.unique(np.round(target, 6), return_inverse=True)
     mean = np.full((2, len(targets)), np.nan)
     deviation = np.full((2, len(targets)), np.nan)
     for row, sign in enumerate((FORWARD, BACKWARD)):
-        chosen = way == sign
+        chosen = travel_sign == sign
         at, values = index.reshape(-1)[chosen], readings[chosen]
         count = np.bincount(at, minlength=len(targets))
-        seen = count > 0
-        mean[row, seen] = np.bincount(at, values, len(targets))[seen] / count[seen]
+        is_measured = count > 0
+        mean[row, is_measured] = (
+            np.bincount(at, values, len(targets))[is_measured] / count[is_measured]
+        )
         squares = np.bincount(at, (values - mean[row, at]) ** 2, len(targets))
-        deviation[row, seen] = np.sqrt(squares[seen] / np.maximum(count[seen] - 1, 1))
+        deviation[row, is_measured] = np.sqrt(
+            squares[is_measured] / np.maximum(count[is_measured] - 1, 1)
+        )
     return TargetStatistics(targets, mean, deviation)
 
 
@@ -55,12 +59,12 @@ class Positioning(BenchTest):
     name = "positioning"
     title = "Positioning accuracy"
     standard = "ISO 230-2"
-    words = (
+    description = (
         "One axis runs to targets along its range, upwards and back; a laser interferometer, a"
-        " rotary encoder or an autocollimator reads where the tool is against the workpiece. Means"
-        " and ±2s bands of both directions give accuracy A, systematic deviation E, mean deviation"
-        " M, repeatability R and reversal B. The readings hold what the axis does at this place:"
-        " angular errors on the lever to the measuring line count in."
+        " rotary encoder or an autocollimator reads the position of the tool relative to the"
+        " workpiece. Means and ±2s bands of both directions give accuracy A, systematic deviation"
+        " E, mean deviation M, repeatability R and reversal B. The readings include the angular"
+        " errors on the lever arm to the measuring line."
     )
     columns = (
         DataColumn("run", "number"),
@@ -73,30 +77,32 @@ class Positioning(BenchTest):
     start: float | None = option(None, "First target, mm or degrees; the range's end")
     end: float | None = option(None, "Last target, mm or degrees; the range's other end")
 
-    def own_axis(self, scene: Scene) -> str:
+    def selected_axis(self, scene: Scene) -> str:
         axes = scene.machine.axes
         if self.axis and self.axis not in axes:
             raise UnknownNameError("axis", self.axis, axes)
         return self.axis or next(iter(axes))
 
     def data_columns(self, scene: Scene) -> tuple[DataColumn, ...]:
-        if is_linear(self.own_axis(scene)):
+        if is_linear(self.selected_axis(scene)):
             return self.columns
         return (*self.columns[:2], DataColumn("target_deg", "number"), DataColumn("deviation_urad"))
 
     def plan(self, scene: Scene) -> BenchPlan:
-        axis = self.own_axis(scene)
+        axis = self.selected_axis(scene)
         low, high = scene.axis_span(axis)
         low = low if self.start is None else self.start
         high = high if self.end is None else self.end
         if not low < high:
             raise OptionError(f"targets from {low:g} to {high:g}; expected start below end")
         targets = np.linspace(low, high, self.targets)
-        way = np.repeat([FORWARD, BACKWARD], self.targets)
-        return self._lay(scene, np.concatenate([targets, targets[::-1]]), way, np.ones(len(way)))
+        travel_sign = np.repeat([FORWARD, BACKWARD], self.targets)
+        return self._lay(
+            scene, np.concatenate([targets, targets[::-1]]), travel_sign, np.ones(len(travel_sign))
+        )
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
-        linear = is_linear(self.own_axis(scene))
+        linear = is_linear(self.selected_axis(scene))
         target = table["target_mm" if linear else "target_deg"]
         readings = table["deviation_um" if linear else "deviation_urad"]
         unit = "mm" if linear else "°"
@@ -118,11 +124,11 @@ class Positioning(BenchTest):
             raise table.refuse(*problems)
         return self._lay(scene, target, table["direction"], table["run"]), readings
 
-    def _lay(self, scene: Scene, target: Array, way: Array, run: Array) -> BenchPlan:
-        axis, model = self.own_axis(scene), self.model(scene)
-        coordinates = {**self.stand(scene), axis: target}
-        marks = {"target": target, "way": way, "run": run}
-        place = f"{axis} · {self.place_words(scene, [axis])}"
+    def _lay(self, scene: Scene, target: Array, travel_sign: Array, run: Array) -> BenchPlan:
+        axis, model = self.selected_axis(scene), self.model(scene)
+        coordinates = {**self.axis_positions(scene), axis: target}
+        marks = {"target": target, "travel_sign": travel_sign, "run": run}
+        place = f"{axis} · {self.place_text(scene, [axis])}"
         zero = {"zero_um" if is_linear(axis) else "zero_urad": np.ones(len(target))}
         count = len(target)
         if is_linear(axis):
@@ -130,7 +136,7 @@ class Positioning(BenchTest):
             direction = motion_direction(model, coordinates, axis)
             return build_plan(
                 coordinates, point, direction, place=place, marks=marks,
-                travel={axis: way}, setup=zero,
+                travel={axis: travel_sign}, setup=zero,
             )  # fmt: skip
         line = axis_line(model, coordinates, axis)
         sign = line.sign * scene.machine.axes[axis].direction
@@ -139,24 +145,24 @@ class Positioning(BenchTest):
             name: np.tile(np.broadcast_to(values, (count,)), 2)
             for name, values in coordinates.items()
         }
-        both = np.arange(count)
+        sites = np.arange(count)
         return build_plan(
             twice, np.concatenate([origin, origin + LEVER_MM * line.across]),
             sign * np.broadcast_to(line.upright, (count, 3)), place=place, marks=marks,
-            site=both + count, against=both, gain=1000.0 / LEVER_MM,
-            travel={axis: np.tile(way, 2)}, setup=zero, path=(both,),
+            site=sites + count, against=sites, gain=1000.0 / LEVER_MM,
+            travel={axis: np.tile(travel_sign, 2)}, setup=zero, path=(sites,),
         )  # fmt: skip
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        found = target_statistics(plan.marks["target"], plan.marks["way"], readings)
+        statistics = target_statistics(plan.marks["target"], plan.marks["travel_sign"], readings)
         unit = "µm" if "zero_um" in plan.setup else "µrad"
         suffix = "um" if unit == "µm" else "urad"
         quantities = [
             BenchQuantity(f"{key}_{suffix}", name, value, unit)
-            for key, name, value in _numbers(found)
+            for key, name, value in _numbers(statistics)
             if np.isfinite(value)
         ]
-        return Outcome(tuple(quantities), {"targets": _target_rows(found, unit)})
+        return Outcome(tuple(quantities), {"targets": _target_rows(statistics, unit)})
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
         curves: list[Curve] = []
@@ -171,17 +177,19 @@ class Positioning(BenchTest):
                 shift = float(runs[-1].readings.mean() - run.readings.mean())
                 note = f"Model shifted by {shift:+.2f} {unit}: the zero of the readings is free."
             marks = run.plan.marks
-            found = target_statistics(marks["target"], marks["way"], run.readings + shift)
-            alike = not run.is_measured and np.ptp(found.mean, axis=0).max() < ALIKE
+            statistics = target_statistics(
+                marks["target"], marks["travel_sign"], run.readings + shift
+            )
+            alike = not run.is_measured and np.ptp(statistics.mean, axis=0).max() < ALIKE
             for row, word in enumerate(("forward", "backward")):
                 if alike and row:
                     continue
-                kept = np.isfinite(found.mean[row])
-                if not kept.any():
+                is_finite = np.isfinite(statistics.mean[row])
+                if not is_finite.any():
                     continue
-                x, mean = found.target[kept], found.mean[row, kept]
+                x, mean = statistics.target[is_finite], statistics.mean[row, is_finite]
                 curves.append(run.curve("both directions" if alike else word, x, mean, row))
-                spread = COVERAGE * found.deviation[row, kept]
+                spread = COVERAGE * statistics.deviation[row, is_finite]
                 if run.is_measured:
                     bands.append(Band(f"{word} ±2s", x, mean - spread, mean + spread, row))
         axis = plan.place.partition(" ")[0]
@@ -193,15 +201,15 @@ class Positioning(BenchTest):
         )  # fmt: skip
 
 
-def _numbers(found: TargetStatistics) -> list[tuple[str, str, float]]:
-    mean, spread = found.mean, COVERAGE * found.deviation
-    both = not np.isnan(mean).any()
+def _numbers(statistics: TargetStatistics) -> list[tuple[str, str, float]]:
+    mean, spread = statistics.mean, COVERAGE * statistics.deviation
+    is_bidirectional = not np.isnan(mean).any()
     reversal = mean[0] - mean[1]
     upper, lower = mean + spread, mean - spread
     repeat = 2.0 * spread
     at_target = np.maximum(spread.sum(axis=0) + np.abs(reversal), repeat.max(axis=0))
     rows: list[tuple[str, str, float]] = []
-    if both:
+    if is_bidirectional:
         rows += [
             ("A", "bidirectional accuracy A", float(upper.max() - lower.min())),
             ("E", "bidirectional systematic deviation E", float(np.ptp(mean))),
@@ -221,17 +229,17 @@ def _numbers(found: TargetStatistics) -> list[tuple[str, str, float]]:
     return rows
 
 
-def _target_rows(found: TargetStatistics, unit: str) -> list[dict[str, float]]:
+def _target_rows(statistics: TargetStatistics, unit: str) -> list[dict[str, float]]:
     suffix = "um" if unit == "µm" else "urad"
     place = "target_mm" if unit == "µm" else "target_deg"
     rows: list[dict[str, float]] = []
-    for index, target in enumerate(found.target):
+    for index, target in enumerate(statistics.target):
         row = {place: float(target)}
-        for way, word in enumerate(("forward", "backward")):
-            if np.isfinite(found.mean[way, index]):
-                row[f"mean_{word}_{suffix}"] = float(found.mean[way, index])
-                row[f"s_{word}_{suffix}"] = float(found.deviation[way, index])
-        if np.isfinite(found.mean[:, index]).all():
-            row[f"reversal_{suffix}"] = float(found.mean[0, index] - found.mean[1, index])
+        for row_index, word in enumerate(("forward", "backward")):
+            if np.isfinite(statistics.mean[row_index, index]):
+                row[f"mean_{word}_{suffix}"] = float(statistics.mean[row_index, index])
+                row[f"s_{word}_{suffix}"] = float(statistics.deviation[row_index, index])
+        if np.isfinite(statistics.mean[:, index]).all():
+            row[f"reversal_{suffix}"] = float(statistics.mean[0, index] - statistics.mean[1, index])
         rows.append(row)
     return rows

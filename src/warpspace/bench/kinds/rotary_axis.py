@@ -1,4 +1,4 @@
-"""A rotary axis that turns: its error motions (ISO 230-7), and the R-test (ISO 10791-6)."""
+"""Tests of a rotary axis: error motions (ISO 230-7) and the R-test (ISO 10791-6)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,13 +47,13 @@ class RotaryAxis(BenchTest):
     name = "rotary-axis"
     title = "Error motions of a rotary axis"
     standard = "ISO 230-7"
-    words = (
+    description = (
         "Sensors at two heights read an artefact on the axis while it turns: two radial, two"
         " tilt, one axial deviation, and the angular one against an encoder; the linear axes"
         " stand. Radial and tilt error motion are taken towards a point that turns with the axis,"
         " about the least-squares centre; axial and angular about their means. The mean of the"
-        " readings over a full turn is the axis average line: where the axis is and how it leans,"
-        " as the place of the test sees it."
+        " readings over a full turn is the axis average line: location and orientation of the axis"
+        " at the place of the test."
     )
     columns = (ANGLE, *map(DataColumn, CHANNELS[:5]), DataColumn("c_urad", default=0.0))
     axis: Axis = option("", "Rotary axis that turns", unset="the last one")
@@ -79,7 +79,7 @@ class RotaryAxis(BenchTest):
 
     def _lay(self, scene: Scene, angle_deg: Array) -> BenchPlan:
         axis, model = placing.rotary_axis(scene.machine, self.axis), self.model(scene)
-        stand = self.stand(scene)
+        stand = self.axis_positions(scene)
         line = placing.axis_line(model, stand, axis)
         height = self.height_mm
         if height is None:
@@ -90,7 +90,7 @@ class RotaryAxis(BenchTest):
         count = len(angle_deg)
         base = np.broadcast_to(line.origin_mm + height * line.direction, (count, 3))
         points = [base, base + LEVER_MM * line.direction, base + LEVER_MM * line.across]
-        one = np.arange(count)
+        sites = np.arange(count)
         across, upright, along = line.across, line.upright, line.direction
         # A turn about `across` moves the upper point along −upright, one about `upright` along
         # +across; a turn about the axis moves the outer point along +upright.
@@ -106,45 +106,51 @@ class RotaryAxis(BenchTest):
             },
             np.concatenate(points),
             np.concatenate(
-                [np.broadcast_to(line.sign * way, (count, 3)) for _, _, way in sensed]
+                [np.broadcast_to(line.sign * direction, (count, 3)) for _, _, direction in sensed]
             ),
             place=f"{axis} · sensors {height:g} mm above its origin · "
-            + self.place_words(scene, [axis]),
+            + self.place_text(scene, [axis]),
             marks={
                 "angle_deg": np.tile(angle_deg, 6),
                 "channel": np.repeat(np.arange(6.0), count),
                 "direction": np.full(6 * count, float(scene.machine.axes[axis].direction)),
             },
-            site=np.concatenate([one + count * at for at, _, _ in sensed]),
+            site=np.concatenate([sites + count * at for at, _, _ in sensed]),
             against=np.concatenate(
-                [np.full(count, -1) if zero is None else one for _, zero, _ in sensed]
+                [np.full(count, -1) if zero is None else sites for _, zero, _ in sensed]
             ),
             gain=np.repeat([1.0, 1.0, 1.0, *[1000.0 / LEVER_MM] * 3], count),
             travel={axis: np.tile(np.sign(np.gradient(angle_deg)), 3)},
             setup=_eccentricity(theta),
-            path=(one,),
+            path=(sites,),
         )  # fmt: skip
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        found = motions(plan, readings)
+        error_motions = motions(plan, readings)
         axis = plan.place.partition(" ")[0]
         quantities = [
-            BenchQuantity("radial_um", "radial error motion", float(np.ptp(found.radial)), "µm"),
-            BenchQuantity("axial_um", "axial error motion", float(np.ptp(found.axial)), "µm"),
-            BenchQuantity("tilt_urad", "tilt error motion", float(np.ptp(found.tilt)), "µrad"),
             BenchQuantity(
-                "angular_urad", "angular positioning", float(np.ptp(found.angular)), "µrad"
+                "radial_um", "radial error motion", float(np.ptp(error_motions.radial)), "µm"
+            ),
+            BenchQuantity(
+                "axial_um", "axial error motion", float(np.ptp(error_motions.axial)), "µm"
+            ),
+            BenchQuantity(
+                "tilt_urad", "tilt error motion", float(np.ptp(error_motions.tilt)), "µrad"
+            ),
+            BenchQuantity(
+                "angular_urad", "angular positioning", float(np.ptp(error_motions.angular)), "µrad"
             ),
         ]
         across = {"A": "yz", "B": "zx", "C": "xy"}[axis[0]]
         parts = [(letter.upper(), f"location in {letter}", "µm") for letter in across]
         parts += [("abc"["xyz".index(a)].upper(), f"orientation about {a}", "µrad") for a in across]
-        for (letter, word, unit), value in zip(parts, found.average_line, strict=True):
+        for (letter, word, unit), value in zip(parts, error_motions.average_line, strict=True):
             key, suffix = f"E{letter}0{axis}", "um" if unit == "µm" else "urad"
             quantities.append(BenchQuantity(f"{key}_{suffix}", f"{word} ({key})", value, unit))
-        details: dict[str, object] = {"angle_deg": found.angle_deg.tolist()}
+        details: dict[str, object] = {"angle_deg": error_motions.angle_deg.tolist()}
         for name in ("radial", "axial", "tilt", "angular"):
-            details[f"{name}_motion"] = getattr(found, name).tolist()
+            details[f"{name}_motion"] = getattr(error_motions, name).tolist()
         return Outcome(tuple(quantities), details)
 
     def charts(self, runs: Sequence[BenchRun]) -> tuple[Lines, ...]:
@@ -154,10 +160,10 @@ class RotaryAxis(BenchTest):
         for name, unit in units.items():
             curves: list[Curve] = []
             for run in runs:
-                found = motions(run.plan, run.readings)
-                x, y = found.angle_deg, getattr(found, name)
-                words = f"{name} error motion"
-                curves.append(run.curve(words, x, y, once_round=is_full(x)))
+                error_motions = motions(run.plan, run.readings)
+                x, y = error_motions.angle_deg, getattr(error_motions, name)
+                name_ = f"{name} error motion"
+                curves.append(run.curve(name_, x, y, once_round=is_full(x)))
             title = f"{axis}: {name}"
             charts.append(
                 Lines("polar", title, f"{axis} [°]", f"deviation [{unit}]", tuple(curves))
@@ -166,7 +172,7 @@ class RotaryAxis(BenchTest):
 
 
 def motions(plan: BenchPlan, readings: Array) -> Motions:
-    """Take the readings of the six channels, [6 n], apart."""
+    """Compute the error motions from the readings of six channels, [6 n]."""
     channels = readings.reshape(6, -1)
     angle_deg = plan.marks["angle_deg"][: channels.shape[1]]
     order = np.argsort(angle_deg, kind="stable")
@@ -190,21 +196,21 @@ def motions(plan: BenchPlan, readings: Array) -> Motions:
         about_centre(leaning),
         z - z.mean(),
         c - c.mean(),
-        # means over the turn, what comes once a turn (an eccentric artefact) set aside
+        # means over the turn without the once-per-turn part of an eccentric artefact
         [float(once_round(values)[0]) for values in (x, y, a, b)],
     )
 
 
 def _eccentricity(theta: Array) -> dict[str, Array]:
     zero, cosine, sine = np.zeros_like(theta), np.cos(theta), np.sin(theta)
-    one = np.ones_like(theta)
+    ones = np.ones_like(theta)
     return {
         "eccentric_x_um": np.concatenate([cosine, sine, zero, zero, zero, zero]),
         "eccentric_y_um": np.concatenate([-sine, cosine, zero, zero, zero, zero]),
         "leaning_x_urad": np.concatenate([zero, zero, zero, cosine, sine, zero]),
         "leaning_y_urad": np.concatenate([zero, zero, zero, -sine, cosine, zero]),
-        "height_um": np.concatenate([zero, zero, one, zero, zero, zero]),
-        "zero_urad": np.concatenate([zero, zero, zero, zero, zero, one]),
+        "height_um": np.concatenate([zero, zero, ones, zero, zero, zero]),
+        "zero_urad": np.concatenate([zero, zero, zero, zero, zero, ones]),
     }
 
 
@@ -215,16 +221,16 @@ AXES = ("x", "y", "z")
 class RTest(BenchTest):
     """R-test with the controller's compensation of the tool centre point on."""
 
-    name = "sphere"
+    name = "r-test"
     title = "R-test with a ball"
     standard = "ISO 10791-6, tests AK, BK, CK"
-    words = (
-        "A ball stands on the table, three sensors on the tool (or the other way round) read"
-        " where it is along x, y and z. A rotary axis turns; the linear axes follow, so that"
+    description = (
+        "A ball stands on the table, three sensors on the tool (or the other way round) read its"
+        " position along x, y and z. A rotary axis turns; the linear axes follow, so that"
         " nominally the tool stays on the ball. Readings are tool minus ball, in R or, with"
-        " --frame workpiece, in directions that turn with the table. The range of each is what the"
-        " standard asks for; with the ball's place fitted (it is never known as well) the ranges"
-        " that are left are given too."
+        " --frame workpiece, in directions that turn with the table. The range of each is the"
+        " quantity of the standard; the ranges after the ball's position is fitted (it is not"
+        " known accurately) are reported too."
     )
     columns = (ANGLE, *XYZ)
     axis: Axis = option("", "Rotary axis that turns", unset="the last one")
@@ -235,19 +241,21 @@ class RTest(BenchTest):
         unset="one that can be reached",
     )
     start: float | None = option(
-        None, "First position of the axis; as far as the others can follow", unit="°"
+        None, "First position of the axis", unset="as far as the others can follow", unit="°"
     )
-    end: float | None = option(None, "Last position, likewise", unit="°")
-    points: int = option(73, "Positions along the way", low=4, high=3_600)
+    end: float | None = option(None, "Last position", unset="likewise", unit="°")
+    points: int = option(73, "Positions along the path", low=4, high=3_600)
     frame: Literal["machine", "workpiece"] = option("machine", "Directions of the readings")
 
     def plan(self, scene: Scene) -> BenchPlan:
         axis, ball = self._set_up(scene)
-        where = scene, self.model(scene), axis, ball, self.stand(scene)
-        return self._lay(scene, placing.reachable(*where, self.start, self.end, self.points))
+        conditions = scene, self.model(scene), axis, ball, self.axis_positions(scene)
+        return self._lay(
+            scene, placing.reachable_positions(*conditions, self.start, self.end, self.points)
+        )
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
-        table.check_angles(4, "way")
+        table.check_angles(4, "path")
         readings = np.concatenate([table[f"{name}_um"] for name in AXES])
         return self._lay(scene, table["angle_deg"]), readings
 
@@ -255,51 +263,57 @@ class RTest(BenchTest):
         axis = placing.rotary_axis(scene.machine, self.axis)
         if self.ball is not None:
             return axis, np.asarray(self.ball, dtype=float)
-        return axis, placing.default_ball(scene, self.model(scene), axis, self.stand(scene), None)
+        return axis, placing.default_ball(
+            scene, self.model(scene), axis, self.axis_positions(scene), None
+        )
 
     def _lay(self, scene: Scene, angle_deg: Array) -> BenchPlan:
         axis, ball = self._set_up(scene)
         model = self.model(scene)
-        coordinates = placing.followed(scene, model, axis, angle_deg, ball, self.stand(scene))
+        coordinates = placing.follow_ball(
+            scene, model, axis, angle_deg, ball, self.axis_positions(scene)
+        )
         count = len(angle_deg)
         turned = np.broadcast_to(np.eye(3), (count, 3, 3))
         if self.frame == "workpiece":
             pose = np.asarray(branch_pose(model, "workpiece", coordinates))
             turned = np.broadcast_to(pose[..., :3, :3], (count, 3, 3))
         direction = np.concatenate([turned[:, :, index] for index in range(3)])
-        spelled = ", ".join(f"{value:.4g}" for value in ball)
+        ball_text = ", ".join(f"{value:.4g}" for value in ball)
         return build_plan(
             coordinates,
             placing.tool_points(model, coordinates, count),
             direction,
-            place=f"{axis} turns · ball at ({spelled}) mm of the workpiece · readings in"
+            place=f"{axis} turns · ball at ({ball_text}) mm of the workpiece · readings in"
             f" {'R' if self.frame == 'machine' else 'the workpiece frame'}",
             marks={
                 "angle_deg": np.tile(angle_deg, 3),
                 "channel": np.repeat(np.arange(3.0), count),
             },
             site=np.tile(np.arange(count), 3),
-            travel=placing.travels(coordinates, np.ones(count)),
-            setup=placing.ball_columns(model, coordinates, direction),
+            travel=placing.travel_directions(coordinates, np.ones(count)),
+            setup=placing.ball_setup(model, coordinates, direction),
         )
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
-        place, rest = fit_setup(plan, readings)
-        raw, left = readings.reshape(3, -1), rest.reshape(3, -1)
+        place, residual = fit_setup(plan, readings)
+        raw, residuals = readings.reshape(3, -1), residual.reshape(3, -1)
         quantities = [
             BenchQuantity(f"{name}_um", f"range in {name}", float(np.ptp(raw[index])), "µm")
             for index, name in enumerate(AXES)
         ]
         quantities += [
             BenchQuantity(
-                f"{name}_fitted_um", f"range in {name}, ball's place fitted",
-                float(np.ptp(left[index])), "µm",
+                f"{name}_fitted_um", f"range in {name}, ball position fitted",
+                float(np.ptp(residuals[index])), "µm",
             )
             for index, name in enumerate(AXES)
         ]  # fmt: skip
-        norm = np.linalg.norm(left, axis=0)
+        norm = np.linalg.norm(residuals, axis=0)
         rms = float(np.sqrt(np.mean(norm**2)))
-        quantities.append(BenchQuantity("rms_fitted_um", "RMS distance, place fitted", rms, "µm"))
+        quantities.append(
+            BenchQuantity("rms_fitted_um", "RMS distance, position fitted", rms, "µm")
+        )
         details: dict[str, object] = {
             "ball_um": place.tolist(),
             "angle_deg": plan.marks["angle_deg"][: raw.shape[1]].tolist(),

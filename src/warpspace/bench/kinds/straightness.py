@@ -18,7 +18,7 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 REFERENCES = ("end_points", "least_squares", "minimum_zone")  # ISO 230-1, 3.4.10 to 3.4.12
-WORDS = {
+LINE_TEXT = {
     "end_points": "end-point line",
     "least_squares": "least-squares line",
     "minimum_zone": "minimum-zone line",
@@ -39,62 +39,62 @@ class FittedLine:
 
 
 def reference_lines(position_mm: Array, deviation_um: Array) -> dict[str, FittedLine]:
-    """Lay the three reference lines through deviations, [n], µm, at two positions or more."""
+    """Fit the three reference lines to deviations, [n], µm, at two positions or more."""
     order = np.argsort(position_mm, kind="stable")
     x, y = position_mm[order], deviation_um[order]
-    found: dict[str, FittedLine] = {}
+    lines: dict[str, FittedLine] = {}
     for name in REFERENCES:
         offset, slope = fit_line(x, y, name.replace("points", "point"))
-        found[name] = FittedLine(name, slope * 1e3, offset, float(np.ptp(y - slope * x)))
-    return found
+        lines[name] = FittedLine(name, slope * 1e3, offset, float(np.ptp(y - slope * x)))
+    return lines
 
 
-def lay_lines(
+def build_line_plan(
     test: BenchTest,
     scene: Scene,
     lines: Mapping[str, Array],
-    which: Array,
+    line_index: Array,
     position: Array,
-    way: Array,
+    travel_sign: Array,
     unknowns: Sequence[str],
 ) -> BenchPlan:
-    """Lay the plan of axes that run along straight edges, a probe sensing across them.
+    """Build the plan of axes that run along straight edges, a probe sensing across them.
 
-    Lines are axes with the direction across each, [3] in R; of each site is given on which line it
-    lies, the position along it and the way of travel, +1 or −1. Unknown are the zero of each line
-    and how the edges lie, in the names given.
+    `lines` are axes with the sensed direction, [3] in R; each site has the index of its line, its
+    position along it and the sign of travel. The zero of each line and the orientation of the
+    edges are unknowns of the set-up, named by `unknowns`.
     """
-    model, stand = test.model(scene), test.stand(scene)
+    model, stand = test.model(scene), test.axis_positions(scene)
     coordinates, travel = dict(stand), dict[str, Array]()
     along, across = np.zeros(len(position)), np.zeros((len(position), 3))
     for number, (axis, direction) in enumerate(lines.items()):
         forth = placing.motion_direction(model, stand, axis)
         if np.sort(np.abs(forth))[-2] > 1e-6:
-            spelled = ", ".join(f"{value:.3f}" for value in np.abs(forth))
+            direction_text = ", ".join(f"{value:.3f}" for value in np.abs(forth))
             raise OptionError(
-                f"{axis} runs along ({spelled}) where the machine stands; expected x, y or z"
+                f"{axis} runs along ({direction_text}) in this pose; expected x, y or z"
             )
-        own = which == number
-        coordinates[axis] = np.where(own, position, stand[axis])
-        travel[axis] = np.where(own, way, 0.0)
+        on_line = line_index == number
+        coordinates[axis] = np.where(on_line, position, stand[axis])
+        travel[axis] = np.where(on_line, travel_sign, 0.0)
         sign = np.sign(forth @ placing.axis_vector(model, stand, axis))
-        along[own], across[own] = sign * position[own], direction
-    zeros = [(which == number).astype(float) for number in range(len(lines))]
+        along[on_line], across[on_line] = sign * position[on_line], direction
+    zeros = [(line_index == number).astype(float) for number in range(len(lines))]
     first = next(iter(lines))
     return build_plan(
         coordinates,
         placing.tool_points(model, coordinates, len(position)),
         across,
-        place=f"{first} · {test.place_words(scene, [first])}",
-        marks={"position_mm": position, "along_mm": along, "way": way},
+        place=f"{first} · {test.place_text(scene, [first])}",
+        marks={"position_mm": position, "along_mm": along, "travel_sign": travel_sign},
         travel=travel,
-        setup=dict(zip(unknowns, (*zeros, (1.0 - 2.0 * which) * along * 1e-3), strict=True)),
+        setup=dict(zip(unknowns, (*zeros, (1.0 - 2.0 * line_index) * along * 1e-3), strict=True)),
         path=tuple(np.flatnonzero(zero) for zero in zeros),
     )
 
 
 def mean_by_position(position: Array, readings: Array) -> tuple[Array, Array]:
-    """Take the mean of all readings at each position, [p] twice."""
+    """Compute the mean of the readings at each position, [p] twice."""
     places, index = np.unique(np.round(position, 6), return_inverse=True)
     weights = np.bincount(index.reshape(-1), readings)
     return places, weights / np.bincount(index.reshape(-1))
@@ -107,29 +107,27 @@ class Straightness(BenchTest):
     name = "straightness"
     title = "Straightness"
     standard = "ISO 230-1"
-    words = (
+    description = (
         "A probe on the tool runs along a straight edge, or a laser with a straightness optic is"
         " used: the axis moves, the deviation across it is read. Straightness is the height of the"
         " deviations about the line through the end points, the least-squares line, and the two"
-        " parallel lines of least distance (minimum zone). How the edge lies is no error: a"
-        " squareness error does not count."
+        " parallel lines of least distance (minimum zone). The orientation of the edge is fitted:"
+        " squareness errors do not count."
     )
     columns = ALONG
     axis: Axis = option("", "Linear axis that runs", unset="the first one")
-    across: Literal["x", "y", "z"] | None = option(
-        None, "Direction that is sensed", unset="the next one"
-    )
+    across: Literal["x", "y", "z"] | None = option(None, "Sensed direction", unset="the next one")
     points: int = option(21, "Positions along the axis", low=3, high=2_000)
 
     def directions(self, scene: Scene) -> tuple[str, int]:
         axis = placing.linear_axis(scene.machine, self.axis)
-        vector = placing.axis_vector(scene.model, self.stand(scene), axis)
-        own = int(np.argmax(np.abs(vector)))
-        if self.across and "xyz".index(self.across) == own:
+        vector = placing.axis_vector(scene.model, self.axis_positions(scene), axis)
+        along = int(np.argmax(np.abs(vector)))
+        if self.across and "xyz".index(self.across) == along:
             raise OptionError(
                 f"{{across}} {self.across} is the direction of {axis}; expected one across it"
             )
-        return axis, "xyz".index(self.across) if self.across else (own + 1) % 3
+        return axis, "xyz".index(self.across) if self.across else (along + 1) % 3
 
     def plan(self, scene: Scene) -> BenchPlan:
         axis, _ = self.directions(scene)
@@ -146,19 +144,21 @@ class Straightness(BenchTest):
             raise table.refuse(f"has {places} positions; expected at least 3")
         return self._lay(scene, table["position_mm"], table["direction"]), table["deviation_um"]
 
-    def _lay(self, scene: Scene, position: Array, way: Array) -> BenchPlan:
+    def _lay(self, scene: Scene, position: Array, travel_sign: Array) -> BenchPlan:
         axis, across = self.directions(scene)
-        lines, which = {axis: np.eye(3)[across]}, np.zeros(len(position))
-        return lay_lines(self, scene, lines, which, position, way, ("zero_um", "tilt_urad"))
+        lines, line_index = {axis: np.eye(3)[across]}, np.zeros(len(position))
+        return build_line_plan(
+            self, scene, lines, line_index, position, travel_sign, ("zero_um", "tilt_urad")
+        )
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         position, mean = mean_by_position(plan.marks["along_mm"], readings)
-        found = reference_lines(position, mean)
+        lines = reference_lines(position, mean)
         quantities = [
-            BenchQuantity(f"{name}_um", f"straightness, {WORDS[name]}", line.deviation_um, "µm")
-            for name, line in found.items()
+            BenchQuantity(f"{name}_um", f"straightness, {LINE_TEXT[name]}", line.deviation_um, "µm")
+            for name, line in lines.items()
         ]
-        slopes = {name: line.slope for name, line in found.items()}
+        slopes = {name: line.slope for name, line in lines.items()}
         details = {
             "slope_urad": slopes,
             "position_mm": position.tolist(),
@@ -190,7 +190,7 @@ def _lines_drawn(
     lines: Mapping[str, FittedLine], names: Sequence[str], position: Array, level: Array | float
 ) -> list[Curve]:
     return [
-        Curve(WORDS[name], position, lines[name].at(position) - level, colour, "dashed")
+        Curve(LINE_TEXT[name], position, lines[name].at(position) - level, colour, "dashed")
         for colour, name in enumerate(names, start=1)
     ]
 
@@ -202,13 +202,13 @@ class Squareness(BenchTest):
     name = "squareness"
     title = "Squareness"
     standard = "ISO 230-1"
-    words = (
+    description = (
         "A probe runs along both arms of a square (or a laser along two lines made square by a"
         " pentaprism): each axis moves, the deviation across it is read. The angle between the"
         " reference lines of both is the squareness error, in the sign of EC0Y, EB0Z or EA0Z:"
         " positive where the second axis is turned by the right-hand rule against the first."
-        " End-point, least-squares and minimum-zone lines may differ. The square itself is taken"
-        " as perfect."
+        " End-point, least-squares and minimum-zone lines may differ. The square itself is assumed"
+        " to be perfect."
     )
     columns = (DataColumn("line", "name"), *ALONG)
     plane: Literal["XY", "XZ", "YZ"] = option("XY", "Plane of the two axes")
@@ -220,43 +220,49 @@ class Squareness(BenchTest):
         return self._lay(
             scene,
             np.repeat([0.0, 1.0], 2 * self.points),
-            np.concatenate([part for one in positions for part in (one, one[::-1])]),
+            np.concatenate([part for stretch in positions for part in (stretch, stretch[::-1])]),
             np.tile(np.repeat([1.0, -1.0], self.points), 2),
         )
 
     def plan_data(self, scene: Scene, table: ReadingsFile) -> tuple[BenchPlan, Array]:
         axes = placing.plane_axes(scene.machine, self.plane)[:2]
         expected = f"{axes[0]} or {axes[1]} (--plane {self.plane})"
-        problems = table.unknown_words("line", axes, expected)
-        which = np.array([float(word == axes[1]) for word in table.words["line"]])
+        problems = table.unknown_labels("line", axes, expected)
+        line_index = np.array([float(word == axes[1]) for word in table.labels["line"]])
         for index, axis in enumerate(axes):
-            count = len(np.unique(np.round(table["position_mm"][which == index], 6)))
+            count = len(np.unique(np.round(table["position_mm"][line_index == index], 6)))
             if count < 3 and not problems:
                 problems.append(f"line {axis} has {count} positions; expected at least 3")
         if problems:
             raise table.refuse(*problems)
-        order = np.argsort(which, kind="stable")
+        order = np.argsort(line_index, kind="stable")
         plan = self._lay(
-            scene, which[order], table["position_mm"][order], table["direction"][order]
+            scene, line_index[order], table["position_mm"][order], table["direction"][order]
         )
         return plan, table["deviation_um"][order]
 
-    def _lay(self, scene: Scene, which: Array, position: Array, way: Array) -> BenchPlan:
-        plane = placing.find_plane(self.model(scene), self.stand(scene), self.plane)
-        lines = {plane.first: plane.up, plane.second: plane.along}
+    def _lay(
+        self, scene: Scene, line_index: Array, position: Array, travel_sign: Array
+    ) -> BenchPlan:
+        plane = placing.find_plane(self.model(scene), self.axis_positions(scene), self.plane)
+        lines = {plane.first: plane.second_direction, plane.second: plane.first_direction}
         unknowns = (*(f"zero_{axis}_um" for axis in lines), "turned_urad")
-        plan = lay_lines(self, scene, lines, which, position, way, unknowns)
-        marks = {**plan.marks, "gain_sign": np.full(len(which), plane.sign), "line": which}
+        plan = build_line_plan(self, scene, lines, line_index, position, travel_sign, unknowns)
+        marks = {
+            **plan.marks,
+            "gain_sign": np.full(len(line_index), plane.sign),
+            "line": line_index,
+        }
         return replace(plan, place=f"{self.plane} · {plan.place}", marks=marks)
 
     def evaluate(self, plan: BenchPlan, readings: Array) -> Outcome:
         key, sign = placing.PLANES[self.plane][2], float(plan.marks["gain_sign"][0])
-        lines = [found for _, _, found in _arms(plan, readings)]
+        lines = [arm_lines for _, _, arm_lines in _arms(plan, readings)]
         quantities: list[BenchQuantity] = []
         for name in REFERENCES:
             angle = sign * (lines[0][name].slope + lines[1][name].slope)
             quantities.append(
-                BenchQuantity(f"{name}_urad", f"squareness {key}, {WORDS[name]}", angle, "µrad")
+                BenchQuantity(f"{name}_urad", f"squareness {key}, {LINE_TEXT[name]}", angle, "µrad")
             )
         for index, axis in enumerate(self.plane):
             height = lines[index]["least_squares"].deviation_um

@@ -1,4 +1,4 @@
-"""The commands that are made from no analysis, one module a task; `warpspace.cli.main` lists them.
+"""Commands that are no analyses, one module per task; `warpspace.cli.main` lists them.
 
-A command imports what it needs when it runs, so that help is instant.
+They import the code that they run when they run, so that help is instant.
 """

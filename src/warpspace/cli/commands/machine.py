@@ -1,9 +1,9 @@
-"""Commands about scenes and machines: what there is, what is right, what the thesis prints."""
+"""Commands about scenes and machines: list, create, validate, annotate, merge."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -12,21 +12,19 @@ from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import OutputFile, SceneName
 from warpspace.cli.shared_options import (
     SCENES,
-    RenamedOption,
     force_option,
     grid_option,
     json_option,
     loop_option,
     output_option,
-    parse_point,
     print_json,
-    say_first_order,
-    say_second_order,
+    run_by,
     scene_argument,
-    warn_outside_travel,
+    warn_first_order,
+    warn_second_order,
     write_text,
 )
-from warpspace.cli.tables import echo, print_table, print_text, progress, warn
+from warpspace.cli.tables import print_table, print_text, progress
 from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
@@ -34,8 +32,9 @@ if TYPE_CHECKING:
     from warpspace.analysis.tolerance_check import Check, Measured
     from warpspace.scene.model import Scene
 
-OWN = "own"
-CHECKED = ("id", "kind", "stale", "numbers", "now")  # what `check` tells of a note
+NOTES = "warpspace.cli.note_editing"
+OWN_TOLERANCES = "own"
+CHECKED = ("id", "kind", "stale", "numbers", "now")  # keys of a note in the output of `check`
 Kind = Literal["scenes", "machines"]
 
 
@@ -45,20 +44,24 @@ Kind = Literal["scenes", "machines"]
 def list_(kind: Kind | None, *, as_json: bool) -> None:
     """List the bundled scenes and machines, or one of both.
 
-    A scene takes a machine by its name, machine = "scara"; machine_NAME is the scene that shows it.
+    A scene refers to a machine by name, machine = "scara"; the scene machine_NAME shows it.
     """
-    found = {one: _found(one) for one in ("scenes", "machines") if kind in (None, one)}
+    listing = {
+        kind_name: _list_kind(kind_name)
+        for kind_name in ("scenes", "machines")
+        if kind in (None, kind_name)
+    }
     if as_json:
-        print_json(found)
+        print_json(listing)
         return
-    for one, rows in found.items():
+    for kind_name, rows in listing.items():
         if kind is None:
-            print_text(one)
+            print_text(kind_name)
         lines = [line for row in rows for line in _lines(row)]
         print_table((Column(leads=True), Column(), Column(wraps=True)), lines, indent=0)
 
 
-def _found(kind: Kind) -> list[dict[str, str | None]]:
+def _list_kind(kind: Kind) -> list[dict[str, str | None]]:
     from warpspace.scene.library import load_scene, scene_names
     from warpspace.scene.machine_library import load_machine, machine_names, machine_picture
 
@@ -79,14 +82,14 @@ def _found(kind: Kind) -> list[dict[str, str | None]]:
 
 def _lines(row: dict[str, str | None]) -> list[tuple[str, str, str]]:
     first = (row["name"] or "", row.get("chain") or "", row["title"] or "")
-    more = [text for text in (row.get("source"), row.get("picture")) if text]
-    return [first, *(("", "", text) for text in more)]
+    details = [text for text in (row.get("source"), row.get("picture")) if text]
+    return [first, *(("", "", text) for text in details)]
 
 
 @click.command("new-machine")
 @click.argument("chain")
 @output_option("Scene file to write: .toml.", *SCENES)
-@click.option("--title", default="", help="Of the machine and the scene.  [the chain]")
+@click.option("--title", default="", help="Title of the machine and the scene.  [the chain]")
 @force_option
 def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
     """Write a scene for a machine with the axes of CHAIN.
@@ -112,12 +115,10 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
 @scene_argument("scenes", nargs=-1, required=True)
 @click.option(
     "--against",
-    cls=RenamedOption,
-    former=("--tolerances",),
     type=SceneName(),
     metavar="SCENE|own",
-    help="Set each error against the tolerances of this scene, for instance dvf5000_proposed, or of"
-    " its own, and say what the model predicts. Then several SCENES may be named.",
+    help="Compare each error with the tolerances of this scene, for instance dvf5000_proposed, or"
+    " of SCENE itself (own), and report the predicted map. Allows several SCENES.",
 )
 @loop_option
 @grid_option(11, "of the predicted map, with --against")
@@ -125,13 +126,13 @@ def new_machine(chain: str, output: str, title: str, *, force: bool) -> None:
 def check(
     scenes: tuple[str, ...], against: str | None, loop: str, grid: int, *, as_json: bool
 ) -> None:
-    """Validate SCENE and say what it holds.
+    """Validate SCENE and summarise its content.
 
-    All problems of a file are reported at once, each with its key, its value and what was expected.
+    All problems of a file are reported together, each with key, value and expected value.
 
-    With --against each error lies within its tolerance or outside it. Beside the predicted error
-    stands the measured one where a publication prints it. The shear is that of the best
-    affine fit to the predicted map: which plane became a rhombus.
+    With --against, each error is within or outside its tolerance. The published measured error, if
+    any, is printed next to the predicted one. The shear of each plane is that of the best affine
+    fit to the predicted map.
     """
     from warpspace.analysis.description import to_json
     from warpspace.analysis.tolerance_check import measured
@@ -143,9 +144,9 @@ def check(
             raise OptionError(f"{len(scenes)} scenes; expected one, or --against")
         _check(*loaded, as_json=as_json)
         return
-    limits = None if against == OWN else load_scene(against).tolerances
+    limits = None if against == OWN_TOLERANCES else load_scene(against).tolerances
     pairs = [(one, measured(one, tolerances=limits, loop=loop, grid=grid)) for one in loaded]
-    say_first_order(loop, *loaded)
+    warn_first_order(loop, *loaded)
     if as_json:
         print_json(
             {
@@ -172,11 +173,12 @@ def check(
 def _check(scene: "Scene", *, as_json: bool) -> None:
     from warpspace.analysis.note_tables import notes_table
     from warpspace.bodies.mesh_files import check_meshes
+    from warpspace.cli.note_editing import notes_json
     from warpspace.scene.model import second_order
 
     remarks = (*scene.notes, *check_meshes(scene.machine))
-    found = second_order(scene)
-    say_second_order(found)
+    estimate = second_order(scene)
+    warn_second_order(estimate)
     non_zero = [key for key in scene.errors if scene.errors.amplitude(key) != 0.0]
     if as_json:
         print_json(
@@ -187,7 +189,7 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
                 "chain": str(scene.machine.chain),
                 "parameters": len(scene.parameter_keys),
                 "non_zero": non_zero,
-                "linearisation_error_um": found.um,
+                "linearisation_error_um": estimate.um,
                 "remarks": list(remarks),
                 "notes": [{key: one[key] for key in CHECKED} for one in notes_json(scene)],
             }
@@ -199,27 +201,11 @@ def _check(scene: "Scene", *, as_json: bool) -> None:
         facts.append((name, f"{span} {scene.machine.axes[name].unit}"))
     count = f"{len(non_zero)} of {len(scene.parameter_keys)} parameters not zero"
     facts.append(("errors", count + (f": {', '.join(non_zero)}" if non_zero else "")))
-    facts.append(("first order", f"differs from the exact chain by at most {found.um:.2g} µm"))
+    facts.append(("first order", f"differs from the exact chain by at most {estimate.um:.2g} µm"))
     facts.extend(("remark", remark) for remark in remarks)
     columns = (Column(leads=True), Column(wraps=True))
     review = [notes_table(scene, "notes")] if scene.review else []
     print_blocks((f"{scene.name}: valid. {scene.title}", Table(columns, facts), *review))
-
-
-def notes_json(scene: "Scene") -> list[dict[str, Any]]:
-    """List the notes of a scene as its file has them, and what their numbers are now."""
-    from warpspace.analysis.note_tables import note_numbers
-    from warpspace.scene.notes import changed_number, note_to_toml
-
-    return [
-        {
-            **note_to_toml(note),
-            "stale": changed_number(note.numbers, now) != "",
-            "numbers": note.numbers,
-            "now": {name: now[name] for name in note.numbers if name in now},
-        }
-        for note, now in zip(scene.review, note_numbers(scene, scene.review), strict=True)
-    ]
 
 
 @click.command()
@@ -229,18 +215,18 @@ def notes_json(scene: "Scene") -> list[dict[str, Any]]:
     "--at",
     "point",
     metavar="X=..,Y=..",
-    help="Where the new note is pinned: axis positions in mm and degrees.  [the whole]",
+    help="Position of the new note: axis positions in mm and degrees.  [none]",
 )
 @click.option(
     "--kind",
     type=click.Choice(("note", "question", "decision")),
     default="note",
     show_default=True,
-    help="What the new note is.",
+    help="Kind of the new note.",
 )
-@click.option("--author", default="", help="Who adds it.")
+@click.option("--author", default="", help="Author of the new note.")
 @click.option(
-    "--step", type=int, default=0, help="Its place in the story; 0 for none.", show_default=True
+    "--step", type=int, default=0, help="Position in the story; 0 for none.", show_default=True
 )
 @output_option(
     "File to write: the notes as .csv or .md, or with --add the scene as .toml.  [SCENE]",
@@ -249,68 +235,12 @@ def notes_json(scene: "Scene") -> list[dict[str, Any]]:
 @loop_option
 @force_option
 @json_option
-def notes(
-    scene: str,
-    text: str | None,
-    point: str | None,
-    output: str | None,
-    *,
-    force: bool,
-    as_json: bool,
-    **about: Any,
-) -> None:
+@run_by(f"{NOTES}:edit_notes")
+def notes() -> None:
     """List the review notes of SCENE, or add one.
 
-    A note whose numbers no longer hold is marked "changed" with its number then and now.
+    A note whose numbers have changed is marked "changed", with the stored and the present number.
     """
-    from warpspace.analysis.blocks import table_markdown
-    from warpspace.analysis.note_tables import notes_table
-    from warpspace.scene.library import load_scene
-    from warpspace.scene.text_files import spell_row
-
-    if text is not None:
-        loaded = _add_note(scene, output or scene, point, force=force, text=text, **about)
-        output = None
-    else:
-        loaded = load_scene(scene)
-    if text is None and (point is not None or (output or "").endswith(".toml")):
-        raise OptionError("--at and an .toml file belong to --add; there is no text to add")
-    title = f"{loaded.name}: {loaded.title}"
-    if output is not None:
-        table = notes_table(loaded, title)
-        rows = table.csv_rows()
-        text = table_markdown(table) if output.endswith(".md") else "".join(map(spell_row, rows))
-        write_text(output, text, force=force)
-    if as_json:
-        print_json({"notes": notes_json(loaded)})
-    elif output is None:
-        print_blocks([notes_table(loaded, title)])
-
-
-def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: Any) -> "Scene":
-    from warpspace.analysis.note_tables import note_numbers
-    from warpspace.machine.limits import MAX_SCENE_BYTES
-    from warpspace.scene.library import load_scene, parse_scene, scene_path
-    from warpspace.scene.notes import Note
-    from warpspace.scene.scene_writer import spell_note
-    from warpspace.scene.text_files import lock_file, read_bytes, read_text
-
-    file = scene_path(name)
-    with lock_file(file):
-        original, scene = read_bytes(file, MAX_SCENE_BYTES), load_scene(file)
-        at = {} if point is None else parse_point(point, scene.machine.axes)
-        if not path.endswith(".toml"):
-            expected = "expected a .toml file (-o FILE.toml); a bundled scene stays as it is"
-            raise OptionError(f"{path}: {expected}")
-        note = Note(at=at, **about)
-        warn_outside_travel(scene.machine, note.at)
-        note = replace(note, numbers=note_numbers(scene, [note])[0])
-        text = f"{read_text(file, MAX_SCENE_BYTES).rstrip()}\n\n{spell_note(note)}"
-        added = parse_scene(text, scene.name, path, Path(path).parent)
-        same = file == Path(path)
-        write_text(path, text, force=force or same, original=original if same else None)
-    echo(f"{path}: {note.kind} {note.id} added", err=True)
-    return added
 
 
 @click.command()
@@ -318,30 +248,13 @@ def _add_note(name: str, path: str, point: str | None, *, force: bool, **about: 
 @scene_argument("second")
 @output_option("Scene file to write: .toml.", *SCENES)
 @force_option
-def merge(first: str, second: str, output: str, *, force: bool) -> None:
-    """Unite the review notes of two copies of a scene.
+@run_by(f"{NOTES}:merge_scenes")
+def merge() -> None:
+    """Merge the review notes of two copies of a scene.
 
-    Notes are matched by their id and replies united. A note that both have edited is kept in both
-    versions, side by side. Everything else of the scene is that of FIRST.
+    Notes are matched by id, and replies merged. Of a note edited in both copies, both versions are
+    retained. All else is taken from FIRST.
     """
-    from warpspace.scene.library import load_scene, parse_scene
-    from warpspace.scene.notes import merge_notes
-    from warpspace.scene.scene_writer import scene_to_toml
-
-    a, b = load_scene(first), load_scene(second)
-    merged = merge_notes(a.review, b.review)
-    text = scene_to_toml(replace(a, review=merged))
-    parse_scene(text, a.name, output, None)  # a note of SECOND may name an axis FIRST has not
-    write_text(output, text, force=force)
-    print_text(f"{output}: {len(merged)} notes of {len(a.review)} and {len(b.review)}")
-    for note in merged:
-        if note.versions:
-            print_text(f"  {note.id}: {1 + len(note.versions)} versions kept side by side")
-    if replace(b, name=a.name, review=a.review) != a:
-        functions, others = a.errors.functions, b.errors.functions
-        keys = [key for key in {**functions, **others} if functions.get(key) != others.get(key)]
-        said = f", among them the errors {', '.join(keys)}" if keys else ""
-        warn(f"the scenes differ beside their notes{said}; those of {first} are kept")
 
 
 def _measured_errors(scene: "Scene") -> list["PrintedNumber"]:
@@ -361,7 +274,10 @@ def _against(scene: "Scene", result: "Measured") -> Iterator[Block]:
         Column("tolerance", _limits),
     )
     verdicts = {True: "within", False: "outside", None: "none"}
-    rows = [(verdicts[one.passes], one.key, one.value, one.unit, one) for one in result.checks]
+    rows = [
+        (verdicts[check_row.passes], check_row.key, check_row.value, check_row.unit, check_row)
+        for check_row in result.checks
+    ]
     yield Table(columns, rows)
     measured = "".join(f"; {number.quotation}" for number in _measured_errors(scene))
     yield (

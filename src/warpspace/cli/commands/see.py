@@ -1,4 +1,4 @@
-"""Commands by which errors are seen: the app, figures, comparisons, files, the design review."""
+"""Commands that show errors: app, figures, comparison, export, design review."""
 
 import os
 import sys
@@ -10,11 +10,10 @@ import click
 
 from warpspace.cli.analyses import print_blocks
 from warpspace.cli.file_arguments import SceneName
-from warpspace.cli.services import build_services, embed_view, tell_story
 from warpspace.cli.shared_options import (
     FIGURES,
-    RenamedOption,
     component_option,
+    deferred,
     direction_option,
     draw_figure_file,
     exaggeration_option,
@@ -27,22 +26,36 @@ from warpspace.cli.shared_options import (
     loop_option,
     output_option,
     print_json,
-    say_first_order,
     scene_argument,
     size_text,
+    warn_first_order,
 )
 from warpspace.cli.tables import echo, print_text, progress
 from warpspace.exceptions import OptionError, RenderError, UnknownNameError
-from warpspace.outputs.exports.formats import export_formats, write_export
+from warpspace.outputs.exports.formats import (
+    ExportFormat,
+    export_formats,
+    register_format,
+    write_export,
+)
 from warpspace.outputs.figures.registry import figure_command, figure_names
 
 if TYPE_CHECKING:
     from warpspace.analysis.description import Analysis
 
 
+SERVICES = "warpspace.cli.services"
 MOVING = (".gif", ".webp", ".mp4")
 SIZE, MOVING_SIZE = (1600, 1200), (960, 720)
 FRAMES, FPS = 48, 15.0
+register_format(
+    ExportFormat(
+        ".html",
+        "the interactive scene, one file that needs no network",
+        f"{SERVICES}:write_page",
+        in_app=False,
+    )
+)
 
 
 @click.command()
@@ -51,26 +64,26 @@ FRAMES, FPS = 48, 15.0
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Address to serve on. Anything but this machine's own is open to the network; the link"
-    " that is printed then carries a token, which the app asks for.",
+    help="Address to serve on. Any other than the loopback address is open to the network; the"
+    " printed link then contains a token that the app requires.",
 )
 @click.option("--port", type=int, help="Port to serve on.  [the next free one from 8080]")
 @click.option(
     "--shared",
     is_flag=True,
-    help="One review for all: every tab shows the same state and may change it.",
+    help="Shared review: all tabs show and edit the same state.",
 )
 @click.option(
     "--allow-host",
     "allow_hosts",
     multiple=True,
     metavar="NAME",
-    help="A further name the page is reached by, for instance that of a proxy. May be repeated.",
+    help="Further host name of the page, for instance that of a proxy. Repeatable.",
 )
 @click.option(
     "--token",
-    help="Ask for this token: 12 or more letters, digits and . _ ~ -"
-    "  [a random one, with a --host that other machines reach]",
+    help="Require this token: 12 or more letters, digits and . _ ~ -"
+    "  [a random one, if --host is open to the network]",
 )
 @click.option(
     "--no-token",
@@ -89,28 +102,29 @@ def view(
 ) -> None:
     """Open SCENE in the browser, with a slider per error.
 
-    SCENE is dvf5000_first where it is left out.
+    Without SCENE, dvf5000_first is opened.
     """
-    # Before numpy is loaded: a slider move is one short product, and threads of OpenBLAS that spin
-    # for it beside a browser that draws in software make it thirty times slower.
+    # Before numpy is loaded: a slider move is one short product, and spinning OpenBLAS threads next
+    # to a browser that renders in software make it thirty times slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from warpspace.app.server.request_policy import Access
     from warpspace.app.server.viewer import run_viewer
     from warpspace.bodies.mesh_files import check_meshes
+    from warpspace.cli.services import build_services
     from warpspace.scene.library import load_scene, scene_names, scene_path
 
     path = scene_path(scene)
     original = path.read_bytes() if path.is_file() else b""
-    shown = load_scene(scene)
-    check_meshes(shown.machine)
-    bundled = {name: shown if name == scene else load_scene(name) for name in scene_names()}
+    opened_scene = load_scene(scene)
+    check_meshes(opened_scene.machine)
+    bundled = {name: opened_scene if name == scene else load_scene(name) for name in scene_names()}
     run_viewer(
-        shown,
+        opened_scene,
         {loaded.title: loaded for loaded in bundled.values()},
         services=replace(
             build_services(),
             is_current=lambda opened: (
-                opened is not shown or (path.is_file() and path.read_bytes() == original)
+                opened is not opened_scene or (path.is_file() and path.read_bytes() == original)
             ),
         ),
         access=Access(allow_hosts, token, no_token=no_token),
@@ -124,21 +138,23 @@ def view(
 
 @click.command()
 @scene_argument()
-@output_option("File to write: .png, .svg or .pdf; .gif, .webp or .mp4 move.", *FIGURES, *MOVING)
+@output_option(
+    "File to write: .png, .svg or .pdf; animated .gif, .webp or .mp4.", *FIGURES, *MOVING
+)
 @click.option(
     "--figure",
     metavar="NAME",
-    help=f"What to draw: {', '.join(figure_names())}.  [error-map]",
+    help=f"Figure to draw: {', '.join(figure_names())}.  [error-map]",
 )
 @click.option(
     "--motion",
     type=click.Choice(("exaggeration", "rotation")),
-    help="What moves: from true scale to the display factor and back, or one turn of the rotary"
+    help="Motion: from true scale to the display factor and back, or one turn of the rotary"
     " table.  [exaggeration]",
 )
-@click.option("--frames", type=int, help=f"Pictures of one round of what moves.  [{FRAMES}]")
-@click.option("--fps", type=float, help=f"Pictures a second.  [{FPS:g}]")
-@figure_options(size=None, sizes="  [1600x1200; 960x720 of what moves]")
+@click.option("--frames", type=int, help=f"Frames of one cycle.  [{FRAMES}]")
+@click.option("--fps", type=float, help=f"Frames per second.  [{FPS:g}]")
+@figure_options(size=None, sizes="  [1600x1200; 960x720 if animated]")
 def draw(
     scene: str,
     output: str,
@@ -153,19 +169,21 @@ def draw(
     size: tuple[int, int] | None,
     **options: Any,
 ) -> None:
-    """Draw a still or moving picture of SCENE.
+    """Draw a figure or an animation of SCENE.
 
-    The picture carries its exaggeration, scale bars, statistics and provenance. It is the same,
-    byte for byte, whenever it is repeated. Charts keep their own height to the width given. Camera
-    and colour scale of a moving picture stay the same.
+    The picture states exaggeration, scale bars, statistics and provenance. Repeated runs give
+    identical files. The height of charts follows from their width. Camera and colour scale of an
+    animation are fixed.
     """
     moves = Path(output).suffix.lower() in MOVING
-    given = {"--motion": motion, "--frames": frames, "--fps": fps}
+    motion_options = {"--motion": motion, "--frames": frames, "--fps": fps}
     if moves and figure not in (None, "error-map"):
-        raise OptionError(f"figure {figure!r} does not move; expected a .png, .svg or .pdf file")
-    for option, value in given.items():
+        raise OptionError(
+            f"figure {figure!r} cannot be animated; expected a .png, .svg or .pdf file"
+        )
+    for option, value in motion_options.items():
         if value is not None and not moves:
-            raise OptionError(f"{option} belongs to a .gif, .webp or .mp4 file; given {output}")
+            raise OptionError(f"{option} needs a .gif, .webp or .mp4 file; found {output}")
     name = figure or "error-map"
     if name in figure_names(scenes=2):
         command = figure_command(name) or "compare A B -o FILE"
@@ -184,7 +202,7 @@ def draw(
             settings,
         )
     loaded = load_placed(scene, direction, settings.loop, placed=placed)
-    say_first_order(settings.loop, loaded)
+    warn_first_order(settings.loop, loaded)
     if moving is None:
         draw_figure_file(name, [loaded], settings, output, force=force)
         echo(f"wrote {output}")
@@ -215,10 +233,9 @@ def compare(
 ) -> None:
     """Compare the errors of two scenes; the change is B − A.
 
-    Beside the statistics of both and their change stand those of |E_B − E_A|, the length of the
-    change of the error vector. The scenes are compared node by node, so that both must have the
-    same working volume. With -o both and the change are drawn on one sheet, with one colour scale
-    and one exaggeration.
+    Reports the statistics of both, their change, and those of |E_B − E_A|, the length of the change
+    of the error vector. The scenes are compared node by node and must have the same working volume.
+    With -o, both and the change are drawn on one sheet with the same colour scale and exaggeration.
     """
     from warpspace.analysis.description import to_json
     from warpspace.analysis.statistics import statistics
@@ -233,24 +250,29 @@ def compare(
     with progress("evaluating", silent=as_json):
         pictures = [evaluate_picture(s, grid=settings.grid, loop=settings.loop) for s in scenes]
     compared = [*pictures, scene_change(pictures[0], pictures[1])]
-    say_first_order(settings.loop, *scenes)
-    sure = [*(volume_uncertainty(one.scene, one.view, settings.grid) for one in pictures), None]
-    both = zip(sure, (picture.statistics for picture in compared), strict=True)
-    found = [one.with_expanded_uncertainty(numbers) if one else numbers for one, numbers in both]
+    warn_first_order(settings.loop, *scenes)
+    uncertainties = [
+        *(volume_uncertainty(one.scene, one.view, settings.grid) for one in pictures),
+        None,
+    ]
+    pairs = zip(uncertainties, (picture.statistics for picture in compared), strict=True)
+    summaries = [
+        one.with_expanded_uncertainty(numbers) if one else numbers for one, numbers in pairs
+    ]
     if output is not None:
         draw_figure_file("comparison", scenes, settings, output, force=force, silent=as_json)
     if as_json:
         names = ("a", "b", "difference")
         nodes = [statistics(picture.field, picture.grid.coordinates) for picture in compared]
-        change = {"change": statistics_change(found[0], found[1])}
+        change = {"change": statistics_change(summaries[0], summaries[1])}
         at_nodes = {"statistics_nodes": to_json(dict(zip(names, nodes, strict=True)))}
-        print_json({**to_json(dict(zip(names, found, strict=True))), **change, **at_nodes})
+        print_json({**to_json(dict(zip(names, summaries, strict=True))), **change, **at_nodes})
         return
     for letter, scene in zip("AB", scenes, strict=True):
         print_text(f"{letter}  {scene.name}: {scene.title}")
-    print_blocks(statistics_blocks(scenes[0], "AB", found))
-    for letter, one, numbers in zip("AB", sure, found, strict=False):
-        print_blocks(u95_lines(one and one.errors, {letter: numbers}))
+    print_blocks(statistics_blocks(scenes[0], "AB", summaries))
+    for letter, uncertainty, summary in zip("AB", uncertainties, summaries, strict=False):
+        print_blocks(u95_lines(uncertainty and uncertainty.errors, {letter: summary}))
     if output is not None:
         echo(f"wrote {output}")
 
@@ -276,10 +298,10 @@ def export(
     force: bool,
     **options: Any,
 ) -> None:
-    """Write SCENE into a file for other programs.
+    """Export SCENE for other programs.
 
-    The ending of FILE chooses the format. Every format carries the scene, the settings, the display
-    factor and the program's version.
+    The ending of FILE selects the format. Every format contains the scene, the settings, the
+    display factor and the version of the program.
     """
     from warpspace.picture.model import evaluate_picture
 
@@ -291,7 +313,7 @@ def export(
         echo(f"{output}: {picture.scene.machine.title}, {size_text(output)}")
         print_text(f"  {kind.left_out}")
         return
-    say_first_order(loop, picture.scene)
+    warn_first_order(loop, picture.scene)
     echo(
         f"{output}: {picture.scene.title}, displacement drawn ×{picture.exaggeration:g},"
         f" {size_text(output)}"
@@ -306,54 +328,51 @@ def export(
     type=SceneName(),
     multiple=True,
     metavar="SCENE",
-    help="Another machine to set beside those of the report, within the tolerances of the first;"
-    " may be given several times.",
+    help="Another machine to compare with those of the report, within the tolerances of the first."
+    " Repeatable.",
 )
 @click.option(
     "--with",
-    "others",
+    "appendices",
     multiple=True,
     metavar="NAME",
-    help="Also what another analysis says of SCENE without options of its own, for instance"
-    " certify; may be given several times.",
+    help="Appendix with another analysis of SCENE at its default options, for instance form."
+    " Repeatable.",
 )
 @click.option(
     "--limit",
     "spec_um",
-    cls=RenamedOption,
-    former=("--spec-um",),
     type=float,
-    help="Of |E| in µm, to say whether it is kept, and how likely a machine keeps it; otherwise"
-    " that of SCENE.",
+    help="Limit of |E| in µm, for the verdict and the probability of conformance.  [that of SCENE]",
 )
-@click.option("--author", default="", help="Who answers for it; on the first page.")
+@click.option("--author", default="", help="Author, printed on page 1.")
 @click.option(
     "--question",
     "questions",
     multiple=True,
     metavar="TEXT",
-    help="What is still open; on the first page; may be given several times.",
+    help="Open question, printed on page 1. Repeatable.",
 )
 @click.option(
     "--samples",
     type=int,
     default=100_000,
     show_default=True,
-    help="How many machines are drawn from the tolerances.",
+    help="Number of machines sampled within the tolerances.",
 )
 @click.option(
     "--distribution",
     type=click.Choice(("uniform", "normal")),
     default="uniform",
     show_default=True,
-    help="uniform over the tolerance, or normal with 3σ = half width.",
+    help="Distribution: uniform over the tolerance, or normal with 3σ = half-width.",
 )
 @click.option(
     "--seed",
     type=int,
     default=0,
     show_default=True,
-    help="Of the random numbers; the same seed gives the same numbers.",
+    help="Seed of the random numbers; equal seeds give equal results.",
 )
 @grid_option()
 @exaggeration_option
@@ -363,17 +382,17 @@ def report(
     scenes: tuple[str, ...],
     output: str,
     concepts: tuple[str, ...],
-    others: tuple[str, ...],
+    appendices: tuple[str, ...],
     *,
     force: bool,
     **options: Any,
 ) -> None:
     """Write the design review of one SCENE or two.
 
-    The first page has the verdict on the limit, four numbers, a map and the advice.
-    Appendices hold the evidence: maps, contributions at the worst point, errors and tolerances,
-    gains, Monte Carlo, conventions and provenance. With --concepts also a table and pictures of
-    machines side by side, as `warpspace concepts` has them; --with adds an appendix of any other
+    The first page states the verdict (pass, fail or undecided), four numbers, a map and the
+    recommended action. Appendices contain maps, contributions at the worst point, errors and
+    tolerances, gains, Monte Carlo, conventions and provenance. --concepts adds a table and pictures
+    of machines side by side, as `warpspace concepts` does; --with adds an appendix of another
     analysis. The file needs no network.
     """
     from warpspace.analysis.description import ignore_progress
@@ -384,20 +403,20 @@ def report(
         raise OptionError(f"report: {len(scenes)} scenes; expected one, or two to compare")
     settings = ReportSettings(**options)
     loaded = [load_scene(scene) for scene in scenes]
-    beside = [load_scene(scene) for scene in concepts]
-    asked = {name: _asked(name) for name in others}
-    say_first_order(settings.loop, *loaded)
+    concept_scenes = [load_scene(scene) for scene in concepts]
+    analyses = {name: _build_analysis(name) for name in appendices}
+    warn_first_order(settings.loop, *loaded)
     with progress("writing the review", total=1.0) as bar:
-        written = write_report(
+        review = write_report(
             loaded,
             output,
             settings,
-            embed=embed_view,
-            story_steps=tell_story,
-            concepts=beside,
+            embed=deferred(f"{SERVICES}:embed_view"),
+            story_steps=deferred(f"{SERVICES}:build_story"),
+            concepts=concept_scenes,
             results={
                 f"{heading}: {scene.title}": analysis.run(scene, ignore_progress)
-                for heading, analysis in asked.items()
+                for heading, analysis in analyses.items()
                 for scene in loaded
             },
             files=[scene_path(scene) for scene in (*scenes, *concepts)],
@@ -406,14 +425,17 @@ def report(
         )
     titles = " and ".join(scene.title for scene in loaded)
     echo(f"{output}: design review of {titles}, {size_text(output)}")
-    if written.missing:
-        raise RenderError(f"{output} is written without figures: {'; '.join(written.missing)}")
+    if review.missing:
+        raise RenderError(f"{output} is written without figures: {'; '.join(review.missing)}")
 
 
-def _asked(name: str) -> "Analysis":
+def _build_analysis(name: str) -> "Analysis":
     from warpspace.analysis.registry import find_analysis
 
-    try:
-        return find_analysis(name)()
-    except TypeError:
-        raise OptionError(f"--with {name}: needs options of its own: warpspace {name}") from None
+    kind = find_analysis(name)
+    required = [option.flag for option in kind.options() if option.required]
+    if required:
+        raise OptionError(
+            f"--with {name}: needs {', '.join(required)}; run `warpspace {name}` instead"
+        )
+    return kind()

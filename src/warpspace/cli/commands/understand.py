@@ -1,25 +1,13 @@
-"""Commands by which errors are understood: the field, at points or over the working volume."""
+"""The command `field`: errors at points or over the working volume."""
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import click
 
-from warpspace.analysis.blocks import Column, Table, number_columns
 from warpspace.cli import shared_options
-from warpspace.cli.analyses import print_blocks
-from warpspace.cli.tables import print_text, progress
-from warpspace.exceptions import OptionError
 
 if TYPE_CHECKING:
-    from warpspace.field.evaluate import ErrorField, View
-    from warpspace.field.grid import Grid
-    from warpspace.scene.model import Scene
-    from warpspace.units import Array
-
-MAX_LISTED = 20
-POINTS_AT_ONCE = 5000  # points that are turned into JSON at a time
-
+    pass
 
 FIELDS = (".parquet", ".npz", ".csv", ".vts")
 
@@ -31,7 +19,11 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
 @shared_options.loop_option
 @shared_options.placed_option
 @shared_options.direction_option
-@click.option("--exact", is_flag=True, help="Full rotations and all products, not the first order.")
+@click.option(
+    "--exact",
+    is_flag=True,
+    help="Exact kinematic chain with full rotations, in place of the first order.",
+)
 @click.option(
     "--frame",
     type=click.Choice(("machine", "workpiece")),
@@ -47,202 +39,11 @@ FIELDS = (".parquet", ".npz", ".csv", ".vts")
 )
 @shared_options.force_option
 @shared_options.json_option
-def field(
-    scene: str,
-    points: tuple[str, ...],
-    grid: int | None,
-    loop: str,
-    frame: str,
-    direction: str | None,
-    csv_path: str | None,
-    output: str | None,
-    *,
-    force: bool,
-    exact: bool,
-    placed: bool,
-    as_json: bool,
-) -> None:
+@shared_options.run_by("warpspace.cli.field_output:print_field")
+def field() -> None:
     """Evaluate the errors of SCENE at points or over a grid.
 
     Errors are actual − nominal, in µm; the orientation error is the rotation vector of the tool
-    axis, in µrad. Without --at the grid of the working volume is evaluated. Where SCENE states how
-    sure its errors are, U95 of each point stands beside them, in files too.
+    axis, in µrad. Without --at the grid of the working volume is evaluated. If SCENE states
+    the uncertainty of its errors, U95 is reported for each point, in files too.
     """
-    from warpspace.analysis.description import to_json
-    from warpspace.analysis.statistics import statistics, volume_statistics
-    from warpspace.analysis.uncertainty.propagation import (
-        field_uncertainty,
-        u95_columns,
-        u95_lines,
-        volume_uncertainty,
-    )
-    from warpspace.field.evaluate import placed_words
-    from warpspace.picture.formatting import direction_words, point_axes, spell_at, spell_point
-    from warpspace.scene.model import choose_view, second_order
-
-    if points and grid is not None:
-        raise OptionError("--at and --grid exclude each other; give one of them")
-    if points and output is not None and output.lower().endswith(".vts"):
-        others = ", ".join(ending for ending in FIELDS if ending != ".vts")
-        raise OptionError(
-            f"{output}: a .vts file holds a grid, --at gives points; expected {others}"
-        )
-    files = [path for path in (csv_path, output) if path is not None]
-    loaded = shared_options.load_placed(scene, direction, loop, placed=placed)
-    view = choose_view(loaded, loop, frame)
-    with progress("evaluating", silent=as_json):
-        axes, result, nodes = _evaluate(loaded, points, grid, view, exact=exact)
-        places = axes if nodes is None else None
-        said = (
-            {} if exact else shared_options.say_second_order(second_order(loaded, loop, at=places))
-        )
-        even = statistics(result, axes)
-        u95 = {}
-        if nodes is None:
-            over, summary = field_uncertainty(loaded, result.error_um, axes, view), even
-            u95 = over.columns if over and over.errors.is_known else {}
-        else:
-            over = volume_uncertainty(loaded, view, max(nodes.shape))
-            summary = volume_statistics(result, nodes)
-            if files or as_json:
-                u95 = u95_columns(loaded, result, axes, view, nodes.point_mm)
-        summary = over.with_expanded_uncertainty(summary) if over else summary
-    if files:
-        from warpspace.outputs.exports.fields import FieldRecord, write_field
-        from warpspace.picture.model import field_remarks
-
-        about = {**field_remarks(loaded, view, exact=exact), "frame": frame}
-        with progress("writing", silent=as_json):
-            for path in files:
-                write_field(FieldRecord(axes, result, about, u95), path, overwrite=force)
-    if as_json:
-        found: dict[str, object] = {"loop": loop, "frame": frame}
-        found["statistics"] = to_json(summary)
-        found |= {} if view.placed_over is None else {"placement": "fitted out"}
-        found |= said if view.reference is None else {**said, "reference": dict(view.reference)}
-        if nodes is not None:
-            found["statistics_nodes"] = to_json(even)
-        if output is not None:
-            size = {"output": output, "points_written": result.norm_um.size}
-            click.echo(shared_options.spell_json({**size, **found}))
-            return
-        found |= {"unknown": over.errors.unknown} if over and over.errors.unknown else {}
-        if nodes is None and over and u95:
-            u95["covariance_um2"] = over.covariance_um2
-            u95 |= {} if loaded.limit_um is None else {"probability": over.conformance_probability(loaded.limit_um)}
-        _print_json(axes, result, found, u95)
-        return
-    told = (*direction_words(loaded), *placed_words(view))
-    words = (f"{loop} loop", *told, "exact" if exact else "first order")
-    print_text(" · ".join((loaded.title, *words)))
-    if points:
-        units = [loaded.machine.axes[name].unit for name in axes]
-        _list_points(axes, result, units, u95)
-    volume = "" if nodes is None else ", over the volume"
-    print_text(
-        f"  {result.norm_um.size} points{volume}: mean {summary.mean_um:.2f},"
-        f" RMS {summary.rms_um:.2f}, P95 {summary.p95_um:.2f}, max {summary.max_um:.2f} µm"
-    )
-    for said in u95_lines(over and over.errors, {"": summary}):
-        print_text(said)
-    if nodes is not None:
-        print_text(f"  each node counted once: mean {even.mean_um:.2f} µm")
-    worst = point_axes(loaded, summary.max_at_axes)
-    print_text(f"  max at {spell_point(worst, summary.max_at_mm)} mm")
-    print_text(f"  --at {spell_at(worst)}")
-    for path in files:
-        print_text(f"  {path}: {shared_options.size_text(path)}")
-
-
-def _evaluate(
-    scene: "Scene", points: tuple[str, ...], grid: int | None, view: "View", *, exact: bool
-) -> "tuple[Mapping[str, Array], ErrorField, Grid | None]":
-    import numpy as np
-
-    from warpspace.field.grid import DEFAULT_NODES, build_grid
-    from warpspace.kinematics.model import complete_coordinates
-    from warpspace.scene.model import evaluate, evaluate_grid
-
-    if points:
-        typed = [shared_options.parse_point(text, scene.machine.axes) for text in points]
-        full = [
-            complete_coordinates(scene.machine, point, scene.workspace.positions) for point in typed
-        ]
-        axes = {name: np.array([point[name] for point in full]) for name in scene.machine.axes}
-        found = evaluate(scene, at=axes, loop=view.loop, exact=exact, frame=view.frame)
-        for point in typed:
-            shared_options.warn_outside_travel(scene.machine, point)
-        return axes, found, None
-    nodes = DEFAULT_NODES if grid is None else grid
-    built = build_grid(scene.model, scene.workspace, nodes)
-    return built.coordinates, evaluate_grid(scene, built, view, exact=exact), built
-
-
-def _print_json(
-    axes: "Mapping[str, Array]",
-    result: "ErrorField",
-    found: "Mapping[str, object]",
-    u95: "Mapping[str, Array]",
-) -> None:
-    """Print the JSON object piece by piece: a million points are never held as one text."""
-    import numpy as np
-
-    columns = {
-        "nominal_mm": result.nominal_mm,
-        "error_um": result.error_um,
-        "norm_um": result.norm_um,
-        "orientation_urad": result.orientation_urad,
-    }
-    if not all(np.isfinite(values).all() for values in columns.values()):
-        raise OptionError("the field has points whose error is no number; JSON cannot hold them")
-    columns |= u95
-    shape, size = result.norm_um.shape, result.norm_um.size
-    positions = [np.broadcast_to(values, shape).reshape(-1) for values in axes.values()]
-    flat = [values.reshape(size, *values.shape[len(shape) :]) for values in columns.values()]
-    click.echo('{"points": [', nl=False)
-    for start in range(0, size, POINTS_AT_ONCE):
-        part = slice(start, start + POINTS_AT_ONCE)
-        places = zip(*(values[part].tolist() for values in positions), strict=True)
-        numbers = zip(*(values[part].tolist() for values in flat), strict=True)
-        rows = [
-            {"axes": dict(zip(axes, place, strict=True)), **dict(zip(columns, row, strict=True))}
-            for place, row in zip(places, numbers, strict=True)
-        ]
-        click.echo((", " if start else "") + shared_options.spell_json(rows)[1:-1], nl=False)
-    click.echo(
-        "]"
-        + "".join(f', "{name}": {shared_options.spell_json(part)}' for name, part in found.items())
-        + "}"
-    )
-
-
-def _list_points(
-    axes: "Mapping[str, Array]",
-    result: "ErrorField",
-    units: "Sequence[str]",
-    u95: "Mapping[str, Array]",
-) -> None:
-    columns = (
-        Column("point", "d", leads=True),
-        *(Column(f"axis {name}", "g", unit) for name, unit in zip(axes, units, strict=True)),
-        *number_columns(("in R x", "y", "z"), "g", "mm"),
-        *number_columns(("error x", "y", "z"), "+.3f", "µm"),
-        Column("|E|", ".3f", "µm", joins=True),
-        *number_columns(("tilt x", "y", "z"), "+.3f", "µrad"),
-        *number_columns(("U95 x", "y", "z", "U95 |E|") if u95 else (), ".3f", "µm"),
-    )
-    rows = [
-        (
-            index + 1,
-            *(values[index] for values in axes.values()),
-            *result.nominal_mm[index],
-            *result.error_um[index],
-            result.norm_um[index],
-            *result.orientation_urad[index],
-            *((*u95["u95_um"][index], u95["u95_norm_um"][index]) if u95 else ()),
-        )
-        for index in range(min(result.norm_um.size, MAX_LISTED))
-    ]
-    print_blocks([Table(columns, rows)])
-    if result.norm_um.size > MAX_LISTED:
-        print_text(f"  … {result.norm_um.size - MAX_LISTED} more; -o, --csv or --json has all")

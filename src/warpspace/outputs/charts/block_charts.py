@@ -17,7 +17,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import Bbox
 
 from warpspace.analysis.blocks import Bars, Curve, Histogram, Lines, Panel, Series
-from warpspace.bench.base import LEAST, lay_polar
+from warpspace.bench.base import SMALLEST_DEVIATION, lay_polar
 from warpspace.outputs.drawing.settings import FONT, LIGHT, SAVE_RC, Theme
 
 DPI = 160.0
@@ -339,7 +339,7 @@ def _lines(axes: Axes, chart: Lines, size: float) -> None:
         axes.set_aspect("equal", adjustable="datalim")
     else:
         values = np.concatenate([curve.y for curve in chart.curves])
-        if np.ptp(values) < LEAST and not chart.bands:  # rounding only: no chart of noise
+        if np.ptp(values) < SMALLEST_DEVIATION and not chart.bands:  # rounding only
             middle = float(np.round(values.mean(), 6))
             axes.set_ylim(middle - 1.0, middle + 1.0)
     if chart.log:

@@ -98,7 +98,7 @@ def _numbers(
     runs = result.runs
     places = [right - VALUE_IN / width * (len(runs) - 1 - index) for index in range(len(runs))]
     for run, place in zip(runs, places, strict=True):
-        figure.text(place, y, run.who, size=SMALL, color=ground().muted, ha="right")
+        figure.text(place, y, run.source, size=SMALL, color=ground().muted, ha="right")
     for key, (name, unit) in names.items():
         rule = y - 0.07 / height
         line = Line2D([x_left, right], [rule, rule], color=ground().faint, linewidth=0.6)

@@ -277,14 +277,12 @@ def _advice(picture: ScenePicture, adjustment: Result | str, settings: ReportSet
         return "No single adjustment reduces the largest error; a set may, see Adjustments."
     ((key, value),) = adjustment.adjustments[0].adjust.items()
     row = parameter(key)
-    effect = f "the largest error falls from {spell(before)} to {spell(largest)}{UM}"
-    if limit is not None and largest < = limit:
-        effect + =
-            ", within the limit"
+    effect = f"the largest error falls from {spell(before)} to {spell(largest)}{UM}"
+    if limit is not None and largest <= limit:
+        effect += ", within the limit"
     elif limit is not None:
         effect += f"; {volume_share(_share_within(after))} of the volume is within the limit"
-    present = spell_setting(adjustment.present[key]
-        )
+    present = spell_setting(adjustment.present[key])
     return (
         f"Adjust {key} ({row.name}) from {present} to {spell_signed(value)} {row.unit}: {effect}."
     )
