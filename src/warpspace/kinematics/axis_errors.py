@@ -50,13 +50,13 @@ class SmallMotion:
         half = (
             self._cosine * other.half + other._cosine * self.half + np.cross(self.half, other.half)
         )
-        return SmallMotion(half, self.shift_mm + other.shift_mm + self.arm(other.shift_mm))
+        return SmallMotion(half, self.shift_mm + other.shift_mm + self.displacement(other.shift_mm))
 
     @property
     def _cosine(self) -> Array:
         return np.sqrt(1.0 - np.sum(self.half**2, axis=-1, keepdims=True))
 
-    def arm(self, lever_mm: Array) -> Array:
+    def displacement(self, lever_mm: Array) -> Array:
         """Give what the rotation alone moves a point by, ``(Rot − 1) · lever``, [..., 3], mm."""
         across = np.cross(self.half, lever_mm)
         return 2.0 * (self._cosine * across + np.cross(self.half, across))
@@ -64,13 +64,13 @@ class SmallMotion:
     @property
     def inverse(self) -> "SmallMotion":
         back = SmallMotion(-self.half, -self.shift_mm)
-        return SmallMotion(-self.half, back.shift_mm + back.arm(back.shift_mm))
+        return SmallMotion(-self.half, back.shift_mm + back.displacement(back.shift_mm))
 
-    def seen_from(self, pose: Array) -> "SmallMotion":
+    def conjugate(self, pose: Array) -> "SmallMotion":
         """Give ``pose · motion · pose⁻¹``; the pose, [..., 4, 4], may be of any size."""
         turn, place = pose[..., :3, :3], pose[..., :3, 3]
         turned = SmallMotion(transforms.rotate(turn, self.half), np.zeros(3))
-        shift = transforms.rotate(turn, self.shift_mm) - turned.arm(place)
+        shift = transforms.rotate(turn, self.shift_mm) - turned.displacement(place)
         return SmallMotion(turned.half, shift)
 
 

@@ -45,7 +45,7 @@ def convert_order(
 def _across(own: AxisErrors, *, forward: bool) -> Along:
     def along(position: Array, errors: SmallMotion) -> SmallMotion:
         pose = own.pose(position)
-        return errors.seen_from(pose if forward else transforms.inverse(pose))
+        return errors.conjugate(pose if forward else transforms.inverse(pose))
 
     return along
 
@@ -56,7 +56,7 @@ def without(
     """Give the component errors, [n], left where a motion before the axis went to the constants."""
     back = taken.inverse
     if own.order == ComponentErrors.AFTER_MOTION:
-        back = back.seen_from(transforms.inverse(own.pose(position)))
+        back = back.conjugate(transforms.inverse(own.pose(position)))
     return back @ present
 
 
@@ -82,7 +82,7 @@ def zero_at(
         there = np.asarray(float(position))
         taken = own.at(there)
         if own.order == ComponentErrors.AFTER_MOTION:
-            taken = taken.seen_from(own.pose(there))
+            taken = taken.conjugate(own.pose(there))
         errors = moved_to_constants(own, taken)
     return errors
 
@@ -255,7 +255,7 @@ def _on_arm(own: AxisErrors, point_mm: Array, sign: float) -> Along:
 
     def along(position: Array, errors: SmallMotion) -> SmallMotion:
         lever = transforms.apply(own.pose(position), point_mm) if is_fixed else point_mm
-        return SmallMotion(errors.half, errors.shift_mm + sign * errors.arm(lever))
+        return SmallMotion(errors.half, errors.shift_mm + sign * errors.displacement(lever))
 
     return along
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpspace.machine.axes import TravelDirection, parameter
-from warpspace.machine.curves.curve import OWN, ErrorFunction
+from warpspace.machine.curves.curve import OWN_AXIS, ErrorFunction
 from warpspace.machine.curves.simple import NOTHING, Constant, Directional, Harmonics, Poly, Ramp
 from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.machine.limits import MIN_SPAN
@@ -52,7 +52,7 @@ class ErrorSet:
     def arguments(self, key: str) -> tuple[str, ...]:
         """List the axes whose positions one error depends on; none where it is constant or zero."""
         own, named = parameter(key).axis, self._function(key).arguments
-        return tuple(dict.fromkeys(own if axis == OWN else axis for axis in named))
+        return tuple(dict.fromkeys(own if axis == OWN_AXIS else axis for axis in named))
 
     def evaluate(self, key: str, position: Array) -> Array:
         """Give one error along its axis, the mean of both directions of travel, [...]."""
@@ -152,15 +152,15 @@ class ToleranceSet:
     # half width about zero per class: translation [µm], rotation and squareness [µrad]
     default: Mapping[str, float] = field(default_factory=dict[str, float])
     # parameters with a tolerance of their own
-    own: Mapping[str, Tolerance] = field(default_factory=dict[str, Tolerance])
+    individual: Mapping[str, Tolerance] = field(default_factory=dict[str, Tolerance])
 
     def __bool__(self) -> bool:
-        return bool(self.default or self.own)
+        return bool(self.default or self.individual)
 
     def get(self, key: str) -> Tolerance | None:
         """Give the tolerance of a parameter; None where neither it nor its class has one."""
-        if key in self.own:
-            return self.own[key]
+        if key in self.individual:
+            return self.individual[key]
         half_width = self.default.get(parameter(key).tolerance_class)
         return None if half_width is None else Tolerance(0.0, half_width)
 
@@ -169,11 +169,11 @@ class ToleranceSet:
 
     def with_half_widths(self, half_widths: Mapping[str, float]) -> "ToleranceSet":
         """Give parameters other half widths, µm or µrad; centres stay where they are."""
-        own = dict(self.own)
+        individual = dict(self.individual)
         for key, half_width in half_widths.items():
             present = self.get(key)
-            own[key] = Tolerance(0.0 if present is None else present.centre, half_width)
-        return replace(self, own=own)
+            individual[key] = Tolerance(0.0 if present is None else present.centre, half_width)
+        return replace(self, individual=individual)
 
 
 FORWARD, BACKWARD, UNKNOWN = "+", "-", ""

@@ -120,7 +120,7 @@ class Scene:
     def parameter_keys(self) -> tuple[str, ...]:
         """Keys of the machine's default parameters and of any other constant the scene gives."""
         default = axes.default_keys(self.machine.chain.axes)
-        given = [*self.errors, *self.tolerances.own, *self.uncertainty]
+        given = [*self.errors, *self.tolerances.individual, *self.uncertainty]
         extra = [key for key in self.machine.allowed_keys if key in given and key not in default]
         return (*default, *extra)
 

@@ -186,7 +186,7 @@ SPAN_SAMPLES = 721
 NEGLIGIBLE = 1e-12
 """Peak in µm or µrad below which a curve counts as zero: no number may be divided by it."""
 
-OWN = "own"
+OWN_AXIS = "own"
 """Stands for the axis of the error among the arguments of a curve that does not know its name."""
 
 Span = tuple[float, float]  # lower and upper end of an axis range, mm or degrees
@@ -224,8 +224,8 @@ class ErrorFunction(ABC):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Axes whose positions it depends on: `OWN` for that of its error; empty for a constant."""
-        return (OWN,)
+        """Axes whose positions it depends on: `OWN_AXIS` for that of its error; empty for a constant."""
+        return (OWN_AXIS,)
 
     def evaluate_at(
         self,

@@ -205,7 +205,7 @@ class TwoArguments(ErrorFunction):
         return self.axes
 
     @property
-    def beside(self) -> float:
+    def middle(self) -> float:
         """Position of the other axis, mm or degrees, that `evaluate` takes: between the ends."""
         other = self.positions[1]
         return (other[0] + other[-1]) / 2.0
@@ -217,7 +217,7 @@ class TwoArguments(ErrorFunction):
     def evaluate(self, position: Array) -> Array:
         """Give the value while the other axis stands in the middle of its positions."""
         own = np.asarray(position, dtype=float)
-        return self._bilinear(own, np.asarray(self.beside))
+        return self._bilinear(own, np.asarray(self.middle))
 
     def evaluate_at(
         self,
@@ -255,7 +255,7 @@ class TwoArguments(ErrorFunction):
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
         """Sections at the first, the middle and the last position of the other axis."""
         other = self.positions[1]
-        shown = dict.fromkeys((other[0], self.beside, other[-1]))
+        shown = dict.fromkeys((other[0], self.middle, other[-1]))
         return tuple((f"{self.axes[1]} {at:g}", self.section(at)) for at in shown)
 
     def scaled(self, factor: float) -> Self:
