@@ -225,7 +225,11 @@ def test_what_makes_a_point_sure_is_what_acts_there():
     # what is known: readings that share a zero and a scale; what comes: a line with its own zero
     share, away = (x + 100.0) / 400.0, x - x.mean()
     parts = {
-        acts: sum(one.at(1.0) ** 2 for one in request.instrument.contributions if one.acts == acts)
+        acts: sum(
+            row.uncertainty_um(1.0) ** 2
+            for row in request.instrument.contributions
+            if row.acts == acts
+        )
         for acts in ("each", "all", "scale")
     }
     spread = parts["each"] * np.eye(3) + parts["all"] + parts["scale"] * np.outer(away, away)

@@ -186,8 +186,8 @@ class Calibrate(Analysis):
         )
         notes = calibration.notes
         if len(steps) < count:
-            further = "further " if steps else ""
-            notes += (f"no {further}measurement reduces U95 {describe_target(self.target)} by 1 %",)
+            measurement = "further measurement" if steps else "measurement"
+            notes += (f"no {measurement} reduces U95 {describe_target(self.target)} by 1 %",)
         return replace(
             calibration,
             separated_by=find_separating(scene, sets, calibration, check_cancelled),
@@ -492,8 +492,8 @@ def _frame_notes(fit: Fit) -> tuple[str, ...]:
     set-ups can explain: the part of them outside the columns of the fitted Jacobian.
     """
     sets = fit.model.sets
-    others = [in_other_frame(fit.scene, readings) for readings in sets]
-    turned = [at for at, other in enumerate(others) if other is not None]
+    turned_sets = [in_other_frame(fit.scene, readings) for readings in sets]
+    turned = [at for at, other in enumerate(turned_sets) if other is not None]
     if not turned:
         return ()
     from scipy.stats import f
@@ -502,7 +502,7 @@ def _frame_notes(fit: Fit) -> tuple[str, ...]:
     for chosen in [turned, *([at] for at in turned if turned[1:])]:
         residuals = list(fit.after)
         for at in chosen:
-            other = others[at] or sets[at]
+            other = turned_sets[at] or sets[at]
             residuals[at] = residuals[at] + other.observed_mm - sets[at].observed_mm
         refitted = _refit(fit, residuals)
         if refitted is not None and refitted[0] < best_sigma:

@@ -48,9 +48,11 @@ def _spans(scene: Scene) -> dict[str, tuple[float, float]]:
 
 def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
     count = max(len(values) for values in positions.values())
-    still = scene.workspace.positions
+    rest_positions = scene.workspace.positions
     return {
-        name: np.asarray(positions[name] if name in positions else np.full(count, still[name]))
+        name: np.asarray(
+            positions[name] if name in positions else np.full(count, rest_positions[name])
+        )
         for name in scene.machine.axes
     }
 
@@ -64,8 +66,8 @@ def _nominal(scene: Scene, kind: str, at: Mapping[str, Array], observed_mm: Arra
 def _trackers(scene: Scene) -> Iterator[Candidate]:
     spans = _spans(scene)
     for shares in (PLACES[::2], PLACES):
-        each = [[low + share * (high - low) for share in shares] for low, high in spans.values()]
-        places = np.array(list(product(*each))).T
+        grid = [[low + share * (high - low) for share in shares] for low, high in spans.values()]
+        places = np.array(list(product(*grid))).T
         if places.shape[-1] > 1:
             count = f"{places.shape[-1]} points, {len(shares)} along each of {', '.join(spans)}"
             title = f"tracker: error vectors at {count}; its position and rotation unknown"
@@ -110,8 +112,8 @@ def _test(scene: Scene, kind: str, title: str) -> Iterator[Candidate]:
 
 
 def _spheres(scene: Scene) -> Iterator[Candidate]:
-    still = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
-    centre = ball_point(scene.model, still)
+    at_rest = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
+    centre = ball_point(scene.model, at_rest)
     rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
     travels = {name: scene.machine.axes[name].travel for name in rotary}
     turns = {

@@ -124,8 +124,8 @@ def describe_rank(rank: Rank, slopes: Collection[str] = ()) -> tuple[str, ...]:
         if len(group) == 2:
             lines.append(f"{name(group[0])} and {name(group[1])} are confounded in these readings")
         elif len(group) > 2:
-            key, *others, last = map(name, group)
-            combination = f"{', '.join(others)} and {last}"
+            key, *keys, last = map(name, group)
+            combination = f"{', '.join(keys)} and {last}"
             lines.append(f"{key} is confounded with a combination of {combination}")
     return tuple(lines)
 

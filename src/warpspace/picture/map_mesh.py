@@ -61,7 +61,7 @@ def map_parts(picture: Picture) -> list[MapPatch]:
         drawn_mm, values = thick_nodes(one, one.drawn_mm), spread(one.values)
         faded = None if one.faded is None else spread(one.faded)
         drawn_of = topology(values.shape, cut=one.cut)
-        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, one.grid.ways, faded))
+        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, one.grid.directions, faded))
     return parts
 
 

@@ -41,7 +41,7 @@ def _test(text, folder):
 def _calibration(text, folder):
     del folder
     table = parse_calibration(text, "t.csv")
-    return [(x, y) for x, y in table.need(("x_mm", "exx_um")).tolist()]
+    return [(x, y) for x, y in table.require(("x_mm", "exx_um")).tolist()]
 
 
 READERS: dict[str, Reader] = {
