@@ -55,7 +55,8 @@ def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(stat
     assert changed.amplitudes["EAX"] == 33.0
     assert changed.tolerances.individual["EAX"].half_width == 7.0
     assert changed.exclusions.excluded == {"EAX"}
-    assert not any(key.endswith("C") for key in (*changed.amplitudes, *changed.tolerances.individual))
+    keys = (*changed.amplitudes, *changed.tolerances.individual)
+    assert not any(key.endswith("C") for key in keys)
     assert {*changed.positions} == {"B"}
     assert changed.origin is state.scene
     assert any("axis C left out" in note for note in changed.notes)
