@@ -231,7 +231,7 @@ def test_told_combinations_hold_in_95_percent_of_trials(trials, near):
             "points", poses, tip, 1e-3 * read, None, ("",) * 27, tuple(range(27)), ""
         )
         found = calibrate(scene, [readings], Calibrate(fit=keys))
-        parts = [one.key for one in found.parameters if one.status is Estimability.CONFOUNDED]
+        parts = [one.key for one in found.parameters if one.estimable is Estimability.CONFOUNDED]
         assert parts == [next(iter(one.factors)) for one in found.combinations] != []
         assert all(one.interval_95 is None for one in found.parameters if not one.identifiable)
         for one in found.combinations:

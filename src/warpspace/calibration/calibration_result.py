@@ -47,9 +47,9 @@ MAX_BARS = 22  # parameters of one unit that are drawn: the most significant cha
 class Estimability(StrEnum):
     """Estimability of one parameter; a confounded value holds for the others as in the scene."""
 
-    ESTIMABLE = "estimable"
+    ESTIMABLE = "yes"
     CONFOUNDED = "confounded"
-    NOT_ESTIMABLE = "not estimable"
+    NOT_ESTIMABLE = "no"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class FittedParameter:
 
     keys: ClassVar[tuple[str, ...]] = (
         "key", "unit", "before", "value", "standard_uncertainty", "interval_95", "identifiable",
-        "status",
+        "estimable",
     )  # fmt: skip
     key: str
     before: float  # µm or µrad
@@ -66,7 +66,7 @@ class FittedParameter:
     # µm or µrad; None where the parameter is not estimable by itself
     standard_uncertainty: float | None
     interval_95: tuple[float, float] | None
-    status: Estimability
+    estimable: Estimability
 
     @property
     def unit(self) -> str:
@@ -75,7 +75,7 @@ class FittedParameter:
     @property
     def identifiable(self) -> bool:
         """True where the readings determine it without fixing another parameter."""
-        return self.status is Estimability.ESTIMABLE
+        return self.estimable is Estimability.ESTIMABLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,19 +331,19 @@ class Calibration(Result):
         listed = [row for row in self.parameters if row.before or row.key not in without_effect]
         columns = (
             Column("key", leads=True), Column("name"),
-            *(Column(name, ".1f") for name in ("before", "value", "± u")), Column("unit"),
-            *number_columns(("95 % from", "to"), ".1f"), Column("status"),
+            *(Column(name, ".1f") for name in ("start", "value", "± u")), Column("unit"),
+            *number_columns(("from", "to"), ".1f"), Column("estimable"),
         )  # fmt: skip
         rows = [
             (
                 row.key, parameter(row.key).name, row.before,
-                None if row.status is Estimability.NOT_ESTIMABLE else row.value,
-                row.standard_uncertainty, row.unit, *(row.interval_95 or (None, None)), row.status,
+                None if row.estimable is Estimability.NOT_ESTIMABLE else row.value,
+                row.standard_uncertainty, row.unit, *(row.interval_95 or (None, None)), row.estimable,
             )
             for row in listed
         ]  # fmt: skip
-        yield Table(columns, rows)
-        if any(row.status is Estimability.CONFOUNDED for row in listed):
+        yield Table(columns, rows, "Error parameters, with 95 % intervals from … to:")
+        if any(row.estimable is Estimability.CONFOUNDED for row in listed):
             yield "  confounded: the value holds if the others in its combination are as in SCENE"
         for total in self.combinations:
             low, high = total.interval_95
@@ -420,7 +420,7 @@ class Calibration(Result):
             if total is not None:
                 before = total.value - row.value + row.before
                 width, interval = total.standard_uncertainty, total.interval_95
-                yield FittedParameter(row.key, before, total.value, width, interval, row.status)
+                yield FittedParameter(row.key, before, total.value, width, interval, row.estimable)
             elif row.interval_95 is not None:
                 yield row
 

@@ -63,8 +63,8 @@ class SmallMotion:
 
     @property
     def inverse(self) -> "SmallMotion":
-        back = SmallMotion(-self.half, -self.shift_mm)
-        return SmallMotion(-self.half, back.shift_mm + back.displacement(back.shift_mm))
+        rotation = SmallMotion(-self.half, np.zeros(3))
+        return SmallMotion(-self.half, -self.shift_mm - rotation.displacement(self.shift_mm))
 
     def conjugate(self, pose: Array) -> "SmallMotion":
         """Compute ``pose · motion · pose⁻¹`` for poses, [..., 4, 4], of any size."""

@@ -304,7 +304,7 @@ class CalibratePanel(FilesPanel):
         parts = [tag("p", join((f"RMS of {count} residuals: {number(before)} → ",
                                 tag("b", f"{number(after)} µm"))))]  # fmt: skip
         for status, words in DOUBTS:
-            keys = [one.key for one in found.parameters if one.status is status]
+            keys = [one.key for one in found.parameters if one.estimable is status]
             if keys:
                 more = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
                 names = ", ".join(keys[:MOST_NAMED])
