@@ -1,5 +1,6 @@
 """Calibration against the public sphere measurements, and against errors that were planted."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,10 +11,10 @@ from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import simulate
 from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.calibration_result import Estimability
-from warpspace.calibration.kinds import VIEW
+from warpspace.calibration.kinds import VIEW, in_other_frame
 from warpspace.calibration.next_best import Candidate, candidates, next_best, u95_at
 from warpspace.calibration.readings import Readings, find_data, parse_reading_table
-from warpspace.calibration.solve import build_fit_parameters, describe_rank
+from warpspace.calibration.solve import build_fit_parameters, describe_rank, solve
 from warpspace.calibration.spheres import circles_of
 from warpspace.field.evaluate import evaluate_exact
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
@@ -386,3 +387,29 @@ def test_squareness_is_found_in_circles_of_two_planes(tmp_path):
     assert ("EXY", "EC0Y") in alone.rank.confounded
     words = "the slope of EXY and EC0Y are confounded in these readings"
     assert words in describe_rank(alone.rank, alone.slopes)
+
+
+def test_vectors_in_the_wrong_frame_are_recognised_without_a_second_fit(monkeypatch):
+    """Trunnion A-C: the residuals in the right frame are those of a fit there, 6.8 µm."""
+    nominal, count = load_scene("machine_trunnion_ac"), 18
+    rng = np.random.default_rng(3)
+    poses = {name: rng.uniform(*axis.travel, count) for name, axis in nominal.machine.axes.items()}
+    errors = {"EC0Y": 250.0, "EB0A": -300.0, "EX0C": 120.0}
+    curves = {key: Constant((0.0, 1.0), value) for key, value in errors.items()}
+    field = evaluate_exact(nominal.model, ErrorSet(curves), poses, replace(VIEW, frame="machine"))
+    observed = 1e-3 * (field.error_um + rng.normal(0.0, 5.0, (count, 3)))
+    readings = Readings(
+        "points", poses, field.nominal_mm, observed, None, ("",) * count, tuple(range(count)),
+        "a.csv", frame="workpiece",
+    )  # fmt: skip
+    right = in_other_frame(nominal, readings)
+    assert right is not None
+    request = Calibrate(fit=tuple(errors))
+    expected = calibrate(nominal, [right], request)
+    fits = []
+    module = sys.modules["warpspace.calibration.calibrate"]
+    monkeypatch.setattr(module, "solve", lambda *a, **k: fits.append(1) or solve(*a, **k))
+    wrong = calibrate(nominal, [readings], request)
+    (note,) = (note for note in wrong.notes if "likely wrong" in note)
+    assert f"in the machine frame {1e3 * expected.rms_after_mm:.3g} µm" in note
+    assert len(fits) == 2  # set-ups alone, and the fit
