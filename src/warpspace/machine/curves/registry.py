@@ -36,7 +36,8 @@ def register_curve(kind: CurveKind) -> None:
         keys = {form[0] for form in kind.forms} & {form[0] for form in other.forms}
         if keys or kind.title == other.title:
             raise OptionError(
-                f"kind of curve {kind.name!r}: {other.name!r} already has the same title or key"
+                f"kind of curve {kind.name!r}: {other.name!r} is there already with the same title"
+                " or key"
             )
     _KINDS.register(kind)
 
