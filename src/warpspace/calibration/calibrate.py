@@ -284,13 +284,11 @@ class Fit:
 
     @cached_property
     def rank(self) -> Rank:
-        by_parameter, by_unknown = self.model.derivatives(
-            self.parameters, self.parameters.start, self.initial.unknown
-        )
-        weights = self.weights[:, None]
+        parameters = self.parameters
+        jacobian = self.model.derivatives(parameters, parameters.start, self.initial.unknown)
+        by_parameter, by_unknown = (self.weights[:, None] * columns for columns in jacobian)
         tolerance = self.model.rank_tolerance
-        keys = self.parameters.keys
-        return find_rank(keys, weights * by_parameter, weights * by_unknown, tolerance)
+        return find_rank(parameters.keys, by_parameter, by_unknown, tolerance)
 
     @cached_property
     def prior(self) -> tuple[Array, Array] | None:
@@ -336,9 +334,15 @@ class Fit:
     @cached_property
     def sigma_mm(self) -> float:
         """Standard deviation of a component; where uncertainties are stated, in units of these."""
-        if self.solved.scale:
-            return self.solved.scale
-        deviations = np.concatenate([row.ravel() for row in self.after]) * self.weights
+        return self.solved.scale or self.standard_deviation(self.deviations(self.after))
+
+    def deviations(self, residuals: Sequence[Array]) -> Array:
+        """Weight and join residuals, [N]."""
+        return np.concatenate([row.ravel() for row in residuals]) * self.weights
+
+    def standard_deviation(self, deviations: Array) -> float:
+        if self.request.robust:
+            return robust_scale(deviations, self.dof)
         return float(np.sqrt(np.sum(deviations**2) / max(self.dof, 1)))
 
     @cached_property
@@ -526,7 +530,7 @@ def _frame_notes(fit: Fit) -> tuple[str, ...]:
 def _refit(fit: Fit, residuals: Sequence[Array]) -> tuple[float, float] | None:
     """Fit residuals, [n, d] each, mm, to first order: their sigma and RMS; None without a fit."""
     trust = np.sqrt(fit.solved.trust)
-    deviations = trust * np.concatenate([row.ravel() for row in residuals]) * fit.weights
+    deviations = trust * fit.deviations(residuals)
     right = deviations
     if fit.prior is not None:
         right = np.append(right, (fit.solved.amplitudes - fit.prior[0]) / fit.prior[1])
@@ -538,12 +542,9 @@ def _refit(fit: Fit, residuals: Sequence[Array]) -> tuple[float, float] | None:
     if np.abs(amplitudes).max(initial=0.0) > MAX_ERROR:
         return None  # errors that no machine has
     deviations = (deviations + (jacobian @ step)[: len(deviations)]) / trust
-    sizes = [row.size for row in residuals]
-    parts = np.split(deviations / fit.weights, np.cumsum(sizes)[:-1])
+    parts = np.split(deviations / fit.weights, np.cumsum([row.size for row in residuals])[:-1])
     vectors = [part.reshape(row.shape) for part, row in zip(parts, residuals, strict=True)]
-    if fit.solved.scale is not None:
-        return robust_scale(deviations, fit.dof), rms_mm(vectors)
-    return float(np.sqrt(np.sum(deviations**2) / max(fit.dof, 1))), rms_mm(vectors)
+    return fit.standard_deviation(deviations), rms_mm(vectors)
 
 
 def _check_count(model: MeasurementModel, rank: Rank, fitted: int, has_prior: bool) -> None:

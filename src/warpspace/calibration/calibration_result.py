@@ -338,7 +338,8 @@ class Calibration(Result):
             (
                 row.key, parameter(row.key).name, row.before,
                 None if row.estimable is Estimability.NOT_ESTIMABLE else row.value,
-                row.standard_uncertainty, row.unit, *(row.interval_95 or (None, None)), row.estimable,
+                row.standard_uncertainty, row.unit, *(row.interval_95 or (None, None)),
+                row.estimable,
             )
             for row in listed
         ]  # fmt: skip

@@ -207,27 +207,18 @@ def next_best(
         check_cancelled()
         u95_before = target_u95(before)
         min_gain = -np.inf if choice else MIN_GAIN * u95_before
-        best: tuple[float, Candidate, Array, Array] | None = None
+        useful: list[tuple[float, Candidate, Array, Array]] = []
         for candidate, added in options:
             after = _covariance(information + added)
             gain = u95_before - target_u95(after)
-            rate = gain / minutes(candidate.readings)
-            if gain >= min_gain and (best is None or rate > best[0]):
-                best = rate, candidate, after, added
-        if best is None:
+            if gain >= min_gain:
+                useful.append((gain / minutes(candidate.readings), candidate, after, added))
+        if not useful:
             break
-        _, candidate, after, added = best
-        steps.append(
-            NextMeasurement(
-                candidate,
-                minutes(candidate.readings),
-                u95_before,
-                target_u95(after),
-                map_u95(before) / FACTOR,
-                map_u95(after) / FACTOR,
-                after,
-            )
-        )
+        _, candidate, after, added = max(useful, key=lambda row: row[0])
+        maps = map_u95(before) / FACTOR, map_u95(after) / FACTOR
+        duration, u95_after = minutes(candidate.readings), target_u95(after)
+        steps.append(NextMeasurement(candidate, duration, u95_before, u95_after, *maps, after))
         information, before = information + added, after
     return tuple(steps)
 
