@@ -53,13 +53,14 @@ def test_another_chain_keeps_changed_errors_and_drops_those_of_axes_that_go(stat
     state = put(state, "exclusions.excluded", "+EAX,+EXC")
     changed = with_word(state, "chain wBFXYZt")
     assert changed.amplitudes["EAX"] == 33.0
-    assert changed.tolerances.own["EAX"].half_width == 7.0
+    assert changed.tolerances.individual["EAX"].half_width == 7.0
     assert changed.exclusions.excluded == {"EAX"}
-    assert not any(key.endswith("C") for key in (*changed.amplitudes, *changed.tolerances.own))
+    keys = (*changed.amplitudes, *changed.tolerances.individual)
+    assert not any(key.endswith("C") for key in keys)
     assert {*changed.positions} == {"B"}
     assert changed.origin is state.scene
     assert any("axis C left out" in note for note in changed.notes)
-    assert with_scene_tolerances(changed).tolerances.own.keys() <= changed.amplitudes.keys()
+    assert with_scene_tolerances(changed).tolerances.individual.keys() <= changed.amplitudes.keys()
     LIVE.evaluate(changed)
 
 
@@ -350,7 +351,7 @@ def test_another_chain_keeps_what_belongs_to_axes_that_stay():
     assert machine.axes["C"].travel == (0.0, 360.0)
     kept = {axis: PLAIN.workspace.ranges[axis] for axis in "XYZ"}
     assert scene.workspace.ranges == {**kept, "C": (0.0, 0.0)}
-    assert ({*scene.errors}, {*scene.tolerances.own}) == ({"EXX", "EAY"}, {"EYY"})
+    assert ({*scene.errors}, {*scene.tolerances.individual}) == ({"EXX", "EAY"}, {"EYY"})
     assert scene.tolerances.default == PLAIN.tolerances.default
     assert scene.reference == {"X": 0.0, "Y": 0.0, "Z": 0.0}
     _, (note,) = edited(PLAIN, "chain wCFXYZt")

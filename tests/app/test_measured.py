@@ -192,7 +192,7 @@ def test_the_numbers_are_those_of_the_analysis(fitted):
     for one, row in zip(found.parameters, said["parameters"], strict=True):
         assert (one.key, one.identifiable) == (row["key"], row["identifiable"])
         assert one.value == pytest.approx(row["value"], rel=1e-9)
-    assert "Determined only in part" in html
+    assert "Confounded with others" in html
     assert arrows_of(found, before=True)[0].shape == (23, 3)
 
 

@@ -92,7 +92,7 @@ def test_axes_are_numbered_in_positions_of_the_machine():
         for text, at in axis.ticks:
             position = float(text.replace("−", "-"))
             assert low <= position <= high
-            if picture.grid.ways[k] > 0:
+            if picture.grid.directions[k] > 0:
                 expected = np.interp(position, np.linspace(low, high, 9), nodes)
                 assert at[k] == pytest.approx(expected)
 

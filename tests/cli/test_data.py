@@ -109,7 +109,7 @@ def test_what_field_writes_is_read_in_its_own_frame(warpspace, tmp_path):
     for name in ("placed.csv", "placed.json"):
         warpspace(*fit, tmp_path / name).refused("error_relative_placed_r", "--kind tracker")
         read = warpspace(*fit, tmp_path / name, "--kind", "tracker").json
-        assert [row["value"] for row in read["parameters"] if row["told"] == "yes"] == (
+        assert [row["value"] for row in read["parameters"] if row["estimable"] == "yes"] == (
             pytest.approx([25.0, -30.0, 12.0], rel=1e-3)
         )
     held = scene.read_text(encoding="utf-8") + "[view]\nreference = { X = 0, Y = 0, Z = -100 }\n"

@@ -52,9 +52,9 @@ def test_working_volume_reaches_51_mm_below_the_table_surface(name):
 
 def test_proposed_errors_are_the_centres_of_the_proposed_ranges():
     scene = load_scene("dvf5000_proposed")
-    assert set(scene.errors) <= set(scene.tolerances.own)
+    assert set(scene.errors) <= set(scene.tolerances.individual)
     for key in scene.errors:
-        assert scene.errors.amplitude(key) == scene.tolerances.own[key].centre
+        assert scene.errors.amplitude(key) == scene.tolerances.individual[key].centre
 
 
 @pytest.mark.parametrize("name", ["dvf5000_general", "dvf5000_proposed"])

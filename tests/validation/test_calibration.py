@@ -1,5 +1,6 @@
 """Calibration against the public sphere measurements, and against errors that were planted."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,11 @@ from warpspace.bench.base import find_test
 from warpspace.bench.placing import ball_point
 from warpspace.bench.plan import simulate
 from warpspace.calibration import Calibrate, calibrate, read_readings
-from warpspace.calibration.kinds import VIEW
+from warpspace.calibration.calibration_result import Estimability
+from warpspace.calibration.kinds import VIEW, in_other_frame
 from warpspace.calibration.next_best import Candidate, candidates, next_best, u95_at
-from warpspace.calibration.readings import Readings, find_data, parse_table
-from warpspace.calibration.solve import build_terms, spell_rank
+from warpspace.calibration.readings import Readings, find_data, parse_reading_table
+from warpspace.calibration.solve import build_fit_parameters, describe_rank, solve
 from warpspace.calibration.spheres import circles_of
 from warpspace.field.evaluate import evaluate_exact
 from warpspace.machine.errors import Constant, ErrorSet, Ramp
@@ -23,7 +25,7 @@ HEAD = {"EX0B": 60.0, "EA0B": -140.0, "EA0C": 90.0, "EB0C": -70.0, "EC0B": 210.0
 
 
 def sphere_circles(axis):
-    table = parse_table(find_data("tcp_off.csv").read_text(), "tcp_off.csv")
+    table = parse_reading_table(find_data("tcp_off.csv").read_text(), "tcp_off.csv")
     return [circle for circle in circles_of(table, FORK) if circle.axis == axis]
 
 
@@ -103,7 +105,7 @@ def test_poses_left_out_are_predicted(tmp_path):
     # the intervals do not hold there, and the repeated pose B0 C0 tells that the model is too small
     assert found.predicted_coverage_95 == pytest.approx(0.583, abs=0.001)
     assert found.lack_of_fit == pytest.approx(3.19, abs=0.01)
-    assert any("3.2 times what repeated readings scatter" in note for note in found.notes)
+    assert any("3.2 times the scatter of repeated readings" in note for note in found.notes)
 
 
 def planted(errors, kind, poses, noise=0.0, seed=0):
@@ -179,7 +181,7 @@ def test_all_errors_of_linear_axes_are_found_from_points():
     # a slope of straightness is a squareness by another name
     alike = next(group for group in found.rank.confounded if group[0] == "EXY")
     assert "EC0Y" in alike
-    assert any("the slope of EXY" in words for words in spell_rank(found.rank, found.slopes))
+    assert any("the slope of EXY" in words for words in describe_rank(found.rank, found.slopes))
     assert found.rms_after_mm < 1e-6 * found.rms_before_mm
 
 
@@ -230,7 +232,7 @@ def test_told_combinations_hold_in_95_percent_of_trials(trials, near):
             "points", poses, tip, 1e-3 * read, None, ("",) * 27, tuple(range(27)), ""
         )
         found = calibrate(scene, [readings], Calibrate(fit=keys))
-        parts = [one.key for one in found.parameters if one.told == "in part"]
+        parts = [one.key for one in found.parameters if one.estimable is Estimability.CONFOUNDED]
         assert parts == [next(iter(one.factors)) for one in found.combinations] != []
         assert all(one.interval_95 is None for one in found.parameters if not one.identifiable)
         for one in found.combinations:
@@ -347,7 +349,7 @@ def test_a_ball_bar_is_no_thirty_six_error_vectors():
 def test_the_map_is_weighted_by_volume():
     """One error, known to a micrometre: the map is its RMS over the volume, ends counted half."""
     scene = replace(load_scene("dvf5000_nominal"), tolerances=type(FORK.tolerances)({}, {}))
-    terms = build_terms(scene, ("EXX:ramp",))
+    terms = build_fit_parameters(scene, ("EXX:ramp",))
     nodes = np.linspace(0.0, 1.0, 5)
     told = u95_at(scene, terms, "map")(np.eye(1))
     assert told == pytest.approx(2.0 * np.sqrt(np.trapezoid(nodes**2, nodes)))
@@ -383,5 +385,31 @@ def test_squareness_is_found_in_circles_of_two_planes(tmp_path):
     # with one circle alone
     alone = calibrate(scene, sets[:1], Calibrate(fit=("EC0Y", "EXY:ramp")))
     assert ("EXY", "EC0Y") in alone.rank.confounded
-    words = "the slope of EXY and EC0Y cannot be told apart by these readings"
-    assert words in spell_rank(alone.rank, alone.slopes)
+    words = "the slope of EXY and EC0Y are confounded in these readings"
+    assert words in describe_rank(alone.rank, alone.slopes)
+
+
+def test_vectors_in_the_wrong_frame_are_recognised_without_a_second_fit(monkeypatch):
+    """Trunnion A-C: the residuals in the right frame are those of a fit there, 6.8 µm."""
+    nominal, count = load_scene("machine_trunnion_ac"), 18
+    rng = np.random.default_rng(3)
+    poses = {name: rng.uniform(*axis.travel, count) for name, axis in nominal.machine.axes.items()}
+    errors = {"EC0Y": 250.0, "EB0A": -300.0, "EX0C": 120.0}
+    curves = {key: Constant((0.0, 1.0), value) for key, value in errors.items()}
+    field = evaluate_exact(nominal.model, ErrorSet(curves), poses, replace(VIEW, frame="machine"))
+    observed = 1e-3 * (field.error_um + rng.normal(0.0, 5.0, (count, 3)))
+    readings = Readings(
+        "points", poses, field.nominal_mm, observed, None, ("",) * count, tuple(range(count)),
+        "a.csv", frame="workpiece",
+    )  # fmt: skip
+    right = in_other_frame(nominal, readings)
+    assert right is not None
+    request = Calibrate(fit=tuple(errors))
+    expected = calibrate(nominal, [right], request)
+    fits = []
+    module = sys.modules["warpspace.calibration.calibrate"]
+    monkeypatch.setattr(module, "solve", lambda *a, **k: fits.append(1) or solve(*a, **k))
+    wrong = calibrate(nominal, [readings], request)
+    (note,) = (note for note in wrong.notes if "likely wrong" in note)
+    assert f"in the machine frame {1e3 * expected.rms_after_mm:.3g} µm" in note
+    assert len(fits) == 2  # set-ups alone, and the fit

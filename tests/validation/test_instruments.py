@@ -14,7 +14,7 @@ from warpspace.calibration.instruments import instrument_names, load_instrument
 from warpspace.calibration.kinds import VIEW
 from warpspace.calibration.next_best import candidates, observability
 from warpspace.calibration.readings import Readings
-from warpspace.calibration.solve import build_terms
+from warpspace.calibration.solve import build_fit_parameters
 from warpspace.exceptions import SceneError, UnknownNameError
 from warpspace.field.evaluate import evaluate_first_order
 from warpspace.kinematics.model import complete_coordinates
@@ -225,7 +225,11 @@ def test_what_makes_a_point_sure_is_what_acts_there():
     # what is known: readings that share a zero and a scale; what comes: a line with its own zero
     share, away = (x + 100.0) / 400.0, x - x.mean()
     parts = {
-        acts: sum(one.at(1.0) ** 2 for one in request.instrument.contributions if one.acts == acts)
+        acts: sum(
+            row.uncertainty_um(1.0) ** 2
+            for row in request.instrument.contributions
+            if row.acts == acts
+        )
         for acts in ("each", "all", "scale")
     }
     spread = parts["each"] * np.eye(3) + parts["all"] + parts["scale"] * np.outer(away, away)
@@ -238,7 +242,7 @@ def test_what_makes_a_point_sure_is_what_acts_there():
 
 
 def calibrate_next(scene, readings, request):
-    (step,) = request.find(scene, [readings]).steps
+    (step,) = request.fit_readings(scene, [readings]).next_measurements
     assert step.minutes > 0.0
     return step
 
@@ -274,7 +278,7 @@ def held_by_planted_machines(name, trials):
     verdicts = []  # stated probability that a limit is kept, and whether it is
     grid = np.meshgrid([-100.0, 100.0, 300.0], [-100.0, 0.0, 100.0], [-200.0, -100.0, 0.0])
     poses = {axis: part.ravel() for axis, part in zip("XYZ", grid, strict=True)}
-    terms = build_terms(scene, KEYS)
+    terms = build_fit_parameters(scene, KEYS)
     clean = vectors(scene, poses, np.zeros((27, 3)))
     away_m = 1e-3 * (clean.nominal_mm - clean.nominal_mm.mean(axis=0))
     for seed in range(trials):

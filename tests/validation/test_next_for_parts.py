@@ -7,7 +7,7 @@ import pytest
 
 from warpspace.calibration import Calibrate, read_readings
 from warpspace.calibration.next_best import u95_at
-from warpspace.calibration.solve import build_terms
+from warpspace.calibration.solve import build_fit_parameters
 from warpspace.exceptions import OptionError
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.library import load_scene
@@ -40,7 +40,7 @@ def test_a_part_is_as_unsure_as_its_vertices_and_its_verdict_as_its_width(tmp_pa
     (tmp_path / "f.toml").write_text(FEATURES, encoding="utf-8")
     mesh = SCENE.part.path("file")
     scene = replace(SCENE, part=replace(SCENE.part, place=place))
-    terms = build_terms(scene, ["EXX:ramp", "EZZ:ramp"])
+    terms = build_fit_parameters(scene, ["EXX:ramp", "EZZ:ramp"])
     covariance = np.diag([9.0, 1e-18])
     x = place_workpiece(load_workpiece(mesh), scene).vertices_mm[:, 0]
     wanted = 2.0 * 3.0 * x.std() / 550.0
@@ -55,17 +55,17 @@ def test_a_part_is_as_unsure_as_its_vertices_and_its_verdict_as_its_width(tmp_pa
 def test_a_scene_without_a_part_is_told_so(target):
     scene = load_scene("dvf5000_nominal")
     with pytest.raises(OptionError, match=r"expected a scene whose \[part\] has"):
-        u95_at(scene, build_terms(scene, ["EXX"]), target)
+        u95_at(scene, build_fit_parameters(scene, ["EXX"]), target)
     bare = replace(SCENE, part=replace(SCENE.part, features=""))
     with pytest.raises(OptionError, match=r"\[part\] has tolerances"):
-        u95_at(bare, build_terms(bare, ["EXX"]), "verdict")
+        u95_at(bare, build_fit_parameters(bare, ["EXX"]), "verdict")
 
 
 def test_measurements_that_gain_nothing_are_not_listed():
     """The corner of this scene depends on what no candidate can show."""
     scene = load_scene("fork_head_bc")
     asked = Calibrate(next_count=3, target="corner")
-    found = asked.find(scene, [read_readings("tcp_on.csv", scene)])
-    assert all(one.after_um <= 0.99 * one.before_um for one in found.steps)
-    assert len(found.steps) < 3
-    assert any("measurement takes 1 % from U95" in note for note in found.notes)
+    found = asked.fit_readings(scene, [read_readings("tcp_on.csv", scene)])
+    assert all(one.after_um <= 0.99 * one.before_um for one in found.next_measurements)
+    assert len(found.next_measurements) < 3
+    assert any("measurement reduces U95" in note for note in found.notes)

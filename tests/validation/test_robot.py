@@ -11,7 +11,8 @@ from warpspace.calibration import Calibrate, calibrate, read_readings
 from warpspace.calibration.instruments import load_instrument
 from warpspace.calibration.kinds import Prediction
 from warpspace.calibration.positions import Positions
-from warpspace.calibration.readings import find_data, parse_readings
+from warpspace.calibration.readings import find_data
+from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.kinematics.chain import branch_pose
 from warpspace.machine.errors import Constant, ErrorSet
@@ -164,9 +165,9 @@ def test_residuals_beyond_their_stated_uncertainty_are_said():
         calibrate(NOMINAL, [planted_points(3.0, stated_um=stated)], fit) for stated in (3.0, 1.0)
     )
     assert honest.lack_of_fit == pytest.approx(1.0, abs=0.15)
-    assert not any("misses something" in note for note in honest.notes)
+    assert not any("lack of fit" in note for note in honest.notes)
     assert short.lack_of_fit == pytest.approx(3.0 * honest.lack_of_fit, rel=1e-6)
-    said = "the model misses something: residuals are 3.0 times what their uncertainty allows"
+    said = "lack of fit: residuals are 3.0 times their stated uncertainty"
     assert said.partition("3.0")[0] in " ".join(short.notes)
     assert short.as_json()["lack_of_fit"] == short.lack_of_fit
 

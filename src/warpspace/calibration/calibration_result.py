@@ -1,7 +1,8 @@
-"""What a calibration gives: the errors found, what is told together, and what is left."""
+"""Result of a calibration: fitted errors, estimable combinations and residuals."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
@@ -23,24 +24,32 @@ from warpspace.analysis.description import Change, Result, to_json
 from warpspace.analysis.options import place_words
 from warpspace.calibration.instruments import budget_blocks
 from warpspace.calibration.readings import Circle, Readings
-from warpspace.calibration.solve import Rank, spell_rank
+from warpspace.calibration.solve import Rank, describe_rank
 from warpspace.machine.axes import parameter
 from warpspace.scene.model import Scene
 from warpspace.units import MICROMETRE, MICRORADIAN, UM_PER_MM, Array
 
 Target: TypeAlias = str | tuple[tuple[str, float], ...]
-"""What is to be made sure: one of those below, or axis positions of a point."""
+"""Quantity whose uncertainty is minimised: one of those below, or axis positions of a point."""
 TARGETS = {
     "map": "of the position error, RMS over the volume",
-    "corner": "of the position error, at the least sure node",
+    "corner": "of the position error, at the most uncertain node",
     "part": "of the vertices of the part, placed, RMS",
-    "verdict": "of the least sure measure of the part that has a tolerance, µm or µrad",
+    "verdict": "of the most uncertain measurand of the part with a tolerance, µm or µrad",
 }
 NUMBERS = (
     "rms_before_mm", "rms_after_mm", "rms_predicted_before_mm", "rms_predicted_after_mm",
     "predicted_coverage_95", "sigma_mm",
 )  # fmt: skip
-MOST_BARS = 22  # parameters of one unit that are drawn; the largest by their uncertainty
+MAX_BARS = 22  # parameters of one unit that are drawn: the most significant changes
+
+
+class Estimability(StrEnum):
+    """Estimability of one parameter; a confounded value holds for the others as in the scene."""
+
+    ESTIMABLE = "yes"
+    CONFOUNDED = "confounded"
+    NOT_ESTIMABLE = "no"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,15 +58,15 @@ class FittedParameter:
 
     json_keys: ClassVar[tuple[str, ...]] = (
         "key", "unit", "before", "value", "standard_uncertainty", "interval_95", "identifiable",
-        "told",
+        "estimable",
     )  # fmt: skip
     key: str
     before: float  # µm or µrad
     value: float
-    # µm or µrad; none where the readings do not determine it by itself
+    # µm or µrad; None where the parameter is not estimable by itself
     standard_uncertainty: float | None
     interval_95: tuple[float, float] | None
-    told: str  # "yes"; "in part": the value holds if others are what the scene says; "no"
+    estimable: Estimability
 
     @property
     def unit(self) -> str:
@@ -65,13 +74,13 @@ class FittedParameter:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the readings determine it without holding another parameter."""
-        return self.told == "yes"
+        """True where the readings determine it without fixing another parameter."""
+        return self.estimable is Estimability.ESTIMABLE
 
 
 @dataclass(frozen=True, slots=True)
 class Combination:
-    """A sum of parameters that the readings tell, although not the parameters in it."""
+    """Sum of confounded parameters that is estimable."""
 
     json_keys: ClassVar[tuple[str, ...]] = (
         "factors", "unit", "value", "standard_uncertainty", "interval_95",
@@ -83,15 +92,14 @@ class Combination:
     interval_95: tuple[float, float]
 
     @property
-    def words(self) -> str:
-        first, *others = self.factors
-        words = first
-        for key in others:
-            own, factor = parameter(key).unit, self.factors[key]
-            each = "" if own == self.unit else f" {self.unit}/{own}"
-            size = f"{abs(factor):.3g}{each} · ".removeprefix("1 · ")
-            words += f" {'−' if factor < 0.0 else '+'} {size}{key}"
-        return words
+    def expression(self) -> str:
+        expression, *keys = self.factors
+        for key in keys:
+            unit, factor = parameter(key).unit, self.factors[key]
+            ratio = "" if unit == self.unit else f" {self.unit}/{unit}"
+            size = f"{abs(factor):.3g}{ratio} · ".removeprefix("1 · ")
+            expression += f" {'−' if factor < 0.0 else '+'} {size}{key}"
+        return expression
 
     @property
     def unit(self) -> str:
@@ -100,13 +108,13 @@ class Combination:
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """What one file of readings leaves."""
+    """Residuals of one file of readings."""
 
     readings: Readings
-    # [n, d]; observed − predicted: with the errors of the scene, and with those found
+    # [n, d]; observed − predicted: with the errors of the scene, and with the fitted errors
     before_mm: Array
     after_mm: Array
-    outliers: tuple[int, ...] = ()  # rows that lie further off than the others let expect
+    outliers: tuple[int, ...] = ()  # rows of readings with outlying residuals
 
     @property
     def file(self) -> str:
@@ -114,54 +122,55 @@ class Residuals:
         return Path(self.readings.source).name
 
     def as_json(self) -> dict[str, Any]:
-        told = self.readings
+        readings = self.readings
         rows = [
             {
                 "line": line,
-                "session": told.session[at],
-                "axes": {name: float(values[at]) for name, values in told.coordinates.items()},
+                "session": readings.session[at],
+                "axes": {
+                    name: float(position[at]) for name, position in readings.coordinates.items()
+                },
                 "before_mm": self.before_mm[at].tolist(),
                 "after_mm": self.after_mm[at].tolist(),
                 "outlier": at in self.outliers,
             }
-            for at, line in enumerate(told.lines)
+            for at, line in enumerate(readings.lines)
         ]
-        return {"file": self.file, "kind": told.kind, "readings": rows}
+        return {"file": self.file, "kind": readings.kind, "readings": rows}
 
     def rows(self, use: str, axes: Sequence[str]) -> Iterator[tuple[object, ...]]:
-        told = self.readings
-        for at, line in enumerate(told.lines):
-            places = [float(told.coordinates[name][at]) for name in axes]
-            parts = [
-                [*map(float, rows[at]), None, None][:3] for rows in (self.before_mm, self.after_mm)
-            ]
-            yield (self.file, line, use, told.session[at], *places, *parts[0], *parts[1])
+        readings = self.readings
+        for at, line in enumerate(readings.lines):
+            positions = [float(readings.coordinates[name][at]) for name in axes]
+            before = [*self.before_mm[at].tolist(), None, None][:3]
+            after = [*self.after_mm[at].tolist(), None, None][:3]
+            yield (self.file, line, use, readings.session[at], *positions, *before, *after)
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A measurement that could be made."""
+    """Candidate for the next measurement."""
 
-    name: str  # in words, with the poses
+    name: str  # description with the poses
     readings: Readings  # nominal ones
 
 
 @dataclass(frozen=True, slots=True)
 class NextMeasurement:
-    """One measurement to make."""
+    """Recommended measurement."""
 
     json_keys: ClassVar[tuple[str, ...]] = (
         "measurement", "kind", "minutes", "before_um", "after_um", "map_before_um", "map_after_um",
     )  # fmt: skip
     candidate: Candidate
-    minutes: float  # that it takes, typically
-    before_um: float  # U95 of the position error at the target, likewise without and with it
+    minutes: float  # typical duration
+    before_um: float  # U95 of the target, without and with this measurement
     after_um: float
     # standard uncertainty of the position error, root mean square over the volume (weighted by
-    # volume): without and with this measurement, all those before it made
+    # volume): without and with this measurement, after all earlier ones
     map_before_um: float
     map_after_um: float
-    covariance: Array  # [K, K]; of the parameters once it is made
+    covariance: Array  # [K, K]; of the parameters, with this measurement
 
     @property
     def measurement(self) -> str:
@@ -176,54 +185,54 @@ class NextMeasurement:
 class Calibration(Result):
     """A calibrated machine."""
 
-    scene: Scene  # with the errors found
-    title: str  # of the scene before
+    scene: Scene  # with the fitted errors
+    title: str  # of the scene before the calibration
     parameters: tuple[FittedParameter, ...]
-    combinations: tuple[Combination, ...]  # what is told of the parameters that are told in part
+    combinations: tuple[Combination, ...]  # estimable sums of confounded parameters
     rank: Rank
-    slopes: frozenset[str]  # parameters of which a slope was looked for
+    slopes: frozenset[str]  # parameters with a slope as amplitude
     fit: tuple[str, ...]  # (k,); parameters of `covariance`
     covariance: Array  # [k, k], µm and µrad
-    unknowns: Mapping[str, float]  # mm; what the set-up left unknown, as found
+    unknowns: Mapping[str, float]  # mm; fitted unknowns of the set-ups
     fitted: tuple[Residuals, ...]
     predicted: tuple[Residuals, ...]
-    rms_before_mm: float  # of the residual vectors that were fitted
+    rms_before_mm: float  # of the residual vectors of fitted readings
     rms_after_mm: float
     rms_predicted_before_mm: float | None
     rms_predicted_after_mm: float | None
-    # share of predicted components inside their stated 95 % intervals; none where no reading was
-    # predicted, or where only those that were fitted state their uncertainty
+    # share of predicted components inside their 95 % intervals; None where no reading was
+    # predicted, or where only the fitted readings state their uncertainty
     predicted_coverage_95: float | None
-    # standard deviation of one component, from the residuals (of a robust fit: their median); of a
-    # weight of one where uncertainties are given
+    # standard deviation of one component, from the residuals (of a robust fit: their median); in
+    # units of the stated uncertainty where there is one
     sigma_mm: float
-    freedom: int  # components less what was fitted
-    # scatter of the residuals in units of what is stated of readings, else of repeated ones; none
-    # where there is neither
+    dof: int  # components less fitted numbers
+    # scatter of the residuals in units of the stated uncertainty, else of the scatter of repeated
+    # readings; None where there is neither
     lack_of_fit: float | None
-    instrument: Mapping[str, Any] | None  # its contributions, and what they bring
+    instrument: Mapping[str, Any] | None  # uncertainty budget
     notes: tuple[str, ...] = ()
-    # groups that cannot be told apart, and the measurement that would
-    apart: Mapping[tuple[str, ...], str] = field(default_factory=dict[tuple[str, ...], str])
-    steps: tuple[NextMeasurement, ...] = ()  # next measurements
-    target: Target = "map"  # that they are to make sure
-    # by rotary axis: how well the poses tell its location and orientation errors
-    merit: Mapping[str, float] = field(default_factory=dict[str, float])
+    # measurement that separates each confounded group
+    separated_by: Mapping[tuple[str, ...], str] = field(default_factory=dict[tuple[str, ...], str])
+    next_measurements: tuple[NextMeasurement, ...] = ()
+    target: Target = "map"  # quantity whose uncertainty they minimise
+    # observability index of the location and orientation errors of each rotary axis
+    observability: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
     def circles(self) -> list[Circle]:
-        """Circles about rotary axes, through the readings that were fitted."""
+        """Circles about rotary axes through fitted readings."""
         return [circle for group in self.fitted for circle in group.readings.circles]
 
     @property
     def correlation(self) -> Array:
-        """Correlation of the parameters that were fitted, [k, k]."""
+        """Correlation of the fitted parameters, [k, k]."""
         width = np.sqrt(np.diag(self.covariance))
         width = np.where(width > 0.0, width, 1.0)
         return self.covariance / np.outer(width, width)
 
     def changes(self) -> tuple[Change, ...]:
-        return (Change("with the errors found", self.scene),)
+        return (Change("with the fitted errors", self.scene),)
 
     def as_json(self) -> dict[str, Any]:
         return {
@@ -231,20 +240,21 @@ class Calibration(Result):
             "combinations": to_json(self.combinations),
             "rank": self.rank.rank,
             "confounded": to_json(self.rank.confounded),
-            "unseen": list(self.rank.unseen),
-            "cannot_tell": list(spell_rank(self.rank, self.slopes)),
+            "without_effect": list(self.rank.without_effect),
+            "rank_notes": list(describe_rank(self.rank, self.slopes)),
             "separated_by": [
-                {"keys": list(group), "measurement": told} for group, told in self.apart.items()
+                {"keys": list(group), "measurement": name}
+                for group, name in self.separated_by.items()
             ],
             **{name: getattr(self, name) for name in NUMBERS},
-            "degrees_of_freedom": self.freedom,
+            "degrees_of_freedom": self.dof,
             "set_up_mm": dict(self.unknowns),
             "correlation": {"keys": list(self.fit), "matrix": self.correlation.tolist()},
             "circles": to_json(self.circles),
             "lack_of_fit": self.lack_of_fit,
             "instrument": self.instrument,
-            "merit": dict(self.merit),
-            "next": to_json(self.steps),
+            "observability": dict(self.observability),
+            "next": to_json(self.next_measurements),
             "fitted": [group.as_json() for group in self.fitted],
             "predicted": [group.as_json() for group in self.predicted],
             "notes": list(self.notes),
@@ -256,12 +266,16 @@ class Calibration(Result):
         parts = [f"{when}_{x}_mm" for when in ("before", "after") for x in "xyz"]
         keys = ("file", "line", "use", "session", *places, *parts)
         uses = (("fitted", self.fitted), ("predicted", self.predicted))
-        rows = [row for use, groups in uses for one in groups for row in one.rows(use, tuple(axes))]
+        rows = [
+            row for use, groups in uses for group in groups for row in group.rows(use, tuple(axes))
+        ]
         return Table(tuple(Column(key=key) for key in keys), rows, exact=True)
 
     def blocks(self) -> Iterator[Block]:
-        sets = [(group.file, group.readings) for group in self.fitted]
-        files = ", ".join(f"{name} ({one.kind}, {len(one)} readings)" for name, one in sets)
+        files = ", ".join(
+            f"{group.file} ({group.readings.kind}, {len(group.readings)} readings)"
+            for group in self.fitted
+        )
         yield f"{self.title} · {files}"
         yield (
             f"  residuals (RMS of the vectors): {self.rms_before_mm:.4f} mm before,"
@@ -274,76 +288,77 @@ class Calibration(Result):
             )
         if self.predicted_coverage_95 is not None:
             share = f"{100.0 * self.predicted_coverage_95:.1f} %"
-            yield f"  {share} of their components are inside the 95 % intervals stated for them"
+            yield f"  {share} of their components are inside their 95 % intervals"
         yield from (f"  note: {note}" for note in self.notes)
-        yield from map(_circle_words, self.circles)
+        yield from map(_describe_circle, self.circles)
         yield from self._errors()
         wide = self.sigma_mm >= 1.0
         width = f"{self.sigma_mm:.2f} mm" if wide else f"{UM_PER_MM * self.sigma_mm:.2f} µm"
         width = f"standard deviation of one component {width}"
-        if all(one.readings.sigma_mm is not None for one in self.fitted):
-            width = f"residuals scatter {self.sigma_mm:.2f} times as far as stated"
-        yield f"  {width}, {self.freedom} degrees of freedom"
+        if all(group.readings.sigma_mm is not None for group in self.fitted):
+            width = f"residuals are {self.sigma_mm:.2f} times the stated uncertainty"
+        yield f"  {width}, {self.dof} degrees of freedom"
         yield from budget_blocks(self.instrument) if self.instrument else ()
-        if self.merit:
-            each = ", of ".join(f"{axis} by {value:.2f}" for axis, value in self.merit.items())
+        if self.observability:
+            axes = ", ".join(f"{axis} {index:.2f}" for axis, index in self.observability.items())
             yield (
-                f"  poses tell location and orientation of {each} µm per µm (all readings together,"
-                " of the combination that they tell least; rotations count at 250 mm)"
+                f"  observability index O3 of location and orientation errors: {axes} µm/µm (all"
+                " readings; rotations at a lever arm of 250 mm)"
             )
         for group in (*self.fitted, *self.predicted):
             for at in group.outliers:
-                yield f"  far off: {group.file} line {group.readings.lines[at]}"
-        yield from (f"  {words}" for words in spell_rank(self.rank, self.slopes))
-        for keys, measurement in self.apart.items():
+                yield f"  outlier: {group.file} line {group.readings.lines[at]}"
+        yield from (f"  {line}" for line in describe_rank(self.rank, self.slopes))
+        for keys, measurement in self.separated_by.items():
             yield f"    {keys[0]} would be determined by: {measurement}"
-        if self.steps:
+        if self.next_measurements:
             columns = (
                 Column("measurement", leads=True, wraps=True),
                 Column("minutes", ".0f"),
                 *number_columns(("U95 before", "after"), unit="µm"),
             )
             rows = [
-                (one.measurement, one.minutes, one.before_um, one.after_um) for one in self.steps
+                (step.measurement, step.minutes, step.before_um, step.after_um)
+                for step in self.next_measurements
             ]
-            words = "Next measurements, each for the greatest gain per minute (typical times):"
-            yield Table(columns, rows, words)
-            yield f"  U95 {target_words(self.target)}"
+            title = "Recommended measurements, by reduction of U95 per minute (typical times):"
+            yield Table(columns, rows, title)
+            yield f"  U95 {describe_target(self.target)}"
         yield from self._charts()
 
     def _errors(self) -> Iterator[Block]:
-        shown = [one for one in self.parameters if one.before or one.key not in self.rank.unseen]
+        without_effect = self.rank.without_effect
+        listed = [row for row in self.parameters if row.before or row.key not in without_effect]
         columns = (
             Column("key", leads=True), Column("name"),
-            *(Column(name, ".1f") for name in ("before", "value", "± u")), Column("unit"),
-            *number_columns(("95 % from", "to"), ".1f"), Column("told"),
+            *(Column(name, ".1f") for name in ("start", "value", "± u")), Column("unit"),
+            *number_columns(("from", "to"), ".1f"), Column("estimable"),
         )  # fmt: skip
         rows = [
             (
-                one.key, parameter(one.key).name, one.before,
-                None if one.told == "no" else one.value, one.standard_uncertainty, one.unit,
-                *(one.interval_95 or (None, None)), one.told,
+                row.key, parameter(row.key).name, row.before,
+                None if row.estimable is Estimability.NOT_ESTIMABLE else row.value,
+                row.standard_uncertainty, row.unit, *(row.interval_95 or (None, None)),
+                row.estimable,
             )
-            for one in shown
+            for row in listed
         ]  # fmt: skip
-        yield Table(columns, rows)
-        if any(one.told == "in part" for one in shown):
-            yield (
-                "  told in part: the value holds if those that look like it are what the scene says"
-            )
-        for one in self.combinations:
-            low, high = one.interval_95
-            value = f"{one.value:.1f} ± {one.standard_uncertainty:.1f} {one.unit}"
-            yield f"  told together: {one.words} = {value}, 95 % {low:.1f} to {high:.1f}"
+        yield Table(columns, rows, "Error parameters, with 95 % intervals from … to:")
+        if any(row.estimable is Estimability.CONFOUNDED for row in listed):
+            yield "  confounded: the value holds if the others in its combination are as in SCENE"
+        for total in self.combinations:
+            low, high = total.interval_95
+            estimate = f"{total.value:.1f} ± {total.standard_uncertainty:.1f} {total.unit}"
+            yield f"  estimable: {total.expression} = {estimate}, 95 % {low:.1f} to {high:.1f}"
 
     def _charts(self) -> Iterator[Block]:
         yield self._lengths()
-        wide = [one for one in (*self.fitted, *self.predicted) if one.after_mm.shape[1] == 3]
-        before, after = (
-            UM_PER_MM * np.concatenate([np.zeros((0, 3)), *rows])
-            for rows in ([one.before_mm for one in wide], [one.after_mm for one in wide])
-        )
-        for a, b in ((0, 1), (0, 2)) if wide else ():
+        groups = (*self.fitted, *self.predicted)
+        vectors = [group for group in groups if group.after_mm.shape[1] == 3]
+        none = np.zeros((0, 3))
+        before = UM_PER_MM * np.concatenate([none, *(group.before_mm for group in vectors)])
+        after = UM_PER_MM * np.concatenate([none, *(group.after_mm for group in vectors)])
+        for a, b in ((0, 1), (0, 2)) if vectors else ():
             labels = (f"{'xyz'[a]} [µm]", f"{'xyz'[b]} [µm]")
             title = f"Residual vectors, {'xyz'[a]} and {'xyz'[b]}"
             curves = (
@@ -355,26 +370,28 @@ class Calibration(Result):
             yield Lines("plane", title, *labels, curves)
         for unit in (MICROMETRE, MICRORADIAN):
             rows = sorted(
-                (one for one in self._told() if one.unit == unit),
-                key=lambda one: (
-                    abs(one.value - one.before) / max(one.standard_uncertainty or 1.0, 1e-12)
+                (row for row in self._estimates() if row.unit == unit),
+                key=lambda row: (
+                    abs(row.value - row.before) / max(row.standard_uncertainty or 1.0, 1e-12)
                 ),
-            )
-            if kept := rows[-MOST_BARS:][::-1]:
+                reverse=True,
+            )[:MAX_BARS]
+            if rows:
                 spread = [
-                    (one.interval_95[1] - one.value) if one.interval_95 else 0.0 for one in kept
+                    row.interval_95[1] - row.value if row.interval_95 else 0.0 for row in rows
                 ]
-                found = Series([one.value for one in kept], spread=spread)
-                was = Series([one.before for one in kept], as_mark=True)
-                panel = Panel("Errors found, 95 % intervals", (found, was), unit, signed=True)
-                names = [one.key + ("" if one.identifiable else " …") for one in kept]
-                yield Bars("Errors found", "", names, (panel,))
+                estimates = Series([row.value for row in rows], spread=spread)
+                before_fit = Series([row.before for row in rows], as_mark=True)
+                series = (estimates, before_fit)
+                panel = Panel("Fitted errors, 95 % intervals", series, unit, signed=True)
+                names = [row.key + ("" if row.identifiable else " …") for row in rows]
+                yield Bars("Fitted errors", "", names, (panel,))
 
     def _lengths(self) -> Lines:
         groups = (*self.fitted, *self.predicted)
         before, after = (
-            UM_PER_MM * np.concatenate([np.linalg.norm(one, axis=-1) for one in rows])
-            for rows in ([one.before_mm for one in groups], [one.after_mm for one in groups])
+            UM_PER_MM * np.concatenate([np.linalg.norm(row, axis=-1) for row in rows])
+            for rows in ([g.before_mm for g in groups], [g.after_mm for g in groups])
         )
         at = np.linspace(1.0, len(before), len(before))
         counts = [len(group.readings) for group in groups]
@@ -389,7 +406,7 @@ class Calibration(Result):
             Curve("after", at, after, 1, "dots"),
         ]
         if len(far):
-            curves.append(Curve("after, far off", at[far], after[far], 3, "dots"))
+            curves.append(Curve("after, outliers", at[far], after[far], 3, "dots"))
         bands: tuple[Band, ...] = ()
         if self.predicted:
             x = np.array([starts[len(self.fitted)] + 0.5, len(at) + 0.5], float)
@@ -397,24 +414,25 @@ class Calibration(Result):
         title = "Residuals, observed − predicted, by reading"
         return Lines("lines", title, "reading", "length [µm]", tuple(curves), bands)
 
-    def _told(self) -> Iterator[FittedParameter]:
-        together = {next(iter(one.factors)): one for one in self.combinations}
-        for one in self.parameters:
-            if (total := together.get(one.key)) is not None:
-                before = total.value - one.value + one.before
+    def _estimates(self) -> Iterator[FittedParameter]:
+        combinations = {next(iter(total.factors)): total for total in self.combinations}
+        for row in self.parameters:
+            total = combinations.get(row.key)
+            if total is not None:
+                before = total.value - row.value + row.before
                 width, interval = total.standard_uncertainty, total.interval_95
-                yield FittedParameter(one.key, before, total.value, width, interval, one.told)
-            elif one.interval_95 is not None:
-                yield one
+                yield FittedParameter(row.key, before, total.value, width, interval, row.estimable)
+            elif row.interval_95 is not None:
+                yield row
 
 
-def target_words(target: Target) -> str:
+def describe_target(target: Target) -> str:
     if not isinstance(target, str):
         return f"of the position error, at {place_words(dict(target))}"
     return TARGETS[target]
 
 
-def _circle_words(circle: Circle) -> str:
+def _describe_circle(circle: Circle) -> str:
     (first, second), (a, b) = circle.plane, circle.centre_mm
     runs = " and ".join(filter(None, circle.sessions)) or "all readings"
     return (

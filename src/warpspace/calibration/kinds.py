@@ -1,4 +1,4 @@
-"""What every kind of measurement is and can: columns, readings, and what the model predicts."""
+"""Kinds of measurement: columns, readings, and their prediction by the model."""
 
 import re
 from abc import ABC, abstractmethod
@@ -15,9 +15,9 @@ from warpspace.calibration.readings import (
     Readings,
     ReadingTable,
     axis_columns,
+    build_readings,
     check_poses,
     check_spread,
-    take_readings,
 )
 from warpspace.exceptions import SceneError
 from warpspace.field.evaluate import View, build_basis, evaluate_exact
@@ -30,103 +30,103 @@ from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
 VIEW = View(Loop.RELATIVE, "workpiece")
-"""How errors are looked at: the tool point relative to the workpiece, in its nominal frame."""
+"""View of all predictions: tool point relative to the workpiece, in its nominal frame."""
 
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """What readings are predicted from: errors, and what the set-ups leave unknown."""
+    """Errors and unknowns of the set-ups from which readings are predicted."""
 
     errors: ErrorSet
     unknowns: tuple[str, ...]  # (m,)
     values: Array  # [m], mm
 
 
-BLIND = 2e-4
-"""Share of its own effect below which what is left of a parameter counts as nothing.
+RANK_TOLERANCE = 2e-4
+"""Share of its effect that a parameter must add to those before it, to be independent.
 
-With less, noise of a thousandth makes values that no machine has.
+Below it, noise of a thousandth leads to values that no machine has.
 """
 
 
 class MeasurementKind(ABC):
     """A kind of measurement.
 
-    A reading is a function of the errors of the machine and of a few numbers that nobody knows:
-    where a sphere or a station stands, by how much a session is shifted.
+    A reading is a function of the errors of the machine and of a few unknowns of the set-up: the
+    position of a sphere or a station, the shift of a session.
     """
 
-    name: ClassVar[str]  # as an option takes it
-    words: ClassVar[str]  # what it is, for lists and help
+    name: ClassVar[str]  # as in options
+    description: ClassVar[str]  # for lists and help
     columns: ClassVar[str]  # of its file
-    # whether it takes the text of the file, columns of words among them, rather than its table
-    own_columns: ClassVar[bool] = False
-    blind: ClassVar[float] = BLIND
+    # true where it parses the text of the file itself, for instance with columns of text
+    reads_text: ClassVar[bool] = False
+    rank_tolerance: ClassVar[float] = RANK_TOLERANCE
 
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:  # noqa: ARG002 - for others
-        """Tell whether a file has the columns of this kind, and of no other."""
+    def matches(self, table: ReadingTable, scene: Scene) -> bool:  # noqa: ARG002 - for overrides
+        """Check for the columns of this kind, and of no other."""
         return False
 
     @abstractmethod
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        """Give the readings of a file; refuse one that lacks a column or holds what cannot be."""
+        """Build the readings of a file; raise SceneError for missing columns or invalid numbers."""
 
     @abstractmethod
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
-        """Name what the set-up leaves unknown, each in mm, for instance ``sphere x``."""
+        """List the unknowns of the set-up, each in mm, for instance ``sphere x``."""
 
     def start(self, readings: Readings) -> Array:
-        """Give values of the unknowns to begin with, [m], mm."""
+        """Return start values of the unknowns, [m], mm."""
         return np.zeros(len(self.unknowns(readings)))
 
     @abstractmethod
-    def observe(self, scene: Scene, readings: Readings, guess: Prediction) -> Array:
-        """Give the readings that errors would lead to, with the exact model, [n, d], mm."""
+    def observe(self, scene: Scene, readings: Readings, prediction: Prediction) -> Array:
+        """Predict the readings with the exact model, [n, d], mm."""
 
     @abstractmethod
     def slopes(
-        self, scene: Scene, readings: Readings, guess: Prediction, keys: tuple[str, ...]
+        self, scene: Scene, readings: Readings, prediction: Prediction, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
         """Differentiate the readings, [n, d, K], mm per µm or µrad, and by unknowns, [n, d, m]."""
 
     def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
-        """List the parameters that are looked for where none are named, the likelier first."""
+        """List the parameters that are fitted by default, the likelier first."""
         del readings
         return scene.parameter_keys
 
 
 class FromVectors(MeasurementKind):
-    """A kind whose readings follow from the error vectors at its poses."""
+    """Kind whose readings follow from the error vectors at its poses."""
 
     @abstractmethod
     def predict(
-        self, readings: Readings, error_mm: Array, guess: Prediction
+        self, readings: Readings, error_mm: Array, prediction: Prediction
     ) -> tuple[Array, Array, Array]:
-        """Give the readings, [n, d], mm, that errors, [n, 3], mm, would lead to.
+        """Predict the readings, [n, d], mm, from error vectors, [n, 3], mm.
 
-        Beside them their derivatives: by the error, [n, d, 3], and by unknowns, [n, d, m].
+        And their derivatives: by the error, [n, d, 3], and by unknowns, [n, d, m].
         """
 
-    def observe(self, scene: Scene, readings: Readings, guess: Prediction) -> Array:
-        return self.predict(readings, _error_mm(scene, readings, guess), guess)[0]
+    def observe(self, scene: Scene, readings: Readings, prediction: Prediction) -> Array:
+        return self.predict(readings, _error_mm(scene, readings, prediction), prediction)[0]
 
     def slopes(
-        self, scene: Scene, readings: Readings, guess: Prediction, keys: tuple[str, ...]
+        self, scene: Scene, readings: Readings, prediction: Prediction, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
-        error_mm = _error_mm(scene, readings, guess)
-        _, by_error, by_unknown = self.predict(readings, error_mm, guess)
-        basis = build_basis(scene.model, guess.errors, keys, readings.coordinates, VIEW)
+        error_mm = _error_mm(scene, readings, prediction)
+        _, by_error, by_unknown = self.predict(readings, error_mm, prediction)
+        basis = build_basis(scene.model, prediction.errors, keys, readings.coordinates, VIEW)
         gains = np.einsum("ndx,knx->ndk", by_error, basis.position) * MM_PER_UM
         return gains, by_unknown
 
 
-def _error_mm(scene: Scene, readings: Readings, guess: Prediction) -> Array:
-    field = evaluate_exact(scene.model, guess.errors, readings.coordinates, VIEW)
+def _error_mm(scene: Scene, readings: Readings, prediction: Prediction) -> Array:
+    field = evaluate_exact(scene.model, prediction.errors, readings.coordinates, VIEW)
     return field.error_um * MM_PER_UM
 
 
 class FreePlacementKind(FromVectors):
-    """A kind whose readings are ± the error plus the place of something, one place per session."""
+    """Kind whose readings are ± the error plus an unknown position per session."""
 
     place: ClassVar[str]
     sign: ClassVar[float]
@@ -144,17 +144,17 @@ class FreePlacementKind(FromVectors):
         return total / np.maximum(member.sum(axis=(0, 1)), 1.0)
 
     def predict(
-        self, readings: Readings, error_mm: Array, guess: Prediction
+        self, readings: Readings, error_mm: Array, prediction: Prediction
     ) -> tuple[Array, Array, Array]:
-        member = self._members(readings, guess.unknowns)
+        member = self._members(readings, prediction.unknowns)
         by_error = np.broadcast_to(self.sign * np.eye(3), (*error_mm.shape, 3))
-        return self.sign * error_mm + member @ guess.values, by_error, member
+        return self.sign * error_mm + member @ prediction.values, by_error, member
 
     def _head(self, session: str) -> str:
         return f"{self.place} {session}".strip()
 
     def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        """Tell which unknown each component of each reading has, [n, 3, m]."""
+        """Build the derivative of the readings by the unknowns, [n, 3, m]."""
         member = np.zeros((len(readings), 3, len(unknowns)))
         index = {name: at for at, name in enumerate(unknowns)}
         for row, session in enumerate(readings.session):
@@ -172,13 +172,13 @@ _COLUMN = re.compile(
 
 
 class Points(FreePlacementKind):
-    """Errors actual − nominal at axis positions; a session that is named has its own shift.
+    """Errors actual − nominal at axis positions; each named session has its own shift.
 
-    Readings are kept in the workpiece frame, whichever they were taken in.
+    Readings are stored in the workpiece frame, whatever their frame in the file.
     """
 
     name = "points"
-    words = "error vectors at points, tool relative to workpiece"
+    description = "error vectors at points, tool relative to workpiece"
     columns = (
         "an axis position each (x_mm, b_deg, …), ex_um, ey_um, ez_um (or _mm; ex_R_um in the"
         " machine frame R, ex_w_um in that of the workpiece); u_um, session"
@@ -187,34 +187,36 @@ class Points(FreePlacementKind):
     place = "shift"
     sign = 1.0
 
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+    def matches(self, table: ReadingTable, scene: Scene) -> bool:
         del scene
         return _vectors(table) is not None
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        columns, loop, told = _vectors(table) or (("ex_um", "ey_um", "ez_um"), None, None)
-        observed = table.need(columns) * (1.0 if columns[0].endswith("_mm") else 1e-3)
+        columns, loop, frame = _vectors(table) or (("ex_um", "ey_um", "ez_um"), None, None)
+        observed = table.require(columns) * (1.0 if columns[0].endswith("_mm") else 1e-3)
         if loop not in (None, *self.loops) and (
             loop != "tool" or scene.machine.branch("workpiece")
         ):
-            found = (
-                f"has column {columns[0]}; expected errors of field --loop relative, no reference"
+            problem = (
+                f"has column {columns[0]}; expected errors of field --loop relative without"
+                " reference (with --placed: --kind tracker)"
             )
-            raise SceneError(table.source, [f"{found} held (with --placed: --kind tracker)"])
-        if told and table.frame and told != table.frame:
-            found = f"has column {columns[0]}, so its vectors are in the {told} frame"
-            raise SceneError(table.source, [f"{found}; expected no --frame {table.frame}"])
+            raise SceneError(table.source, [problem])
+        if frame and table.frame and frame != table.frame:
+            problem = f"has column {columns[0]}, so its vectors are in the {frame} frame"
+            raise SceneError(table.source, [f"{problem}; expected no --frame {table.frame}"])
+        is_assumed = not (frame or table.frame)
         axes = tuple(scene.machine.axes)
         coordinates, notes = axis_columns(table, scene, axes)
-        frame = told or table.frame or "workpiece"
+        frame = frame or table.frame or "workpiece"
         if frame == "machine":
             observed = transforms.rotate(_from_machine(scene, coordinates), observed)
         check_poses(coordinates, table.source)
-        hint = "Are the errors in the unit that their columns name?"
+        hint = "Do the column names state the right unit?"
         check_spread(float(np.abs(observed).max()), MAX_ERROR * 1e-3, table.source, hint)
-        readings = take_readings(self.name, scene, table, coordinates, observed, notes)
+        readings = build_readings(self.name, scene, table, coordinates, observed, notes)
         readings = replace(readings, frame=frame)
-        if told or table.frame or in_other_frame(scene, readings) is None:
+        if not is_assumed or in_other_frame(scene, readings) is None:
             return readings
         note = f"{Path(table.source).name}: vectors are taken in the workpiece frame"
         return replace(readings, notes=(*notes, note))
@@ -224,11 +226,12 @@ class Points(FreePlacementKind):
 
 
 class Tracker(Points):
-    """Error vectors in the coordinates of an instrument whose place nobody knows: six numbers."""
+    """Error vectors in the frame of an instrument with unknown position and orientation."""
 
     name = "tracker"
-    words = (
-        "error vectors of a tracker whose place and turn are unknown in each session; turns in mrad"
+    description = (
+        "error vectors of a tracker, its position and rotation unknown in each session; rotation in"
+        " mrad"
     )
     loops = ("relative", "relative_placed")
     place = "tracker"
@@ -241,7 +244,7 @@ class Tracker(Points):
         return np.zeros(len(self.unknowns(readings)))
 
     def _members(self, readings: Readings, unknowns: tuple[str, ...]) -> Array:
-        """Tell what a unit of each unknown adds to each component, [n, 3, m]."""
+        """Build the derivative of the readings by the unknowns, [n, 3, m]."""
         member = super()._members(readings, unknowns)
         heads = np.array([self._head(session) for session in readings.session])
         for at, name in enumerate(unknowns):
@@ -254,26 +257,27 @@ class Tracker(Points):
 
 
 def _vectors(table: ReadingTable) -> tuple[tuple[str, ...], str | None, str | None] | None:
-    found: dict[tuple[str | None, ...], dict[str, str]] = {}
+    """Find three columns of vectors: their names, loop and frame."""
+    groups: dict[tuple[str | None, ...], dict[str, str]] = {}
     for column in table.columns:
-        told = _COLUMN.fullmatch(column)
-        if told and bool(told["short"]) != bool(told["long"]):
-            group = told["loop"], told["frame"], told["unit"]
-            found.setdefault(group, {})[told["short"] or told["long"]] = column
-    for (loop, frame, _), columns in found.items():
+        match = _COLUMN.fullmatch(column)
+        if match and bool(match["short"]) != bool(match["long"]):
+            group = match["loop"], match["frame"], match["unit"]
+            groups.setdefault(group, {})[match["short"] or match["long"]] = column
+    frames = {letter: frame for frame, letter in FRAMES.items()}
+    for (loop, letter, _), columns in groups.items():
         if len(columns) == 3:
-            names = tuple(columns[letter] for letter in "xyz")
-            return names, loop, next((word for word in FRAMES if FRAMES[word] == frame), None)
+            return tuple(columns[x] for x in "xyz"), loop, frames.get(letter or "")
     return None
 
 
 def _from_machine(scene: Scene, coordinates: Mapping[str, Array]) -> Array:
-    """Give the rotations that turn vectors from R into the workpiece frame, [n, 3, 3]."""
+    """Compute the rotations of vectors from R to the workpiece frame, [n, 3, 3]."""
     return np.swapaxes(branch_pose(scene.model, "workpiece", coordinates)[..., :3, :3], -1, -2)
 
 
 def in_other_frame(scene: Scene, readings: Readings) -> Readings | None:
-    """Take vectors as if they were read in the other frame; None where that is the same."""
+    """Return readings as if taken in the other frame; None where both frames are parallel."""
     turn, was_machine = _from_machine(scene, readings.coordinates), readings.frame == "machine"
     if not readings.frame or np.abs(turn - np.eye(3)).max() < 1e-9:
         return None
@@ -282,59 +286,60 @@ def in_other_frame(scene: Scene, readings: Readings) -> Readings | None:
     return replace(readings, observed_mm=observed, frame="workpiece" if was_machine else "machine")
 
 
-LEAST = 5  # readings that a station needs: its place, its dead path, and one to check
+MIN_LENGTHS = 5  # per station: four for its position and dead path, and one redundant
 
 
 class Lengths(FromVectors):
-    """Distances between the tool point and stations, each with an unknown place and dead path."""
+    """Distances from stations of unknown position and dead path to the tool point."""
 
     name = "lengths"
-    words = "lengths from unknown stations to the tool point (tracking laser)"
+    description = "lengths from unknown stations to the tool point (tracking laser)"
     columns = "an axis position each (x_mm, b_deg, …), length_mm; session names the station; u_um"
 
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+    def matches(self, table: ReadingTable, scene: Scene) -> bool:
         del scene
         return "length_mm" in table.columns
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        observed = table.need(("length_mm",))
+        observed = table.require(("length_mm",))
         coordinates, notes = axis_columns(table, scene, tuple(scene.machine.axes))
         check_poses(coordinates, table.source)
         labels = table.session if table.labels.keys() & {*LABELS} else ("1",) * len(table)
         for name in dict.fromkeys(labels):
             count = labels.count(name)
-            if count < LEAST:
-                found = f"station {name!r} has {count} lengths"
-                raise SceneError(table.source, [f"{found}; expected at least {LEAST}"])
-        found = take_readings(self.name, scene, table, coordinates, observed, notes)
-        return replace(found, session=labels)
+            if count < MIN_LENGTHS:
+                problem = f"station {name!r} has {count} lengths"
+                raise SceneError(table.source, [f"{problem}; expected at least {MIN_LENGTHS}"])
+        readings = build_readings(self.name, scene, table, coordinates, observed, notes)
+        return replace(readings, session=labels)
 
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         return tuple(
-            f"station {name} {what}"
+            f"station {name} {quantity}"
             for name in dict.fromkeys(readings.session)
-            for what in ("x", "y", "z", "dead path")
+            for quantity in ("x", "y", "z", "dead path")
         )
 
     def start(self, readings: Readings) -> Array:
         sessions = np.array(readings.session)
         stations = (sessions == name for name in dict.fromkeys(readings.session))
         return np.concatenate(
-            [_locate(readings.nominal_mm[own], readings.observed_mm[own, 0]) for own in stations]
+            [_locate(readings.nominal_mm[at], readings.observed_mm[at, 0]) for at in stations]
         )
 
     def predict(
-        self, readings: Readings, error_mm: Array, guess: Prediction
+        self, readings: Readings, error_mm: Array, prediction: Prediction
     ) -> tuple[Array, Array, Array]:
-        index = {name: at for at, name in enumerate(guess.unknowns)}
+        index = {name: at for at, name in enumerate(prediction.unknowns)}
         first = np.array([index[f"station {name} x"] for name in readings.session])
-        own = first[:, None] + np.arange(4)  # place and dead path of the station of each reading
-        values = guess.values[own]
+        station = first[:, None] + np.arange(4)  # position and dead path, of each reading
+        values = prediction.values[station]
         away = readings.nominal_mm + error_mm - values[:, :3]
         length = np.linalg.norm(away, axis=-1)
         beam = away / length[:, None]
-        by_unknown = np.zeros((len(readings), 1, len(guess.unknowns)))
-        np.put_along_axis(by_unknown[:, 0], own, np.column_stack([-beam, -np.ones(len(own))]), -1)
+        by_unknown = np.zeros((len(readings), 1, len(prediction.unknowns)))
+        slopes = np.column_stack([-beam, -np.ones(len(beam))])
+        np.put_along_axis(by_unknown[:, 0], station, slopes, -1)
         return (length - values[:, 3])[:, None], beam[:, None, :], by_unknown
 
 
@@ -344,12 +349,12 @@ def _locate(points_mm: Array, length_mm: Array) -> Array:
     middle = points_mm.mean(axis=0)
     reach = max(float(np.ptp(points_mm, axis=0).max()), float(np.ptp(length_mm)), 1.0)
 
-    def missed(values: Array) -> Array:
+    def deviations(values: Array) -> Array:
         return np.linalg.norm(points_mm - values[:3], axis=-1) - values[3] - length_mm
 
     corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), -1).reshape(-1, 3)
-    found = (
-        least_squares(missed, [*(middle + reach * corner), 0.0], x_scale=reach)
+    solutions = (
+        least_squares(deviations, [*(middle + reach * corner), 0.0], x_scale=reach)
         for corner in corners
     )
-    return min(found, key=lambda one: one.cost).x
+    return min(solutions, key=lambda solution: solution.cost).x

@@ -1,4 +1,4 @@
-"""The measurement to make next: the one that lowers an uncertainty most per minute of work."""
+"""Next measurement: the one that reduces an uncertainty most per minute of work."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -32,9 +32,9 @@ from warpspace.units import UM_PER_MM, Array
 PLACES = (0.0, 0.5, 1.0)  # shares of the working volume, the ends at the ends
 TURNS_DEG = (-90.0, -60.0, -30.0, 0.0, 30.0, 60.0, 90.0, 180.0, 270.0)
 ON_CIRCLE = 36
-POSES, REACH = 60, (-180.0, 180.0)  # poses, mm and degrees, that tell all that can be told
-ARM_MM = 250.0  # at which a rotation counts like a location
-SESSION = "next"  # the set-up of a measurement not made yet: a sphere put somewhere anew
+POSES, RANGE = 60, (-180.0, 180.0)  # poses, mm and degrees, of the maximum observability
+ARM_MM = 250.0  # lever arm of rotations in comparison with locations
+SESSION = "next"  # the new set-up of a planned measurement
 
 
 def candidates(scene: Scene) -> tuple[Candidate, ...]:
@@ -48,9 +48,11 @@ def _spans(scene: Scene) -> dict[str, tuple[float, float]]:
 
 def _complete(scene: Scene, positions: Mapping[str, Array]) -> dict[str, Array]:
     count = max(len(values) for values in positions.values())
-    still = scene.workspace.positions
+    rest_positions = scene.workspace.positions
     return {
-        name: np.asarray(positions[name] if name in positions else np.full(count, still[name]))
+        name: np.asarray(
+            positions[name] if name in positions else np.full(count, rest_positions[name])
+        )
         for name in scene.machine.axes
     }
 
@@ -64,11 +66,11 @@ def _nominal(scene: Scene, kind: str, at: Mapping[str, Array], observed_mm: Arra
 def _trackers(scene: Scene) -> Iterator[Candidate]:
     spans = _spans(scene)
     for shares in (PLACES[::2], PLACES):
-        each = [[low + share * (high - low) for share in shares] for low, high in spans.values()]
-        places = np.array(list(product(*each))).T
+        grid = [[low + share * (high - low) for share in shares] for low, high in spans.values()]
+        places = np.array(list(product(*grid))).T
         if places.shape[-1] > 1:
             count = f"{places.shape[-1]} points, {len(shares)} along each of {', '.join(spans)}"
-            title = f"tracker: error vectors at {count}; its place and turn unknown"
+            title = f"tracker: error vectors at {count}; its position and rotation unknown"
             at = _complete(scene, dict(zip(spans, places, strict=True)))
             yield Candidate(title, _nominal(scene, "tracker", at, np.zeros(places.T.shape)))
 
@@ -80,37 +82,38 @@ def _tests(scene: Scene) -> Iterator[Candidate]:
     for name in spans:
         yield from _test(scene, f"positioning:axis={name}", f"laser along {name}")
         for across in "xyz":
-            words = f"probe along {name}, sensing {across} against a straight edge"
-            yield from _test(scene, f"straightness:axis={name}:across={across}:points=11", words)
+            title = f"probe along {name}, sensing {across} against a straight edge"
+            yield from _test(scene, f"straightness:axis={name}:across={across}:points=11", title)
     yield from _test(scene, "diagonals", "laser along the four body diagonals")
     for plane, (first, second, _) in PLANES.items():
         if not {first, second} <= set(spans):
             continue
         yield from _test(scene, f"squareness:plane={plane}:points=11", f"square in {plane}, probed")
-        others = [name for name in spans if name not in (first, second)]
+        normal = [name for name in spans if name not in (first, second)]
         radius = 0.4 * min(spans[name][1] - spans[name][0] for name in (first, second))
         options = f"circular:plane={plane}:radius={radius:g}:points={ON_CIRCLE // 2}"
-        for share in PLACES[:: 2 if others else 3]:
-            at = [f"{n}={spans[n][0] + share * (spans[n][1] - spans[n][0]):g}" for n in others]
-            place = f":at={','.join(at)}" if at else ""
-            words = f"ball bar, circle {plane}, radius {radius:g} mm" + (
-                f" at {', '.join(at).replace('=', ' ')}" if at else ""
-            )
-            yield from _test(scene, options + place, words)
+        for share in PLACES[:: 2 if normal else 3]:
+            at = [f"{n}={spans[n][0] + share * (spans[n][1] - spans[n][0]):g}" for n in normal]
+            title = f"ball bar, circle {plane}, radius {radius:g} mm"
+            if not at:
+                yield from _test(scene, options, title)
+                continue
+            title += f" at {', '.join(at).replace('=', ' ')}"
+            yield from _test(scene, f"{options}:at={','.join(at)}", title)
 
 
-def _test(scene: Scene, kind: str, words: str) -> Iterator[Candidate]:
+def _test(scene: Scene, kind: str, title: str) -> Iterator[Candidate]:
     with suppress(OptionError, UnknownNameError):
-        readings = TestReadings(kind).planned(scene)
+        readings = TestReadings(kind).plan_readings(scene)
         setup = readings.plan.setup if readings.plan else ()
         unknown = ", ".join(name.rpartition("_")[0].replace("_", " ") for name in setup)
-        read = f"{len(readings)} readings of one component"
-        yield Candidate(f"{words}: {read}; unknown: {unknown}", readings)
+        count = f"{len(readings)} readings of one component"
+        yield Candidate(f"{title}: {count}; unknown: {unknown}", readings)
 
 
 def _spheres(scene: Scene) -> Iterator[Candidate]:
-    still = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
-    centre = ball_point(scene.model, still)
+    at_rest = {name: np.array([value]) for name, value in scene.workspace.positions.items()}
+    centre = ball_point(scene.model, at_rest)
     rotary = [name for name, axis in scene.machine.axes.items() if not axis.is_linear]
     travels = {name: scene.machine.axes[name].travel for name in rotary}
     turns = {
@@ -118,24 +121,24 @@ def _spheres(scene: Scene) -> Iterator[Candidate]:
         for name, (low, high) in travels.items()
     }
     for name in rotary:
-        others = [other for other in rotary if other != name] or [""]
-        for other in others:
+        for other in [axis for axis in rotary if axis != name] or [""]:
             for turn in turns.get(other, np.zeros(1)):
                 if len(turns[name]) < 2 or (other and abs(turn) > 90.0):
                     continue
                 place = {name: turns[name]}
-                held = ""
+                fixed = ""
                 if other:
                     place[other] = np.full(len(turns[name]), turn)
-                    held = f" at {other} {turn:g}°"
+                    fixed = f" at {other} {turn:g}°"
                 at, target = _complete(scene, place), np.repeat(centre, len(turns[name]), axis=0)
                 with suppress(SceneError):
                     at = solve_linear(scene, at, target, "")
                     inside = within_travel(scene.machine, at)
                     at = {axis: values[inside] for axis, values in at.items()}
-                    if (count := len(at[name])) > 1:
-                        spelled = ", ".join(f"{value:g}" for value in at[name])
-                        title = f"sphere, TCP on: {name} at {spelled}°{held}"
+                    count = len(at[name])
+                    if count > 1:
+                        angles = ", ".join(f"{angle:g}" for angle in at[name])
+                        title = f"sphere, TCP on: {name} at {angles}°{fixed}"
                         yield Candidate(title, _nominal(scene, "sphere-tcp", at, target[:count]))
 
 
@@ -148,161 +151,171 @@ MINUTES = {
     "circular": (12.0, 0.05),
     "sphere-tcp": (10.0, 1.0),
 }
-"""Minutes of work by kind: to set up, and for each reading. Typical, of somebody who does it often;
-what a shop needs differs, and the ranking with it."""
+"""Minutes of work by kind: set-up, and per reading. Typical of an experienced operator; the ranking
+depends on them."""
 
 
 def minutes(readings: Readings) -> float:
-    set_up, each = MINUTES.get(readings.kind.partition(":")[0], (30.0, 0.5))
-    return set_up + each * len(readings)
+    set_up, per_reading = MINUTES.get(readings.kind.partition(":")[0], (30.0, 0.5))
+    return set_up + per_reading * len(readings)
 
 
-NODES = 5  # nodes per axis of the map whose uncertainty counts
-WIDE = 1000.0  # standard uncertainty in µm or µrad of a parameter of which nothing is known
-LEAST_NOISE_MM = 1e-4
-LEAST_GAIN = 0.01  # share of U95 that a measurement has to take away, unless it is asked about
+NODES = 5  # nodes per axis of the map whose uncertainty is minimised
+WIDE = 1000.0  # standard uncertainty in µm or µrad of a parameter without tolerance
+MIN_NOISE_MM = 1e-4
+MIN_GAIN = 0.01  # minimum reduction of U95, as a share, unless candidates are specified
 
 
 def next_best(
     scene: Scene,
     sets: Sequence[Readings],
-    found: Calibration,
+    calibration: Calibration,
     count: int = 1,
     choice: Sequence[Candidate] | None = None,
-    watch: solve.Watch = solve.unwatched,
+    check_cancelled: solve.CheckCancelled = solve.never_cancelled,
     target: Target = "map",
     instrument: Instrument = NO_INSTRUMENT,
 ) -> tuple[NextMeasurement, ...]:
-    """Choose measurements one after the other, each for the greatest gain per minute.
+    """Choose measurements one after the other, each for the greatest reduction per minute.
 
     Notes
     -----
-    The information of what is measured, JᵀWJ less what its instrument shares, plus that of the
-    tolerances (1000 µm or µrad where there is none), plus that of the candidate; what a set-up
-    leaves unknown is eliminated, and each candidate has one of its own. First order, at the errors
-    found.
+    The information of the readings, JᵀWJ less that of common contributions of the instrument, plus
+    that of the tolerances (1000 µm or µrad where there is none), plus that of the candidate. The
+    unknowns of set-ups are eliminated; each candidate has a new set-up. First order, at the fitted
+    errors.
     """
     if not count:
         return ()
-    keys = tuple(one.key for one in found.parameters)
-    terms = solve.build_terms(found.scene, keys)
-    noise = max(found.sigma_mm, LEAST_NOISE_MM)
-    stated = [one.sigma_mm for one in sets if one.sigma_mm is not None]
+    keys = tuple(row.key for row in calibration.parameters)
+    parameters = solve.build_fit_parameters(calibration.scene, keys)
+    noise = max(calibration.sigma_mm, MIN_NOISE_MM)
+    stated = [readings.sigma_mm for readings in sets if readings.sigma_mm is not None]
     if len(stated) == len(sets):
         noise = float(np.median(np.concatenate(stated)))
-    made = solve.MeasurementModel.of(scene, sets, watch)
-    known = _information(made, terms, noise, instrument) + _prior(scene, keys)
-    over_map = u95_at(found.scene, terms, "map")
-    told = u95_at(found.scene, terms, target)
-    rows = [
-        (one, _information(solve.MeasurementModel.of(scene, [one.readings], watch), terms, noise))
-        for one in choice or candidates(scene)
-    ]
+    present = solve.MeasurementModel.of(scene, sets, check_cancelled)
+    information = _information(present, parameters, noise, instrument) + _prior(scene, keys)
+    map_u95 = u95_at(calibration.scene, parameters, "map")
+    target_u95 = u95_at(calibration.scene, parameters, target)
+    options: list[tuple[Candidate, Array]] = []
+    for candidate in choice or candidates(scene):
+        model = solve.MeasurementModel.of(scene, [candidate.readings], check_cancelled)
+        options.append((candidate, _information(model, parameters, noise)))
     steps: list[NextMeasurement] = []
-    covariance = _covariance(known)
+    before = _covariance(information)
     for _ in range(count):
-        watch()
-        before, map_before = told(covariance), over_map(covariance)
-        least = -np.inf if choice else LEAST_GAIN * before
-        after = [(one, _covariance(known + row), row) for one, row in rows]
-        gains = [(before - told(one[1]), *one) for one in after]
-        useful = [gain for gain in gains if gain[0] >= least]
+        check_cancelled()
+        u95_before = target_u95(before)
+        min_gain = -np.inf if choice else MIN_GAIN * u95_before
+        useful: list[tuple[float, Candidate, Array, Array]] = []
+        for candidate, added in options:
+            after = _covariance(information + added)
+            gain = u95_before - target_u95(after)
+            if gain >= min_gain:
+                useful.append((gain / minutes(candidate.readings), candidate, after, added))
         if not useful:
             break
-        _, best, covariance, row = max(useful, key=lambda gain: gain[0] / minutes(gain[1].readings))
-        ends = before, told(covariance), map_before / FACTOR, over_map(covariance) / FACTOR
-        steps.append(NextMeasurement(best, minutes(best.readings), *ends, covariance))
-        known = known + row
+        _, candidate, after, added = max(useful, key=lambda row: row[0])
+        maps = map_u95(before) / FACTOR, map_u95(after) / FACTOR
+        duration, u95_after = minutes(candidate.readings), target_u95(after)
+        steps.append(NextMeasurement(candidate, duration, u95_before, u95_after, *maps, after))
+        information, before = information + added, after
     return tuple(steps)
 
 
-def separating(
+def find_separating(
     scene: Scene,
     sets: Sequence[Readings],
-    found: Calibration,
-    watch: solve.Watch = solve.unwatched,
+    calibration: Calibration,
+    check_cancelled: solve.CheckCancelled = solve.never_cancelled,
 ) -> dict[tuple[str, ...], str]:
-    """Name for each group of parameters that look alike a measurement that tells them apart."""
-    keys = tuple(one.key for one in found.parameters)
-    terms = solve.build_terms(scene, keys)
-    missing = set(found.rank.confounded)
-    told: dict[tuple[str, ...], str] = {}
-    for one in candidates(scene):
-        if not missing:
+    """Find for each confounded group the first candidate that separates its parameters."""
+    keys = tuple(row.key for row in calibration.parameters)
+    parameters = solve.build_fit_parameters(scene, keys)
+    remaining = set(calibration.rank.confounded)
+    separated_by: dict[tuple[str, ...], str] = {}
+    for candidate in candidates(scene):
+        if not remaining:
             break
-        stack = solve.MeasurementModel.of(scene, [*sets, one.readings], watch)
-        both = stack.derivatives(terms, terms.start, stack.start())
-        rank = solve.find_rank(keys, *both, stack.blind)
-        still = {group[0] for group in rank.confounded}
-        for group in [group for group in missing if group[0] not in still]:
-            told[group] = one.name
-            missing.remove(group)
-    return {group: told[group] for group in found.rank.confounded if group in told}
+        model = solve.MeasurementModel.of(scene, [*sets, candidate.readings], check_cancelled)
+        jacobian = model.derivatives(parameters, parameters.start, model.start())
+        rank = solve.find_rank(keys, *jacobian, model.rank_tolerance)
+        confounded = {group[0] for group in rank.confounded}
+        separated = {group for group in remaining if group[0] not in confounded}
+        separated_by |= dict.fromkeys(separated, candidate.name)
+        remaining -= separated
+    groups = calibration.rank.confounded
+    return {group: separated_by[group] for group in groups if group in separated_by}
 
 
 def _information(
-    stack: solve.MeasurementModel,
-    terms: solve.FitParameters,
+    model: solve.MeasurementModel,
+    parameters: solve.FitParameters,
     noise_mm: float,
     instrument: Instrument = NO_INSTRUMENT,
 ) -> Array:
-    by_parameter, by_unknown = stack.derivatives(terms, terms.start, stack.start())
-    weights = np.concatenate(stack.weights(noise_mm))[:, None]
-    common = [common_mode(stack, one) for one in instrument.shared]
-    seen = weights * np.hstack([by_parameter, *common])
-    seen = solve.without(seen, solve.orthonormal(weights * by_unknown))
-    whole, count = seen.T @ seen, len(terms.keys)
-    # what readings share is unknown as well, but by a standard uncertainty of one
-    shared = whole[count:, count:] + np.eye(len(whole) - count)
-    lost = whole[:count, count:] @ np.linalg.solve(shared, whole[count:, :count])
-    return whole[:count, :count] - lost
+    by_parameter, by_unknown = model.derivatives(parameters, parameters.start, model.start())
+    weights = np.concatenate(model.weights(noise_mm))[:, None]
+    common = [common_mode(model, contribution) for contribution in instrument.shared]
+    jacobian = weights * np.hstack([by_parameter, *common])
+    jacobian = solve.project_out(jacobian, solve.orthonormal_basis(weights * by_unknown))
+    gram, count = jacobian.T @ jacobian, len(parameters.keys)
+    # common contributions are unknown too, with a prior standard uncertainty of one
+    shared = gram[count:, count:] + np.eye(len(gram) - count)
+    lost = gram[:count, count:] @ np.linalg.solve(shared, gram[count:, :count])
+    return gram[:count, :count] - lost
 
 
 def _prior(scene: Scene, keys: Sequence[str]) -> Array:
     tolerances = [scene.tolerances.get(key) for key in keys]
     widths = [
-        WIDE if one is None else max(one.half_width, 1e-6) / np.sqrt(3.0) for one in tolerances
+        WIDE if tolerance is None else max(tolerance.half_width, 1e-6) / np.sqrt(3.0)
+        for tolerance in tolerances
     ]
     return np.diag(1.0 / np.array(widths) ** 2)
 
 
-def _covariance(known: Array) -> Array:
-    scale = np.sqrt(np.diag(known))
-    inverse = np.linalg.pinv(known / np.outer(scale, scale), rcond=1e-13, hermitian=True)
+def _covariance(information: Array) -> Array:
+    scale = np.sqrt(np.diag(information))
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-13, hermitian=True)
     return inverse / np.outer(scale, scale)
 
 
 FACTOR = coverage_factor(np.inf)
 
 
-def u95_at(scene: Scene, terms: solve.FitParameters, target: Target) -> Callable[[Array], float]:
-    """Give what tells U95 of a position error, µm, by the covariance of the parameters.
+def u95_at(
+    scene: Scene, parameters: solve.FitParameters, target: Target
+) -> Callable[[Array], float]:
+    """Build the function from the covariance of the parameters to U95 of a target, µm.
 
     Of the map the root mean square over the volume, of its corners the largest at a node; of the
-    scene's part the root mean square over its vertices, placed, or the largest at a measure with a
+    part the root mean square over its placed vertices, or the largest of the measurands with a
     tolerance, µm or µrad.
     """
     if target in ("part", "verdict"):
-        return _u95_of_part(scene, terms, str(target))
+        return _u95_of_part(scene, parameters, str(target))
     if isinstance(target, str):
         grid = build_grid(scene.model, scene.workspace, NODES)
-        basis = grid_basis(replace(scene, errors=terms.errors), grid, keys=terms.keys)
+        basis = grid_basis(replace(scene, errors=parameters.errors), grid, keys=parameters.keys)
         weights = grid.weights.ravel() if target == "map" else None
     else:
         at = complete_coordinates(scene.machine, dict(target), scene.workspace.positions)
-        basis = build_basis(scene.model, terms.errors, terms.keys, at, scene.view())
+        basis = build_basis(scene.model, parameters.errors, parameters.keys, at, scene.view())
         weights = None
-    flat = basis.position.reshape(len(terms.keys), -1)
+    flat = basis.position.reshape(len(parameters.keys), -1)
 
-    def told(covariance: Array) -> float:
+    def u95(covariance: Array) -> float:
         variance = np.sum(flat * (covariance @ flat), axis=0).reshape(-1, 3).sum(axis=1)
-        whole = variance.max() if weights is None else weights @ variance
-        return FACTOR * float(np.sqrt(max(whole, 0.0)))
+        total = variance.max() if weights is None else weights @ variance
+        return FACTOR * float(np.sqrt(max(total, 0.0)))
 
-    return told
+    return u95
 
 
-def _u95_of_part(scene: Scene, terms: solve.FitParameters, target: str) -> Callable[[Array], float]:
+def _u95_of_part(
+    scene: Scene, parameters: solve.FitParameters, target: str
+) -> Callable[[Array], float]:
     from warpspace.parts.inspection import measure_changes
     from warpspace.parts.workpiece import (
         evaluate_points,
@@ -312,56 +325,67 @@ def _u95_of_part(scene: Scene, terms: solve.FitParameters, target: str) -> Calla
         subtract_best_fit,
     )
 
-    if (file := scene.part.path("file")) is None:
+    file = scene.part.path("file")
+    if file is None:
         raise OptionError(f"{{target}} {target}: expected a scene whose [part] has a file")
     mesh = load_workpiece(file, scene.part.unit or None)
-    made = evaluate_points(scene, place_workpiece(mesh, scene).vertices_mm)
-    gains = point_basis(replace(scene, errors=terms.errors), made, terms.keys).position
-    features, count = scene.part.path("features"), len(made.point_mm)
+    points = evaluate_points(scene, place_workpiece(mesh, scene).vertices_mm)
+    gains = point_basis(replace(scene, errors=parameters.errors), points, parameters.keys).position
+    features, count = scene.part.path("features"), len(points.point_mm)
     if target == "part":
-        gains = subtract_best_fit(made.point_mm, gains).reshape(len(terms.keys), -1) / np.sqrt(
+        gains = subtract_best_fit(points.point_mm, gains).reshape(len(parameters.keys), -1) / np.sqrt(
             count
         )
-        return lambda found: FACTOR * float(np.sqrt(np.sum(gains * (found @ gains))))
+        return lambda covariance: FACTOR * float(np.sqrt(np.sum(gains * (covariance @ gains))))
     if features is not None:
-        told = features, read_text(Path(features), MAX_SCENE_BYTES)
-        gains = measure_changes(mesh, made, gains, told)
+        tolerances = features, read_text(Path(features), MAX_SCENE_BYTES)
+        gains = measure_changes(mesh, points, gains, tolerances)
     if features is None or not gains.size:
         raise OptionError("{target} verdict: expected a scene whose [part] has tolerances")
-    return lambda found: FACTOR * float(np.sqrt(np.sum(gains * (found @ gains), axis=0).max()))
+
+    def worst_u95(covariance: Array) -> float:
+        return FACTOR * float(np.sqrt(np.sum(gains * (covariance @ gains), axis=0).max()))
+
+    return worst_u95
 
 
 def observability(
-    scene: Scene, sets: Sequence[Readings], watch: solve.Watch = solve.unwatched
+    scene: Scene,
+    sets: Sequence[Readings],
+    check_cancelled: solve.CheckCancelled = solve.never_cancelled,
 ) -> dict[str, float]:
-    """Say for each rotary axis how well poses tell its location and orientation errors.
+    """Compute the observability of location and orientation errors by rotary axis.
 
     The smallest singular value of the readings' Jacobian, set-ups eliminated, µm per µm: the
     observability index O3 (Nahvi, Hollerbach and Hayward 1994; Sun and Hollerbach 2008). At the
-    nominal machine, each reading counting alike, so that deviations play no part. Combinations that
-    error vectors at no pose tell, since they look like a shift, are left out.
+    nominal machine, with equal weights, so that it does not depend on the observations. Without the
+    combinations that no pose can separate from a shift of the set-up.
     """
     scene = replace(scene, errors=ErrorSet())
     rows = [parameter(key) for key in default_keys(scene.machine.chain.axes)]
     rows = [row for row in rows if row.is_constant and not is_linear(row.axis)]
     if not rows:
         return {}
-    terms = solve.build_terms(scene, [row.key for row in rows])
+    parameters = solve.build_fit_parameters(scene, [row.key for row in rows])
     scale = np.array([UM_PER_MM * (UM_PER_MM / ARM_MM if row.is_rotation else 1.0) for row in rows])
 
     def gram(readings: Sequence[Readings]) -> Array:
-        alike = [replace(one, sigma_mm=None) for one in readings]
-        stack = solve.MeasurementModel.of(scene, alike, watch)
-        return _information(stack, terms, 1.0) * np.outer(scale, scale)
+        unweighted = [replace(one_set, sigma_mm=None) for one_set in readings]
+        model = solve.MeasurementModel.of(scene, unweighted, check_cancelled)
+        return _information(model, parameters, 1.0) * np.outer(scale, scale)
 
-    draw, ends = np.random.default_rng(0), {n: a.travel for n, a in scene.machine.axes.items()}
-    anywhere = {name: draw.uniform(*np.clip(ends[name], *REACH), size=POSES) for name in ends}
-    found, most = gram(sets), gram([_nominal(scene, "points", anywhere, np.zeros((POSES, 3)))])
-    merit: dict[str, float] = {}
+    rng, travels = np.random.default_rng(0), {n: a.travel for n, a in scene.machine.axes.items()}
+    poses = {
+        name: rng.uniform(*np.clip(travel, *RANGE), size=POSES) for name, travel in travels.items()
+    }
+    present = gram(sets)
+    possible = gram([_nominal(scene, "points", poses, np.zeros((POSES, 3)))])
+    indices: dict[str, float] = {}
     for axis in dict.fromkeys(row.axis for row in rows):
-        own = np.ix_(*[[at for at, row in enumerate(rows) if row.axis == axis]] * 2)
-        values, told = np.linalg.eigh(most[own])
-        told = told[:, values > solve.BLIND**2 * values[-1]]
-        least = np.linalg.eigvalsh(told.T @ found[own] @ told).min(initial=np.inf)
-        merit |= {axis: float(np.sqrt(max(least, 0.0)))} if told.size else {}
-    return merit
+        block = np.ix_(*[[at for at, row in enumerate(rows) if row.axis == axis]] * 2)
+        eigenvalues, vectors = np.linalg.eigh(possible[block])
+        vectors = vectors[:, eigenvalues > solve.RANK_TOLERANCE**2 * eigenvalues[-1]]
+        if vectors.size:
+            smallest = np.linalg.eigvalsh(vectors.T @ present[block] @ vectors).min()
+            indices[axis] = float(np.sqrt(max(smallest, 0.0)))
+    return indices

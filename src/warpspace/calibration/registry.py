@@ -1,4 +1,4 @@
-"""The kinds of measurement there are. A new one is a module beside this and a line below."""
+"""Registry of the kinds of measurement: a new kind is a module and a line below."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,12 +13,18 @@ from warpspace.bench.data import parse_table
 from warpspace.bench.plan import BenchPlan, respond, simulate
 from warpspace.calibration.kinds import Lengths, MeasurementKind, Points, Prediction, Tracker
 from warpspace.calibration.positions import Positions
-from warpspace.calibration.readings import Readings, ReadingTable, check_spread
+from warpspace.calibration.readings import (
+    Readings,
+    ReadingTable,
+    check_spread,
+    find_data,
+    parse_reading_table,
+)
 from warpspace.calibration.spheres import SphereKind, SphereTcp
 from warpspace.exceptions import OptionError, SceneError, UnknownNameError
-from warpspace.machine.limits import MAX_ERROR
+from warpspace.machine.limits import MAX_CSV_BYTES, MAX_ERROR
 from warpspace.scene.model import Scene
-from warpspace.scene.text_files import parse_number
+from warpspace.scene.text_files import parse_number, read_text
 from warpspace.units import MM_PER_UM, Array
 
 
@@ -26,36 +32,39 @@ class TestReadings(MeasurementKind):
     """Readings of one test with its options, for instance ``circular:plane=XZ:radius=150``."""
 
     __test__ = False
-    own_columns = True
-    words = "readings of a standard test (warpspace test --list)"
+    reads_text = True
+    description = "readings of a standard test (warpspace test --list)"
     columns = "those of warpspace test NAME --data FILE"
 
     def __init__(self, text: str) -> None:
-        given, *options = text.split(":")
-        kind = find_test(given)
-        known = {option.flag.removeprefix("--"): option for option in kind.settings()}
+        test_name, *parts = text.split(":")
+        kind = find_test(test_name)
+        options = {option.flag.removeprefix("--"): option for option in kind.settings()}
         values: dict[str, Any] = {}
-        for part in options:
+        for part in parts:
             name, equals, value = part.partition("=")
             name = name.strip().replace("_", "-")
-            if not equals or name not in known:
-                raise UnknownNameError(f"option of {given}", name, known)
-            values[known[name].name] = _value(known[name], value.strip(), text)
+            if not equals or name not in options:
+                raise UnknownNameError(f"option of {test_name}", name, options)
+            values[options[name].name] = _value(options[name], value.strip(), text)
         self.test: BenchTest = kind(**values)
         self._text = text
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        own = parse_table(table.text, self.test.data_columns(scene), table.source)
-        plan, measured = self.test.plan_data(scene, own)
+        test_data = parse_table(table.text, self.test.data_columns(scene), table.source)
+        plan, measured_um = self.test.plan_data(scene, test_data)
+        largest_mm = float(np.abs(measured_um).max()) * MM_PER_UM
         hint = "Are the readings in the unit that their column names?"
-        check_spread(float(np.abs(measured).max()) * MM_PER_UM, MAX_ERROR * 1e-3, own.source, hint)
-        count = len(measured)
-        lines = own.lines if len(own) == count else np.arange(2, count + 2)
-        found = self._readings(plan, measured, own.source, tuple(int(line) for line in lines))
-        return replace(found, notes=(*found.notes, *own.notes, *self.test.data_notes(own)))
+        check_spread(largest_mm, MAX_ERROR * 1e-3, test_data.source, hint)
+        count = len(measured_um)
+        lines = test_data.lines if len(test_data) == count else np.arange(2, count + 2)
+        rows = tuple(int(line) for line in lines)
+        readings = self._readings(plan, measured_um, test_data.source, rows)
+        notes = (*readings.notes, *test_data.notes, *self.test.data_notes(test_data))
+        return replace(readings, notes=notes)
 
-    def planned(self, scene: Scene) -> Readings:
-        """Lay the path of the test as it would be run; nothing is read yet."""
+    def plan_readings(self, scene: Scene) -> Readings:
+        """Build the readings of a planned test, all zero."""
         plan = self.test.plan(scene)
         lines = tuple(range(1, plan.readings + 1))
         return self._readings(plan, np.zeros(plan.readings), self._text, lines)
@@ -79,17 +88,17 @@ class TestReadings(MeasurementKind):
     def unknowns(self, readings: Readings) -> tuple[str, ...]:
         return tuple(f"{readings.source} {name}" for name in _plan(readings).setup)
 
-    def observe(self, scene: Scene, readings: Readings, guess: Prediction) -> Array:
-        machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
-        taken = simulate(machine, _plan(readings)) * MM_PER_UM
-        return (taken + _set_up(readings, guess.unknowns) @ guess.values)[:, None]
+    def observe(self, scene: Scene, readings: Readings, prediction: Prediction) -> Array:
+        machine = replace(scene, model=self.test.model(scene), errors=prediction.errors)
+        simulated_mm = simulate(machine, _plan(readings)) * MM_PER_UM
+        return (simulated_mm + _set_up(readings, prediction.unknowns) @ prediction.values)[:, None]
 
     def slopes(
-        self, scene: Scene, readings: Readings, guess: Prediction, keys: tuple[str, ...]
+        self, scene: Scene, readings: Readings, prediction: Prediction, keys: tuple[str, ...]
     ) -> tuple[Array, Array]:
-        machine = replace(scene, model=self.test.model(scene), errors=guess.errors)
+        machine = replace(scene, model=self.test.model(scene), errors=prediction.errors)
         matrix = respond(machine, _plan(readings), keys) * MM_PER_UM
-        return matrix[:, None, :], _set_up(readings, guess.unknowns)[:, None, :]
+        return matrix[:, None, :], _set_up(readings, prediction.unknowns)[:, None, :]
 
 
 def _plan(readings: Readings) -> BenchPlan:
@@ -99,25 +108,25 @@ def _plan(readings: Readings) -> BenchPlan:
 
 
 def _set_up(readings: Readings, unknowns: tuple[str, ...]) -> Array:
-    own: Mapping[str, Array] = {
+    set_up: Mapping[str, Array] = {
         f"{readings.source} {name}": column for name, column in _plan(readings).setup.items()
     }
     none = np.zeros(len(readings))
-    columns = [own.get(name, none) for name in unknowns]
+    columns = [set_up.get(name, none) for name in unknowns]
     return np.stack(columns, -1) if columns else np.zeros((len(none), 0))
 
 
-def _value(option: Option, text: str, given: str) -> Any:
+def _value(option: Option, text: str, test: str) -> Any:
     try:
         if option.name == "at":
             parts = (part.partition("=") for part in text.split(",") if part)
             return {name.strip().upper(): parse_number(number) for name, _, number in parts}
         return option.read(text, None)
     except ValueError:
-        raise OptionError(f"{{kinds}} {given!r}: {text!r} is no point for {option.flag}") from None
+        raise OptionError(f"{{kinds}} {test!r}: {text!r} is no point for {option.flag}") from None
     except OptionError as error:
-        said = error.with_names(lambda _: option.flag)
-        raise OptionError(f"{{kinds}} {given!r}: {said}") from None
+        message = error.with_names(lambda _: option.flag)
+        raise OptionError(f"{{kinds}} {test!r}: {message}") from None
 
 
 KINDS: Mapping[str, MeasurementKind] = {
@@ -127,7 +136,7 @@ KINDS: Mapping[str, MeasurementKind] = {
 
 
 def find_kind(name: str) -> MeasurementKind:
-    """Look up a kind: one of this table, or a test with its options (``circular:plane=XZ``)."""
+    """Find a kind: one of this table, or a test with its options (``circular:plane=XZ``)."""
     if name in KINDS:
         return KINDS[name]
     tests = bench_names()
@@ -140,9 +149,31 @@ _test_kind = lru_cache(maxsize=256)(TestReadings)
 
 
 def recognise(table: ReadingTable, scene: Scene) -> MeasurementKind:
-    found = next((kind for kind in KINDS.values() if kind.fits(table, scene)), None)
-    if found is None:
-        there = ", ".join((*table.labels, *table.columns))
-        kinds = "; ".join(f"{kind.name}: {kind.columns}" for kind in KINDS.values())
-        raise SceneError(table.source, [f"has columns {there}; expected those of a kind: {kinds}"])
-    return found
+    for kind in KINDS.values():
+        if kind.matches(table, scene):
+            return kind
+    columns = ", ".join((*table.labels, *table.columns))
+    kinds = "; ".join(f"{kind.name}: {kind.columns}" for kind in KINDS.values())
+    raise SceneError(table.source, [f"has columns {columns}; expected those of a kind: {kinds}"])
+
+
+def read_readings(
+    name: str, scene: Scene, kind: str | None = None, frame: str | None = None
+) -> Readings:
+    """Read a file of readings, or a bundled one; the kind is recognised if it is not stated."""
+    path = find_data(name)
+    return parse_readings(read_text(path, MAX_CSV_BYTES), str(path), scene, kind, frame)
+
+
+def parse_readings(
+    text: str, source: str, scene: Scene, kind: str | None = None, frame: str | None = None
+) -> Readings:
+    measurement = None if kind is None else find_kind(kind)
+    if measurement is not None and measurement.reads_text:
+        return measurement.read(ReadingTable(source, {}, {}, (), text), scene)
+    table = replace(parse_reading_table(text, source), frame=frame)
+    is_points = measurement is not None and measurement.name == "points"
+    if measurement is None or (is_points and KINDS["positions"].matches(table, scene)):
+        measurement = recognise(table, scene)
+    readings = measurement.read(table, scene)
+    return replace(readings, notes=(*readings.notes, *table.notes))

@@ -12,9 +12,9 @@ from warpspace.calibration.readings import (
     Readings,
     ReadingTable,
     axis_columns,
+    build_readings,
     check_poses,
     check_spread,
-    take_readings,
 )
 from warpspace.exceptions import SceneError
 from warpspace.machine.axes import direction_index, sort_axes
@@ -22,14 +22,14 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 PLANES = {0: (1, 2), 1: (0, 2), 2: (0, 1)}
-LEAST = 3
+MIN_POSITIONS = 3  # of the rotary axis, for a circle
 SPREAD_MM = 100.0
 READ = ("x_mm", "y_mm", "z_mm")
-TCP_SPREAD_MM = 20.0  # centres that wander further than this were not measured with TCP correction
+TCP_SPREAD_MM = 20.0  # a larger spread of centres means that TCP correction was off
 
 
 class Centres(FreePlacementKind):
-    """Centres of one sphere, wherever its stand is."""
+    """Centres of one sphere at an unknown position."""
 
     place = "sphere"
     sign = -1.0
@@ -37,9 +37,9 @@ class Centres(FreePlacementKind):
     def automatic_keys(self, readings: Readings, scene: Scene) -> tuple[str, ...]:
         """List location, orientation and zero errors of the rotary axes that move.
 
-        The last rotary axis on the side of the tool has the offset of the tool point as well:
-        constant component translations, which turn with it. Its length comes before the zero
-        positions, what leads sideways last.
+        For the last rotary axis on the tool side also the offset of the tool point: constant
+        component translations, which rotate with it. The length comes before the zero positions,
+        the lateral offsets last.
         """
         moving = [
             name
@@ -48,57 +48,57 @@ class Centres(FreePlacementKind):
         ]
         constants = [f"E{letter}0{axis}" for letter in "XYZABC" for axis in moving]
         usual = [key for key in constants if key in scene.parameter_keys]
-        others = [key for key in constants if key not in usual]
+        unusual = [key for key in constants if key not in usual]
         last = [axis.name for axis in scene.machine.branch("tool") if axis.name in moving][-1:]
         length = [f"EZ{axis}" for axis in last]
         sideways = [f"E{letter}{axis}" for letter in "XY" for axis in last]
-        return (*usual, *length, *others, *sideways)
+        return (*usual, *length, *unusual, *sideways)
 
 
 class SphereTcp(Centres):
-    """The tool point that the controller believes in, each time it stands at the sphere.
+    """Nominal tool point of the controller, each time the actual tool point is at the sphere.
 
-    The controller moves the linear axes so that its nominal tool point stays; the errors of the
-    machine move the true one off, and the reading by the same amount the other way.
+    The controller moves the linear axes so that its nominal tool point is constant; the machine
+    errors shift the actual tool point, and the reading by the same amount in the opposite sense.
     """
 
     name = "sphere-tcp"
-    words = "centres of one sphere, TCP correction on (R-test, ISO 10791-6)"
+    description = "centres of one sphere, TCP correction on (R-test, ISO 10791-6)"
     columns = "rotary positions (b_deg, c_deg), x_mm, y_mm, z_mm; u_um, session"
 
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+    def matches(self, table: ReadingTable, scene: Scene) -> bool:
         return has_centres(table, scene) and spread_mm(table) <= TCP_SPREAD_MM
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        observed = table.need(READ)
+        observed = table.require(READ)
         rotary = rotary_axes(scene)
         coordinates, notes = axis_columns(table, scene, rotary, rotary)
         check_poses({name: coordinates[name] for name in rotary}, table.source)
         hint = "Were they measured with TCP correction off (--kind sphere), or in another unit?"
         check_spread(spread_mm(table), TCP_SPREAD_MM, table.source, hint)
-        coordinates = solve_linear(scene, coordinates, places(observed, table), table.source)
-        return take_readings(self.name, scene, table, coordinates, observed, notes)
+        coordinates = solve_linear(scene, coordinates, mean_centres(observed, table), table.source)
+        return build_readings(self.name, scene, table, coordinates, observed, notes)
 
 
 class SphereKind(Centres):
     """Positions of the linear axes, each time the tool point stands at the sphere."""
 
     name = "sphere"
-    words = "centres of one sphere, TCP correction off: circles about rotary axes"
+    description = "centres of one sphere, TCP correction off: circles about rotary axes"
     columns = (
         "rotary positions (b_deg, c_deg), linear positions x_mm, y_mm, z_mm; u_um, session or run"
     )
 
-    def fits(self, table: ReadingTable, scene: Scene) -> bool:
+    def matches(self, table: ReadingTable, scene: Scene) -> bool:
         return has_centres(table, scene) and spread_mm(table) > TCP_SPREAD_MM
 
     def read(self, table: ReadingTable, scene: Scene) -> Readings:
-        table.need(READ)
+        table.require(READ)
         rotary = rotary_axes(scene)
         linear = tuple(name for name in ("X", "Y", "Z") if name in scene.machine.axes)
         if len(linear) < len(READ):
-            found = "holds positions of X, Y and Z"
-            raise SceneError(table.source, [f"{found}; expected a machine with these three axes"])
+            problem = "holds positions of X, Y and Z"
+            raise SceneError(table.source, [f"{problem}; expected a machine with these three axes"])
         coordinates, notes = axis_columns(table, scene, (*rotary, *linear), rotary)
         check_poses({name: coordinates[name] for name in rotary}, table.source)
         circles = circles_of(table, scene)
@@ -110,17 +110,17 @@ class SphereKind(Centres):
                     coordinates[circle.axis],
                 )
                 note = (
-                    f"run {', '.join(circle.sessions)}: {circle.axis} turns against the machine of"
-                    " the scene; its positions are taken with the other sign"
+                    f"run {', '.join(circle.sessions)}: {circle.axis} rotates opposite to that"
+                    " of the scene; its positions are used with the opposite sign"
                 )
                 notes = (*notes, note)
         tip = ball_point(scene.model, coordinates)
-        nominal = solve_linear(scene, coordinates, places(tip, table), table.source)
-        readings = take_readings(self.name, scene, table, nominal, tip, notes)
+        nominal = solve_linear(scene, coordinates, mean_centres(tip, table), table.source)
+        readings = build_readings(self.name, scene, table, nominal, tip, notes)
         readings = replace(readings, circles=circles)
-        about = tip - self._members(readings, self.unknowns(readings)) @ self.start(readings)
+        from_centre = tip - self._members(readings, self.unknowns(readings)) @ self.start(readings)
         hint = "Are they in mm, and are the offsets of the scene those of the machine?"
-        check_spread(float(np.abs(about).max()), SPREAD_MM, table.source, hint)
+        check_spread(float(np.abs(from_centre).max()), SPREAD_MM, table.source, hint)
         return readings
 
 
@@ -130,21 +130,21 @@ def rotary_axes(scene: Scene) -> tuple[str, ...]:
 
 def has_centres(table: ReadingTable, scene: Scene) -> bool:
     rotary = {f"{name.lower()}_deg" for name in rotary_axes(scene)}
-    there = set(table.columns)
-    return set(READ) <= there and bool(rotary & there) and "length_mm" not in there
+    columns = set(table.columns)
+    return set(READ) <= columns and bool(rotary & columns) and "length_mm" not in columns
 
 
 def spread_mm(table: ReadingTable) -> float:
-    observed, labels = table.need(READ), np.array(table.session)
+    observed, labels = table.require(READ), np.array(table.session)
     groups = [labels == name for name in dict.fromkeys(table.session)]
     return max(float(np.ptp(observed[group], axis=0).max()) for group in groups)
 
 
-def places(observed_mm: Array, table: ReadingTable) -> Array:
-    """Give the mean centre of the session of each reading, [n, 3], mm.
+def mean_centres(observed_mm: Array, table: ReadingTable) -> Array:
+    """Compute the mean centre of the session of each reading, [n, 3], mm.
 
-    Errors are evaluated where the axes stand nominally. Positions that held the reading itself
-    would let an error of scale explain any reading.
+    Errors are evaluated at nominal axis positions. Positions that included the reading itself would
+    allow a scale error to explain any reading.
     """
     labels = np.array(table.session)
     means = {name: observed_mm[labels == name].mean(axis=0) for name in dict.fromkeys(labels)}
@@ -167,35 +167,36 @@ def solve_linear(
     ]
     system = np.stack(columns, -1) if columns else np.zeros((len(target_mm), 3, 0))
     solved = np.linalg.pinv(system) @ (target_mm - start)[..., None]
-    missed = float(np.abs(system @ solved - (target_mm - start)[..., None]).max())
-    if missed > 1e-6:
+    missed_mm = float(np.abs(system @ solved - (target_mm - start)[..., None]).max())
+    if missed_mm > 1e-6:
         names = ", ".join(linear) or "none"
-        found = f"lies up to {missed:.3g} mm from where linear axes ({names}) can bring the tool"
-        raise SceneError(source, [f"{found}; expected a machine that reaches the sphere"])
+        problem = f"is up to {missed_mm:.3g} mm out of reach of the linear axes ({names})"
+        raise SceneError(source, [f"{problem}; expected a machine that reaches the sphere"])
     return {**zero, **{name: solved[:, at, 0] for at, name in enumerate(linear)}}
 
 
 def circles_of(table: ReadingTable, scene: Scene) -> tuple[Circle, ...]:
     """Fit a circle per run in which one rotary axis turns, and one per axis to all such runs."""
-    read, labels = table.need(READ), np.array(table.session)
+    read, labels = table.require(READ), np.array(table.session)
+    columns = {name: f"{name.lower()}_deg" for name in rotary_axes(scene)}
     turned = {
-        name: table.columns[column]
-        for name in rotary_axes(scene)
-        if (column := f"{name.lower()}_deg") in table.columns
+        name: table.columns[column] for name, column in columns.items() if column in table.columns
     }
     runs: dict[str, list[str]] = {}
     for session in dict.fromkeys(labels.tolist()):
-        mine = labels == session
-        moving = [name for name, values in turned.items() if np.ptp(values[mine]) > 0.0]
-        if len(moving) == 1 and len(np.unique(turned[moving[0]][mine])) >= LEAST:
+        members = labels == session
+        moving = [name for name, values in turned.items() if np.ptp(values[members]) > 0.0]
+        if len(moving) == 1 and len(np.unique(turned[moving[0]][members])) >= MIN_POSITIONS:
             runs.setdefault(moving[0], []).append(session)
-    found: list[Circle] = []
+    circles: list[Circle] = []
     for axis, sessions in runs.items():
-        groups = [(one,) for one in sessions] + ([tuple(sessions)] if len(sessions) > 1 else [])
+        groups: list[tuple[str, ...]] = [(session,) for session in sessions]
+        if len(sessions) > 1:
+            groups.append(tuple(sessions))
         for group in groups:
-            mine = np.isin(labels, group)
-            found.append(_fit(axis, group, read[mine], turned[axis][mine], scene))
-    return tuple(found)
+            members = np.isin(labels, group)
+            circles.append(_fit(axis, group, read[members], turned[axis][members], scene))
+    return tuple(circles)
 
 
 def _fit(

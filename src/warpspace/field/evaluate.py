@@ -1,9 +1,9 @@
 """Errors at given coordinates, to first order and exactly.
 
-Fields of many points are evaluated in pieces that stay in the processor's cache. An error is asked
-for its values at the coordinates of a piece, and for nothing else: values of one axis are an array
-over that axis, so that only sums and products are as large as the grid; values of several axes are
-an array over these.
+Fields of many points are evaluated in pieces that fit into the processor cache. Errors are
+evaluated at the coordinates of a piece only: an error of one axis is an array over that axis, so
+that only sums and products have the size of the grid; an error of several axes is an array over
+these.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,8 +43,8 @@ class ErrorField:
         Position error, actual − nominal.
     orientation_urad : ndarray, [..., 3], µrad
         Orientation error of the tool axis: the small rotation vector that turns it, right-hand
-        rule. It has no part about the tool axis itself; its norm is the tilt. Not a number where it
-        was not asked for.
+        rule. It has no component about the tool axis itself; its norm is the tilt. NaN where it was
+        not evaluated.
     """
 
     nominal_mm: Array
@@ -56,17 +56,17 @@ class ErrorField:
         """Length of the position error, [...], µm."""
         x, y, z = (self.error_um[..., axis] for axis in range(3))
         squared = x * x
-        squared += y * y  # in place: a volume of points is larger than what a processor keeps near
+        squared += y * y  # in place: a volume of points exceeds the processor cache
         squared += z * z
         return np.sqrt(squared)
 
     @property
     def tilts(self) -> "ErrorField":
-        """The same with the orientation error in place of the position error, µrad for µm."""
+        """Field with the orientation error in place of the position error, µrad for µm."""
         return replace(self, error_um=self.orientation_urad)
 
     def __sub__(self, other: "ErrorField") -> "ErrorField":
-        """Give by how much errors of the same points differ."""
+        """Compute the difference of errors at the same points."""
         error, orientation = self.error_um, self.orientation_urad
         return ErrorField(
             self.nominal_mm, error - other.error_um, orientation - other.orientation_urad
@@ -76,7 +76,7 @@ class ErrorField:
     def cells_um(self) -> Array:
         """Length of the position error in cells of a volume, [X, Y, Z], µm; linear between nodes.
 
-        Percentiles and shares of the volume are read from it, whatever the number of its nodes.
+        Percentiles and shares of the volume are computed from it, for any number of nodes.
         """
         return cell_values(self.norm_um)
 
@@ -93,7 +93,7 @@ class ErrorBasis:
     orientation: Array  # [K, ..., 3], µrad per µm or µrad of amplitude
 
     def evaluate(self, amplitudes: Array, *, orientation: bool = True) -> ErrorField:
-        """Add up the response to amplitudes, [K]; the orientation error is twice the work."""
+        """Sum the responses to amplitudes, [K]; the orientation error doubles the time."""
         return ErrorField(
             self.nominal_mm,
             self._combine(amplitudes, self.position),
@@ -122,39 +122,39 @@ class ErrorBasis:
         return amplitudes[:, None] * chosen.reshape(len(self.keys), 3)
 
 
-# They are a shift along the axes of the workpiece frame and a small rotation about them, so that
-# they stay the same wherever the axes stand.
+# Placement numbers are a shift along the axes of the workpiece frame and a small rotation about
+# them, so that they do not depend on the axis positions.
 
-LEAST = 1e-12
-"""Combinations of the six with less than this share of the largest effect squared are left out."""
+MIN_EFFECT = 1e-12
+"""Share of the largest effect, squared, below which a combination of the six is not fitted."""
 
 
 def fit_placement(model: Model, grid: Grid, error_um: Array) -> Array:
     """Fit the placement of the workpiece, [..., 6], µm and µrad, to relative errors over a volume.
 
-    Errors, [..., nx, ny, nz, 3], µm, are absolute, in R; leading axes are fits of their own. Least
-    squares, each node weighing its share of the volume; the smallest numbers where a volume along a
-    line or a point does not tell them all.
+    Errors, [..., nx, ny, nz, 3], µm, are absolute, in R; leading axes are independent fits.
+    Least squares, nodes weighted by their share of the volume; the minimum-norm solution where a
+    line or a point does not determine all six.
     """
     columns = _columns(model, grid.coordinates, grid.point_mm)
     weighted = (grid.weights[..., None, None] * columns).reshape(-1, 6)
-    normal = np.linalg.pinv(columns.reshape(-1, 6).T @ weighted, rcond=LEAST, hermitian=True)
-    found = error_um.reshape(-1, len(weighted)) @ weighted @ normal
-    return found.reshape(*error_um.shape[:-4], 6)
+    normal = np.linalg.pinv(columns.reshape(-1, 6).T @ weighted, rcond=MIN_EFFECT, hermitian=True)
+    placements = error_um.reshape(-1, len(weighted)) @ weighted @ normal
+    return placements.reshape(*error_um.shape[:-4], 6)
 
 
 def placement_effect(
     model: Model, placement: Array, coordinates: Coordinates, point_mm: Array
 ) -> tuple[Array, Array]:
-    """Give the relative error in R that placements, [6] or [K, 6], take away.
+    """Compute the relative error in R that placements, [6] or [K, 6], remove.
 
     µm and µrad, [..., 3] or [K, ..., 3]; the orientation is without the part about the tool axis.
     """
     columns = _columns(model, coordinates, point_mm)
     turned = {name: np.zeros(()) if is_linear(name) else at for name, at in coordinates.items()}
     aim = chain.tool_axis(model, turned)
-    own = chain.branch_pose(model, "workpiece", turned)[..., :3, :3]
-    tilt = own - aim[..., None] * (aim[..., None, :] @ own)
+    rotation = chain.branch_pose(model, "workpiece", turned)[..., :3, :3]
+    tilt = rotation - aim[..., None] * (aim[..., None, :] @ rotation)
     return (
         np.tensordot(placement, columns, (-1, -1)),
         np.tensordot(placement[..., 3:], np.broadcast_to(tilt, columns[..., 3:].shape), (-1, -1)),
@@ -163,14 +163,14 @@ def placement_effect(
 
 def _columns(model: Model, coordinates: Coordinates, point_mm: Array) -> Array:
     pose = chain.branch_pose(model, "workpiece", coordinates)
-    own = pose[..., :3, :3]
-    about = transforms.skew(pose[..., :3, 3] - point_mm) @ own * UM_PER_MM_URAD
-    return np.concatenate([np.broadcast_to(own, about.shape), about], axis=-1)
+    rotation = pose[..., :3, :3]
+    about = transforms.skew(pose[..., :3, 3] - point_mm) @ rotation * UM_PER_MM_URAD
+    return np.concatenate([np.broadcast_to(rotation, about.shape), about], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """How errors are looked at: the loop, the frame of the result and the point held still."""
+    """View of errors: the loop, the frame of the result and the reference point."""
 
     loop: Loop = Loop.TOOL
     # "machine" for results in R, "workpiece" for results in the nominal workpiece frame
@@ -179,36 +179,38 @@ class View:
     # Orientation errors stay absolute.
     reference: Mapping[str, float] | None = None
     # working volume over which the placement of the workpiece is fitted out of a relative error,
-    # before the reference counts; None leaves it in
+    # before the reference is subtracted; None without a fit
     placed_over: Workspace | None = None
 
 
 class SecondOrder(NamedTuple):
-    """What the first order leaves out of position errors."""
+    """Deviation of the first order from the exact position errors."""
 
     um: float  # largest |E exact − E first order|
     largest_um: float  # largest |E| of the exact chain
 
     @property
     def matters(self) -> bool:
-        """Whether it has to be said: above 0.1 µm or 1 % of the largest |E|, if that is 1 nm."""
+        """True above 0.1 µm or 1 % of the largest |E|, at least 1 nm: the user is warned."""
         return self.um > min(0.1, max(0.01 * self.largest_um, 0.001))
 
 
 def compare_orders(first_um: Array, exact_um: Array) -> SecondOrder:
     """Compare position errors, [..., 3], µm, of the same points."""
-    lengths = (np.linalg.norm(each, axis=-1) for each in (exact_um - first_um, exact_um))
+    lengths = (
+        np.linalg.norm(difference, axis=-1) for difference in (exact_um - first_um, exact_um)
+    )
     return SecondOrder(*(float(length.max(initial=0.0)) for length in lengths))
 
 
 def placed_words(view: View) -> tuple[str, ...]:
-    """Say that errors leave out where the workpiece lies; nothing where they do not."""
+    """Format the note that the placement is fitted out; empty where it is not."""
     return () if view.placed_over is None else ("placement of the workpiece fitted out",)
 
 
-def second_order_words(*found: SecondOrder) -> tuple[str, ...]:
-    """Say that the first order is not enough, of one picture or several; nothing where it is."""
-    largest = max((one.um for one in found if one.matters), default=0.0)
+def second_order_words(*orders: SecondOrder) -> tuple[str, ...]:
+    """Format the warning that the first order is insufficient, for one picture or several."""
+    largest = max((order.um for order in orders if order.matters), default=0.0)
     return (f"first order; the exact chain differs by up to {spell(largest)} µm",) * (largest > 0.0)
 
 
@@ -235,11 +237,11 @@ def reference_point(
     """Coordinates and nominal tool point of the reference; None for an absolute view."""
     if view.reference is None:
         return None
-    held = {
+    fixed = {
         name: np.asarray(view.reference[name]) if name in view.reference else values
         for name, values in coordinates.items()
     }
-    return held, chain.nominal_point(model, Loop.TOOL, held)
+    return fixed, chain.nominal_point(model, Loop.TOOL, fixed)
 
 
 def build_basis(
@@ -265,11 +267,11 @@ def build_basis(
         placement = fit_placement(model, volume, response)
 
     def respond(at: Coordinates, point: Array) -> tuple[Array, Array]:
-        found = _shaped_jacobian(model, errors, keys, at, view, point)
+        response = _shaped_jacobian(model, errors, keys, at, view, point)
         if placement is None:
-            return found
-        less = placement_effect(model, placement, at, point)
-        return found[0] - less[0], found[1] - less[1]
+            return response
+        placed = placement_effect(model, placement, at, point)
+        return response[0] - placed[0], response[1] - placed[1]
 
     position, orientation = respond(coordinates, point)
     reference = reference_point(model, view, coordinates)
@@ -310,7 +312,7 @@ def amplitudes_of(errors: ErrorSet, keys: Sequence[str]) -> Array:
 def find_placement(
     model: Model, errors: ErrorSet, view: View, *, exact: bool = False
 ) -> Array | None:
-    """Fit where the workpiece lies, [6], µm and µrad; None where a view leaves it in."""
+    """Fit the placement of the workpiece, [6], µm and µrad; None where a view has none."""
     if view.placed_over is None:
         return None
     volume = build_grid(model, view.placed_over)
@@ -331,17 +333,16 @@ def evaluate_field(
 ) -> ErrorField:
     """Evaluate the field at points in R, [..., 3], or at that of the loop.
 
-    Where the model looks at the difference of both directions of travel, the exact field is that
-    forward minus that backward. To first order the numbers are those of the basis, without its
-    memory.
+    For the difference of both directions of travel, the exact field is forward minus backward. To
+    first order the numbers are those of the basis, with less memory.
     """
     view = view or View()
     if exact and model.direction == TravelDirection.DIFFERENCE:
-        there, back = (
-            evaluate_exact(replace(model, direction=way), errors, coordinates, view, point_mm)
-            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        forward, backward = (
+            evaluate_exact(replace(model, direction=direction), errors, coordinates, view, point_mm)
+            for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
-        return there - back
+        return forward - backward
     point = chain.nominal_point(model, view.loop, coordinates) if point_mm is None else point_mm
     shape = (*np.broadcast_shapes(batch_shape(coordinates), point.shape[:-1]), 3)
     error, orientation = np.empty(shape), np.empty(shape)
@@ -349,30 +350,34 @@ def evaluate_field(
     if reference is None:
         fixed = np.zeros(3)
     else:
-        held, held_point = reference
-        still = replace(view, frame="machine", reference=None)
-        fixed = evaluate_field(model, errors, held, still, held_point, exact=exact).error_um
+        reference_at, reference_mm = reference
+        unreferenced = replace(view, frame="machine", reference=None)
+        fixed = evaluate_field(
+            model, errors, reference_at, unreferenced, reference_mm, exact=exact
+        ).error_um
     placement = find_placement(model, errors, view, exact=exact)
 
     def steps(at: Coordinates) -> chain.LoopLinks:
         return chain.build_links(model, at, error_values(model, errors, at), exact=exact)
 
-    # A grid has few positions of each axis: what depends on these alone is worked out once.
-    few = all(positions.size <= NODES for positions in coordinates.values())
-    links = steps(coordinates) if few else None
+    # A grid has few positions of each axis: the links of all of them are computed once.
+    is_shared = all(positions.size <= NODES for positions in coordinates.values())
+    links = steps(coordinates) if is_shared else None
     for piece in pieces(shape[:-1]):
         at = {name: cut(values, piece) for name, values in coordinates.items()}
-        here = steps(at) if links is None else cut_all(links, piece)
+        piece_links = steps(at) if links is None else cut_all(links, piece)
         nodes = (*piece, slice(None))
-        found, tilt = chain.solve_links(here, view.loop, split(cut(point, nodes)), exact=exact)
+        error_um, tilt = chain.solve_links(
+            piece_links, view.loop, split(cut(point, nodes)), exact=exact
+        )
         if placement is not None:
-            less = map(split, placement_effect(model, placement, at, cut(point, nodes)))
-            found, tilt = map(subtract, (found, tilt), less)
-        found = subtract(found, split(cut(fixed, nodes)))
+            placed = map(split, placement_effect(model, placement, at, cut(point, nodes)))
+            error_um, tilt = map(subtract, (error_um, tilt), placed)
+        error_um = subtract(error_um, split(cut(fixed, nodes)))
         rotation = _result_rotation(model, view, at)
         if rotation is not None:
-            found, tilt = (rotate(split_rows(rotation), vectors) for vectors in (found, tilt))
-        join(found, error[nodes])
+            error_um, tilt = (rotate(split_rows(rotation), vectors) for vectors in (error_um, tilt))
+        join(error_um, error[nodes])
         join(tilt, orientation[nodes])
     return ErrorField(np.broadcast_to(point, shape), error, orientation)
 

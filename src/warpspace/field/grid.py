@@ -29,23 +29,24 @@ def pieces(shape: tuple[int, ...]) -> Iterator[Piece]:
     if not shape:
         yield ()
         return
-    first, rest = shape[0], shape[1:]
-    if prod(rest) > NODES:
+    first, inner = shape[0], shape[1:]
+    if prod(inner) > NODES:
         for index in range(first):
-            for piece in pieces(rest):
+            for piece in pieces(inner):
                 yield (slice(index, index + 1), *piece)
         return
-    step = max(1, NODES // max(prod(rest), 1))
+    step = max(1, NODES // max(prod(inner), 1))
     for start in range(0, first, step):
-        yield (slice(start, start + step), *(slice(None) for _ in rest))
+        yield (slice(start, start + step), *(slice(None) for _ in inner))
 
 
 def cut(array: Array, piece: Piece) -> Array:
-    """Give the part of an array, [...] or broadcastable to it, that a piece needs."""
-    own = piece[len(piece) - array.ndim :]
+    """Return the part of an array, [...] or broadcastable to it, that a piece needs."""
+    trailing = piece[len(piece) - array.ndim :]
     return array[
         tuple(
-            slice(None) if size == 1 else part for size, part in zip(array.shape, own, strict=True)
+            slice(None) if size == 1 else part
+            for size, part in zip(array.shape, trailing, strict=True)
         )
     ]
 
@@ -64,37 +65,37 @@ DEFAULT_NODES = 21
 MIN_NODES, MAX_NODES = GRID_NODES
 DIMENSIONS = 3
 VolumeAxes = tuple[str, str, str]
-"""The axis that runs along each direction of a volume; empty where none does."""
+"""Axis along each direction of a volume; empty where there is none."""
 
 
 def find_volume_axes(ranges: Mapping[str, tuple[float, float]]) -> VolumeAxes:
     """Find the axes that span a volume, by direction.
 
-    Linear axes take the direction they move along; rotary ones with a range take what is left, in
+    Linear axes take the direction they move along; rotary ones with a range take the free ones, in
     the order of their names: the volume of a robot with two rotary axes in series is curved.
     """
     slots = ["", "", ""]
     for axis in sort_axes(axis for axis, (low, high) in ranges.items() if low < high):
-        wanted = [direction_index(axis)] if is_linear(axis) else range(DIMENSIONS)
-        free = [slot for slot in wanted if not slots[slot]]
+        directions = [direction_index(axis)] if is_linear(axis) else range(DIMENSIONS)
+        free = [slot for slot in directions if not slots[slot]]
         if not free:
-            taken = ", ".join(slots[slot] for slot in wanted)
+            names = ", ".join(slots[slot] for slot in directions)
             expected = "expected one position for one of them"
-            raise OptionError(f"{axis} has a range beside {taken}; {expected}")
+            raise OptionError(f"{axis} has a range in addition to {names}; {expected}")
         slots[free[0]] = axis
     return slots[0], slots[1], slots[2]
 
 
 @dataclass(frozen=True, slots=True)
 class Workspace:
-    """Axis coordinates of the working volume, and the positions it is drawn at."""
+    """Axis coordinates of the working volume, and the positions at which it is drawn."""
 
-    # mm or degrees; lower and upper end per axis; equal where the axis stands still
+    # mm or degrees; lower and upper end per axis; equal for a fixed axis
     ranges: Mapping[str, tuple[float, float]]
 
     @property
     def positions(self) -> dict[str, float]:
-        """Position of the axes that stand still, the middle of those that move."""
+        """Position of fixed axes, the middle of the range of the others."""
         return {axis: (low + high) / 2.0 for axis, (low, high) in self.ranges.items()}
 
     @property
@@ -103,7 +104,7 @@ class Workspace:
         return find_volume_axes(self.ranges)
 
     def moved(self, positions: Mapping[str, float]) -> "Workspace":
-        """Give the workspace with some axes standing at other positions, mm or degrees."""
+        """Return the workspace with some axes fixed at other positions, mm or degrees."""
         moved = {axis: (value, value) for axis, value in positions.items()}
         return Workspace({**self.ranges, **moved})
 
@@ -134,8 +135,8 @@ class Grid:
         return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
     @cached_property
-    def ways(self) -> Array:
-        """Which way the nodes run along x, y and z, [3]: +1, or −1 where from upper to lower."""
+    def directions(self) -> Array:
+        """Direction of the nodes along x, y and z, [3]: +1, or −1 from upper to lower."""
         along = self.nominal_mm[-1, -1, -1] - self.nominal_mm[0, 0, 0]
         return np.where(along < 0.0, -1.0, 1.0)
 
@@ -157,22 +158,22 @@ class Grid:
 
 
 def shares(count: int) -> Array:
-    """Give the share of an axis that belongs to each of its points, trapezoidal, [n]."""
-    found = np.ones(count)
+    """Compute the share of an axis of each of its points, trapezoidal, [n]."""
+    weights = np.ones(count)
     if count > 1:
-        found[[0, -1]] = 0.5
-    return found / found.sum()
+        weights[[0, -1]] = 0.5
+    return weights / weights.sum()
 
 
 def node_counts(nodes: int | Sequence[int]) -> tuple[int, int, int]:
     try:
-        given = nodes if isinstance(nodes, Sequence) else (nodes,) * DIMENSIONS
-        counts = tuple(map(whole_number, given))
+        nodes_per_axis = nodes if isinstance(nodes, Sequence) else (nodes,) * DIMENSIONS
+        counts = tuple(map(whole_number, nodes_per_axis))
     except TypeError:
         raise OptionError(f"grid: {nodes!r}; expected whole numbers of nodes") from None
     if len(counts) != DIMENSIONS or any(not MIN_NODES <= n <= MAX_NODES for n in counts):
-        said = " × ".join(map(str, counts)) if isinstance(nodes, Sequence) else nodes
-        raise OptionError(f"grid: {said} nodes; expected {MIN_NODES} to {MAX_NODES} per axis")
+        text = " × ".join(map(str, counts)) if isinstance(nodes, Sequence) else nodes
+        raise OptionError(f"grid: {text} nodes; expected {MIN_NODES} to {MAX_NODES} per axis")
     return counts[0], counts[1], counts[2]
 
 
@@ -194,8 +195,8 @@ def build_grid(
         coordinates[name] = np.linspace(low, high, counts[index]).reshape(along)
     full = (shape[0], shape[1], shape[2])
     point = np.broadcast_to(nominal_point(model, Loop.TOOL, coordinates), (*full, 3)).copy()
-    seen = seen_from_workpiece(model, coordinates, workspace, point)
-    return Grid(coordinates, full, seen, point, axes)
+    in_workpiece = seen_from_workpiece(model, coordinates, workspace, point)
+    return Grid(coordinates, full, in_workpiece, point, axes)
 
 
 def seen_from_workpiece(
@@ -208,17 +209,17 @@ def seen_from_workpiece(
     if not carrying:
         return point_mm
     home = {**coordinates, **{name: np.asarray(middle.get(name, 0.0)) for name in carrying}}
-    seen = np.empty_like(point_mm)
+    in_workpiece = np.empty_like(point_mm)
     for piece in pieces(point_mm.shape[:-1]):
         nodes = (*piece, slice(None))
-        here = {name: cut(values, piece) for name, values in coordinates.items()}
-        there = {name: cut(values, piece) for name, values in home.items()}
-        point = carry_outwards(model, "workpiece", here, split(point_mm[nodes]))
-        join(carry_inwards(model, "workpiece", there, point), seen[nodes])
-    return seen
+        positions = {name: cut(values, piece) for name, values in coordinates.items()}
+        home_positions = {name: cut(values, piece) for name, values in home.items()}
+        point = carry_outwards(model, "workpiece", positions, split(point_mm[nodes]))
+        join(carry_inwards(model, "workpiece", home_positions, point), in_workpiece[nodes])
+    return in_workpiece
 
 
-# A slice at any position is a grid of n × 1 × m nodes with one axis standing still, so that its
+# A slice at any position is a grid of n × 1 × m nodes with one axis fixed, so that its
 # errors come from the model and not from interpolation between the nodes of the volume.
 
 PLANES: Mapping[str, str] = {"X": "YZ", "Y": "XZ", "Z": "XY"}
@@ -245,14 +246,14 @@ def build_slice(
     if not low <= position_mm <= high:
         raise OptionError(f"slice at {axis} = {position_mm:g} mm; expected {low:g} to {high:g} mm")
     grid = build_grid(model, workspace.moved({axis: position_mm}), nodes)
-    if axis not in {found.name for found in model.machine.branch("workpiece")}:
+    if axis not in {carried.name for carried in model.machine.branch("workpiece")}:
         return grid
     # the slice is drawn where the whole volume is: with the table in the middle of its range
-    here, home = (
+    pose, home = (
         branch_pose(model, "workpiece", complete_coordinates(model.machine, volume.positions))
         for volume in (workspace.moved({axis: position_mm}), workspace)
     )
-    step = home @ transforms.inverse(here)
+    step = home @ transforms.inverse(pose)
     return replace(grid, nominal_mm=transforms.apply(step, grid.nominal_mm))
 
 
@@ -264,8 +265,8 @@ CELLS = 40  # about as many cells per axis; a coarse grid is subdivided
 def cell_values(values: Array) -> Array:
     """Interpolate values at nodes, [x, y, z], to the middles of cells that are equally large."""
     x, y, z = (_to_cells(nodes) for nodes in values.shape)
-    found = y @ (values @ z.T)
-    return np.tensordot(x, found, axes=1)
+    mean = y @ (values @ z.T)
+    return np.tensordot(x, mean, axes=1)
 
 
 @cache

@@ -60,7 +60,7 @@ class ColourScale:
 
 @cache
 def colour_table(*, diverging: bool = False) -> Bytes:
-    """Give the colours of a scale from its low to its high end, [256, 3] of uint8, sRGB."""
+    """Return the colours of a scale from its low to its high end, [256, 3] of uint8, sRGB."""
     colours = Colormap(DIVERGING if diverging else SEQUENTIAL).lut(LEVELS)
     return (np.asarray(colours)[:, :3] * 255.0 + 0.5).astype(np.uint8)
 
@@ -90,7 +90,7 @@ def build_scale(
     end: float | None = None,
     change: bool = False,
 ) -> ColourScale:
-    """Choose a scale with round ends for values up to a largest magnitude, or with a given end."""
+    """Choose a scale with round ends for values up to a magnitude, or a specified end."""
     top = 1.0
     if math.isfinite(largest) and largest > 0.0:
         step = nice_step(largest if component == "norm" else 2.0 * largest)
@@ -118,12 +118,12 @@ def linear_to_srgb(linear: Array) -> Array:
 NO_SPAN = 1e-12  # A range below this part of its ends is rounding, mm a part of 1 mm
 
 
-def tick_values(low: float, high: float, most: float) -> list[float]:
+def tick_values(low: float, high: float, max_count: float) -> list[float]:
     span = high - low
     if not span > NO_SPAN * max(1.0, abs(low), abs(high)):
         return [low]
     step = nice_step(span)
-    while span / step > max(most, 2.0):
+    while span / step > max(max_count, 2.0):
         step = nice_step(10.0 * step * 1.01)
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [round(step * number, 10) for number in range(first, last + 1)]

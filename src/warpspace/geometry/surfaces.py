@@ -2,7 +2,7 @@
 
 Indices do not change when the grid is bent, so a picture is updated by moving nodes only.
 A face is a patch, a 2-D array of flat grid indices: surfaces, grid lines, creases and isolines of a
-picture come from one list of patches, so that they lie on each other.
+picture come from one list of patches, so that they coincide.
 """
 
 import math
@@ -39,13 +39,13 @@ def outer_faces(shape: Shape) -> list[Index]:
     One face for a flat grid (a count of 1), none for a line.
     """
     numbers = np.arange(np.prod(shape)).reshape(shape)
-    found: list[Index] = []
+    faces: list[Index] = []
     for axis in range(3):
         if min(shape[other] for other in range(3) if other != axis) == 1:
             continue
         ends = (0, 1) if shape[axis] > 1 else (1,)
-        found += [oriented(np.take(numbers, -end, axis=axis), axis, upper=end) for end in ends]
-    return found
+        faces += [oriented(np.take(numbers, -end, axis=axis), axis, upper=end) for end in ends]
+    return faces
 
 
 def oriented(face: Index, axis: int, *, upper: int) -> Index:
@@ -75,11 +75,11 @@ def triangulate(faces: list[Index]) -> Surface:
 
 def box_edges(shape: Shape) -> list[Index]:
     """List the edges of the grid as polylines of flat node indices; twelve for a full volume."""
-    whole = max(shape)
-    return grid_lines(shape, (whole, whole, whole))
+    spacing = max(shape)
+    return grid_lines(shape, (spacing, spacing, spacing))
 
 
-def grid_lines(shape: Shape, every: tuple[int, int, int]) -> list[Index]:
+def grid_lines(shape: Shape, spacing: tuple[int, int, int]) -> list[Index]:
     """List every n-th line of each axis on the faces of the grid, first and last included."""
     numbers = np.arange(np.prod(shape)).reshape(shape)
     lines: list[Index] = []
@@ -87,15 +87,18 @@ def grid_lines(shape: Shape, every: tuple[int, int, int]) -> list[Index]:
         if shape[axis] == 1:
             continue
         first, second = (other for other in range(3) if other != axis)
-        for i, j in product(_kept(shape[first], every[first]), _kept(shape[second], every[second])):
+        for i, j in product(
+            _line_indices(shape[first], spacing[first]),
+            _line_indices(shape[second], spacing[second]),
+        ):
             on_face = i in (0, shape[first] - 1) or j in (0, shape[second] - 1)
             if on_face:
                 lines.append(np.moveaxis(numbers, axis, -1)[i, j])
     return lines
 
 
-def _kept(count: int, every: int) -> list[int]:
-    return sorted({*range(0, count, every), count - 1})
+def _line_indices(count: int, spacing: int) -> list[int]:
+    return sorted({*range(0, count, spacing), count - 1})
 
 
 def line_spacing(shape: Shape) -> Shape:
@@ -120,50 +123,50 @@ def corners(shape: Shape) -> Index:
 
 # A line becomes a bar, a point a cube.
 #
-# The axes that stand still get two nodes instead of one, half a thickness to either side; a bar
-# then has surface, grid lines and edges like any other volume.
+# Fixed axes get two nodes instead of one, half a thickness to either side, so that a bar has
+# surface, grid lines and edges like any other volume.
 
 THICKNESS = 0.016  # of a bar or a cube, as a part of the length that the picture is sized by
 
 
 def is_thin(shape: Shape) -> bool:
-    """Tell whether a grid is a line or a point, so that it has no area."""
+    """Check whether a grid is a line or a point, without area."""
     return shape.count(1) >= 2
 
 
 def thicken(points_mm: Array, thickness_mm: float) -> Array:
-    """Give a line or a point of nodes, [nx, ny, nz, 3], mm, a thickness: two where one was."""
+    """Thicken a line or a point of nodes, [nx, ny, nz, 3], mm: two nodes for one."""
     shape = points_mm.shape[:3]
-    still = [axis for axis in range(3) if shape[axis] == 1]
+    flat_axes = [axis for axis in range(3) if shape[axis] == 1]
     run = np.abs(points_mm[-1, -1, -1] - points_mm[0, 0, 0])
-    ways = list(np.eye(3))
-    if len(still) < len(shape):
+    directions = list(np.eye(3))
+    if len(flat_axes) < len(shape):
         # a turned machine may have its line along another direction than its axis is named for
-        along = ways.pop(int(np.argmax(run)))
-        ways.insert(next(axis for axis in range(3) if shape[axis] > 1), along)
+        along = directions.pop(int(np.argmax(run)))
+        directions.insert(next(axis for axis in range(3) if shape[axis] > 1), along)
     thick = points_mm
-    for axis in still:
-        shift = 0.5 * thickness_mm * ways[axis]
+    for axis in flat_axes:
+        shift = 0.5 * thickness_mm * directions[axis]
         thick = np.concatenate([thick - shift, thick + shift], axis=axis)
     return thick
 
 
 def spread(values: NDArray[Any]) -> NDArray[Any]:
-    """Repeat what is known at the nodes, [nx, ny, nz, ...], of a line or a point, as `thicken`."""
-    still = [axis for axis in range(3) if values.shape[axis] == 1]
-    for axis in still if is_thin(values.shape[:3]) else ():
+    """Repeat values at the nodes, [nx, ny, nz, ...], of a line or a point, as `thicken` does."""
+    flat_axes = [axis for axis in range(3) if values.shape[axis] == 1]
+    for axis in flat_axes if is_thin(values.shape[:3]) else ():
         values = np.repeat(values, 2, axis=axis)
     return values
 
 
 def spread_nodes(shape: Shape) -> NDArray[np.intp]:
-    """Give the flat index of the grid node that each node belongs to as it is drawn, [M]."""
+    """Return the flat index of the grid node of each drawn node, [M]."""
     return spread(np.arange(np.prod(shape), dtype=np.intp).reshape(shape)).reshape(-1)
 
 
 TARGET_FRACTION = 0.1
-"""Largest displacement on screen, as a fraction of the volume's longest edge, that auto aims at."""
-NEUTRAL_EXAGGERATION = 1000.0  # what auto chooses where nothing is displaced
+"""Target of auto: the largest displacement, as a fraction of the longest edge of the volume."""
+NEUTRAL_EXAGGERATION = 1000.0  # of auto, without displacements
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -176,14 +179,16 @@ def auto_exaggeration(largest_um: float, longest_edge_mm: float) -> float:
     largest_mm = largest_um * MM_PER_UM  # zero also where an error is too small to be divided by
     if not largest_mm > 0.0 or not longest_edge_mm > 0.0:
         return NEUTRAL_EXAGGERATION
-    wanted = TARGET_FRACTION * longest_edge_mm / largest_mm
-    wanted = min(max(wanted, 1.0), EXAGGERATION[1])
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return min((step * decade for step in _ROUND), key=lambda value: abs(math.log(value / wanted)))
+    exaggeration = TARGET_FRACTION * longest_edge_mm / largest_mm
+    exaggeration = min(max(exaggeration, 1.0), EXAGGERATION[1])
+    decade = 10.0 ** math.floor(math.log10(exaggeration))
+    return min(
+        (step * decade for step in _ROUND), key=lambda value: abs(math.log(value / exaggeration))
+    )
 
 
 def round_down(value: float) -> float:
-    """Give the largest 1, 2 or 5 × 10ⁿ that is not above a positive value (scale bars)."""
+    """Return the largest 1, 2 or 5 × 10ⁿ that is not above a positive value (scale bars)."""
     decade = 10.0 ** math.floor(math.log10(value))
     return max(step * decade for step in _ROUND if step * decade <= value * (1.0 + 1e-9))
 
@@ -205,11 +210,11 @@ def cut_faces(shape: Shape, corner: tuple[int, int, int]) -> list[Index]:
     for axis in range(3):
         first, second = (other for other in range(3) if other != axis)
         gone = [_half(corner[other], middle[other]) for other in (first, second)]
-        kept = [_half(1 - corner[other], middle[other]) for other in (first, second)]
+        opposite = [_half(1 - corner[other], middle[other]) for other in (first, second)]
         for end in (0, 1):
             face = np.take(numbers, -end, axis=axis)
-            whole = end != corner[axis]
-            patches = [face] if whole else [face[kept[0], :], face[gone[0], kept[1]]]
+            is_uncut = end != corner[axis]
+            patches = [face] if is_uncut else [face[opposite[0], :], face[gone[0], opposite[1]]]
             faces += [oriented(patch, axis, upper=end) for patch in patches]
         inner = np.take(numbers, middle[axis], axis=axis)[gone[0], gone[1]]
         faces.append(oriented(inner, axis, upper=corner[axis]))
@@ -223,8 +228,8 @@ def _half(upper: int, middle: int) -> slice:
 def face_axis(face: Index, shape: Shape) -> int:
     ends = np.stack(np.unravel_index(face[[0, -1], [0, -1]], shape), -1)
     other = np.stack(np.unravel_index(face[[0, -1], [-1, 0]], shape), -1)
-    still = (ends[0] == ends[1]) & (other[0] == other[1])
-    return int(np.argmax(still))
+    is_constant = (ends[0] == ends[1]) & (other[0] == other[1])
+    return int(np.argmax(is_constant))
 
 
 def crease_lines(faces: Sequence[Index], shape: Shape) -> list[Index]:
@@ -238,12 +243,12 @@ def crease_lines(faces: Sequence[Index], shape: Shape) -> list[Index]:
         for line in lines:
             for pair in _pairs(line):
                 met[pair].append(axis)
-    wanted = {pair for pair, axes in met.items() if len(axes) == 1 or len(set(axes)) > 1}
-    return _collect((line for _, lines in borders for line in lines), wanted)
+    creases = {pair for pair, axes in met.items() if len(axes) == 1 or len(set(axes)) > 1}
+    return _collect((line for _, lines in borders for line in lines), creases)
 
 
-def face_lines(faces: Sequence[Index], shape: Shape, every: Shape) -> list[Index]:
-    """Find every n-th grid line of each axis on patches, those on creases left out."""
+def face_lines(faces: Sequence[Index], shape: Shape, spacing: Shape) -> list[Index]:
+    """Find every n-th grid line of each axis on patches, except those on creases."""
     creases = {pair for line in crease_lines(faces, shape) for pair in _pairs(line)}
     lines: list[Index] = []
     for face in faces:
@@ -251,9 +256,9 @@ def face_lines(faces: Sequence[Index], shape: Shape, every: Shape) -> list[Index
             at = np.stack(np.unravel_index(patch, shape))  # [3, a, b]
             across = int(np.argmax(at[:, 0, 0] != at[:, -1, 0]))
             if patch.shape[1] > 1:
-                lines.extend(patch[at[across, :, 0] % every[across] == 0])
-    wanted = {pair for line in lines for pair in _pairs(line)} - creases
-    return _collect(iter(lines), wanted)
+                lines.extend(patch[at[across, :, 0] % spacing[across] == 0])
+    pairs = {pair for line in lines for pair in _pairs(line)} - creases
+    return _collect(iter(lines), pairs)
 
 
 def _pairs(line: Index) -> list[tuple[int, int]]:
@@ -261,23 +266,23 @@ def _pairs(line: Index) -> list[tuple[int, int]]:
     return list(zip(low.tolist(), high.tolist(), strict=True))
 
 
-def _collect(lines: Iterator[Index], wanted: set[tuple[int, int]]) -> list[Index]:
-    left = set(wanted)
-    found: list[Index] = []
+def _collect(lines: Iterator[Index], pairs: set[tuple[int, int]]) -> list[Index]:
+    remaining = set(pairs)
+    polylines: list[Index] = []
     for line in lines:
         start = None
         for at, pair in enumerate([*_pairs(line), (-1, -1)]):
-            if pair in left:
-                left.discard(pair)
+            if pair in remaining:
+                remaining.discard(pair)
                 start = at if start is None else start
             elif start is not None:
-                found.append(line[start : at + 1])
+                polylines.append(line[start : at + 1])
                 start = None
-    return found
+    return polylines
 
 
 def isoline_levels(scale: ColourScale) -> tuple[float, ...]:
-    """Give the values that lines are drawn at: the ticks of the scale, its ends left out."""
+    """Return the values of isolines: the ticks of the scale without its ends."""
     return tuple(tick for tick in scale.ticks if scale.low < tick < scale.high)
 
 
@@ -297,13 +302,13 @@ def isolines(
 
     generator = contourpy.contour_generator(z=at_nodes, name="serial")
     corners = nodes_mm[face]
-    found: list[tuple[float, Array]] = []
+    polylines: list[tuple[float, Array]] = []
     for level in inside:
         for line in generator.lines(level):
             at = np.asarray(line, dtype=float)
             if len(at) > 1:
-                found.append((level, _bilinear(corners, at[:, 1], at[:, 0])))
-    return found
+                polylines.append((level, _bilinear(corners, at[:, 1], at[:, 0])))
+    return polylines
 
 
 def _bilinear(corners: Array, row: Array, column: Array) -> Array:

@@ -1,1 +1,1 @@
-"""How errors travel along the kinematic chain: exactly, and to first order."""
+"""Kinematic chains: propagation of axis errors, exactly and to first order."""

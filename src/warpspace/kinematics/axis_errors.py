@@ -1,4 +1,4 @@
-"""The errors of one axis as rigid motions along it, and back to curves."""
+"""Errors of one axis as rigid motions along it, and their conversion back to curves."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,8 +19,8 @@ from warpspace.units import MM_PER_UM, RAD_PER_URAD, UM_PER_MM, URAD_PER_RAD, Ar
 
 # A rotation by its half-angle vector, and a shift.
 #
-# Matrices near the unit matrix lose the digits of small angles; here every number is as small as
-# what it stands for, so that products and inverses are exact to its last digits.
+# Matrices near the identity lose the digits of small angles; here all numbers are small, so that
+# products and inverses are exact to the last digit.
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class SmallMotion:
         return cls(angle * share, np.asarray(shift_um, dtype=float) * MM_PER_UM)
 
     def to_errors(self) -> tuple[Array, Array]:
-        """Give shift and rotation vector, [..., 3] each, µm and µrad."""
+        """Return shift and rotation vector, [..., 3] each, µm and µrad."""
         sine = np.linalg.norm(self.half, axis=-1, keepdims=True)
         safe = np.where(sine > 0.0, sine, 1.0)
         share = np.where(sine > 0.0, 2.0 * np.arcsin(np.minimum(sine, 1.0)) / safe, 2.0)
@@ -50,50 +50,50 @@ class SmallMotion:
         half = (
             self._cosine * other.half + other._cosine * self.half + np.cross(self.half, other.half)
         )
-        return SmallMotion(half, self.shift_mm + other.shift_mm + self.arm(other.shift_mm))
+        return SmallMotion(half, self.shift_mm + other.shift_mm + self.displacement(other.shift_mm))
 
     @property
     def _cosine(self) -> Array:
         return np.sqrt(1.0 - np.sum(self.half**2, axis=-1, keepdims=True))
 
-    def arm(self, lever_mm: Array) -> Array:
-        """Give what the rotation alone moves a point by, ``(Rot − 1) · lever``, [..., 3], mm."""
+    def displacement(self, lever_mm: Array) -> Array:
+        """Compute the displacement by the rotation, ``(Rot − 1) · lever``, [..., 3], mm."""
         across = np.cross(self.half, lever_mm)
         return 2.0 * (self._cosine * across + np.cross(self.half, across))
 
     @property
     def inverse(self) -> "SmallMotion":
-        back = SmallMotion(-self.half, -self.shift_mm)
-        return SmallMotion(-self.half, back.shift_mm + back.arm(back.shift_mm))
+        rotation = SmallMotion(-self.half, np.zeros(3))
+        return SmallMotion(-self.half, -self.shift_mm - rotation.displacement(self.shift_mm))
 
-    def seen_from(self, pose: Array) -> "SmallMotion":
-        """Give ``pose · motion · pose⁻¹``; the pose, [..., 4, 4], may be of any size."""
+    def conjugate(self, pose: Array) -> "SmallMotion":
+        """Compute ``pose · motion · pose⁻¹`` for poses, [..., 4, 4], of any size."""
         turn, place = pose[..., :3, :3], pose[..., :3, 3]
         turned = SmallMotion(transforms.rotate(turn, self.half), np.zeros(3))
-        shift = transforms.rotate(turn, self.shift_mm) - turned.arm(place)
+        shift = transforms.rotate(turn, self.shift_mm) - turned.displacement(place)
         return SmallMotion(turned.half, shift)
 
 
 Along = Callable[[Array, SmallMotion], SmallMotion]
-"""From positions, [n], and the component errors there to other component errors."""
+"""Function from positions, [n], and their component errors to other component errors."""
 
 
 @dataclass(frozen=True, slots=True)
 class AxisErrors:
-    """The errors of one axis, to be read as motions and written as curves."""
+    """Errors of one axis, read as motions and written as curves."""
 
     model: Model
     errors: ErrorSet
     axis: str
-    span: Span  # mm or degrees; positions at which the numbers must hold
+    span: Span  # mm or degrees; range over which the conversion holds
 
     @property
     def order(self) -> str:
         name = self.model.convention(self.axis).name
         if name not in [*ComponentErrors]:
-            known = ", ".join(ComponentErrors)
+            names = ", ".join(ComponentErrors)
             raise OptionError(
-                f"convention {name!r} of {self.axis} cannot be converted; only {known}"
+                f"convention {name!r} of {self.axis} cannot be converted; only {names}"
             )
         return name
 
@@ -106,7 +106,7 @@ class AxisErrors:
         return motion(self.model.machine.axes[self.axis], position)
 
     def at(self, position: Array, direction: str = TravelDirection.MEAN) -> SmallMotion:
-        """Give the component errors at positions, [n]; those of two arguments do not count."""
+        """Evaluate the component errors at positions, [n], without those of two arguments."""
         along = {self.axis: np.asarray(position, dtype=float)}
         values = [
             np.zeros(along[self.axis].shape)
@@ -117,7 +117,7 @@ class AxisErrors:
         return SmallMotion.from_errors(np.stack(values[:3], -1), np.stack(values[3:], -1))
 
     def depends_on_others(self, key: str) -> bool:
-        """Tell whether an error depends on another axis as well."""
+        """Check whether an error depends on another axis as well."""
         return any(axis != self.axis for axis in self.errors.arguments(key))
 
     @property
@@ -138,15 +138,21 @@ class AxisErrors:
 
     def with_components(self, along: Along, *, adds: bool = False) -> ErrorSet:
         self.refuse_two_arguments(adds=adds)
-        ways = [TravelDirection.MEAN]
+        directions = [TravelDirection.MEAN]
         functions = [self.errors.functions.get(key) for key in self.keys()]
         if any(function and function.has_directions for function in functions):
-            ways = [TravelDirection.FORWARD, TravelDirection.BACKWARD]
-        found = [fit_curves(self._changes(along, way), self.span, self.kinks) for way in ways]
-        new = [fit_curves(self._values(along, way), self.span, self.kinks) for way in ways]
+            directions = [TravelDirection.FORWARD, TravelDirection.BACKWARD]
+        changes = [
+            fit_curves(self._changes(along, direction), self.span, self.kinks)
+            for direction in directions
+        ]
+        new = [
+            fit_curves(self._values(along, direction), self.span, self.kinks)
+            for direction in directions
+        ]
         chosen = dict(self.errors.functions)
         for index, key in enumerate(self.keys()):
-            if all(change[index] is None for change in found):
+            if all(change[index] is None for change in changes):
                 continue
             if self.depends_on_others(key):
                 raise OptionError(
@@ -162,7 +168,7 @@ class AxisErrors:
         return ErrorSet(chosen)
 
     def refuse_two_arguments(self, *, adds: bool) -> None:
-        """Refuse errors of two arguments where they cannot stay as they are."""
+        """Raise OptionError for errors of two arguments that the conversion would change."""
         for key in self.keys():
             if self.depends_on_others(key) and not (adds and key[1] in DIRECTIONS[:3]):
                 other = " and ".join(self.errors.arguments(key))
@@ -171,24 +177,26 @@ class AxisErrors:
                     " with it"
                 )
 
-    def _values(self, along: Along, way: str) -> Callable[[Array], Array]:
+    def _values(self, along: Along, direction: str) -> Callable[[Array], Array]:
         def values(position: Array) -> Array:
-            return np.concatenate(along(position, self.at(position, way)).to_errors(), axis=-1)
+            return np.concatenate(
+                along(position, self.at(position, direction)).to_errors(), axis=-1
+            )
 
         return values
 
-    def _changes(self, along: Along, way: str) -> Callable[[Array], Array]:
-        values = self._values(along, way)
+    def _changes(self, along: Along, direction: str) -> Callable[[Array], Array]:
+        values = self._values(along, direction)
 
         def changes(position: Array) -> Array:
-            present = np.concatenate(self.at(position, way).to_errors(), axis=-1)
+            present = np.concatenate(self.at(position, direction).to_errors(), axis=-1)
             difference = values(position) - present
             return np.where(np.abs(difference) > 1e-14 * np.abs(present), difference, 0.0)
 
         return changes
 
     def with_constant(self, constant: SmallMotion) -> ErrorSet:
-        """Give the set with other constant errors of the axis; what is nothing is left out."""
+        """Return the set with other constant errors of the axis, without those that are zero."""
         values = np.concatenate(constant.to_errors(), axis=-1)
         chosen = dict(self.errors.functions)
         for key, value in zip(self.keys(constant=True), values.tolist(), strict=True):
@@ -201,7 +209,7 @@ class AxisErrors:
 
 
 def _joined(curves: list[ErrorFunction | None], span: Span) -> ErrorFunction | None:
-    there, back = curves[0], curves[-1]
-    if there == back:
-        return there
-    return Directional(span, there or Constant(span), back or Constant(span))
+    forward, backward = curves[0], curves[-1]
+    if forward == backward:
+        return forward
+    return Directional(span, forward or Constant(span), backward or Constant(span))

@@ -1,7 +1,7 @@
-"""What errors do to a kinematic chain: every transformation in full, and to first order.
+"""Errors of a kinematic chain: with full transformations, and to first order.
 
-Per axis ``T = Trans(offset) · Rot(fixed) · E0 · Motion(direction·q) · E(q)``, or what another
-convention makes of the last three; E0 and E(q) are ``Trans(δ) · Rot(ε)`` with the full rotation of
+Per axis ``T = Trans(offset) · Rot(fixed) · E0 · Motion(direction·q) · E(q)``, or another
+order of the last three; E0 and E(q) are ``Trans(δ) · Rot(ε)`` with the full rotation of
 the vector ε.
 """
 
@@ -31,7 +31,7 @@ def motion(axis: Axis, position: Array) -> Array:
 
 
 def error_transform(axis: str, values: ErrorValues, *, constant: bool) -> Array | None:
-    """Build ``Trans(δ)·Rot(ε)`` of an axis, [..., 4, 4]; None where no parameter is given."""
+    """Build ``Trans(δ)·Rot(ε)`` of an axis, [..., 4, 4]; None without any parameter."""
     middle = "0" if constant else ""
     keys = [f"E{letter}{middle}{axis}" for letter in DIRECTIONS]
     if not any(key in values for key in keys):
@@ -43,7 +43,7 @@ def error_transform(axis: str, values: ErrorValues, *, constant: bool) -> Array 
 
 
 def branch_frames(model: Model, side: str, coordinates: Coordinates) -> Iterator[AxisFrames]:
-    """Walk the nominal frames of a branch, tool or workpiece, from the frame outwards."""
+    """Iterate over the nominal frames of a branch, tool or workpiece, from the frame outwards."""
     pose = np.eye(4)
     for axis in model.machine.branch(side):
         before = pose @ transforms.placed(axis.offset_mm, axis.rotation_deg)
@@ -54,7 +54,7 @@ def branch_frames(model: Model, side: str, coordinates: Coordinates) -> Iterator
 def branch_pose(
     model: Model, side: str, coordinates: Coordinates, values: ErrorValues | None = None
 ) -> Array:
-    """Multiply out the pose of the tool or workpiece frame in R, [..., 4, 4]."""
+    """Compute the pose of the tool or workpiece frame in R, [..., 4, 4]."""
     pose = np.eye(4)
     errors = values or {}
     for axis in model.machine.branch(side):
@@ -70,19 +70,19 @@ def branch_pose(
 
 
 def nominal_point(model: Model, loop: Loop, coordinates: Coordinates) -> Array:
-    """Give where the tool point or, of its loop, the workpiece point nominally is, [..., 3], mm."""
+    """Compute the nominal tool point, or workpiece point in its loop, in R, [..., 3], mm."""
     if loop is Loop.WORKPIECE:
         return point_in_branch(model, "workpiece", coordinates, model.workpiece_point_mm)
     return point_in_branch(model, "tool", coordinates, model.tool_point_mm)
 
 
 def tool_axis(model: Model, coordinates: Coordinates) -> Array:
-    """Give the nominal direction of the tool axis in R, unit vectors, [..., 3]."""
+    """Compute the nominal direction of the tool axis in R, unit vectors, [..., 3]."""
     return transforms.rotate(branch_pose(model, "tool", coordinates)[..., :3, :3], TOOL_AXIS)
 
 
 def point_in_branch(model: Model, side: str, coordinates: Coordinates, point: Vector) -> Array:
-    """Give the nominal position in R of a point of the tool or workpiece frame, [..., 3], mm."""
+    """Compute the nominal position in R of a point of the tool or workpiece frame, [..., 3], mm."""
     carried = components.split(np.array(point, dtype=float))
     for _, offset, rotation in reversed(model.machine.end_frames(side)):
         carried = components.move(transforms.placed(offset, rotation), carried)
@@ -93,17 +93,17 @@ def point_in_branch(model: Model, side: str, coordinates: Coordinates, point: Ve
 
 
 def carry_inwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
-    """Take a point from the frame behind the last axis of a branch to R, components, mm."""
+    """Transform a point from the frame after the last axis of a branch to R, components, mm."""
     for axis in reversed(model.machine.branch(side)):
         point_mm = components.move(_nominal_step(axis, coordinates), point_mm)
     return point_mm
 
 
 def carry_outwards(model: Model, side: str, coordinates: Coordinates, point_mm: Triple) -> Triple:
-    """Take a point from R to the frame behind the last axis of a branch, components, mm."""
+    """Transform a point from R to the frame after the last axis of a branch, components, mm."""
     for axis in model.machine.branch(side):
-        back = transforms.inverse(_nominal_step(axis, coordinates))
-        point_mm = components.move(back, point_mm)
+        inverse_step = transforms.inverse(_nominal_step(axis, coordinates))
+        point_mm = components.move(inverse_step, point_mm)
     return point_mm
 
 
@@ -117,9 +117,10 @@ def _nominal_step(axis: Axis, coordinates: Coordinates) -> Array:
 # the motion is I + D' in front of it, with D' = (A · N⁻¹ − I) + A · D · N⁻¹. To first order A is N
 # in the second term, and the first one is the sum of the errors of the axis.
 #
-# An axis knows its own position only, so over a grid the arrays grow by one direction an axis, and
-# only the last steps have the size of the batch. An error that depends on several axes is an array
-# over these. The large numbers of a pose never enter D, so that small errors keep their digits.
+# A step depends on the position of its axis only, so over a grid the arrays grow by one dimension
+# per axis, and only the last steps have the size of the batch. An error of several axes is an
+# array over these. The large numbers of a pose never enter D, so that small errors keep their
+# digits.
 
 
 class Link(NamedTuple):
@@ -128,7 +129,7 @@ class Link(NamedTuple):
     nominal: Rows  # rotation of N
     position_mm: Triple  # position of N
     actual: Rows  # rotation of A
-    shift_um: Triple  # what A · N⁻¹ − I does to the origin of the frame before the axis
+    shift_um: Triple  # displacement of the origin of the frame before the axis, by A · N⁻¹ − I
     turn_urad: Rows  # its rotation part
 
 
@@ -137,17 +138,17 @@ class LoopLinks(NamedTuple):
 
     tool: tuple[Link, ...]  # from the frame of the machine outwards
     workpiece: tuple[Link, ...]
-    tool_axis: Triple  # direction of the tool axis behind the last step of the tool branch
+    tool_axis: Triple  # direction of the tool axis after the last step of the tool branch
 
 
 class BranchMotion(NamedTuple):
-    """The motion D of a branch in R, as `Link` has it of an axis."""
+    """Motion D of a branch in R, in the form of `Link`."""
 
     shift_um: Triple
     turn_urad: Rows
 
     def move(self, point_mm: Triple) -> Triple:
-        """Give the displacement of points of R, µm."""
+        """Compute the displacement of points of R, µm."""
         turned = components.rotate(self.turn_urad, point_mm)
         return components.add(self.shift_um, components.scale(UM_PER_MM_URAD, turned))
 
@@ -190,8 +191,10 @@ def _exact_link(model: Model, axis: Axis, coordinates: Coordinates, values: Erro
     actual = place
     for factor in model.convention(axis.name).factors(constant, move, component):
         actual = actual if factor is None else actual @ factor
-    own = actual @ transforms.inverse(nominal) - np.eye(4)
-    return _link(nominal, actual, own[..., :3, 3] * UM_PER_MM, own[..., :3, :3] * URAD_PER_RAD)
+    deviation = actual @ transforms.inverse(nominal) - np.eye(4)
+    return _link(
+        nominal, actual, deviation[..., :3, 3] * UM_PER_MM, deviation[..., :3, :3] * URAD_PER_RAD
+    )
 
 
 def _first_order_link(
@@ -222,7 +225,7 @@ def solve_links(
         axis = components.rotate(link.nominal, axis)
     first = _walk(links.workpiece) if loop is not Loop.TOOL else NO_DEVIATION
     last = _walk(links.tool) if loop is not Loop.WORKPIECE else NO_DEVIATION
-    if loop is Loop.WORKPIECE:  # the workpiece against the frame, not the frame against it
+    if loop is Loop.WORKPIECE:  # the workpiece relative to the frame, not the reverse
         first, last = last, first
     difference = BranchMotion(
         components.subtract(last.shift_um, first.shift_um),
@@ -230,7 +233,7 @@ def solve_links(
     )
     error = difference.move(point_mm)
     if exact:
-        tilts = (components.rotate(each.turn_urad, axis) for each in (first, last))
+        tilts = (components.rotate(branch.turn_urad, axis) for branch in (first, last))
         start, end = (components.add(axis, components.scale(RAD_PER_URAD, tilt)) for tilt in tilts)
         return error, _between(start, end)
     (_, _, y), (z, _, _), (_, x, _) = difference.turn_urad
@@ -269,12 +272,12 @@ def loop_error(
         the tool axis itself.
     """
     links = build_links(model, coordinates, values, exact=exact)
-    found = solve_links(links, loop, components.split(point_mm), exact=exact)
+    solution = solve_links(links, loop, components.split(point_mm), exact=exact)
     arrays = [point_mm[..., 0], *coordinates.values(), *values.values()]
     shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
     error, orientation = np.empty((*shape, 3)), np.empty((*shape, 3))
-    components.join(found[0], error)
-    components.join(found[1], orientation)
+    components.join(solution[0], error)
+    components.join(solution[1], orientation)
     return error, orientation
 
 
@@ -315,13 +318,13 @@ class JacobianColumn:
     """One column of the geometric Jacobian."""
 
     direction: Array  # [..., 3]; unit vector in R along or about which the error acts
-    lever_mm: Array  # [..., 3]; from the origin of the frame the error sits in to the point
+    lever_mm: Array  # [..., 3]; from the origin of the frame of the error to the point
     position: Array  # [..., 3], µm/µm or µm/µrad; displacement of the point per unit of the error
     sign: float  # +1, or −1 for the workpiece branch in the relative loop; already in `position`
 
 
 def rotation_gain(lever_mm: ArrayLike, direction: ArrayLike) -> Array:
-    """Displacement of a point per unit of a small rotation.
+    """Compute the displacement of a point per unit of a small rotation.
 
     Parameters
     ----------
@@ -396,16 +399,17 @@ def jacobian(
 
     Notes
     -----
-    First order in all errors; `warpspace.kinematics.chain.loop_error` has all of them.
+    First order in all errors; `warpspace.kinematics.chain.loop_error` is exact.
     """
     point = np.asarray(point_mm, dtype=float)
     shape = np.broadcast_shapes((*batch_shape(coordinates), 3), point.shape)
     position = np.zeros((len(keys), *shape))
     orientation = np.zeros((len(keys), *shape))
     about = tool_axis(model, coordinates)
-    found = columns(model, loop, keys, coordinates, point)
+    jacobian_columns = columns(model, loop, keys, coordinates, point)
     for index, key in enumerate(keys):
-        if (col := found.get(key)) is None:
+        col = jacobian_columns.get(key)
+        if col is None:
             continue
         position[index] = col.position
         if parameter(key).is_rotation:
@@ -414,23 +418,23 @@ def jacobian(
     return position, orientation
 
 
-# Every body takes the small motion of all errors between the frame and itself. To first order that
-# is one rotation vector and one displacement a body; drawn larger by a factor it is an affine map
-# that takes each point exactly where the deformed grid has it.
+# The small motion of a body is that of all errors between the frame and the body: to first order
+# one rotation vector and one displacement. Exaggerated, it is an affine map that agrees exactly
+# with the deformed grid.
 
 BASE = "R"
 
 
 @dataclass(frozen=True, slots=True)
 class BodyMotion:
-    """Nominal place of a body and its small motion."""
+    """Nominal pose of a body and its small motion."""
 
     nominal: Array  # [4, 4]; pose of the body's frame in R
     rotation_rad: Array  # [3]; small rotation vector in R
     displacement_mm: Array  # [3]; displacement of the point of the body at the origin of R
 
     def drawn(self, exaggeration: float) -> Array:
-        """Give the affine map, [4, 4], from the body's frame to where it is drawn in R."""
+        """Compute the exaggerated affine map, [4, 4], from the frame of the body to R."""
         bend = np.eye(4)
         bend[:3, :3] += exaggeration * transforms.skew(self.rotation_rad)
         bend[:3, 3] = exaggeration * self.displacement_mm
@@ -440,11 +444,11 @@ class BodyMotion:
 def body_motions(
     model: Model, values: Mapping[str, Array | float], coordinates: Coordinates
 ) -> dict[str, BodyMotion]:
-    """Find the place and the small motion of every body: R, every axis, S, t and w."""
-    still = np.zeros(3)
-    found = {BASE: BodyMotion(np.eye(4), still, still)}
+    """Compute the pose and the small motion of all bodies: R, the axes, S, t and w."""
+    zero = np.zeros(3)
+    motions = {BASE: BodyMotion(np.eye(4), zero, zero)}
     for side in ("tool", "workpiece"):
-        pose, rotation, displacement = np.eye(4), still, still
+        pose, rotation, displacement = np.eye(4), zero, zero
         for frames in branch_frames(model, side, coordinates):
             pose = frames.after
             for row in axis_parameters(frames.axis.name):
@@ -455,8 +459,8 @@ def body_motions(
                 displacement = displacement + col.position * value * MM_PER_UM
                 if row.is_rotation:
                     rotation = rotation + col.direction * value * RAD_PER_URAD
-            found[frames.axis.name] = BodyMotion(pose, rotation, displacement)
+            motions[frames.axis.name] = BodyMotion(pose, rotation, displacement)
         for name, offset, turned in model.machine.end_frames(side):
             pose = pose @ transforms.placed(offset, turned)
-            found[name] = BodyMotion(pose, rotation, displacement)
-    return found
+            motions[name] = BodyMotion(pose, rotation, displacement)
+    return motions

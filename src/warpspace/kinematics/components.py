@@ -1,8 +1,8 @@
 """Vectors and matrices as tuples of their components, each an array over as few axes as it needs.
 
-Over a grid a component that varies along one axis is held once for all nodes along the others, and
-one that never varies is a plain float: zeros and ones then cost nothing. Batches of any shape that
-broadcasts go together, and no array ends with a short dimension, which numpy is slow at.
+Over a grid a component that varies along one axis is an array over that axis only, and a constant
+one is a float, so that zeros and ones cost nothing. Batches of any broadcastable shape are allowed,
+and no array ends with a short dimension, which is slow in numpy.
 """
 
 from collections.abc import Iterable
@@ -25,12 +25,12 @@ def triple(values: Iterable[T]) -> tuple[T, T, T]:
 
 
 def split(vectors: Array) -> Triple:
-    """Split vectors, [..., 3], into components; one that never varies becomes a float."""
+    """Split vectors, [..., 3], into components; a constant one becomes a float."""
     return triple(_plain(vectors[..., index]) for index in range(3))
 
 
 def split_rows(matrices: Array) -> Rows:
-    """Split matrices, [..., 3, 3], into components; one that never varies becomes a float."""
+    """Split matrices, [..., 3, 3], into components; a constant one becomes a float."""
     return triple(split(matrices[..., index, :]) for index in range(3))
 
 
@@ -40,41 +40,41 @@ def join(components: Iterable[Number], out: Array) -> None:
         out[..., index] = values
 
 
-def plus(one: Number, other: Number) -> Number:
-    if isinstance(one, float) and one == 0.0:
-        return other
-    if isinstance(other, float) and other == 0.0:
-        return one
-    return one + other
+def plus(a: Number, b: Number) -> Number:
+    if isinstance(a, float) and a == 0.0:
+        return b
+    if isinstance(b, float) and b == 0.0:
+        return a
+    return a + b
 
 
-def times(one: Number, other: Number) -> Number:
-    for first, second in ((one, other), (other, one)):
+def times(a: Number, b: Number) -> Number:
+    for first, second in ((a, b), (b, a)):
         if isinstance(first, float) and first in (0.0, 1.0):
             return second if first else 0.0
-    return one * other
+    return a * b
 
 
-def dot(one: Triple, other: Triple) -> Number:
-    x, y, z = map(times, one, other)
+def dot(a: Triple, b: Triple) -> Number:
+    x, y, z = map(times, a, b)
     return plus(plus(x, y), z)
 
 
-def add(one: Triple, other: Triple) -> Triple:
-    return triple(map(plus, one, other))
+def add(a: Triple, b: Triple) -> Triple:
+    return triple(map(plus, a, b))
 
 
-def subtract(one: Triple, other: Triple) -> Triple:
-    return add(one, scale(-1.0, other))
+def subtract(a: Triple, b: Triple) -> Triple:
+    return add(a, scale(-1.0, b))
 
 
 def scale(factor: Number, vector: Triple) -> Triple:
     return triple(times(factor, value) for value in vector)
 
 
-def cross(one: Triple, other: Triple) -> Triple:
-    (a, b, c), (x, y, z) = one, scale(-1.0, other)
-    u, v, w = other
+def cross(first: Triple, second: Triple) -> Triple:
+    (a, b, c), (x, y, z) = first, scale(-1.0, second)
+    u, v, w = second
     return (
         plus(times(b, w), times(c, y)),
         plus(times(c, u), times(a, z)),
@@ -87,22 +87,22 @@ def rotate(rows: Rows, vector: Triple) -> Triple:
 
 
 def move(transform: Array, point: Triple) -> Triple:
-    """Take a point from child to parent coordinates by a transformation, [..., 4, 4]."""
+    """Transform a point from child to parent coordinates, [..., 4, 4]."""
     turned = rotate(split_rows(transform[..., :3, :3]), point)
     return add(turned, split(transform[..., :3, 3]))
 
 
-def multiply(one: Rows, other: Rows) -> Rows:
-    columns = transpose(other)
-    return triple(triple(dot(row, column) for column in columns) for row in one)
+def multiply(a: Rows, b: Rows) -> Rows:
+    columns = transpose(b)
+    return triple(triple(dot(row, column) for column in columns) for row in a)
 
 
-def add_rows(one: Rows, other: Rows) -> Rows:
-    return triple(map(add, one, other))
+def add_rows(a: Rows, b: Rows) -> Rows:
+    return triple(map(add, a, b))
 
 
-def subtract_rows(one: Rows, other: Rows) -> Rows:
-    return triple(map(subtract, one, other))
+def subtract_rows(a: Rows, b: Rows) -> Rows:
+    return triple(map(subtract, a, b))
 
 
 def transpose(rows: Rows) -> Rows:

@@ -1,4 +1,4 @@
-"""What the kinematic functions work on: a machine, its functional points and its conventions."""
+"""Kinematic model: a machine, its functional points and its conventions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from warpspace.machine.definition import ORIGIN, Axis, Machine, Vector
 from warpspace.plugins import Registry
 from warpspace.units import Array
 
-Factor: TypeAlias = Array | None  # of a product of transformations, [..., 4, 4]; None is left out
+Factor: TypeAlias = Array | None  # of a product of transformations, [..., 4, 4]; None is ignored
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,33 +30,33 @@ class AxisFrames:
 class Convention(ABC):
     """The order of the constant errors, the motion and the component errors of an axis."""
 
-    name: ClassVar[str]  # as scene files have it, for instance "after_motion"
+    name: ClassVar[str]  # in scene files, for instance "after_motion"
     title: ClassVar[str]  # in lists of choices
-    # where component errors stand in the product, for instance "after the motion"
+    # place of component errors in the product, for instance "after the motion"
     place: ClassVar[str]
-    meaning: ClassVar[str]  # what component errors do, after the words "component errors"
+    meaning: ClassVar[str]  # predicate of the sentence "Component errors …"
 
     @abstractmethod
     def factors(self, constant: Factor, motion: Array, component: Factor) -> tuple[Factor, ...]:
-        """Give the factors of the exact chain behind the offset, from the frame outwards.
+        """Return the factors of the exact chain after the offset, from the frame outwards.
 
         Parameters
         ----------
         constant, component : ndarray, [..., 4, 4], or None
-            ``Trans(δ) · Rot(ε)`` of the constant and of the component errors; None where there are
-            none.
+            ``Trans(δ) · Rot(ε)`` of the constant and of the component errors; None without
+            errors.
         motion : ndarray, [..., 4, 4]
             Nominal motion of the axis.
 
         Returns
         -------
         tuple of ndarray, [..., 4, 4], or None
-            Multiplied from left to right; None is left out.
+            Multiplied from left to right; None is ignored.
         """
 
     @abstractmethod
     def frame(self, frames: AxisFrames, row: Parameter) -> Array:
-        """Give the nominal frame that a parameter acts in, to first order.
+        """Return the nominal frame of a parameter, to first order.
 
         Parameters
         ----------
@@ -67,8 +67,8 @@ class Convention(ABC):
         Returns
         -------
         ndarray, [..., 4, 4]
-            Pose in R. Its columns are the directions of errors, its origin is what rotations turn
-            about. It must be the derivative of `factors`.
+            Pose in R. Its columns are the directions of errors, its origin is the centre of
+            rotations. It must be the derivative of `factors`.
         """
 
     @property
@@ -108,14 +108,14 @@ class BeforeMotion(Convention):
 
 
 _CONVENTIONS: Registry[Convention] = Registry(
-    "convention", {one.name: one for one in (AfterMotion(), BeforeMotion())}
+    "convention", {convention.name: convention for convention in (AfterMotion(), BeforeMotion())}
 )
 find_convention = _CONVENTIONS.find
 register_convention, unregister_convention = _CONVENTIONS.register, _CONVENTIONS.unregister
 
 
 def convention_names() -> tuple[str, ...]:
-    return tuple(one.name for one in _CONVENTIONS.members())
+    return tuple(convention.name for convention in _CONVENTIONS.members())
 
 
 Coordinates = Mapping[str, Array]
@@ -123,7 +123,7 @@ Coordinates = Mapping[str, Array]
 
 
 class Loop(StrEnum):
-    """Which structural loop an error is looked at through."""
+    """Structural loop of an error."""
 
     TOOL = "tool"
     WORKPIECE = "workpiece"
@@ -142,15 +142,14 @@ TOOL_AXIS: Vector = (0.0, 0.0, 1.0)  # direction of the tool axis in the tool fr
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A machine with the points and conventions its errors are evaluated with."""
+    """Machine with functional points and conventions for the evaluation of its errors."""
 
     machine: Machine
-    # name of the convention for component errors: one of `ComponentErrors`, or one that was
-    # registered
+    # name of the convention for component errors: one of `ComponentErrors`, or a registered one
     component_errors: str = ComponentErrors.AFTER_MOTION
     tool_point_mm: Vector = ORIGIN  # functional point in the tool frame
     workpiece_point_mm: Vector = ORIGIN  # functional point in the workpiece frame
-    # axes that have another one: name of the axis and of its convention
+    # exceptions: name of the axis and of its convention
     own_component_errors: tuple[tuple[str, str], ...] = ()
     direction: str = TravelDirection.MEAN
 
@@ -159,12 +158,12 @@ class Model:
 
     @property
     def convention_names(self) -> tuple[str, ...]:
-        """Names of the conventions that axes of the machine have, each once."""
+        """Names of the conventions of all axes, each once."""
         return tuple(dict.fromkeys(self.convention(axis).name for axis in self.machine.axes))
 
     @property
     def convention_value(self) -> str | dict[str, str]:
-        """The convention as scene files spell it: one name, or the name of each axis."""
+        """Convention in scene files: one name, or one for each axis."""
         names = self.convention_names
         if len(names) == 1:
             return names[0]
@@ -172,25 +171,27 @@ class Model:
 
 
 def batch_shape(coordinates: Coordinates) -> tuple[int, ...]:
-    """Give the batch shape that the positions of all axes broadcast to."""
+    """Return the batch shape to which the positions of all axes broadcast."""
     return np.broadcast_shapes(*(np.shape(values) for values in coordinates.values()))
 
 
 def complete_coordinates(
-    machine: Machine, given: Mapping[str, ArrayLike], default: Mapping[str, float] | None = None
+    machine: Machine,
+    positions: Mapping[str, ArrayLike],
+    default: Mapping[str, float] | None = None,
 ) -> dict[str, Array]:
-    """Give every axis of the machine a position: the given, else the default one, else zero."""
-    for name in given:
+    """Complete positions with the default ones, else zero, for every axis of the machine."""
+    for name in positions:
         if name not in machine.axes:
             raise UnknownNameError("axis", name, machine.axes)
-    complete = {**dict.fromkeys(machine.axes, 0.0), **(default or {}), **given}
-    positions = {name: _finite(name, complete[name]) for name in machine.axes}
+    complete = {**dict.fromkeys(machine.axes, 0.0), **(default or {}), **positions}
+    coordinates = {name: _finite(name, complete[name]) for name in machine.axes}
     try:
-        batch_shape(positions)
+        batch_shape(coordinates)
     except ValueError:
-        shapes = ", ".join(f"{name} {values.shape}" for name, values in positions.items())
+        shapes = ", ".join(f"{name} {values.shape}" for name, values in coordinates.items())
         raise OptionError(f"axis positions of shapes {shapes}; expected one batch shape") from None
-    return positions
+    return coordinates
 
 
 def _finite(name: str, value: ArrayLike) -> Array:

@@ -1,7 +1,7 @@
 """Batched kernels on homogeneous transformations.
 
-Every function takes and gives arrays whose leading dimensions are any batch shape; a transformation
-is [..., 4, 4] and acts on column vectors: ``T_parent_child`` takes child coordinates to parent.
+Leading dimensions of all arrays are any batch shape; a transformation is [..., 4, 4] and acts on
+column vectors: ``T_parent_child`` transforms child to parent coordinates.
 """
 
 import warnings
@@ -83,7 +83,7 @@ def inverse(transform: Array) -> Array:
 
 
 def apply(transform: Array, point_mm: ArrayLike) -> Array:
-    """Take points, [..., 3], mm, from child to parent coordinates by transformations."""
+    """Transform points, [..., 3], mm, from child to parent coordinates."""
     return rotate(transform[..., :3, :3], point_mm) + transform[..., :3, 3]
 
 
@@ -93,7 +93,7 @@ def rotate(rotation: Array, vector: ArrayLike) -> Array:
 
 
 def roll_pitch_yaw_deg(rotation: Array) -> Array:
-    """Give the rotations about the fixed x, y and z axes, [3], degrees, of a rotation, [3, 3]."""
+    """Compute roll, pitch and yaw (fixed x, y, z axes), [3], degrees, of a rotation, [3, 3]."""
     from scipy.spatial.transform import Rotation
 
     with warnings.catch_warnings():

@@ -1,1 +1,1 @@
-"""What a machine is: its axes, its error parameters and the functions they follow."""
+"""Machine description: axes, error parameters and error curves."""

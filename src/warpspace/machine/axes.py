@@ -1,7 +1,7 @@
-"""Names of axes, and the one table of the error parameters that they can have.
+"""Names of axes, and the table of all error parameters.
 
 An axis is a letter and, where there is more than one, a digit: X Y Z and U V W translate along x,
-y, z; A B C turn about them (ISO 841); ``C2`` is a second axis that turns about z.
+y, z; A B C rotate about them (ISO 841); ``C2`` is a second axis about z.
 
 Keys of parameters are ISO 230-1 names in ASCII: ``E`` + direction + axis for a component error that
 varies along the axis (``EAX``: rotation about x of the X axis), ``E`` + direction + ``0`` + axis
@@ -23,7 +23,7 @@ ROTARY_LETTERS = "ABC"
 AXIS_LETTERS = LINEAR_LETTERS + ROTARY_LETTERS
 MAX_AXES = 8  # of a chain
 AXIS_NAMES = tuple(letter + digit for letter in AXIS_LETTERS for digit in ("", *"0123456789"))
-"""Every name that an axis can have, in the order that axes are listed in."""
+"""All names of axes, in the order of lists."""
 
 _ORDER = {name: number for number, name in enumerate(AXIS_NAMES)}
 _WITHIN = {letter: number % 3 for number, letter in enumerate(AXIS_LETTERS)}
@@ -34,7 +34,7 @@ def is_axis_name(name: str) -> bool:
 
 
 def is_linear(name: str) -> bool:
-    """Tell whether an axis translates; if not, it turns."""
+    """Check whether an axis translates; a rotary one rotates."""
     return name[0] in LINEAR_LETTERS
 
 
@@ -43,26 +43,26 @@ def is_rotary(name: str) -> bool:
 
 
 def direction_index(name: str) -> int:
-    """Give the index 0, 1 or 2 of the direction along or about which an axis moves."""
+    """Return the index 0, 1 or 2 of the direction along or about which an axis moves."""
     return _WITHIN[name[0]]
 
 
 def sort_axes(names: Iterable[str]) -> tuple[str, ...]:
     """Sort axes: X Y Z U V W A B C, then by their digit."""
-    found = list(names)
-    for name in found:
+    axes = list(names)
+    for name in axes:
         if name not in _ORDER:
             raise UnknownNameError("axis", name, AXIS_NAMES)
-    return tuple(sorted(found, key=_ORDER.__getitem__))
+    return tuple(sorted(axes, key=_ORDER.__getitem__))
 
 
 def axis_order(name: str) -> int:
-    """Give the place of an axis in the order of `sort_axes`."""
+    """Return the rank of an axis in the order of `sort_axes`."""
     return _ORDER[name]
 
 
 class TravelDirection(StrEnum):
-    """What counts of errors that depend on the direction of travel.
+    """Direction of travel in the evaluation of errors that depend on it.
 
     Forward is towards growing positions of the axis, as commanded. Errors that do not depend on the
     direction are the same in the first three and zero in the difference.
@@ -110,7 +110,7 @@ _THESIS_AXES = ("X", "Y", "Z", "B", "C")
 
 
 class ErrorKind(StrEnum):
-    """What an error parameter describes, in the words of ISO 230-1."""
+    """Kind of an error parameter, in the terms of ISO 230-1."""
 
     TRANSLATION = "component translation"
     ROTATION = "component rotation"
@@ -124,11 +124,11 @@ class Parameter:
     """One error parameter."""
 
     key: str  # ISO 230-1 name in ASCII
-    symbol: str  # the thesis's symbol, or one formed like it for axes the thesis does not have
+    symbol: str  # that of the thesis, or one formed alike for other axes
     name: str  # plain name, for instance "roll of X"
-    axis: str  # name of the axis it belongs to
-    kind: ErrorKind  # what it describes
-    source: str  # where it is defined
+    axis: str  # name of its axis
+    kind: ErrorKind
+    source: str  # of its definition
 
     @property
     def letter(self) -> str:
@@ -142,12 +142,12 @@ class Parameter:
 
     @property
     def is_rotation(self) -> bool:
-        """Whether it is an angle."""
+        """True for an angle."""
         return self.letter in ROTARY_LETTERS
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is a property of the assembly that does not vary along the axis."""
+        """True for a property of the assembly, constant along the axis."""
         return self.key[2] == "0"
 
     @property
@@ -156,9 +156,9 @@ class Parameter:
 
     @property
     def tolerance_class(self) -> str:
-        """The default tolerance it takes: translation, rotation or squareness.
+        """Class of its default tolerance: translation, rotation or squareness.
 
-        The thesis (table 4-6) gives the orientation errors of rotary axes the tolerance of a
+        In the thesis (table 4-6) the orientation errors of rotary axes have the tolerance of a
         squareness.
         """
         if not self.is_rotation:
@@ -173,17 +173,19 @@ class Parameter:
 
 def _component(letter: str, axis: str) -> Parameter:
     rotation = letter in ROTARY_LETTERS
-    about, own = direction_index(letter), direction_index(axis)
+    about, along = direction_index(letter), direction_index(axis)
     low = "xyz"[about]
     if is_linear(axis):
         if rotation:
-            name = f"{_LINEAR_ROTATIONS[own][about]} of {axis}"
+            name = f"{_LINEAR_ROTATIONS[along][about]} of {axis}"
         else:
-            name = f"positioning of {axis}" if about == own else f"straightness of {axis} in {low}"
+            name = (
+                f"positioning of {axis}" if about == along else f"straightness of {axis} in {low}"
+            )
     elif rotation:
-        name = f"angular positioning of {axis}" if about == own else f"tilt of {axis} about {low}"
+        name = f"angular positioning of {axis}" if about == along else f"tilt of {axis} about {low}"
     else:
-        name = f"axial error of {axis}" if about == own else f"radial error of {axis} in {low}"
+        name = f"axial error of {axis}" if about == along else f"radial error of {axis} in {low}"
     of_thesis = axis in _THESIS_AXES
     source = "ISO 230-1; thesis table 4-2" if of_thesis else "ISO 230-1, 3.4 (not in the thesis)"
     kind = ErrorKind.ROTATION if rotation else ErrorKind.TRANSLATION
@@ -192,7 +194,7 @@ def _component(letter: str, axis: str) -> Parameter:
 
 def _constant(letter: str, axis: str) -> Parameter:
     key = f"E{letter}0{axis}"
-    about, own = direction_index(letter), direction_index(axis)
+    about, along = direction_index(letter), direction_index(axis)
     low = "xyz"[about]
     if letter not in ROTARY_LETTERS:
         kind = ErrorKind.LOCATION
@@ -202,10 +204,10 @@ def _constant(letter: str, axis: str) -> Parameter:
         name = f"orientation of {axis} about {low}"
     else:
         kind = ErrorKind.SQUARENESS
-        if about == own:
+        if about == along:
             name = f"rotation of {axis} about itself"
         else:
-            name = f"squareness of {axis} to {'XYZ'[3 - about - own]}"
+            name = f"squareness of {axis} to {'XYZ'[3 - about - along]}"
     symbol = _THESIS_CONSTANTS.get(key, f"{_CONSTANT_GREEK[letter]}_0{axis}")
     if kind is ErrorKind.LOCATION and key in _THESIS_CONSTANTS:
         source = "ISO 230-1; thesis equations (left out of its table 4-2)"
@@ -222,7 +224,7 @@ def axis_parameters(axis: str) -> tuple[Parameter, ...]:
 
 
 PARAMETERS = {row.key: row for axis in AXIS_NAMES for row in axis_parameters(axis)}
-"""The only table of parameters there is: by key, those of every axis that a machine may have."""
+"""Table of all parameters by key, for every axis that a machine may have."""
 
 
 def parameter(key: str) -> Parameter:
@@ -245,16 +247,16 @@ def default_keys(axes: Sequence[str]) -> tuple[str, ...]:
     earlier: list[int] = []
     for axis in sort_axes(axes):
         keys += [row.key for row in axis_parameters(axis) if not row.is_constant]
-        own = direction_index(axis)
+        along = direction_index(axis)
         if is_linear(axis):
-            letters = [letter for letter in "ABC" if _turns_away(letter, own, earlier)]
-            earlier.append(own)
+            letters = [letter for letter in "ABC" if _turns_away(letter, along, earlier)]
+            earlier.append(along)
         else:
-            letters = [letter for letter in "ABCXYZ" if direction_index(letter) != own]
+            letters = [letter for letter in "ABCXYZ" if direction_index(letter) != along]
         keys += [f"E{letter}0{axis}" for letter in letters]
     return tuple(keys)
 
 
-def _turns_away(letter: str, own: int, earlier: Sequence[int]) -> bool:
+def _turns_away(letter: str, along: int, earlier: Sequence[int]) -> bool:
     about = direction_index(letter)
-    return about != own and (own in earlier or 3 - about - own in earlier)
+    return about != along and (along in earlier or 3 - about - along in earlier)

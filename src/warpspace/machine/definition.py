@@ -35,7 +35,7 @@ class Chain:
 
 
 def parse_chain(text: str) -> Chain:
-    """Read a kinematic chain written from the workpiece over the frame to the tool."""
+    """Parse a kinematic chain written from the workpiece over the frame to the tool."""
     bare = re.sub(r"[\s()\[\]{}'’′\-–_]", "", text)
     expected = (
         "expected w, axes (a letter of X Y Z U V W A B C and an optional digit), F (or b), axes, t;"
@@ -47,8 +47,8 @@ def parse_chain(text: str) -> Chain:
     workpiece, tool = (tuple(re.findall(r"[A-Z][0-9]*", matched[side])) for side in (1, 3))
     axes = workpiece + tool
     if not 1 <= len(axes) <= MAX_AXES:
-        found = f"{len(axes)} axes" if axes else "no axis"
-        raise ChainError(f"chain {text!r} has {found}; expected one to eight")
+        count = f"{len(axes)} axes" if axes else "no axis"
+        raise ChainError(f"chain {text!r} has {count}; expected one to eight")
     unknown = sorted({name for name in axes if not is_axis_name(name)})
     if unknown:
         raise ChainError(f"chain {text!r} has unknown axis {', '.join(unknown)}; {expected}")
@@ -56,7 +56,7 @@ def parse_chain(text: str) -> Chain:
     if twice:
         raise ChainError(
             f"chain {text!r} has axis {', '.join(twice)} twice; expected each name once"
-            f" (a digit tells them apart: {twice[0][0]}1, {twice[0][0]}2)"
+            f" (distinguish them by a digit: {twice[0][0]}1, {twice[0][0]}2)"
         )
     return Chain(tuple(reversed(workpiece)), tool)
 
@@ -79,47 +79,47 @@ class Gantry:
 
     @property
     def positioning_key(self) -> str:
-        """Key of the positioning error of the axis, which is the mean of the guides'."""
+        """Key of the positioning error of the axis, the mean of both guides."""
         return f"E{'XYZ'[direction_index(self.axis)]}{self.axis}"
 
     @property
     def rotation_key(self) -> str:
-        """Key of the rotation that the difference between the guides gives."""
+        """Key of the rotation caused by the difference between the guides."""
         third = 3 - direction_index(self.axis) - ACROSS.index(self.across)
         return f"E{'ABC'[third]}{self.axis}"
 
     @property
     def rotation_weight(self) -> float:
-        """Rotation for each micrometre that the second guide is ahead of the first, µrad/µm.
+        """Rotation for each micrometre that the second guide leads the first, µrad/µm.
 
         A rotation c about the third direction moves a point at p of the direction across by
         c·p·(third × across) along the axis. That is −c·p for X across y, and where the axis, the
-        direction across and the third one follow each other like x, y, z; +c·p otherwise.
+        direction across and the third one are in cyclic order; +c·p otherwise.
         """
         cyclic = (ACROSS.index(self.across) - direction_index(self.axis)) % 3 == 1
         return (-1.0 if cyclic else 1.0) * URAD_PER_UM_OVER_MM / self.span_mm
 
 
 def default_across(axis: str) -> str:
-    """Give the direction across that none is given for: the other horizontal one; x for Z."""
+    """Return the default direction across: the other horizontal one; x for Z."""
     return _DEFAULT_ACROSS["xyz"[direction_index(axis)]]
 
 
 Vector = tuple[float, float, float]
-BODY_FRAMES = ("R", "S", "t", "w")  # frames beside the axes that a body can ride on
+BODY_FRAMES = ("R", "S", "t", "w")  # frames of bodies, besides the axes
 MESH_ENDINGS = (".stl", ".obj", ".ply", ".glb")
 MESH_UNITS = ("mm", "cm", "m", "in")
-TOOL_SHAPES = ("cutter", "probe", "nozzle", "wheel", "gripper")  # what a tool can be drawn as
+TOOL_SHAPES = ("cutter", "probe", "nozzle", "wheel", "gripper")  # drawn shapes of tools
 
 
 @dataclass(frozen=True, slots=True)
 class BodySource:
-    """Where the body of a frame comes from."""
+    """Source of the body of a frame."""
 
-    # mesh, as its name stands in the file of the scene or machine; empty for a shape
+    # mesh, named as in the file of the scene or machine; empty for a shape
     file: str = ""
-    path: str = ""  # where that file is; empty where the description has no folder (an upload)
-    unit: str = ""  # unit of its numbers; empty for the one of its format
+    path: str = ""  # of that file; empty where the description has no folder (an upload)
+    unit: str = ""  # of its numbers; empty for that of its format
     offset_mm: Vector = (0.0, 0.0, 0.0)  # origin of the mesh in its frame
     # its rotation there, about the fixed x, y and z axes in that order
     rotation_deg: Vector = (0.0, 0.0, 0.0)
@@ -140,7 +140,7 @@ _DEFAULT_TRAVEL: Mapping[str, Range] = {
 
 
 def default_travel(axis: str) -> Range:
-    """Give the travel of an axis that none is given for, mm or degrees."""
+    """Return the default travel of an axis, mm or degrees."""
     return _DEFAULT_TRAVEL[axis[0]]
 
 
@@ -151,11 +151,11 @@ class Axis:
     name: str  # X Y Z U V W (linear) or A B C (rotary, about x y z), and an optional digit
     offset_mm: Vector  # origin of its frame in the frame before it, mm
     travel: Range  # lower and upper end, mm or degrees
-    direction: int = 1  # +1, or −1 for an axis that moves against its name
+    direction: int = 1  # +1, or −1 for an axis that moves opposite to its name
     # fixed rotation of its frame against the frame before it, degrees, about the fixed x, y and z
     # axes in that order (roll, pitch, yaw of URDF)
     rotation_deg: Vector = ORIGIN
-    # whether the description says the direction, or leaves it at +1
+    # true where the description states the direction
     direction_given: bool = field(default=False, compare=False)
 
     @property
@@ -186,9 +186,9 @@ class Machine:
     body_dir: str = ""  # folder with the schematic bodies, empty where there are none
     # their fixed rotations, degrees, as those of axes
     fixed_deg: Mapping[str, Vector] = field(default_factory=dict[str, Vector])
-    # linear axes that stand on two guides
+    # linear axes with two guides
     gantries: Mapping[str, Gantry] = field(default_factory=dict[str, Gantry])
-    # bodies of frames that the description gives; all others are generated
+    # bodies of frames in the description; all others are generated
     bodies: Mapping[str, BodySource] = field(default_factory=dict[str, BodySource])
     source: str = ""  # where its structure is published
     columns: Mapping[str, str] = field(default_factory=dict[str, str])  # names of axes in data
@@ -205,12 +205,12 @@ class Machine:
         return tuple(self.axes[name] for name in names)
 
     def sense(self, axis: str) -> int:
-        """Give +1 where a positive command moves the tool with the axis over the workpiece."""
+        """Return the sign of the tool motion relative to the workpiece for a positive command."""
         side = 1 if axis in self.chain.tool else -1
         return side * self.axes[axis].direction
 
     def end_frames(self, side: str) -> tuple[tuple[str, Vector, Vector], ...]:
-        """List the fixed frames behind the last axis of a branch: name, offset [mm], turn [°]."""
+        """List the fixed frames at the end of a branch: name, offset [mm], rotation [°]."""
         names = ("S", "t") if side == "tool" else ("w",)
         return tuple(
             (name, self.fixed_mm.get(name, ORIGIN), self.fixed_deg.get(name, ORIGIN))
@@ -223,13 +223,13 @@ class Machine:
 
     @property
     def reference_keys(self) -> tuple[str, ...]:
-        """Keys of the rotations of the reference axis, which the frame R absorbs by definition."""
+        """Keys of the rotations of the reference axis, absorbed by the frame R by definition."""
         linear = [axis for axis in self.axes if is_linear(axis)]
         return tuple(f"E{letter}0{axis}" for axis in linear[:1] for letter in "ABC")
 
     @property
     def allowed_keys(self) -> tuple[str, ...]:
-        """Keys of all parameters that may be given, every constant of every axis included."""
+        """Keys of all allowed parameters, with all constants of all axes."""
         return tuple(row.key for axis in self.axes for row in axis_parameters(axis))
 
 
@@ -246,7 +246,7 @@ def build_machine(
     body_dir: str = "",
     source: str = "",
 ) -> Machine:
-    """Put a machine together from its chain and the tables that go with it."""
+    """Build a machine from its chain and the tables of its axes and frames."""
     parsed = parse_chain(chain) if isinstance(chain, str) else chain
     offsets, rotations = offset_mm or {}, rotation_deg or {}
     travels, directions = travel or {}, direction or {}

@@ -1,4 +1,4 @@
-"""Every limit on what a user may give, in one table: for files, options, widgets and drawing."""
+"""Limits of user input, in one table: files, options, widgets and drawing."""
 
 import sys
 
@@ -16,8 +16,8 @@ MIN_HALF_WIDTH = 1e-6  # µm or µrad: smallest half width of a tolerance beside
 # µm or µrad: largest half width that an allocation gives, and that sliders reach
 MAX_HALF_WIDTH = 1000.0
 LIMIT_UM = (1e-3, 1e6)  # of |E| that tolerances are allocated for, µm
-PROBABILITY = (0.5, 0.9999)  # of keeping the limit
-COST = (1e-6, 1e6)  # of a tolerance, by that of others
+PROBABILITY = (0.5, 0.9999)  # of conformity with the limit
+COST = (1e-6, 1e6)  # of a tolerance, relative to others
 
 # --- error curves ---------------------------------------------------------------------------------
 
@@ -26,7 +26,7 @@ MAX_TERMS = 64  # harmonics of one curve
 MAX_ORDER = 1000
 # points of a table, values of a table over two axes, rows of a CSV file, readings of an error
 MAX_POINTS = 100_000
-MAX_COVARIANCE = 200  # errors that one covariance is of
+MAX_COVARIANCE = 200  # errors in one covariance
 MAX_RUNS = 1000  # runs of one measured error
 MAX_CURVE_ROWS = 2000  # rows of a curve that may be edited or pasted in the app
 MAX_CURVE_TEXT = 80_000  # their characters
@@ -55,9 +55,9 @@ MAX_REPLIES = 200  # of one note, and versions of it
 MAX_REPLACED = 1000  # earlier versions that an edit of a note names
 
 MAX_TOLERANCES = 1000  # of the features of a part
-MAX_FEATURE_TRIANGLES = 300_000  # of a mesh that features are looked for in: a second or two
+MAX_FEATURE_TRIANGLES = 300_000  # of a mesh in which features are recognised: a second or two
 
-# --- meshes and robots: what is counted before anything is built ----------------------------------
+# --- meshes and robots: counted before anything is built ------------------------------------------
 
 # of one mesh file, each placing of a mesh counted: 2 s to read and to find the edges of
 MAX_TRIANGLES = 250_000
@@ -66,7 +66,7 @@ MAX_SOLIDS = 1_000  # of an STL file, those between which there is text
 MAX_MESH_DEPTH = 50  # nodes of a GLB file below each other
 MAX_MESH_HEADER = {".glb": 12_000_000, ".ply": 65_536}  # bytes before the numbers
 MAX_UPLOAD_BYTES = 11 * 2**20  # of one that a page sends, which is a third longer on its way
-MAX_PART_TRIANGLES = 2_000_000  # of a part that is to be cut
+MAX_PART_TRIANGLES = 2_000_000  # of a workpiece
 MAX_LINKS = 2_000  # links of a URDF file
 MAX_SHAPES = 500  # shapes of its links
 MAX_URDF_ELEMENTS = 50_000
@@ -82,7 +82,7 @@ MAX_CYCLE_MOVES = 40_000  # of one line: holes times the moves of each
 MAX_TURNS = 1_000  # of one arc
 MAX_LINE_POINTS = 100_000  # samples of one line
 
-# --- how a scene is looked at ---------------------------------------------------------------------
+# --- view of a scene ------------------------------------------------------------------------------
 
 EXAGGERATION = (1e-3, 1e6)
 RANGE_TOP = (1e-3, 1e6)  # upper end of a colour scale, µm or µrad
@@ -102,6 +102,6 @@ MOST_CONCEPTS = 8  # machines that are set side by side
 WORKERS = (1, 100_000)  # tasks of a Monte Carlo run that are worked on at a time
 LOCAL_WORKERS = (1, 512)  # processes or threads of this machine
 SWEEP_CASES = 1_000_000  # combinations of scenes and half widths in one sweep
-REPAIR_COUNT = (1, 12)  # adjustments in one set of a repair
-# nodes per axis of the grid that repairs are looked for on: all responses are held at once
+REPAIR_COUNT = (1, 12)  # adjustments in one set
+# nodes per axis of the grid for adjustments: all responses are in memory at once
 REPAIR_NODES = (2, 41)

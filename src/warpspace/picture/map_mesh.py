@@ -62,7 +62,7 @@ def map_parts(picture: Picture) -> list[MapPatch]:
         drawn_mm, values = thick_nodes(section, section.drawn_mm), spread(section.values)
         faded = None if section.faded is None else spread(section.faded)
         drawn_of = topology(values.shape, cut=section.cut)
-        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, section.grid.ways, faded))
+        parts.append(MapPatch(drawn_mm, values, drawn_of, lifts, section.grid.directions, faded))
     return parts
 
 

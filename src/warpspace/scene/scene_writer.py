@@ -148,7 +148,7 @@ def scene_to_toml(scene: Scene, notation: Notation | None = None, matrix: str = 
         parts += _machine_sections(scene.machine)
     parts.append(_bodies_section(scene.machine, bundled))
     convention: dict[str, object] = {"component_errors": scene.model.convention_value}
-    if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.own}:
+    if {*scene.machine.reference_keys} & {*scene.errors, *scene.tolerances.individual}:
         convention["reference_axis"] = "free"
     if scene.model.direction != TravelDirection.MEAN:
         convention["direction"] = str(scene.model.direction)
@@ -266,7 +266,7 @@ def _tolerances_section(scene: Scene) -> str:
     values: dict[str, object] = {}
     if scene.tolerances.default:
         values["default"] = scene.tolerances.default
-    for key, tolerance in scene.tolerances.own.items():
+    for key, tolerance in scene.tolerances.individual.items():
         values[key] = asdict(tolerance) if tolerance.centre else tolerance.half_width
     return spell_section("tolerances", values, PARAMETERS)
 

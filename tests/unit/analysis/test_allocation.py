@@ -160,9 +160,9 @@ def test_where_the_variance_decides_widths_go_with_the_cube_root_of_cost_by_squa
 def test_the_measured_machine_keeps_the_limit_on_machines_of_its_own(loop, over):
     scene = load_scene("dvf5000_proposed")
     found = warpspace.allocate(scene, limit_um=60.0, loop=loop, over=over, samples=40_000, seed=4)
-    own = {**scene.tolerances.own}
+    own = {**scene.tolerances.individual}
     own |= {k: Tolerance(scene.tolerances.get(k).centre, w) for k, w in found.tolerances.items()}
-    allocated = replace(scene, tolerances=replace(scene.tolerances, own=own))
+    allocated = replace(scene, tolerances=replace(scene.tolerances, individual=own))
     run = warpspace.montecarlo(
         allocated, loop=loop, over=over, samples=40_000, seed=99, limit_um=60.0
     )

@@ -163,7 +163,7 @@ def test_translations_alone_give_the_root_of_their_number_everywhere(chain, coun
 def test_the_expected_error_is_that_of_machines_drawn_apart():
     scene = with_default("wCBFXYZt", 10.0, 20.0, 25.0)
     own = {"EAX": Tolerance(-30.0, 5.0), "EC0Y": Tolerance(40.0, 10.0)}
-    scene = replace(scene, tolerances=replace(scene.tolerances, own=own))
+    scene = replace(scene, tolerances=replace(scene.tolerances, individual=own))
     (concept,) = compare_concepts([scene], replace(QUICK, own_tolerances=True))
     grid = build_grid(scene.model, scene.workspace, 2)
     expected = expected_um(concept, grid)

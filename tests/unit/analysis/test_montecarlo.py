@@ -256,9 +256,9 @@ def test_bad_tolerances():
     with pytest.raises(SceneError, match="no half width for EAX, EC0Y"):
         build_draws(ToleranceSet({"translation": 1.0}), ["EXX", "EAX", "EC0Y"])
     with pytest.raises(SceneError, match="half width -1"):
-        build_draws(ToleranceSet(own={"EAX": Tolerance(0.0, -1.0)}), ["EAX"])
+        build_draws(ToleranceSet(individual={"EAX": Tolerance(0.0, -1.0)}), ["EAX"])
     with pytest.raises(SceneError, match="half width nan"):
-        build_draws(ToleranceSet(own={"EAX": Tolerance(0.0, float("nan"))}), ["EAX"])
+        build_draws(ToleranceSet(individual={"EAX": Tolerance(0.0, float("nan"))}), ["EAX"])
     with pytest.raises(OptionError, match="distribution 'beta'"):
         build_draws(ToleranceSet({"rotation": 1.0}), ["EAX"], "beta")
 

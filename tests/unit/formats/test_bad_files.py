@@ -9,7 +9,7 @@ import pytest
 from bench_scenes import scene_with
 from warpspace.analysis.uncertainty.propagation import scene_uncertainty
 from warpspace.bench.base import find_test, run_test
-from warpspace.calibration.readings import parse_readings
+from warpspace.calibration.registry import parse_readings
 from warpspace.exceptions import SceneError
 from warpspace.formats import source
 from warpspace.formats.registry import ReadOptions, find_format, open_upload, read_errors

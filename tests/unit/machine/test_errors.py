@@ -251,7 +251,7 @@ def test_own_tolerance_comes_before_that_of_the_class():
     assert tolerances.missing(["EXX", "EAX", "EAY", "EBY", "EC0Y"]) == ("EAY", "EBY")
     assert tolerances
     assert not ToleranceSet()
-    assert ToleranceSet(own={"EAX": Tolerance(0.0, 0.0)})
+    assert ToleranceSet(individual={"EAX": Tolerance(0.0, 0.0)})
 
 
 AXES = ("X", "Z"), ((-1.0, 0.0, 3.0), (0.0, 5.0))

@@ -78,7 +78,7 @@ def test_constant_beyond_the_default_ones_becomes_a_parameter_of_the_scene():
 def test_tolerances_are_a_half_width_or_a_range():
     text = DVF + "[tolerances]\ndefault = { rotation = 20 }\nEXB = 5\nEAX = { centre = -8, "
     tolerances = parse_scene(text + "half_width = 6 }\n", "x").tolerances
-    assert tolerances.own == {"EXB": Tolerance(0.0, 5.0), "EAX": Tolerance(-8.0, 6.0)}
+    assert tolerances.individual == {"EXB": Tolerance(0.0, 5.0), "EAX": Tolerance(-8.0, 6.0)}
     assert tolerances.default == {"rotation": 20.0}
 
 

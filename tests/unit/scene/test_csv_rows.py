@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from warpspace.bench.data import DataColumn
 from warpspace.bench.data import parse_table as parse_test
-from warpspace.calibration.readings import parse_table as parse_calibration
+from warpspace.calibration.readings import parse_reading_table as parse_calibration
 from warpspace.exceptions import SceneError
 from warpspace.formats.registry import ReadOptions, open_upload, read_errors
 from warpspace.scene.curve_reader import read_csv_column
@@ -41,7 +41,7 @@ def _test(text, folder):
 def _calibration(text, folder):
     del folder
     table = parse_calibration(text, "t.csv")
-    return [(x, y) for x, y in table.need(("x_mm", "exx_um")).tolist()]
+    return [(x, y) for x, y in table.require(("x_mm", "exx_um")).tolist()]
 
 
 READERS: dict[str, Reader] = {

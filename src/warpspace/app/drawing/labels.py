@@ -76,7 +76,7 @@ def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
         along, name, way, shift = np.eye(3)[k], grid.axes[k], 1.0, 0.0
         if name and is_linear(name):
             # position of the axis = way × (place in R) + shift
-            way = float(grid.ways[k])
+            way = float(grid.directions[k])
             start = float(low[k] if way > 0.0 else high[k])
             shift = float(np.min(grid.coordinates[name])) - way * start
         else:

@@ -23,7 +23,7 @@ from warpspace.exceptions import OptionError, UnknownNameError, WarpspaceError
 from warpspace.field.grid import find_volume_axes
 from warpspace.machine import definition
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
-from warpspace.machine.curves.curve import OWN, ErrorFunction
+from warpspace.machine.curves.curve import OWN_AXIS, ErrorFunction
 from warpspace.machine.errors import ErrorSet
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machine_library import body_notes, load_machine, machine_names
@@ -243,7 +243,7 @@ def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
         depend = [key for key in scene.errors if axis in scene.errors.arguments(key)]
         parts = {
             "its errors {}": of_axes(scene.errors.functions, [axis]),
-            "its tolerances {}": of_axes(scene.tolerances.own, [axis]),
+            "its tolerances {}": of_axes(scene.tolerances.individual, [axis]),
             "how {} depends on it": [k for k in depend if parameter(k).axis not in gone],
             "its position at the reference": {axis} & (scene.reference or {}).keys(),
         }
@@ -288,14 +288,14 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         axis: span.clamp(kept.get(axis, stands[axis]), span.low)
         for axis, span in position_spans(scene).items()
     }
-    tolerances = of_axes(state.tolerances.own, scene.machine.axes)
+    tolerances = of_axes(state.tolerances.individual, scene.machine.axes)
     fixed = state.specification.fixed & frozenset(keys)
     changed = replace(
         state.with_edited(scene),
         amplitudes={key: _amplitude(state, scene, key) for key in keys},
         positions=positions,
         exclusions=state.exclusions.within(keys),
-        tolerances=replace(state.tolerances, own=tolerances),
+        tolerances=replace(state.tolerances, individual=tolerances),
         specification=replace(state.specification, fixed=fixed),
         picked=state.picked if scene.machine.chain == before.machine.chain else None,
         lever=state.lever if state.lever in keys else "",
@@ -331,13 +331,13 @@ def with_own_machine(state: AppState) -> AppState:
         axis: (own if axis in returned else scene).model.convention(axis).name
         for axis in own.machine.axes
     }
-    tolerances = {**of_axes(own.tolerances.own, returned), **state.tolerances.own}
+    tolerances = {**of_axes(own.tolerances.individual, returned), **state.tolerances.individual}
     joined = replace(
         scene,
         model=replace(scene.model, own_component_errors=tuple(orders.items())),
         errors=ErrorSet({**own.errors.functions, **curves}),
         reference=scene.reference and {**(own.reference or {}), **scene.reference},
-        tolerances=replace(state.tolerances, own=tolerances),
+        tolerances=replace(state.tolerances, individual=tolerances),
     )
     back, notes = _with_machine(joined, own)
     state = replace(state, tolerances=joined.tolerances)
@@ -386,7 +386,7 @@ def _alike(*curves: ErrorFunction) -> bool:
     if any(curve.amplitude == 0.0 for curve in curves):
         return True
     one, other = (curve.with_amplitude(1.0) for curve in curves)
-    if any(curve.has_directions or {*curve.arguments} - {OWN} for curve in curves):
+    if any(curve.has_directions or {*curve.arguments} - {OWN_AXIS} for curve in curves):
         return one == other
     at = np.linspace(*one.span, SAMPLES)
     return bool(np.abs(one.evaluate(at) - other.evaluate(at)).max() <= ALIKE)

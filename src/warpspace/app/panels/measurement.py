@@ -41,9 +41,9 @@ from warpspace.app.state.form_values import TEST, read_form, with_form
 from warpspace.bench.base import BenchResult, BenchTest, bench_names, find_test
 from warpspace.bench.data import parse_table as parse_test
 from warpspace.calibration.calibrate import Calibrate
-from warpspace.calibration.calibration_result import Calibration
-from warpspace.calibration.readings import bundled_data, find_data, parse_readings, parse_table
-from warpspace.calibration.registry import KINDS
+from warpspace.calibration.calibration_result import Calibration, Estimability
+from warpspace.calibration.readings import bundled_data, find_data, parse_reading_table
+from warpspace.calibration.registry import KINDS, parse_readings
 from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 from warpspace.units import UM_PER_MM, Array
@@ -223,7 +223,10 @@ LONGEST_KIND = 200
 MOST_NAMED = 12  # doubtful errors and notes that are listed
 ARROWS = {"": "none", "before": "before", "after": "after"}
 TURNED = "No arrows: a rotary axis carries the workpiece, which the box does not turn with."
-DOUBTS = (("in part", "Determined only in part"), ("no", "Not determined, kept"))
+DOUBTS = (
+    (Estimability.CONFOUNDED, "Confounded with others"),
+    (Estimability.NOT_ESTIMABLE, "Not estimable, unchanged"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,7 +239,7 @@ class CalibrateTexts(Calibrate):
         sets = [
             parse_readings(one.content, one.name, scene, one.kind, self.frame) for one in self.files
         ]
-        return self.find(scene, sets, (), lambda: watch(0.0))
+        return self.fit_readings(scene, sets, (), lambda: watch(0.0))
 
 
 def take_file(
@@ -250,7 +253,7 @@ def take_file(
     unlike = next(one for one in (name, *numbered) if one not in known)
     lines = text.count("\n")
     if kind is None or kind in KINDS:
-        lines = len(parse_table(text, unlike))
+        lines = len(parse_reading_table(text, unlike))
     if lines > MOST_READINGS - sum(one.count for one in others):
         raise OptionError(
             f"{name} has {lines:,} readings; expected at most {MOST_READINGS:,} in all files"
@@ -300,8 +303,8 @@ class CalibratePanel(FilesPanel):
         count = sum(len(one.readings) for one in found.fitted)
         parts = [tag("p", join((f"RMS of {count} residuals: {number(before)} → ",
                                 tag("b", f"{number(after)} µm"))))]  # fmt: skip
-        for told, words in DOUBTS:
-            keys = [one.key for one in found.parameters if one.told == told]
+        for status, words in DOUBTS:
+            keys = [one.key for one in found.parameters if one.estimable is status]
             if keys:
                 more = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
                 names = ", ".join(keys[:MOST_NAMED])
@@ -376,5 +379,5 @@ def arrows_of(found: Calibration, *, before: bool) -> tuple[Array, Array]:
 def _kind_words(kind: str) -> str:
     name, _, _ = kind.partition(":")
     if name in KINDS:
-        return KINDS[name].words
+        return KINDS[name].description
     return find_test(name).title if name in bench_names() else name

@@ -128,7 +128,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
              "way": [float(k == i) * way for i in range(3)]}
-            for k, (name, way) in enumerate(zip(grid.axes, grid.ways.tolist(), strict=True))
+            for k, (name, way) in enumerate(zip(grid.axes, grid.directions.tolist(), strict=True))
         ],
         "perMm": SCENE_PER_MM,
         "centre": _scene(grid.bounds_mm.mean(axis=0)),

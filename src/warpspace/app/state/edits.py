@@ -63,8 +63,8 @@ def half_width_span(state: AppState, key: str) -> Span:
 def with_scene_tolerances(state: AppState) -> AppState:
     own = state.origin.tolerances
     # an edited machine may not have all axes of the scene's
-    kept = {key: own.own[key] for key in own.own if key in state.amplitudes}
-    return replace(state, tolerances=replace(own, own=kept))
+    kept = {key: own.individual[key] for key in own.individual if key in state.amplitudes}
+    return replace(state, tolerances=replace(own, individual=kept))
 
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:

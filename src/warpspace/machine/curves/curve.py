@@ -1,8 +1,8 @@
-"""What every kind of error curve is and can: numbers, spelling in files, editing as rows.
+"""Base class of error curves: values, representation in files, editing as rows.
 
-A curve gives µm or µrad for an axis position in file units (mm or degrees). All are linear in one
-amplitude, which is what a slider moves: the value of a constant, the upper end of a ramp, the
-largest value (with its sign) of anything else.
+The value of a curve is in µm or µrad, the axis position in file units (mm or degrees). All are
+linear in one amplitude, which a slider sets: the value of a constant, the upper end of a ramp, the
+largest value (with its sign) of any other kind.
 """
 
 import math
@@ -23,15 +23,15 @@ from warpspace.units import Array
 Path = tuple[int | str, ...]  # keys and indices below the error, for instance ``("table", 3, 0)``
 Points = Sequence[tuple[float, float]]
 CsvColumn = Callable[[str, str], Points]
-"""Reads axis positions and one column, by file and name of the column; may raise SceneError."""
+"""Function from file and column name to axis positions and values; may raise SceneError."""
 ReadCurve = Callable[[object, Path], "ErrorFunction | None"]
-"""Reads a curve within a curve, by its raw value and its place; None where problems were noted."""
-MISSING = object()  # stands where a table has not all keys of its form
+"""Function from raw value and path to a nested curve; None where problems were noted."""
+MISSING = object()  # placeholder of missing keys of a table
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One problem: its place below the error, what was expected, and the value found."""
+    """Problem of a raw value: its path, the expectation, and the value."""
 
     path: Path
     text: str
@@ -39,12 +39,12 @@ class Finding:
 
 
 def is_number(value: object) -> bool:
-    """Tell whether a raw value is a number; a truth value is none."""
+    """Check for a number; a Boolean is none."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 class ValueReader:
-    """Checks raw values and collects what is wrong with them."""
+    """Reader that checks raw values and collects findings."""
 
     def __init__(
         self,
@@ -59,9 +59,9 @@ class ValueReader:
         self._csv_column, self._curve = csv_column, curve
 
     def note(self, path: Path, text: str, value: object = ...) -> None:
-        """Note a problem; of a missing value, that it is missing."""
-        found = Finding(path, "is missing") if value is MISSING else Finding(path, text, value)
-        self.findings.append(found)
+        """Add a finding."""
+        finding = Finding(path, "is missing") if value is MISSING else Finding(path, text, value)
+        self.findings.append(finding)
 
     def number(
         self,
@@ -72,7 +72,7 @@ class ValueReader:
         least: float = MIN_NUMBER,
         expected: str = "a number",
     ) -> float:
-        """Read a finite number between limits, and where it is not 0 of a least magnitude."""
+        """Read a finite number between limits, zero or of a minimum magnitude."""
         try:
             number = float(cast("float", value)) if is_number(value) else None
         except OverflowError:
@@ -91,16 +91,18 @@ class ValueReader:
             self.note(path, f"expected 0, or at least {least:.3g}", value)
         return number
 
-    def entries(self, value: object, path: Path, most: int, least: int = 1) -> Sequence[object]:
-        """Read a list with at least one entry, or none, and at most so many."""
+    def entries(
+        self, value: object, path: Path, max_count: int, least: int = 1
+    ) -> Sequence[object]:
+        """Read a list with a minimum and maximum number of entries."""
         if not isinstance(value, list | tuple):
             self.note(path, "expected a list", value)
             return ()
         entries = cast("Sequence[object]", value)
         if len(entries) < least:
             self.note(path, "expected at least 1, not 0 entries", value)
-        elif len(entries) > most:
-            self.note(path, f"expected at most {most} entries", value)
+        elif len(entries) > max_count:
+            self.note(path, f"expected at most {max_count} entries", value)
             return ()
         return entries
 
@@ -121,7 +123,7 @@ class ValueReader:
         )
 
     def text(self, value: object, path: Path, longest: int, least: int = 1) -> str:
-        """Read a text that is not empty, or may be."""
+        """Read a text of limited length."""
         if not isinstance(value, str):
             self.note(path, "expected a text", value)
             return ""
@@ -137,37 +139,37 @@ class ValueReader:
         self.note(path, "expected a table", value)
         return {}
 
-    def only(self, table: Mapping[str, object], path: Path, known: Collection[str]) -> None:
-        """Note the keys of a table that it does not have."""
+    def only(self, table: Mapping[str, object], path: Path, allowed: Collection[str]) -> None:
+        """Note unknown keys of a table."""
         for key in table:
-            if key not in known:
-                hint = near_miss(key, known) if len(self.findings) < SHOWN_PROBLEMS else ""
+            if key not in allowed:
+                hint = near_miss(key, allowed) if len(self.findings) < SHOWN_PROBLEMS else ""
                 self.note((*path, key), f"unknown key{hint}")
 
     def ascending(
-        self, value: object, path: Path, most: int, limit: tuple[float, float]
+        self, value: object, path: Path, max_count: int, limit: tuple[float, float]
     ) -> tuple[float, ...]:
         """Read a list of ascending numbers between limits."""
         before = len(self.findings)
-        found = tuple(
+        numbers = tuple(
             self.number(entry, (*path, index), *limit)
-            for index, entry in enumerate(self.entries(value, path, most))
+            for index, entry in enumerate(self.entries(value, path, max_count))
         )
-        for number, (low, high) in enumerate(pairwise(found), start=2):
+        for number, (low, high) in enumerate(pairwise(numbers), start=2):
             if len(self.findings) == before and not low < high:
                 text = f"entry {number} is {high:g} after {low:g}; expected ascending positions"
                 self.note(path, text)
-        return found
+        return numbers
 
     def curve(self, value: object, path: Path) -> "ErrorFunction | None":
-        """Read a curve within this one; None where problems were noted."""
+        """Read a nested curve; None where problems were noted."""
         if self._curve is None:
             self.note(path, "expected a number", value)
             return None
         return self._curve(value, path)
 
     def csv_points(self, file: str, column: str) -> Points:
-        """Read a column of a CSV file; nothing where a problem was noted before."""
+        """Read a column of a CSV file; empty after an earlier finding."""
         if self.findings:
             return ()
         if self._csv_column is None:
@@ -182,16 +184,16 @@ class ValueReader:
 
 
 SPAN_SAMPLES = 721
-"""Positions at which the peak of a curve is looked for: every half degree of a turn."""
+"""Positions at which the peak of a curve is searched: every half degree of a turn."""
 NEGLIGIBLE = 1e-12
-"""Peak in µm or µrad below which a curve counts as zero: no number may be divided by it."""
+"""Peak in µm or µrad below which a curve counts as zero, to avoid division by it."""
 
-OWN = "own"
-"""Stands for the axis of the error among the arguments of a curve that does not know its name."""
+OWN_AXIS = "own"
+"""Placeholder of the axis of the error among the arguments of a curve."""
 
 Span = tuple[float, float]  # lower and upper end of an axis range, mm or degrees
-Rows = Sequence[Sequence[float]]  # numbers as a user edits them, one row a line
-Spell = Callable[[float], str]  # writes one number for people
+Rows = Sequence[Sequence[float]]  # numbers for editing, one row per line
+Spell = Callable[[float], str]  # formats one number
 
 
 @dataclass(frozen=True)
@@ -200,18 +202,18 @@ class ErrorFunction(ABC):
 
     name: ClassVar[str]  # short name of the kind, for instance "poly"
     title: ClassVar[str]  # name of the kind in lists, for instance "polynomial"
-    # the tables that spell it in a scene file, each by its keys; none where it is a number
+    # keys of the tables that represent it in a scene file; empty where it is a number
     forms: ClassVar[tuple[tuple[str, ...], ...]]
-    row_words: ClassVar[str]  # how its numbers are written as rows
-    # what the amplitude is; the name of the kind and the axis stand in braces
+    row_words: ClassVar[str]  # description of its rows
+    # description of the amplitude, with the fields {name} and {axis}
     slider: ClassVar[str] = "{name} along {axis}; this is its largest value"
-    # whether people can write its numbers as rows; if not, it comes from files
+    # false where it comes from files only
     edited_as_rows: ClassVar[bool] = True
-    span: Span  # lower and upper end of the axis range it is meant for, mm or degrees
+    span: Span  # axis range of the curve, mm or degrees
 
     @abstractmethod
     def evaluate(self, position: Array) -> Array:
-        """Give the error at axis positions.
+        """Evaluate the error at axis positions.
 
         Parameters
         ----------
@@ -224,8 +226,8 @@ class ErrorFunction(ABC):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """Axes whose positions it depends on: `OWN` for that of its error; empty for a constant."""
-        return (OWN,)
+        """Axes of its arguments: `OWN_AXIS` for that of its error; empty for a constant."""
+        return (OWN_AXIS,)
 
     def evaluate_at(
         self,
@@ -233,22 +235,21 @@ class ErrorFunction(ABC):
         coordinates: Mapping[str, Array],
         direction: str = TravelDirection.MEAN,
     ) -> Array:
-        """Give the error where all axes stand somewhere, reached in a direction of travel.
+        """Evaluate the error at axis positions reached in a direction of travel.
 
         Parameters
         ----------
         axis : str
             Axis of the error.
         coordinates : mapping of str to ndarray, [...], mm or degrees
-            Broadcastable positions of all axes that the curve depends on.
+            Broadcastable positions of all axes of its arguments.
         direction : str, optional
             One of `TravelDirection`.
 
         Returns
         -------
         ndarray, [...], µm or µrad
-            Of the shape that the positions of its arguments broadcast to; the axis of the error is
-            one of them.
+            Shape of the broadcast positions of its arguments, the axis of the error included.
         """
         if direction == TravelDirection.DIFFERENCE:
             return np.zeros(np.shape(coordinates[axis]))
@@ -256,27 +257,27 @@ class ErrorFunction(ABC):
 
     @property
     def has_directions(self) -> bool:
-        """Whether it depends on the direction of travel."""
+        """True where it depends on the direction of travel."""
         return False
 
     @property
     def lines(self) -> tuple[tuple[str, "ErrorFunction"], ...]:
-        """Curves along the axis of the error that show it in a chart, each with its words."""
+        """Curves along the axis of the error for a chart, each with its label."""
         return (("", self),)
 
     def without_axes(self, positions: Mapping[str, float]) -> "ErrorFunction":
-        """Give the curve that is left where other axes stand still for good, mm or degrees."""
+        """Return the curve with other axes fixed at positions, mm or degrees."""
         del positions
         return self
 
     @property
     def parts(self) -> tuple["ErrorFunction", ...]:
-        """The curves that it is put together from; itself where it is one curve."""
+        """Curves of which it consists."""
         return (self,)
 
     @abstractmethod
     def scaled(self, factor: float) -> Self:
-        """Give the same curve with all values times a factor."""
+        """Return the curve with all values multiplied by a factor."""
 
     @cached_property
     def _peak(self) -> float:
@@ -290,7 +291,7 @@ class ErrorFunction(ABC):
 
     @property
     def samples(self) -> int:
-        """Number of positions over the span at which the peak is looked for."""
+        """Number of positions over the span at which the peak is searched."""
         return SPAN_SAMPLES
 
     @property
@@ -299,9 +300,9 @@ class ErrorFunction(ABC):
         return ()
 
     def with_amplitude(self, amplitude: float) -> Self:
-        """Give the same curve with another amplitude, µm or µrad, of the same kind.
+        """Return a curve of the same kind with another amplitude, µm or µrad.
 
-        A zero one takes the shape of `grown`; it stays zero where that is zero too.
+        A zero curve takes the shape of `grown`; it remains zero where that is zero too.
         """
         present = self.amplitude
         if abs(present) >= NEGLIGIBLE:
@@ -313,17 +314,17 @@ class ErrorFunction(ABC):
         return self if abs(reached) < NEGLIGIBLE else grown.scaled(amplitude / reached)
 
     def grown(self) -> Self:
-        """Give the curve that a zero one becomes when its slider leaves zero, of any amplitude.
+        """Return the shape of a zero curve when its slider leaves zero, of any amplitude.
 
-        Needed by kinds of several numbers, all of which can be zero: their shape is lost then. A
-        kind that keeps zero needs no more than its own `with_amplitude`.
+        For kinds of several numbers, whose shape is lost if all are zero. Other kinds override
+        `with_amplitude` only.
         """
         return self
 
     @classmethod
     @abstractmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
-        """Build a curve from what a scene file says.
+        """Build a curve from the raw value of a scene file.
 
         Parameters
         ----------
@@ -340,44 +341,44 @@ class ErrorFunction(ABC):
 
     @abstractmethod
     def to_toml(self) -> object:
-        """Give the value that a scene file spells for this curve."""
+        """Return the value of this curve in a scene file."""
 
     def for_span(self, span: Span) -> "ErrorFunction":
-        """Give a curve with the same values that is spelled the same way over another range.
+        """Return a curve with the same values that is represented equally over another range.
 
-        Most spellings do not depend on the range; a kind whose values follow from its range gives
-        a curve of another kind here.
+        Most representations do not depend on the range; a kind whose values follow from its range
+        returns a curve of another kind.
         """
         del span
         return self
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        """Describe the curve along its axis for a report; values and positions are spelled."""
+        """Format a description of the curve for a report."""
         del unit, value, position
         return self.title
 
     def slider_words(self, axis: str) -> str:
-        """Say what the amplitude of the curve along an axis is."""
+        """Format the description of the amplitude for the slider."""
         return self.slider.format(name=self.name, axis=axis)
 
     @classmethod
     def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
-        """Put rows into the order that `from_rows` expects, and say each change."""
+        """Sort rows for `from_rows`, and list the changes."""
         return rows, ()
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Build a curve from rows that a user edited; OptionError names a row that is wrong."""
+        """Build a curve from edited rows; OptionError names an invalid row."""
         del span, rows
         raise OptionError(cls.row_words)
 
     @abstractmethod
     def rows(self) -> Rows:
-        """Give the rows that `from_rows` reads back to this curve."""
+        """Return the rows from which `from_rows` builds this curve."""
 
     @classmethod
     def from_curve(cls, present: "ErrorFunction", span: Span) -> Self:
-        """Give the curve that a user who changes the kind of a present one starts from."""
+        """Build the initial curve of this kind when it replaces another."""
         if not isinstance(present, cls):
             raise OptionError(cls.row_words)
         return replace(present, span=span)
@@ -395,6 +396,6 @@ def limited(value: float, row: int, limit: float = MAX_ERROR, what: str = "value
     return value
 
 
-def refuse_more(count: int, most: int, what: str) -> None:
-    if count > most:
-        raise OptionError(f"{count} {what}; expected at most {most}")
+def refuse_more(count: int, limit: int, what: str) -> None:
+    if count > limit:
+        raise OptionError(f"{count} {what}; expected at most {limit}")

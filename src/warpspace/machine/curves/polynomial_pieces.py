@@ -1,4 +1,4 @@
-"""Pieces of polynomials: what an exact translation between conventions gives."""
+"""Piecewise polynomials: the result of an exact conversion between conventions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,14 +15,14 @@ from warpspace.machine.limits import MAX_LENGTH_MM, MAX_POINTS
 from warpspace.units import Array
 
 DEGREE = 5
-MOST_PIECES = 4096
-SMALL = 1e-12  # µm or µrad: what is smaller everywhere counts as nothing, and fits are no worse
-PER_PIECE = 8  # positions of each piece at which the peak is looked for
+MAX_PIECES = 4096
+SMALL = 1e-12  # µm or µrad: tolerance of fits, below which a curve is zero
+PER_PIECE = 8  # positions of each piece at which the peak is searched
 
 
 @dataclass(frozen=True)
 class Pieces(curve.ErrorFunction):
-    """Polynomials one behind the other, their ends held."""
+    """Piecewise polynomial, constant beyond its ends."""
 
     name = "pieces"
     title = "pieces of polynomials"
@@ -31,27 +31,27 @@ class Pieces(curve.ErrorFunction):
     edited_as_rows = False
     # (n,); ascending positions at which the pieces begin, mm or degrees
     starts: tuple[float, ...] = (0.0,)
-    end: float = 1.0  # where the last one ends
+    end: float = 1.0  # of the last piece
     # (n, up to 6); of Σ cₖ·(q − start)ᵏ, per piece
     coefficients: tuple[tuple[float, ...], ...] = ((0.0,),)
-    # positions at which it was measured, where it was converted from a table
+    # measured positions, where it was converted from a table
     points: tuple[float, ...] = ()
 
     @cached_property
     def _padded(self) -> Array:
         padded = np.zeros((len(self.starts), DEGREE + 1))
-        for row, own in zip(padded, self.coefficients, strict=True):
-            row[: len(own)] = own
+        for row, piece in zip(padded, self.coefficients, strict=True):
+            row[: len(piece)] = piece
         return padded
 
     def evaluate(self, position: Array) -> Array:
         starts = np.array(self.starts)
-        held = np.clip(np.asarray(position, dtype=float), starts[0], self.end)
-        piece = np.clip(np.searchsorted(starts, held, side="right") - 1, 0, len(starts) - 1)
-        along, own = held - starts[piece], self._padded[piece]
+        clipped = np.clip(np.asarray(position, dtype=float), starts[0], self.end)
+        piece = np.clip(np.searchsorted(starts, clipped, side="right") - 1, 0, len(starts) - 1)
+        along, coefficients = clipped - starts[piece], self._padded[piece]
         value = np.zeros(along.shape)
         for k in range(DEGREE, -1, -1):
-            value = value * along + own[..., k]
+            value = value * along + coefficients[..., k]
         return value
 
     def scaled(self, factor: float) -> Self:
@@ -113,21 +113,20 @@ def fit_curves(
 ) -> list[curve.ErrorFunction | None]:
     """Fit curves to functions of one position, values [n, K] at [n], smooth between kinks, [m].
 
-    A constant or a polynomial where one piece is enough, else pieces; None where the function is
-    nothing anywhere. Off by no more than 10⁻¹² µm or µrad, as far as numbers of this size can be
-    told apart.
+    A constant or a polynomial where one piece is sufficient, else pieces; None for a zero function.
+    The deviation is at most 10⁻¹² µm or µrad, as far as floating-point resolution allows.
     """
     low, high = span
     inner = kinks[(kinks > low) & (kinks < high)]
     at = np.concatenate([[low], np.unique(inner), [high]])
-    limit = len(at) + MOST_PIECES
+    limit = len(at) + MAX_PIECES
     while True:
-        coefficients, off = _fit(evaluate, at)
-        bad = off > SMALL
+        coefficients, deviation = _fit(evaluate, at)
+        bad = deviation > SMALL
         if not bad.any():
             break
         if len(at) + int(bad.sum()) > limit:
-            raise OptionError("the curves wave too much to be converted exactly")
+            raise OptionError("the curves vary too rapidly to be converted exactly")
         at = np.sort(np.concatenate([at, ((at[:-1] + at[1:]) / 2.0)[bad]]))
     return [_simplest(span, at, coefficients[..., k]) for k in range(coefficients.shape[-1])]
 
@@ -136,24 +135,26 @@ def _fit(evaluate: Callable[[Array], Array], at: Array) -> tuple[Array, Array]:
     width = np.diff(at)
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     checks = np.linspace(-0.97, 0.97, 9)
-    everything = np.concatenate([nodes, checks])
-    places = at[:-1, None] + 0.5 * width[:, None] * (1.0 + everything)
+    abscissae = np.concatenate([nodes, checks])
+    places = at[:-1, None] + 0.5 * width[:, None] * (1.0 + abscissae)
     values = np.asarray(evaluate(places.ravel()))
-    values = values.reshape(len(width), len(everything), -1)
+    values = values.reshape(len(width), len(abscissae), -1)
     inside, beyond = values[:, : DEGREE + 1], values[:, DEGREE + 1 :]
     series = np.linalg.solve(
         np.polynomial.chebyshev.chebvander(nodes, DEGREE),
         inside.transpose(1, 0, 2).reshape(DEGREE + 1, -1),
     )
-    found = np.tensordot(np.polynomial.chebyshev.chebvander(checks, DEGREE), series, axes=1)
-    missed = np.abs(found - beyond.transpose(1, 0, 2).reshape(len(checks), -1)).max(axis=0)
+    interpolated = np.tensordot(np.polynomial.chebyshev.chebvander(checks, DEGREE), series, axes=1)
+    deviation = np.abs(interpolated - beyond.transpose(1, 0, 2).reshape(len(checks), -1)).max(
+        axis=0
+    )
     size = np.abs(values).max(axis=1).ravel()
-    missed = np.where(missed > 2e-14 * size, missed, 0.0)  # no number of this size is finer
+    deviation = np.where(deviation > 2e-14 * size, deviation, 0.0)  # floating-point resolution
     powers = _power_matrix() @ series  # of (q − start) / width
     shape = (DEGREE + 1, len(width), values.shape[-1])
     scale = width[:, None] ** -np.arange(DEGREE + 1.0)
     local = powers.reshape(shape).transpose(1, 0, 2) * scale[..., None]
-    return local, missed.reshape(len(width), -1).max(axis=1)
+    return local, deviation.reshape(len(width), -1).max(axis=1)
 
 
 def _power_matrix() -> Array:
@@ -166,14 +167,14 @@ def _power_matrix() -> Array:
 def _simplest(span: curve.Span, at: Array, coefficients: Array) -> curve.ErrorFunction | None:
     width = np.diff(at)[:, None]
     reach = np.abs(coefficients) * width ** np.arange(DEGREE + 1.0)
-    kept = np.where(reach > SMALL / 4.0, coefficients, 0.0)
-    if not kept.any():
+    significant = np.where(reach > SMALL / 4.0, coefficients, 0.0)
+    if not significant.any():
         return None
-    degree = int(np.flatnonzero(kept.any(axis=0)).max())
-    if degree == 0 and np.ptp(kept[:, 0]) <= SMALL:
-        return Constant(span, float(kept[:, 0].mean()))
-    if len(kept) == 1:
-        shifted = Polynomial(kept[0, : degree + 1])(Polynomial([-at[0], 1.0]))
+    degree = int(np.flatnonzero(significant.any(axis=0)).max())
+    if degree == 0 and np.ptp(significant[:, 0]) <= SMALL:
+        return Constant(span, float(significant[:, 0].mean()))
+    if len(significant) == 1:
+        shifted = Polynomial(significant[0, : degree + 1])(Polynomial([-at[0], 1.0]))
         return Poly(span, tuple(shifted.coef.tolist()))
-    rows = tuple(tuple(float(c) for c in row[: degree + 1]) for row in kept)
+    rows = tuple(tuple(float(c) for c in row[: degree + 1]) for row in significant)
     return Pieces(span, tuple(at[:-1].tolist()), float(at[-1]), rows)

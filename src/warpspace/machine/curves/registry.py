@@ -1,4 +1,4 @@
-"""The kinds of error curve there are. A new one is a module beside this and a line below."""
+"""Registry of error curves: a new kind is a module and a line below."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.plugins import Registry
 
 CurveKind = type[ErrorFunction]
-Form = tuple[str, ...]  # keys of the table that spells a curve in a scene file
+Form = tuple[str, ...]  # keys of the table of a curve in a scene file
 
 _KINDS: Registry[CurveKind] = Registry(
     "kind of curve",
@@ -19,7 +19,7 @@ _KINDS: Registry[CurveKind] = Registry(
         for kind in (Constant, Ramp, Poly, Harmonics, TableCurve, TwoArguments, Directional, Pieces)
     },
 )
-"""By name, in the order of lists: simplest first."""
+"""By name, in the order of lists, the simplest first."""
 curve_kinds, unregister_curve = _KINDS.members, _KINDS.unregister
 
 
@@ -43,7 +43,7 @@ def register_curve(kind: CurveKind) -> None:
 
 
 def find_form(raw: Mapping[str, object]) -> tuple[CurveKind, Form] | None:
-    """Find the kind of curve, and its form, that a table of a scene file spells."""
+    """Find the kind and form of a curve in a table of a scene file."""
     return next(
         ((kind, form) for kind in curve_kinds() for form in kind.forms if form[0] in raw), None
     )

@@ -1,4 +1,4 @@
-"""The plain kinds of curve: constant, ramp, polynomial and harmonics; one each way of travel."""
+"""Simple curves: constant, ramp, polynomial and harmonics; curves by direction of travel."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -90,7 +90,7 @@ class Poly(ErrorFunction):
     coefficients: tuple[float, ...] = ()
 
     def evaluate(self, position: Array) -> Array:
-        """Give the value of the polynomial; infinite where no number can hold it."""
+        """Evaluate the polynomial; infinite beyond the range of floating-point numbers."""
         with np.errstate(over="ignore", invalid="ignore"):
             value = np.polynomial.polynomial.polyval(
                 np.asarray(position, dtype=float), np.array(self.coefficients)
@@ -101,12 +101,12 @@ class Poly(ErrorFunction):
         return replace(self, coefficients=tuple(factor * c for c in self.coefficients))
 
     def grown(self) -> Self:
-        """Give the line from 0 at the lower end to 1 at the upper; of c0 alone the constant 1."""
+        """Return the line from 0 at the lower end to 1 at the upper; c0 alone becomes 1."""
         if len(self.coefficients) < 2:
             return replace(self, coefficients=(1.0,))
         low, high = self.span
-        rest = (0.0,) * (len(self.coefficients) - 2)
-        return replace(self, coefficients=(-low / (high - low), 1.0 / (high - low), *rest))
+        higher = (0.0,) * (len(self.coefficients) - 2)
+        return replace(self, coefficients=(-low / (high - low), 1.0 / (high - low), *higher))
 
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
@@ -123,7 +123,7 @@ class Poly(ErrorFunction):
 
     @classmethod
     def from_rows(cls, span: Span, rows: Rows) -> Self:
-        """Read coefficients, in one row or one below the other."""
+        """Build the polynomial from coefficients in one row or one column."""
         coefficients = tuple(value for row in rows for value in row)
         refuse_more(len(coefficients), limits.MAX_COEFFICIENTS, "coefficients")
         return cls(span, coefficients)
@@ -167,11 +167,11 @@ class Ramp(OneNumber):
 
 
 MAX_SAMPLES = 200_001
-MAX_COSINES = 2_000_000  # cosines that the peak of a curve may take: terms × positions
+MAX_COSINES = 2_000_000  # limit of terms × positions in the search of a peak
 SAMPLES_PER_WAVE = 16
 SHOWN_TERMS = 3
-LEAST_PEAK = 1e-6
-"""Largest value below which a wave of amplitude one does not leave zero within the range."""
+MIN_PEAK = 1e-6
+"""Peak below which a wave of amplitude one counts as zero within the range."""
 LIMITS = (
     (0.0, limits.MAX_ORDER),
     (-limits.MAX_ERROR, limits.MAX_ERROR),
@@ -203,13 +203,13 @@ class Harmonics(ErrorFunction):
         return replace(self, terms=tuple((n, factor * a, phase) for n, a, phase in self.terms))
 
     def grown(self) -> Self:
-        """Give the first wave that is not zero by its order and phase, else one whole wave."""
+        """Return the first wave whose order and phase make it non-zero, else one full wave."""
         for index in range(len(self.terms)):
             terms = tuple(
                 (n, float(k == index), phase) for k, (n, _, phase) in enumerate(self.terms)
             )
             wave = replace(self, terms=terms)
-            if abs(wave.amplitude) > LEAST_PEAK:
+            if abs(wave.amplitude) > MIN_PEAK:
                 return wave
         return replace(self, terms=((_one_wave(self.span), 1.0, 0.0),))
 
@@ -217,12 +217,12 @@ class Harmonics(ErrorFunction):
     def samples(self) -> int:
         highest = max((order for order, _, _ in self.terms), default=0.0)
         waves = highest * (self.span[1] - self.span[0]) / 360.0
-        most = min(MAX_SAMPLES, MAX_COSINES // max(len(self.terms), 1))
-        return int(min(max(SPAN_SAMPLES, SAMPLES_PER_WAVE * waves + 1), most))
+        max_count = min(MAX_SAMPLES, MAX_COSINES // max(len(self.terms), 1))
+        return int(min(max(SPAN_SAMPLES, SAMPLES_PER_WAVE * waves + 1), max_count))
 
     @property
     def cosines(self) -> int:
-        """Number of cosines that its peak takes: what opening a scene with this curve costs."""
+        """Number of cosines in the search of its peak: the cost of opening a scene with it."""
         return self.samples * len(self.terms)
 
     @classmethod
@@ -280,16 +280,16 @@ SHARES = {
     TravelDirection.BACKWARD: (0.0, 1.0),
     TravelDirection.DIFFERENCE: (1.0, -1.0),
 }
-"""Of the curve forward and of that backward."""
+"""Weights of the forward and the backward curve."""
 NOTHING = Constant((0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class Directional(ErrorFunction):
-    """An error whose value depends on the way that its axis has come.
+    """Error that depends on the direction of travel of its axis.
 
-    `evaluate` gives the mean of both; `evaluate_at` takes a direction. The amplitude is the larger
-    one of the two curves' and scales both, so that their ratio stays.
+    `evaluate` returns the mean of both; `evaluate_at` has a direction. The amplitude is that of the
+    larger curve and scales both, so that their ratio is constant.
     """
 
     name = "directional"
@@ -298,7 +298,7 @@ class Directional(ErrorFunction):
     row_words = "curves by direction come from a scene file or an import"
     slider = "differs by direction of travel of {axis}; this is the larger one's amplitude"
     edited_as_rows = False
-    # reached towards growing positions, and towards falling ones; of any other kind
+    # towards increasing and decreasing positions; of any other kind
     forward: ErrorFunction = NOTHING
     backward: ErrorFunction = NOTHING
 
@@ -315,11 +315,11 @@ class Directional(ErrorFunction):
         coordinates: Mapping[str, Array],
         direction: str = TravelDirection.MEAN,
     ) -> Array:
-        """Give the mean, one of the directions, or forward − backward, [...]."""
-        there, back = SHARES[TravelDirection(direction)]
-        ways = ((there, self.forward), (back, self.backward))
+        """Evaluate the mean, one of the directions, or forward − backward, [...]."""
+        forward, backward = SHARES[TravelDirection(direction)]
+        weighted = ((forward, self.forward), (backward, self.backward))
         return np.asarray(
-            sum(share * curve.evaluate_at(axis, coordinates) for share, curve in ways if share)
+            sum(share * curve.evaluate_at(axis, coordinates) for share, curve in weighted if share)
         )
 
     @property
@@ -330,26 +330,28 @@ class Directional(ErrorFunction):
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
         pairs = (("forward", self.forward), ("backward", self.backward))
         return tuple(
-            (f"{way} {words}".rstrip(), line) for way, one in pairs for words, line in one.lines
+            (f"{direction} {label}".rstrip(), line)
+            for direction, curve in pairs
+            for label, line in curve.lines
         )
 
     @property
     def parts(self) -> tuple[ErrorFunction, ...]:
         return (*self.forward.parts, *self.backward.parts)
 
-    def _each(self, change: Callable[[ErrorFunction], ErrorFunction]) -> Self:
+    def _with_both(self, change: Callable[[ErrorFunction], ErrorFunction]) -> Self:
         return replace(self, forward=change(self.forward), backward=change(self.backward))
 
     def scaled(self, factor: float) -> Self:
-        return self._each(lambda one: one.scaled(factor))
+        return self._with_both(lambda curve: curve.scaled(factor))
 
     @property
     def amplitude(self) -> float:
-        there, back = self.forward.amplitude, self.backward.amplitude
-        return back if math.isnan(back) or abs(back) > abs(there) else there
+        forward, backward = self.forward.amplitude, self.backward.amplitude
+        return backward if math.isnan(backward) or abs(backward) > abs(forward) else forward
 
     def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
-        return self._each(lambda one: one.without_axes(positions))
+        return self._with_both(lambda curve: curve.without_axes(positions))
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -360,28 +362,32 @@ class Directional(ErrorFunction):
         return max(self.forward.samples, self.backward.samples)
 
     def grown(self) -> Self:
-        return self._each(lambda one: one.with_amplitude(1.0))
+        return self._with_both(lambda curve: curve.with_amplitude(1.0))
 
     @classmethod
     def read(cls, raw: Any, span: Span, reader: ValueReader) -> Self:
         """Read ``{ forward = CURVE, backward = CURVE }``."""
-        found: list[ErrorFunction] = []
-        for way in ("forward", "backward"):
-            curve = reader.curve(raw[way], (way,))
+        curves: list[ErrorFunction] = []
+        for direction in ("forward", "backward"):
+            curve = reader.curve(raw[direction], (direction,))
             if isinstance(curve, Directional):
-                reader.note((way,), "expected a curve that has no directions of its own")
-            found.append(curve or Constant(span))
-        return cls(span, *found)
+                reader.note((direction,), "expected a curve without directions")
+            curves.append(curve or Constant(span))
+        return cls(span, *curves)
 
     def to_toml(self) -> object:
         return {"forward": self.forward.to_toml(), "backward": self.backward.to_toml()}
 
     def for_span(self, span: Span) -> ErrorFunction:
-        return replace(self._each(lambda one: replace(one.for_span(span), span=span)), span=span)
+        return replace(
+            self._with_both(lambda curve: replace(curve.for_span(span), span=span)), span=span
+        )
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
-        there, back = (one.describe(unit, value, position) for one in (self.forward, self.backward))
-        return f"forward {there}, backward {back}"
+        forward, backward = (
+            curve.describe(unit, value, position) for curve in (self.forward, self.backward)
+        )
+        return f"forward {forward}, backward {backward}"
 
     def rows(self) -> Rows:
         return [*self.forward.rows(), *self.backward.rows()]

@@ -28,19 +28,19 @@ from warpspace.units import Array
 
 MAX_FILE_NAME, MAX_COLUMN_NAME = 1024, 256
 FIRST_POINTS = 5
-"""Points that a straight curve of another kind is turned into; a bent one takes more."""
-KEPT = 0.002
-"""Largest distance of the table from the curve it was made of, as a share of its largest value."""
-BETWEEN = 8  # places between two points at which that distance is looked for
-DIGITS = 6  # digits behind the point of the share of the amplitude that a first value is rounded to
+"""Points of a table made from a straight curve of another kind; a bent one has more."""
+MAX_DEPARTURE = 0.002
+"""Largest deviation of a table from the curve it replaces, as a share of the peak."""
+BETWEEN = 8  # positions between two points at which the deviation is evaluated
+DIGITS = 6  # decimals of initial values, relative to the amplitude
 LIMITS = ((-MAX_LENGTH_MM, MAX_LENGTH_MM), (-MAX_ERROR, MAX_ERROR))  # of position and value
-SHOWN_POSITIONS = 3  # positions that a remark names
+SHOWN_POSITIONS = 3  # in a remark
 Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class TableCurve(ErrorFunction):
-    """Piecewise linear curve through measured points, its ends held."""
+    """Piecewise linear curve through measured points, constant beyond its ends."""
 
     name = "table"
     title = "table"
@@ -64,7 +64,7 @@ class TableCurve(ErrorFunction):
         return tuple(q for q, _ in self.points)
 
     def grown(self) -> Self:
-        """Give the line from 0 at its first position to 1 at its last; of one row the value 1."""
+        """Return the line from 0 at its first position to 1 at its last; one row becomes 1."""
         first, last = self.points[0][0], self.points[-1][0]
         reach = last - first
         return replace(
@@ -81,7 +81,7 @@ class TableCurve(ErrorFunction):
         return cls(span, tuple(reader.csv_points(file, column)))
 
     def to_toml(self) -> object:
-        """Spell it as ``{ table = [[q, value], …] }``, wherever the points came from."""
+        """Return ``{ table = [[q, value], …] }``, whatever the source of the points."""
         return {"table": [list(point) for point in self.points]}
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
@@ -97,7 +97,8 @@ class TableCurve(ErrorFunction):
             limited(row[0], number, MAX_LENGTH_MM, "position")
             limited(row[1], number)
         points = tuple((row[0], row[1]) for row in rows)
-        if unsorted := _first_unsorted(points):
+        unsorted = _first_unsorted(points)
+        if unsorted:
             number, low, high = unsorted
             raise OptionError(
                 f"row {number}: position {high:g} after {low:g}; expected ascending positions"
@@ -107,7 +108,7 @@ class TableCurve(ErrorFunction):
     @classmethod
     def tidied(cls, rows: Rows) -> tuple[Rows, tuple[str, ...]]:
         if any(len(row) != 2 for row in rows):
-            return rows, ()  # `from_rows` says so
+            return rows, ()  # refused by `from_rows`
         if all(low[0] < high[0] for low, high in pairwise(rows)):
             return rows, ()
         remarks: list[str] = []
@@ -116,11 +117,11 @@ class TableCurve(ErrorFunction):
         values: dict[float, list[float]] = {}
         for position, value in rows:
             values.setdefault(position, []).append(value)
-        repeated = sorted(q for q, found in values.items() if len(found) > 1)
+        repeated = sorted(q for q, repeats in values.items() if len(repeats) > 1)
         if repeated:
-            shown = ", ".join(f"{q:g}" for q in repeated[:SHOWN_POSITIONS])
-            more = ", …" if len(repeated) > SHOWN_POSITIONS else ""
-            remarks.append(f"Values of the same position averaged, at {shown}{more}.")
+            listed = ", ".join(f"{q:g}" for q in repeated[:SHOWN_POSITIONS])
+            ellipsis = ", …" if len(repeated) > SHOWN_POSITIONS else ""
+            remarks.append(f"Values of the same position averaged, at {listed}{ellipsis}.")
         return [(q, fsum(values[q]) / len(values[q])) for q in sorted(values)], tuple(remarks)
 
     def rows(self) -> Rows:
@@ -128,13 +129,13 @@ class TableCurve(ErrorFunction):
 
     @classmethod
     def from_curve(cls, present: ErrorFunction, span: Span) -> Self:
-        """Give evenly spread points of the present curve, as many as its shape needs."""
+        """Build a table of evenly spaced points, as many as the shape of the curve needs."""
         peak = abs(present.amplitude)
         kinks = [q for q in present.kinks if span[0] < q < span[1]][: MAX_CURVE_ROWS // 2]
-        count, most = FIRST_POINTS, MAX_CURVE_ROWS - len(kinks)
+        count, max_count = FIRST_POINTS, MAX_CURVE_ROWS - len(kinks)
         at = np.union1d(np.linspace(*span, count), np.array(kinks))
-        while count < most and _departure(present, at) > KEPT * peak:
-            count = min(2 * count - 1, most)
+        while count < max_count and _departure(present, at) > MAX_DEPARTURE * peak:
+            count = min(2 * count - 1, max_count)
             at = np.union1d(np.linspace(*span, count), np.array(kinks))
         values = present.evaluate(at)
         if peak > 0.0 and np.isfinite(peak):
@@ -155,7 +156,8 @@ def _points(raw: object, reader: ValueReader) -> tuple[Point, ...]:
     for index, entry in enumerate(reader.entries(raw, ("table",), MAX_POINTS)):
         position, value = reader.row(entry, ("table", index), "[position, value]", LIMITS)
         points.append((position, value))
-    if not reader.findings and (unsorted := _first_unsorted(points)):
+    unsorted = None if reader.findings else _first_unsorted(points)
+    if unsorted:
         number, low, high = unsorted
         text = f"row {number} has position {high} after {low}; expected ascending positions"
         reader.note(("table",), text, raw)
@@ -178,15 +180,15 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class TwoArguments(ErrorFunction):
-    """Bilinear table over the positions of two axes, its ends held.
+    """Bilinear table over the positions of two axes, constant beyond its edges.
 
-    It stays an error of its own axis, which is the first of the two: where the errors of that axis
-    act, this one acts; only its value depends on the other axis as well.
+    It is an error of the first of the two axes and acts in the frame of that axis; only its value
+    depends on the other axis as well.
 
     Notes
     -----
-    Between four neighbouring points the value is bilinear: linear in either position while the
-    other one stays. Beyond the table the nearest point of its edge counts.
+    Between four neighbouring points the value is bilinear: linear in either position for a constant
+    other one. Beyond the table the value is that of the nearest point of its edge.
     """
 
     name = "table2"
@@ -205,8 +207,8 @@ class TwoArguments(ErrorFunction):
         return self.axes
 
     @property
-    def beside(self) -> float:
-        """Position of the other axis, mm or degrees, that `evaluate` takes: between the ends."""
+    def middle(self) -> float:
+        """Middle position of the other axis, mm or degrees, used by `evaluate`."""
         other = self.positions[1]
         return (other[0] + other[-1]) / 2.0
 
@@ -215,9 +217,9 @@ class TwoArguments(ErrorFunction):
         return np.array(self.values)
 
     def evaluate(self, position: Array) -> Array:
-        """Give the value while the other axis stands in the middle of its positions."""
-        own = np.asarray(position, dtype=float)
-        return self._bilinear(own, np.asarray(self.beside))
+        """Evaluate the error with the other axis in the middle of its positions."""
+        along = np.asarray(position, dtype=float)
+        return self._bilinear(along, np.asarray(self.middle))
 
     def evaluate_at(
         self,
@@ -227,27 +229,27 @@ class TwoArguments(ErrorFunction):
     ) -> Array:
         """Interpolate between the positions of both axes, [...]."""
         del axis  # is the first of `axes`
-        own, other = (np.asarray(coordinates[name], dtype=float) for name in self.axes)
+        along, other = (np.asarray(coordinates[name], dtype=float) for name in self.axes)
         if direction == TravelDirection.DIFFERENCE:
-            return np.zeros(np.broadcast_shapes(own.shape, other.shape))
-        return self._bilinear(own, other)
+            return np.zeros(np.broadcast_shapes(along.shape, other.shape))
+        return self._bilinear(along, other)
 
-    def _bilinear(self, own: Array, other: Array) -> Array:
-        low, high, share = _cell(self.positions[0], own)
-        left, right, across = _cell(self.positions[1], other)
+    def _bilinear(self, along: Array, other: Array) -> Array:
+        low, high, share = _cell(self.positions[0], along)
+        near, far, across = _cell(self.positions[1], other)
         grid = self._grid
-        lower = grid[low, left] * (1.0 - across) + grid[low, right] * across
-        upper = grid[high, left] * (1.0 - across) + grid[high, right] * across
+        lower = grid[low, near] * (1.0 - across) + grid[low, far] * across
+        upper = grid[high, near] * (1.0 - across) + grid[high, far] * across
         return np.asarray(lower * (1.0 - share) + upper * share)
 
     def section(self, other: float) -> TableCurve:
-        """Give the curve along the own axis while the other one stands at a position."""
+        """Return the curve along the first axis with the other one at a position."""
         at = self.positions[0]
         values = self._bilinear(np.array(at), np.asarray(other))
         return TableCurve(self.span, tuple(zip(at, values.tolist(), strict=True)))
 
     def without_axes(self, positions: Mapping[str, float]) -> ErrorFunction:
-        """Give the section where the other axis stands, if it is gone."""
+        """Return the section at the fixed position of the other axis."""
         other = self.axes[1]
         return self.section(positions[other]) if other in positions else self
 
@@ -255,8 +257,8 @@ class TwoArguments(ErrorFunction):
     def lines(self) -> tuple[tuple[str, ErrorFunction], ...]:
         """Sections at the first, the middle and the last position of the other axis."""
         other = self.positions[1]
-        shown = dict.fromkeys((other[0], self.beside, other[-1]))
-        return tuple((f"{self.axes[1]} {at:g}", self.section(at)) for at in shown)
+        sections = dict.fromkeys((other[0], self.middle, other[-1]))
+        return tuple((f"{self.axes[1]} {at:g}", self.section(at)) for at in sections)
 
     def scaled(self, factor: float) -> Self:
         rows = (factor * self._grid).tolist()
@@ -272,7 +274,7 @@ class TwoArguments(ErrorFunction):
         return self.positions[0]
 
     def grown(self) -> Self:
-        """Give the ramp from 0 at the first position of its axis to 1 at the last, of one row 1."""
+        """Return the ramp from 0 at the first position of its axis to 1 at the last, or 1."""
         at = np.array(self.positions[0])
         reach = at[-1] - at[0]
         ramp = (at - at[0]) / reach if reach else np.ones(1)
@@ -287,9 +289,9 @@ class TwoArguments(ErrorFunction):
         axes = None if reader.findings else _axes(inner.get("axes", MISSING), reader)
         if axes is None:
             return empty
-        known = ("axes", *axes, "values")
-        reader.only(inner, place, known)
-        table = {**dict.fromkeys(known, MISSING), **inner}
+        keys = ("axes", *axes, "values")
+        reader.only(inner, place, keys)
+        table = {**dict.fromkeys(keys, MISSING), **inner}
         at = tuple(
             reader.ascending(table[axis], (*place, axis), MAX_POINTS, POSITIONS) for axis in axes
         )
@@ -309,10 +311,10 @@ class TwoArguments(ErrorFunction):
         return cls(span, axes, (at[0], at[1]), values)
 
     def to_toml(self) -> object:
-        own, other = self.axes
+        axis, other = self.axes
         inner = {
-            "axes": [own, other],
-            own: list(self.positions[0]),
+            "axes": [axis, other],
+            axis: list(self.positions[0]),
             other: list(self.positions[1]),
             "values": [list(row) for row in self.values],
         }
@@ -320,9 +322,9 @@ class TwoArguments(ErrorFunction):
 
     def describe(self, unit: str, value: Spell, position: Spell) -> str:
         del unit, value, position
-        own, other = self.axes
+        axis, other = self.axes
         sizes = " × ".join(str(len(at)) for at in self.positions)
-        return f"table of {sizes} points over {own} and {other}"
+        return f"table of {sizes} points over {axis} and {other}"
 
     def slider_words(self, axis: str) -> str:
         return f"varies with {axis} and {self.axes[1]}; this is its largest value"
@@ -334,28 +336,29 @@ class TwoArguments(ErrorFunction):
 
 def _cell(at: Numbers, position: Array) -> tuple[Indices, Indices, Array]:
     points = np.array(at)
-    held = np.clip(position, points[0], points[-1])
-    low = np.clip(np.searchsorted(points, held, side="right") - 1, 0, max(len(points) - 2, 0))
+    clipped = np.clip(position, points[0], points[-1])
+    low = np.clip(np.searchsorted(points, clipped, side="right") - 1, 0, max(len(points) - 2, 0))
     high = np.minimum(low + 1, len(points) - 1)
     width = points[high] - points[low]
-    return low, high, (held - points[low]) / np.where(width > 0.0, width, 1.0)
+    return low, high, (clipped - points[low]) / np.where(width > 0.0, width, 1.0)
 
 
 def _axes(raw: object, reader: ValueReader) -> tuple[str, str] | None:
     place: Path = (FORM, "axes")
-    own = reader.axis
+    axis = reader.axis
     names = list(cast("Sequence[object]", raw)) if isinstance(raw, list | tuple) else []
     if len(names) != 2 or not all(isinstance(name, str) for name in names):
-        reader.note(place, f'expected two names of axes, for instance ["{own or "X"}", "Z"]', raw)
+        reader.note(place, f'expected two names of axes, for instance ["{axis or "X"}", "Z"]', raw)
         return None
     first, second = cast("list[str]", names)
-    known = ", ".join(reader.axes)
+    unknown = [name for name in (first, second) if name not in reader.axes]
     if first == second:
         reader.note(place, "names one axis twice; expected two axes", raw)
-    elif unknown := [name for name in (first, second) if name not in reader.axes]:
-        reader.note(place, f"no axis {unknown[0]} in this machine; expected two of {known}", raw)
-    elif own not in (first, second):
-        reader.note(place, f"expected {own}, the axis of the error, and another one", raw)
+    elif unknown:
+        text = f"no axis {unknown[0]} in this machine; expected two of {', '.join(reader.axes)}"
+        reader.note(place, text, raw)
+    elif axis not in (first, second):
+        reader.note(place, f"expected {axis}, the axis of the error, and another one", raw)
     else:
         return first, second
     return None
@@ -373,7 +376,7 @@ def _values(
         text = f"has {len(rows)} rows; expected {shape[0]}, one per position of {axes[0]}"
         reader.note(place, text)
         return ()
-    found: list[Numbers] = []
+    table: list[Numbers] = []
     for index, row in enumerate(rows):
         entries = reader.entries(row, (*place, index), MAX_POINTS)
         if entries and len(entries) != shape[1]:
@@ -383,5 +386,5 @@ def _values(
         numbers = (
             reader.number(value, (*place, index, k), *VALUES) for k, value in enumerate(entries)
         )
-        found.append(tuple(numbers))
-    return tuple(found)
+        table.append(tuple(numbers))
+    return tuple(table)
