@@ -18,7 +18,7 @@ from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-FORWARD, BACKWARD, BOTH = 1, -1, 0
+FORWARD, BACKWARD, UNDIRECTED = 1, -1, 0
 """Direction of travel in which a value was taken; both where a file does not tell."""
 REPEATABILITY = 4.0  # ISO 230-2, 3.17: unidirectional repeatability in standard deviations
 Matrix = tuple[tuple[float, ...], ...]
@@ -54,7 +54,7 @@ class ErrorSeries:
         found = self._runs(direction)
         return np.nanmean(found, axis=0) if len(found) else None
 
-    def toward(self, direction: int) -> Array:
+    def in_direction(self, direction: int) -> Array:
         """Give the mean in a direction of travel, [n]; of both where there are no such runs."""
         mean = self.mean(direction)
         return self.values if mean is None else mean
@@ -63,7 +63,9 @@ class ErrorSeries:
     def values(self) -> Array:
         """Mean bidirectional error, [n], µm or µrad (x̄ᵢ); the mean of what there is otherwise."""
         means = [
-            found for way in (FORWARD, BACKWARD, BOTH) if (found := self.mean(way)) is not None
+            found
+            for way in (FORWARD, BACKWARD, UNDIRECTED)
+            if (found := self.mean(way)) is not None
         ]
         return np.mean(means, axis=0)
 
@@ -109,10 +111,12 @@ class ErrorSurface:
         """Give the values of a direction of travel, the mean of both for 0, (first, second)."""
         forward = np.array(self.values)
         backward = np.array(self.backward) if self.backward else forward
-        return {FORWARD: forward, BACKWARD: backward, BOTH: (forward + backward) / 2.0}[direction]
+        return {FORWARD: forward, BACKWARD: backward, UNDIRECTED: (forward + backward) / 2.0}[
+            direction
+        ]
 
 
-def plane_by_direction(
+def surface_from_directions(
     key: str,
     axes: tuple[str, str],
     positions: tuple[ArrayLike, ArrayLike],
@@ -127,12 +131,12 @@ def plane_by_direction(
 
 
 @dataclass(frozen=True)
-class Imported:
+class ImportedErrors:
     """What a file holds."""
 
     format: str  # name of its format
     series: tuple[ErrorSeries, ...] = ()
-    planes: tuple[ErrorSurface, ...] = ()
+    surfaces: tuple[ErrorSurface, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict[str, float])  # µm or µrad
     # µm or µrad; standard uncertainty of constants
     uncertainty: Mapping[str, float] = field(default_factory=dict[str, float])
@@ -147,26 +151,26 @@ class Imported:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        own = [one.key for one in (*self.series, *self.planes)]
+        own = [one.key for one in (*self.series, *self.surfaces)]
         return tuple(dict.fromkeys((*own, *self.constants, *self.curves)))
 
     @property
     def axes(self) -> tuple[str, ...]:
         own = [parameter(key).axis for key in self.keys]
-        return tuple(dict.fromkeys((*own, *(axis for one in self.planes for axis in one.axes))))
+        return tuple(dict.fromkeys((*own, *(axis for one in self.surfaces for axis in one.axes))))
 
     @property
     def size(self) -> int:
         series = sum(len(run.values) for one in self.series for run in one.runs)
         planes = sum(
-            len(one.first) * len(one.second) * (2 if one.backward else 1) for one in self.planes
+            len(one.first) * len(one.second) * (2 if one.backward else 1) for one in self.surfaces
         )
         return series + planes + len(self.constants)
 
 
-def merge(parts: Sequence[Imported]) -> Imported:
+def merge(parts: Sequence[ImportedErrors]) -> ImportedErrors:
     found: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
-    for name in (entry.name for entry in fields(Imported)[1:]):
+    for name in (entry.name for entry in fields(ImportedErrors)[1:]):
         values = [getattr(part, name) for part in parts]
         if isinstance(values[0], Mapping):
             found[name] = {key: value for table in values for key, value in table.items()}
@@ -174,7 +178,7 @@ def merge(parts: Sequence[Imported]) -> Imported:
             every = [one for value in values for one in value]
             # an error that is given twice is refused later
             found[name] = tuple(every if name in ("series", "planes") else dict.fromkeys(every))
-    return Imported(**found)
+    return ImportedErrors(**found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,10 +208,10 @@ class ErrorSummary:
         return parameter(self.key).unit
 
 
-def summaries(found: Imported) -> list[ErrorSummary]:
-    rows = [_of_series(one) for one in found.series]
-    for plane in found.planes:
-        values = plane.table(BOTH)
+def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
+    rows = [_of_series(one) for one in imported.series]
+    for plane in imported.surfaces:
+        values = plane.table(UNDIRECTED)
         rows.append(
             ErrorSummary(
                 key=plane.key,
@@ -219,11 +223,11 @@ def summaries(found: Imported) -> list[ErrorSummary]:
                 largest=float(values.max()),
             )
         )
-    for key, value in found.constants.items():
-        own = found.uncertainty.get(key)
+    for key, value in imported.constants.items():
+        own = imported.uncertainty.get(key)
         row = ErrorSummary(key=key, kind="constant", smallest=value, largest=value, uncertainty=own)
         rows.append(row)
-    for key, curve in found.curves.items():
+    for key, curve in imported.curves.items():
         ((kind, numbers),) = curve.items()
         last = numbers[-1][1] if kind == "harmonics" else numbers[-1]
         rows.append(
@@ -232,7 +236,7 @@ def summaries(found: Imported) -> list[ErrorSummary]:
     return rows
 
 
-def summary_table(found: Imported) -> blocks.Table:
+def summary_table(imported: ImportedErrors) -> blocks.Table:
     """List all errors of an import."""
     rows = [
         (
@@ -240,7 +244,7 @@ def summary_table(found: Imported) -> blocks.Table:
             f"{one.range[0]:g} … {one.range[1]:g}" if one.range else "",
             one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
         )
-        for one in summaries(found)
+        for one in summarise_errors(imported)
     ]  # fmt: skip
     columns = (
         blocks.Column("error", leads=True),
@@ -277,8 +281,8 @@ def _of_series(one: ErrorSeries) -> ErrorSummary:
     )
 
 
-WAYS = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
-SAME = 1e-9  # mm or degrees: positions nearer than this are one
+RUN_DIRECTION = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
+POSITION_TOLERANCE = 1e-9  # mm or degrees: positions nearer than this are one
 Point = tuple[SourceLine, float, float, float]  # line, position of both axes, value
 
 
@@ -293,7 +297,7 @@ class ErrorTable:
 
     @property
     def directed(self) -> bool:
-        return any(way != BOTH for _, way, _ in self.rows)
+        return any(way != UNDIRECTED for _, way, _ in self.rows)
 
 
 def zero_key(scene: Scene) -> str:
@@ -302,9 +306,9 @@ def zero_key(scene: Scene) -> str:
     return f"E{'XYZABC'[direction_index(axis) + (0 if is_linear(axis) else 3)]}{axis}"
 
 
-def sampled(wanted: RequiredCorrections) -> Imported:
+def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
     """Sample the errors of a scene at the points of a table."""
-    scene = wanted.scene
+    scene = corrections.scene
     constants: dict[str, float] = {}
     series: list[ErrorSeries] = []
     planes: list[ErrorSurface] = []
@@ -315,9 +319,9 @@ def sampled(wanted: RequiredCorrections) -> Imported:
         if row.is_constant:
             constants[key] = float(curve.amplitude)
             continue
-        count = wanted.points.get(row.axis) or max(wanted.points.values())
+        count = corrections.points.get(row.axis) or max(corrections.points.values())
         at = np.linspace(*scene.axis_span(row.axis), count)
-        ways = _ways(curve)
+        ways = _curves_by_direction(curve)
         other = _second_axis(curve)
         tabled = all(isinstance(one, TableCurve | TwoArguments) for one in ways.values() or [curve])
         if tabled and (other is not None or len(curve.kinks) <= count):
@@ -332,43 +336,53 @@ def sampled(wanted: RequiredCorrections) -> Imported:
                 + np.zeros((len(at), len(other[1])))
                 for way, part in {FORWARD: curve, BACKWARD: curve, **ways}.items()
             }
-            planes.append(plane_by_direction(key, (row.axis, other[0]), (at, other[1]), tables))
+            planes.append(
+                surface_from_directions(key, (row.axis, other[0]), (at, other[1]), tables)
+            )
         else:
             runs = tuple(
                 MeasuredRun(1, way, tuple(np.asarray(part.evaluate(at)).tolist()))
-                for way, part in (ways or {BOTH: curve}).items()
+                for way, part in (ways or {UNDIRECTED: curve}).items()
             )
             series.append(ErrorSeries(key, tuple(at.tolist()), runs))
-    return Imported("scene", tuple(series), tuple(planes), constants)
+    return ImportedErrors("scene", tuple(series), tuple(planes), constants)
 
 
-def in_one_direction(held: Imported, wanted: RequiredCorrections) -> Imported:
+def to_single_direction(
+    imported: ImportedErrors, corrections: RequiredCorrections
+) -> ImportedErrors:
     """Give errors by direction of travel as the scene has them in the direction it looks at."""
-    way = WAYS.get(TravelDirection(wanted.scene.model.direction), BOTH)
+    way = RUN_DIRECTION.get(TravelDirection(corrections.scene.model.direction), UNDIRECTED)
 
     return replace(
-        held,
+        imported,
         series=tuple(
             ErrorSeries(
-                one.key, one.positions, (MeasuredRun(1, BOTH, tuple(one.toward(way).tolist())),)
+                one.key,
+                one.positions,
+                (MeasuredRun(1, UNDIRECTED, tuple(one.in_direction(way).tolist())),),
             )
-            for one in held.series
+            for one in imported.series
         ),
         planes=tuple(
             replace(one, values=tuple(map(tuple, one.table(way).tolist())), backward=())
-            for one in held.planes
+            for one in imported.surfaces
         ),
     )
 
 
-def _ways(curve: ErrorFunction) -> dict[int, ErrorFunction]:
+def _curves_by_direction(curve: ErrorFunction) -> dict[int, ErrorFunction]:
     if not isinstance(curve, Directional):
         return {}
     return {FORWARD: curve.forward, BACKWARD: curve.backward}
 
 
 def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
-    surfaces = [one for one in (curve, *_ways(curve).values()) if isinstance(one, TwoArguments)]
+    surfaces = [
+        one
+        for one in (curve, *_curves_by_direction(curve).values())
+        if isinstance(one, TwoArguments)
+    ]
     others = {one.axes[1] for one in surfaces}
     if len(others) != 1:
         return None
@@ -376,25 +390,27 @@ def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
     return others.pop(), at
 
 
-def tables_of(held: Imported) -> list[ErrorTable]:
+def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
     """Put errors over the same axes side by side, those of one axis at all their positions."""
     tables: list[ErrorTable] = []
-    if held.constants:
-        row = ((), BOTH, tuple(held.constants.values()))
-        tables.append(ErrorTable((), tuple(held.constants), [row]))
-    for axis in dict.fromkeys(parameter(one.key).axis for one in held.series):
-        series = [one for one in held.series if parameter(one.key).axis == axis]
+    if imported.constants:
+        row = ((), UNDIRECTED, tuple(imported.constants.values()))
+        tables.append(ErrorTable((), tuple(imported.constants), [row]))
+    for axis in dict.fromkeys(parameter(one.key).axis for one in imported.series):
+        series = [one for one in imported.series if parameter(one.key).axis == axis]
         at = np.unique(np.concatenate([one.positions for one in series]))
         directed = any(one.reversal is not None for one in series)
         table = ErrorTable((axis,), tuple(one.key for one in series), [])
-        for way in (FORWARD, BACKWARD) if directed else (BOTH,):
-            columns = [np.interp(at, one.positions, one.toward(way)).tolist() for one in series]
+        for way in (FORWARD, BACKWARD) if directed else (UNDIRECTED,):
+            columns = [
+                np.interp(at, one.positions, one.in_direction(way)).tolist() for one in series
+            ]
             found = zip(at.tolist(), *columns, strict=True)
             table.rows.extend(((q,), way, values) for q, *values in found)
         tables.append(table)
-    for plane in held.planes:
+    for plane in imported.surfaces:
         table = ErrorTable(plane.axes, (plane.key,), [])
-        for way in (FORWARD, BACKWARD) if plane.backward else (BOTH,):
+        for way in (FORWARD, BACKWARD) if plane.backward else (UNDIRECTED,):
             values = plane.backward if way == BACKWARD else plane.values
             for first, row in zip(plane.first, values, strict=True):
                 points = zip(plane.second, row, strict=True)
@@ -403,16 +419,16 @@ def tables_of(held: Imported) -> list[ErrorTable]:
     return tables
 
 
-def distinct(at: np.ndarray) -> np.ndarray:
+def distinct_positions(at: np.ndarray) -> np.ndarray:
     ordered = np.sort(at)
-    return ordered[np.concatenate([[True], np.diff(ordered) > SAME])]
+    return ordered[np.concatenate([[True], np.diff(ordered) > POSITION_TOLERANCE])]
 
 
-def plane_of(
+def build_surface(
     key: str, axes: tuple[str, str], points: Sequence[Point], source: Source, where: str = ""
 ) -> ErrorSurface:
-    first = distinct(np.array([point[1] for point in points]))
-    second = distinct(np.array([point[2] for point in points]))
+    first = distinct_positions(np.array([point[1] for point in points]))
+    second = distinct_positions(np.array([point[2] for point in points]))
     values = np.full((len(first), len(second)), math.nan)
     lines: dict[tuple[int, int], SourceLine] = {}
     for at, one, other, value in points:
@@ -431,20 +447,20 @@ def plane_of(
     return ErrorSurface(key, axes, tuple(first.tolist()), tuple(second.tolist()), rows)
 
 
-def plane_by_ways(
+def build_surface_by_direction(
     key: str, axes: tuple[str, str], points: Mapping[int, Sequence[Point]], source: Source
 ) -> ErrorSurface:
     """Build an error of two axes from its points by direction of travel, see `plane_of`."""
-    words = {FORWARD: " forward", BACKWARD: " backward", BOTH: ""}
-    planes = {way: plane_of(key, axes, own, source, words[way]) for way, own in points.items()}
+    words = {FORWARD: " forward", BACKWARD: " backward", UNDIRECTED: ""}
+    planes = {way: build_surface(key, axes, own, source, words[way]) for way, own in points.items()}
     if len(planes) == 1:
         return next(iter(planes.values()))
     if set(planes) != {FORWARD, BACKWARD}:
         expected = "+ or - in every row, or in none"
-        points[BOTH][0][0].refuse("has no direction", expected)
+        points[UNDIRECTED][0][0].refuse("has no direction", expected)
     there, back = planes[FORWARD], planes[BACKWARD]
     if (there.first, there.second) != (back.first, back.second):
         found = f"{key} has other points backward than forward"
         points[BACKWARD][0][0].refuse(found, "the same")
-    tables = {way: plane.table(BOTH) for way, plane in planes.items()}
-    return plane_by_direction(key, axes, (there.first, there.second), tables)
+    tables = {way: plane.table(UNDIRECTED) for way, plane in planes.items()}
+    return surface_from_directions(key, axes, (there.first, there.second), tables)

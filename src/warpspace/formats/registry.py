@@ -12,9 +12,9 @@ from typing import Any
 
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.measured import Imported, merge
+from warpspace.formats.measured import ImportedErrors, merge
 from warpspace.formats.source import MAX_BYTES, Source, SourceLine, source_of_bytes
-from warpspace.formats.terms import Tables, errors_of
+from warpspace.formats.terms import Tables, errors_from_tables
 from warpspace.machine.axes import is_axis_name
 from warpspace.machine.definition import Machine
 from warpspace.plugins import Registry
@@ -25,7 +25,7 @@ ERROR, CORRECTION = "error", "correction"
 SIGNS = (ERROR, CORRECTION)
 Files = Mapping[str, str]
 """Text of each file by what is added to the name that the user gives: "" is that file itself."""
-MOST_FILES = 64
+MAX_FILES = 64
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ReadOptions:
         """Give the factor from a number of a table to a correction: −1 where it is an error."""
         return -1.0 if (self.sign or usual) == ERROR else 1.0
 
-    def said_sign(self, usual: str) -> str:
+    def sign_statement(self, usual: str) -> str:
         """Say what the numbers are: what the user says, else the documentation of the format."""
         return f"sign: {self.sign}" if self.sign else usual
 
@@ -80,13 +80,13 @@ class Format:
     limits: str
     recognise: Callable[[str, str], bool]  # by the first lines of a file and its name
     # the errors that files hold; None for those that `tables` correct
-    read: Callable[[Sequence[Source], ReadOptions], Imported] | None = None
+    read: Callable[[Sequence[Source], ReadOptions], ImportedErrors] | None = None
     # what the controller evaluates after reading them; None where it is no controller's
     tables: Callable[[Sequence[Source], ReadOptions], Tables] | None = None
     write: Callable[[RequiredCorrections], Files] | None = None  # the files that compensate
-    apart: bool = False  # whether each of its files is a table by itself
+    independent_files: bool = False  # whether each of its files is a table by itself
     points: int = 21  # per axis where none are asked for
-    most_points: int = 10_000  # per axis that the controller takes
+    max_points: int = 10_000  # per axis that the controller takes
     # whether it holds error parameters, from which the controller works out its corrections
     parametric: bool = False
     variants: tuple[str, ...] = ()  # published ones, the usual one first
@@ -105,30 +105,30 @@ class Format:
     def can_write(self) -> bool:
         return self.write is not None
 
-    def errors(self, sources: Sequence[Source], options: ReadOptions) -> Imported:
+    def errors(self, sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
         if self.read is not None:
             return self.read(sources, options)
         if self.tables is None:
             raise OptionError(f"{self.name} is written only; expected another format")
-        parts = [[source] for source in sources] if self.apart else [sources]
+        parts = [[source] for source in sources] if self.independent_files else [sources]
         found = [
-            errors_of(self.tables(part, options), self.name, part[0], options.machine)
+            errors_from_tables(self.tables(part, options), self.name, part[0], options.machine)
             for part in parts
         ]
         return merge(found) if len(found) > 1 else found[0]
 
 
 @cache
-def _words() -> dict[str, Any]:
+def _catalogue() -> dict[str, Any]:
     return tomllib.loads((files("warpspace.formats") / "formats.toml").read_text("utf-8"))
 
 
-def described(name: str) -> dict[str, Any]:
-    words = _words()["formats"][name]
+def format_description(name: str) -> dict[str, Any]:
+    words = _catalogue()["formats"][name]
     return {**words, "name": name, "endings": tuple(words["endings"])}
 
 
-def has(pattern: str) -> Callable[[str, str], bool]:
+def head_matcher(pattern: str) -> Callable[[str, str], bool]:
     """Tell files by a pattern in their first lines, whatever their name."""
     found = re.compile(pattern, re.MULTILINE)
     return lambda head, _: found.search(head) is not None
@@ -160,26 +160,26 @@ _KINDS = ["csv_own", "volumetric", "rtl", "sinumerik", "heidenhain", "fanuc_3d",
 
 
 @cache
-def _known() -> Registry[Format]:
+def _registry() -> Registry[Format]:
     kinds = (resolve_name(f"{__package__}.kinds.{kind}:FORMATS") for kind in _KINDS)
     return Registry("format", {one.name: one for kind in kinds for one in kind})
 
 
 def formats() -> tuple[Format, ...]:
-    return _known().every()
+    return _registry().every()
 
 
 def find_format(name: str) -> Format:
-    return _known().find(name)
+    return _registry().find(name)
 
 
-def register_format(found: Format) -> None:
+def register_format(new_format: Format) -> None:
     """Add a format; it is then recognised, listed, read and written."""
-    _known().register(found)
+    _registry().register(new_format)
 
 
 def unregister_format(name: str) -> None:
-    _known().unregister(name)
+    _registry().unregister(name)
 
 
 def recognise(sources: Sequence[Source]) -> Format:
@@ -191,7 +191,7 @@ def recognise(sources: Sequence[Source]) -> Format:
             first = next((line for line in source.lines if line.strip()), "")
             number = source.lines.index(first) + 1 if first else None
             said = (
-                f"{source.at(number).shown if number else 'nothing'} is of no format that is known"
+                f"{source.at(number).quoted if number else 'nothing'} is of no format that is known"
             )
             expected = (
                 f"one of {names} (--format NAME says which; `warpspace import --formats` lists"
@@ -208,7 +208,7 @@ def recognise(sources: Sequence[Source]) -> Format:
 class Reading:
     """What was read, and as what."""
 
-    found: Imported
+    imported: ImportedErrors
     format: Format
     recognised: bool  # whether the format was found in the files; if not, the user said it
 
@@ -216,7 +216,7 @@ class Reading:
 def open_upload(name: str, content: bytes) -> Source:
     """Take in a file; one whose structure nobody has published is refused."""
     lower = name.lower()
-    for kind in _words()["unpublished"]:
+    for kind in _catalogue()["unpublished"]:
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
         if content.startswith(starts) or lower.endswith(tuple(kind["endings"])):
             found = f"is {kind['what']}; expected another file: {kind['instead']}"
@@ -225,8 +225,8 @@ def open_upload(name: str, content: bytes) -> Source:
 
 
 def open_files(paths: Sequence[Path]) -> list[Source]:
-    if len(paths) > MOST_FILES:
-        raise OptionError(f"{len(paths)} files; expected at most {MOST_FILES} an import")
+    if len(paths) > MAX_FILES:
+        raise OptionError(f"{len(paths)} files; expected at most {MAX_FILES} an import")
     return [open_upload(str(path), read_bytes(path, MAX_BYTES)) for path in paths]
 
 

@@ -46,7 +46,7 @@ DEG_PER: Mapping[str, float] = {
 DEG_TO_URAD = URAD_PER["deg"]
 
 
-def spell(value: float, digits: int) -> str:
+def format_number(value: float, digits: int) -> str:
     """Spell a number with at most so many digits behind the point, without needless zeros."""
     text = f"{value:.{digits}f}"
     if "." in text:
@@ -59,7 +59,7 @@ _DELIMITERS = str.maketrans(dict.fromkeys("();#%*\\", " "))  # and what joins li
 MAX_COMMENT = 200  # characters; LinuxCNC reads lines of 255
 
 
-def spell_comment(opens: str, text: str, closes: str = "") -> str:
+def format_comment(opens: str, text: str, closes: str = "") -> str:
     """Spell a comment of a file that a control reads: one line of printable ASCII.
 
     Some controls read other letters byte by byte, and take some bytes for the end of a line.
@@ -72,7 +72,7 @@ MAX_BYTES = 64 * 1024 * 1024
 MAX_LINES = 2_000_000
 MAX_LINE = 16_384  # characters of one line
 HEAD_LINES = 60  # lines by which a format is recognised
-SHOWN = 60  # characters of a line that a message shows
+MAX_QUOTED = 60  # characters of a line that a message shows
 _UTF16_SHARE = 0.3
 """Share of zero bytes at every other place from which bytes without a mark count as UTF-16."""
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")
@@ -103,12 +103,12 @@ class Source:
     def stem(self) -> str:
         return self.base.rsplit(".", 1)[0]
 
-    def refuse(self, found: str, expected: str = "") -> NoReturn:
-        raise SceneError(self.name, [_joined(found, expected)])
+    def refuse(self, problem: str, expected: str = "") -> NoReturn:
+        raise SceneError(self.name, [_joined(problem, expected)])
 
-    def rows(self, most: int) -> CsvRows:
+    def rows(self, max_rows: int) -> CsvRows:
         """Read it as a table with a header and at most so many rows."""
-        return CsvRows(io.StringIO(self.text), self.name, most, once=True)
+        return CsvRows(io.StringIO(self.text), self.name, max_rows, once=True)
 
     def at(self, line: int) -> "SourceLine":
         """Give one of its lines, counted from 1."""
@@ -132,66 +132,66 @@ class SourceLine:
     line: int
 
     @property
-    def shown(self) -> str:
-        return shown(self.source.lines[self.line - 1])
+    def quoted(self) -> str:
+        return quote(self.source.lines[self.line - 1])
 
-    def refuse(self, found: str, expected: str = "") -> NoReturn:
-        self.source.refuse(f"line {self.line}: {found}", expected)
+    def refuse(self, problem: str, expected: str = "") -> NoReturn:
+        self.source.refuse(f"line {self.line}: {problem}", expected)
 
-    def number(self, text: str, what: str) -> float:
+    def number(self, text: str, quantity: str) -> float:
         try:
             return parse_number(text)
         except ValueError:
             if "," in text:
-                self.refuse(f"{what} {shown(text)} has a decimal comma", "a point")
-            self.refuse(f"{what} {shown(text)}", "a finite number")
+                self.refuse(f"{quantity} {quote(text)} has a decimal comma", "a point")
+            self.refuse(f"{quantity} {quote(text)}", "a finite number")
 
-    def whole(self, text: str, what: str, low: int, high: int) -> int:
-        value = self.number(text, what)
+    def integer(self, text: str, quantity: str, low: int, high: int) -> int:
+        value = self.number(text, quantity)
         if value != int(value) or not low <= value <= high:
-            self.refuse(f"{what} {shown(text)}", f"a whole number {low} … {high}")
+            self.refuse(f"{quantity} {quote(text)}", f"a whole number {low} … {high}")
         return int(value)
 
-    def position(self, text: str, what: str) -> float:
+    def position(self, text: str, quantity: str) -> float:
         """Read a position that a machine reaches, mm or degrees."""
-        return self.checked_position(self.number(text, what), what)
+        return self.checked_position(self.number(text, quantity), quantity)
 
-    def checked_position(self, value: float, what: str) -> float:
+    def checked_position(self, value: float, quantity: str) -> float:
         """Refuse a position that no machine reaches, mm or degrees."""
         if abs(value) > MAX_LENGTH_MM:
-            self.refuse(f"{what} {value:g}", f"at most ±{MAX_LENGTH_MM:g} mm or degrees")
+            self.refuse(f"{quantity} {value:g}", f"at most ±{MAX_LENGTH_MM:g} mm or degrees")
         return value
 
-    def error(self, text: str, what: str, scale: float = 1.0) -> float:
+    def error(self, text: str, quantity: str, scale: float = 1.0) -> float:
         """Read an error in its own unit, as µm or µrad."""
-        return self.checked_error(self.number(text, what) * scale, what)
+        return self.checked_error(self.number(text, quantity) * scale, quantity)
 
-    def checked_error(self, value: float, what: str) -> float:
+    def checked_error(self, value: float, quantity: str) -> float:
         """Refuse an error that no rigid-body model holds, µm or µrad."""
         if abs(value) > MAX_ERROR:
             expected = f"at most ±{MAX_ERROR:g} (is the unit right?)"
-            self.refuse(f"{what} {value:g} µm or µrad", expected)
+            self.refuse(f"{quantity} {value:g} µm or µrad", expected)
         return value
 
-    def unit(self, unit: str, known: Mapping[str, float], what: str) -> float:
-        if unit not in known:
-            units = ", ".join(name for name in known if name.isascii())
-            self.refuse(f"{what} in {shown(unit)}", f"one of the units {units}")
-        return known[unit]
+    def unit(self, unit: str, factors: Mapping[str, float], quantity: str) -> float:
+        if unit not in factors:
+            units = ", ".join(name for name in factors if name.isascii())
+            self.refuse(f"{quantity} in {quote(unit)}", f"one of the units {units}")
+        return factors[unit]
 
-    def ascending(self, value: float, before: Sequence[float], what: str, of: str = "") -> None:
+    def ascending(self, value: float, before: Sequence[float], quantity: str, of: str = "") -> None:
         if before and value <= before[-1]:
-            self.refuse(f"{what} {value:g}{of} after {before[-1]:g}", "ascending positions")
+            self.refuse(f"{quantity} {value:g}{of} after {before[-1]:g}", "ascending positions")
 
 
-def _joined(found: str, expected: str) -> str:
-    return f"{found}; expected {expected}" if expected else found
+def _joined(problem: str, expected: str) -> str:
+    return f"{problem}; expected {expected}" if expected else problem
 
 
-def shown(text: str) -> str:
+def quote(text: str) -> str:
     """Spell what a file says in at most a line, without control characters."""
     clean = one_line(text.strip())
-    return repr(clean if len(clean) <= SHOWN else clean[: SHOWN - 1] + "…")
+    return repr(clean if len(clean) <= MAX_QUOTED else clean[: MAX_QUOTED - 1] + "…")
 
 
 def source_of_bytes(content: bytes, name: str) -> Source:

@@ -18,7 +18,7 @@ from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.definition import Machine
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
-HELD, MODULO, EXTENDED = "held", "modulo", "extended"
+HOLD_ENDS, MODULO, EXTRAPOLATE = "held", "modulo", "extended"
 """What a table does beyond its ends: its end values, its period, or its last straight line."""
 
 
@@ -32,7 +32,7 @@ class AxisTable:
     # (n,), mm or degrees; what is added to the commanded position of the target. Forward values
     # where `backward` is given.
     values: tuple[float, ...]
-    ends: str = HELD  # "held", "modulo" (the period is that of the table) or "extended"
+    ends: str = HOLD_ENDS  # "held", "modulo" (the period is that of the table) or "extended"
     # (n,); values for travel in the negative direction; empty where they are the same
     backward: tuple[float, ...] = ()
     direction: int = 0  # 1 or −1 where it acts in one direction of travel only, else 0
@@ -137,7 +137,7 @@ def interpolate(position: Array, at: Sequence[float], values: Sequence[float], e
         period = places[-1] - places[0]
         position = places[0] + np.mod(position - places[0], period)
     inside = np.interp(position, places, found)
-    if ends != EXTENDED or len(places) < 2:
+    if ends != EXTRAPOLATE or len(places) < 2:
         return inside
     low = (found[1] - found[0]) / (places[1] - places[0])
     high = (found[-1] - found[-2]) / (places[-1] - places[-2])
@@ -179,13 +179,13 @@ class Tables:
 
 SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
 """Squareness that an error of the first axis in proportion to the second one is, and its sign."""
-WAYS: tuple[int, ...] = (measured.FORWARD, measured.BACKWARD)
+DIRECTIONS: tuple[int, ...] = (measured.FORWARD, measured.BACKWARD)
 NEGLIGIBLE = 1e-9  # µm or µrad
 
 
-def errors_of(
+def errors_from_tables(
     tables: Tables, name: str, source: Source, machine: Machine | None = None
-) -> measured.Imported:
+) -> measured.ImportedErrors:
     lines = [term for term in tables.terms if isinstance(term, AxisTable)]
     series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
     planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]
@@ -207,7 +207,7 @@ def errors_of(
             _affine(term, machine, constants, curves)
     side = "" if machine is not None else " (all axes taken to carry the tool)"
     assumed = (*tables.assumed, f"what the table corrects is taken for the whole error{side}")
-    return measured.Imported(
+    return measured.ImportedErrors(
         name,
         tuple(
             one
@@ -263,9 +263,13 @@ def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> me
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
-        ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
+        ways = {
+            way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in DIRECTIONS
+        }
     if np.array_equal(ways[measured.FORWARD], ways[measured.BACKWARD]):
-        runs = (measured.MeasuredRun(1, measured.BOTH, tuple(ways[measured.FORWARD].tolist())),)
+        runs = (
+            measured.MeasuredRun(1, measured.UNDIRECTED, tuple(ways[measured.FORWARD].tolist())),
+        )
     else:
         runs = tuple(
             measured.MeasuredRun(1, way, tuple(values.tolist())) for way, values in ways.items()
@@ -282,9 +286,9 @@ def _plane(term: Product, machine: Machine | None, source: Source) -> measured.E
         )
     factor = _factor(machine, one.source, one.target)
     first, second = np.meshgrid(one.positions, other.positions, indexing="ij")
-    tables = {way: factor * term.at(first, second, way) for way in WAYS}
+    tables = {way: factor * term.at(first, second, way) for way in DIRECTIONS}
     key = error_key(one.source, one.target)
-    return measured.plane_by_direction(
+    return measured.surface_from_directions(
         key, (one.source, other.source), (one.positions, other.positions), tables
     )
 
@@ -311,9 +315,9 @@ def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.Er
             axes = (term.axes[first], term.axes[second])
             scaled: Array = _factor(machine, axes[0], target) * table
             places = (term.positions[first], term.positions[second])
-            tables = dict.fromkeys(WAYS, scaled)
+            tables = dict.fromkeys(DIRECTIONS, scaled)
             planes.append(
-                measured.plane_by_direction(error_key(axes[0], target), axes, places, tables)
+                measured.surface_from_directions(error_key(axes[0], target), axes, places, tables)
             )
     return [plane for plane in planes if np.abs(plane.values).max() > NEGLIGIBLE], left
 
@@ -335,8 +339,8 @@ def _joined(
             left.append(one)
             continue
         ends = (joined[place].second[0], joined[place].second[-1])
-        columns = {way: np.repeat(one.toward(way)[:, None], 2, axis=1) for way in WAYS}
-        own = measured.plane_by_direction(one.key, place[1], (one.positions, ends), columns)
+        columns = {way: np.repeat(one.in_direction(way)[:, None], 2, axis=1) for way in DIRECTIONS}
+        own = measured.surface_from_directions(one.key, place[1], (one.positions, ends), columns)
         joined[place] = _added(joined[place], own)
     return left, list(joined.values())
 
@@ -346,9 +350,11 @@ def _added(one: measured.ErrorSurface, other: measured.ErrorSurface) -> measured
     second = np.union1d(one.second, other.second)
     totals = {
         way: _resampled(one, way, first, second) + _resampled(other, way, first, second)
-        for way in WAYS
+        for way in DIRECTIONS
     }
-    return measured.plane_by_direction(one.key, one.axes, (first.tolist(), second.tolist()), totals)
+    return measured.surface_from_directions(
+        one.key, one.axes, (first.tolist(), second.tolist()), totals
+    )
 
 
 def _resampled(plane: measured.ErrorSurface, direction: int, first: Array, second: Array) -> Array:

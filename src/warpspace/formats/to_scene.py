@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, ErrorSurface, Imported
+from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, ErrorSurface, ImportedErrors
 from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear, parameter
@@ -24,8 +24,8 @@ from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.schema import Problems
 from warpspace.scene.text_files import one_line, radian_notes
 
-LEEWAY = 1e-6  # mm or degrees by which a position may lie beyond the travel
-LARGE = {False: 1000.0, True: 5000.0}
+TRAVEL_TOLERANCE = 1e-6  # mm or degrees by which a position may lie beyond the travel
+IMPLAUSIBLE = {False: 1000.0, True: 5000.0}
 """µm of a translation and µrad of a rotation above which the unit of a file is asked about."""
 T = TypeVar("T")
 SIGNS = {FORWARD: "+", BACKWARD: "-"}
@@ -47,7 +47,7 @@ def base_scene(machine: str) -> Scene:
     return load_scene(machine)
 
 
-def plain_scene(found: Imported) -> Scene:
+def default_scene(found: ImportedErrors) -> Scene:
     other = [axis for axis in found.axes if axis not in ("X", "Y", "Z")]
     if other:
         raise OptionError(
@@ -60,16 +60,18 @@ def plain_scene(found: Imported) -> Scene:
     return parse_scene(text, "imported")
 
 
-def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> ImportedScene:
-    found = reading.found
+def build_imported_scene(
+    reading: Reading, base: Scene | None, title: str, name: str
+) -> ImportedScene:
+    found = reading.imported
     notes: list[str] = []
     if base is None:
-        base = plain_scene(found)
+        base = default_scene(found)
         base = replace(base, title=one_line(title)[:MAX_TEXT])
         notes.append("no machine named: X, Y and Z carry the tool, travels are those of the data")
     _check_keys(found, base, name)
     _check_travel(found, base, name)
-    notes += _doubts(found, base)
+    notes += _plausibility_notes(found, base)
     curves = _curves(found, base, name)
     replaced = [key for key in curves if key in base.errors]
     if replaced:
@@ -79,7 +81,7 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
         notes.append(f"kept from {base.name}: {', '.join(kept)}")
     uncertainty, measured = _measured(found, base, keep_runs=reading.format.measured)
     model, said = _convention(found, base)
-    said_by = [*reading.found.assumed, *notes, *said, *found.notes]
+    said_by = [*reading.imported.assumed, *notes, *said, *found.notes]
     description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
     covariance = base.covariance and base.covariance.without(curves)
     if uncertainty:
@@ -106,11 +108,11 @@ def _without(table: Mapping[str, T], curves: Mapping[str, ErrorFunction]) -> dic
     return {key: value for key, value in table.items() if key not in curves}
 
 
-def _check_keys(found: Imported, base: Scene, name: str) -> None:
+def _check_keys(found: ImportedErrors, base: Scene, name: str) -> None:
     machine = base.machine
     expected = f"expected errors of {', '.join(machine.axes)}"
     needed = [(key, parameter(key).axis) for key in found.keys]
-    needed += [(plane.key, axis) for plane in found.planes for axis in plane.axes]
+    needed += [(plane.key, axis) for plane in found.surfaces for axis in plane.axes]
     problems = [
         f"{key}: the machine {machine.chain} has no axis {axis}; {expected}"
         for key, axis in needed
@@ -120,23 +122,23 @@ def _check_keys(found: Imported, base: Scene, name: str) -> None:
         raise SceneError(name, list(dict.fromkeys(problems)))
 
 
-def _ranges(found: Imported) -> dict[str, tuple[float, float]]:
+def _ranges(found: ImportedErrors) -> dict[str, tuple[float, float]]:
     at: dict[str, list[float]] = {}
     for one in found.series:
         at.setdefault(parameter(one.key).axis, []).extend(one.positions)
-    for plane in found.planes:
+    for plane in found.surfaces:
         for axis, places in zip(plane.axes, (plane.first, plane.second), strict=True):
             at.setdefault(axis, []).extend(places)
     return {axis: (min(places), max(places)) for axis, places in at.items()}
 
 
-def _check_travel(found: Imported, base: Scene, name: str) -> None:
+def _check_travel(found: ImportedErrors, base: Scene, name: str) -> None:
     problems: list[str] = []
     for axis, (low, high) in _ranges(found).items():
         one = base.machine.axes[axis]
-        if not is_linear(axis) and one.travel[1] - one.travel[0] >= 360.0 - LEEWAY:
+        if not is_linear(axis) and one.travel[1] - one.travel[0] >= 360.0 - TRAVEL_TOLERANCE:
             continue
-        if low < one.travel[0] - LEEWAY or high > one.travel[1] + LEEWAY:
+        if low < one.travel[0] - TRAVEL_TOLERANCE or high > one.travel[1] + TRAVEL_TOLERANCE:
             unit = f" {one.unit}" if is_linear(axis) else one.unit
             problems.append(
                 f"positions of {axis} {low:g} … {high:g}{unit} reach beyond its travel"
@@ -147,15 +149,15 @@ def _check_travel(found: Imported, base: Scene, name: str) -> None:
         raise SceneError(name, problems)
 
 
-def _doubts(found: Imported, base: Scene) -> list[str]:
+def _plausibility_notes(found: ImportedErrors, base: Scene) -> list[str]:
     notes = list(coverage_notes(base, _ranges(found)))
     for one in found.series:
         if not is_linear(axis := parameter(one.key).axis):
             notes += radian_notes({f"{one.key} over {axis}_deg": one.positions})
-    largest = {one.key: float(np.abs(one.values).max()) for one in (*found.series, *found.planes)}
+    largest = {one.key: float(np.abs(one.values).max()) for one in (*found.series, *found.surfaces)}
     largest |= {key: abs(value) for key, value in found.constants.items()}
     for key, value in largest.items():
-        if value > LARGE[parameter(key).is_rotation]:
+        if value > IMPLAUSIBLE[parameter(key).is_rotation]:
             units = f", read in {', '.join(found.units)}" if found.units else ""
             notes.append(
                 f"{key} reaches {value:g} {parameter(key).unit}{units}: is the file in this unit?"
@@ -163,11 +165,11 @@ def _doubts(found: Imported, base: Scene) -> list[str]:
     return notes
 
 
-def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]:
+def _curves(found: ImportedErrors, base: Scene, name: str) -> dict[str, ErrorFunction]:
     curves: dict[str, ErrorFunction] = {}
     for key, value in found.constants.items():
         curves[key] = Constant(base.axis_span(parameter(key).axis), value)
-    for one in (*found.series, *found.planes):
+    for one in (*found.series, *found.surfaces):
         if one.key in curves:
             raise SceneError(name, [f"{one.key} is given twice; expected each error once"])
         curves[one.key] = (
@@ -212,7 +214,7 @@ def _surface(plane: ErrorSurface, base: Scene, name: str) -> ErrorFunction:
 
 
 def _measured(
-    found: Imported, base: Scene, *, keep_runs: bool
+    found: ImportedErrors, base: Scene, *, keep_runs: bool
 ) -> tuple[dict[str, ErrorFunction], dict[str, Measurement]]:
     uncertainty: dict[str, ErrorFunction] = {
         key: Constant(base.axis_span(parameter(key).axis), value)
@@ -237,7 +239,7 @@ def _measured(
     return uncertainty, measured
 
 
-def _convention(found: Imported, base: Scene) -> tuple[Model, list[str]]:
+def _convention(found: ImportedErrors, base: Scene) -> tuple[Model, list[str]]:
     model = base.model
     own = dict(model.own_component_errors)
     said: list[str] = []

@@ -35,7 +35,7 @@ from warpspace.analysis.uncertainty.propagation import (
 from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.formats.source import MAX_LINES, spell, spell_comment
+from warpspace.formats.source import MAX_LINES, format_comment, format_number
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_LINE_POINTS, MAX_PATH_POINTS
@@ -428,7 +428,7 @@ def correct_program(asked: Program, read: interpreter.ReadProgram) -> Iterator[s
 def _header(scene: Scene, asked: Program) -> Iterator[str]:
     digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
     said = f"for {scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
-    yield spell_comment("(", f"corrected {said}", ")")
+    yield format_comment("(", f"corrected {said}", ")")
     setup = "".join(f", {name}={value:g}" for name, value in asked.offset)
     yield f"(TCP {asked.tcp}, length {asked.length_mm:g} mm{setup})"
     yield f"(within {asked.within_um:g} um between points; geometry only)"
@@ -452,11 +452,11 @@ def _blocks(
             value = float(place[state.index[letter]]) - state.place(letter, 0.0)
             digits = DECIMALS + (2 if letter in "ABC" else state.unit_mm != 1.0)
             unit = 1.0 if letter in "ABC" else state.unit_mm
-            words.append(letter + spell(value / unit, digits))
+            words.append(letter + format_number(value / unit, digits))
         if state.inverse_time and not is_rapid and "F" in state.words:
-            words.append("F" + spell(state.words["F"] * len(kinds), DECIMALS))
+            words.append("F" + format_number(state.words["F"] * len(kinds), DECIMALS))
         yield state.skip + " ".join([*number, *words, *(() if left else last), *rest])
         number, rest = [], []
         if state.motion == "G82" and not is_rapid:
-            dwell = spell(state.cycle.get("P", 0.0), DECIMALS).removesuffix(".0")
+            dwell = format_number(state.cycle.get("P", 0.0), DECIMALS).removesuffix(".0")
             yield f"{state.skip}G4 P{dwell}"

@@ -12,7 +12,7 @@ from warpspace.formats.kinds import fanuc_3d
 from warpspace.formats.registry import ReadOptions, formats, read_errors, recognise
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import AxisTable, Product
-from warpspace.formats.to_scene import into_scene
+from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, error_transform, point_in_branch
 from warpspace.kinematics.model import complete_coordinates
@@ -45,7 +45,7 @@ def sources_of(found):
 def read_back(found, scene):
     reading = read_errors(sources_of(found), ReadOptions(scene.machine))
     assert reading.recognised
-    return into_scene(reading, replace(scene, errors=ErrorSet()), "", "written").scene
+    return build_imported_scene(reading, replace(scene, errors=ErrorSet()), "", "written").scene
 
 
 WRITTEN = {one.name: one for one in formats() if one.can_write}
@@ -237,7 +237,7 @@ def test_constants_of_the_alternative_model_turn_with_the_axis():
     base = load_scene("dvf5000_nominal")
     options = ReadOptions(base.machine, variant="alternative")
     reading = read_errors([source_of_text(text, "e.exc")], options)
-    scene = into_scene(reading, base, "", "e.exc").scene
+    scene = build_imported_scene(reading, base, "", "e.exc").scene
     assert isinstance(scene.errors.functions["EAC"], Harmonics)
     at = {"X": 0.0, "Y": 0.0, "Z": 0.0, "B": 0.0, "C": np.array([0.0, 30.0, 90.0, 200.0])}
     found = evaluate(scene, at=at, loop="workpiece").error_um

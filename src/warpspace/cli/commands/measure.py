@@ -198,9 +198,9 @@ def import_(
         return
 
     from warpspace.analysis.description import to_json
-    from warpspace.formats.measured import summaries, summary_table
+    from warpspace.formats.measured import summarise_errors, summary_table
     from warpspace.formats.registry import ReadOptions, open_files, parse_axis_options, read_errors
-    from warpspace.formats.to_scene import base_scene, into_scene
+    from warpspace.formats.to_scene import base_scene, build_imported_scene
     from warpspace.scene.machine_library import machine_names
 
     scenes = [machine] if machine and machine not in machine_names() else []
@@ -214,12 +214,12 @@ def import_(
         what = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
         if base is not None and (title or not scenes):
             base = replace(base, title=one_line(title or files[0].stem), name=Path(output).stem)
-        made = into_scene(reading, base, title or files[0].stem, what)
+        made = build_imported_scene(reading, base, title or files[0].stem, what)
     kind = reading.format
     how = "recognised" if reading.recognised else "as told"
     echo(f"warpspace: {kind.name}, {kind.title} ({how})", err=True)
     write_text(output, made.text, force=force)
-    notes = [*reading.found.notes, *made.notes]
+    notes = [*reading.imported.notes, *made.notes]
     if as_json:
         print_json(
             {
@@ -227,18 +227,18 @@ def import_(
                 "recognised": reading.recognised,
                 "machine": made.scene.machine.name,
                 "chain": str(made.scene.machine.chain),
-                "units": list(reading.found.units),
-                "errors": to_json(summaries(reading.found)),
-                "assumed": list(reading.found.assumed),
+                "units": list(reading.imported.units),
+                "errors": to_json(summarise_errors(reading.imported)),
+                "assumed": list(reading.imported.assumed),
                 "notes": notes,
                 "output": str(output),
             }
         )
         return
     print_text(f"{output}: {kind.title}, {made.scene.machine.chain}")
-    print_text(f"  units: {', '.join(reading.found.units)}")
-    print_blocks([summary_table(reading.found)])
-    for text in reading.found.assumed:
+    print_text(f"  units: {', '.join(reading.imported.units)}")
+    print_blocks([summary_table(reading.imported)])
+    for text in reading.imported.assumed:
         print_text(f"  assumed: {text}")
     for text in notes:
         print_text(f"  {text}")
@@ -289,7 +289,7 @@ def _write_template(
     *,
     force: bool,
 ) -> None:
-    from warpspace.formats.kinds.csv_own import surface_template, usual_places
+    from warpspace.formats.kinds.csv_own import default_positions, surface_template
     from warpspace.formats.kinds.csv_own import template as spelled
     from warpspace.machine.axes import is_axis_name
 
@@ -310,7 +310,7 @@ def _write_template(
                 f"--over {over!r}; expected another axis than {name}, such as Z=0,100"
             )
         beside = _positions(given if equals else None, "--over")
-        at = (places or usual_places(name), beside or usual_places(other))
+        at = (places or default_positions(name), beside or default_positions(other))
         if len(at[0]) * len(at[1]) > MOST_ROWS:
             found = f"{len(at[0])} × {len(at[1])} points"
             raise OptionError(f"{found}; expected at most {MOST_ROWS:,} rows")

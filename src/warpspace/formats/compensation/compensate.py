@@ -17,7 +17,7 @@ from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.controller import (
     BeforeAfter,
     Controller,
-    evaluated,
+    evaluate_before_after,
     read_back,
     reversal_notes,
 )
@@ -37,18 +37,18 @@ NODES = 28  # nodes per axis that what is left is evaluated at: between the poin
 SMALL_NODES = 7  # nodes and points per axis that the placement of a workpiece is fitted with
 STEP = 100.0  # µm and µrad by which a placement is changed to see what a table makes of it
 MOVABLE = 0.05  # A table that leaves less than this share of a displaced part can move it
-PLACED = (
+PLACED_ASSUMPTION = (
     "a part is judged by its shape: where it lies (three shifts, three small rotations) is fitted"
     " out of the errors before and after"
 )
 NO_OFFSETS = ", since the format has no place for it"
 RESOLUTION = (0.0, 0.1)  # mm or degrees
 SIZES = (3, 5, 9, 17)
-MOST = 32  # compensations of one sweep
-FEW = ("linuxcnc-matrix", "marlin")
+MAX_TABLES = 32  # compensations of one sweep
+GRIDLESS = ("linuxcnc-matrix", "marlin")
 """Formats without a grid that a sweep shows where none are named; Klipper's skew is Marlin's."""
 TABLES = ("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv")
-LEAST_UM = 1e-3  # lower end of the chart of a sweep, where nothing is left
+MIN_CHART_UM = 1e-3  # lower end of the chart of a sweep, where nothing is left
 Points: TypeAlias = int | tuple[tuple[str, int], ...]
 """Points of a table along every axis, or along each."""
 
@@ -154,7 +154,7 @@ class Compensate(Analysis):
         scene = placed_in(scene, asked.loop or "", placed=self.placed)
         if self.sweep:
             return sweep(scene, asked)
-        return compensate(scene, asked, watch=lambda: watch(0.0))
+        return compensate(scene, asked, check_cancelled=lambda: watch(0.0))
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,11 @@ class Compensation(BeforeAfter, Result):
             for sense, words in senses
             if (axes := [axis for axis in self.axes if machine.sense(axis) == sense])
         )
-        placed = [f"{PLACED}{'' if self.format.offsets else NO_OFFSETS}"] if self.placed else []
+        placed = (
+            [f"{PLACED_ASSUMPTION}{'' if self.format.offsets else NO_OFFSETS}"]
+            if self.placed
+            else []
+        )
         return (*self.controller.assumed, *said, *placed)
 
     @property
@@ -220,8 +224,8 @@ class Compensation(BeforeAfter, Result):
         return {"expected_rms_um": rms if self.field_uncertainty.errors.is_known else None}
 
     @property
-    def points_words(self) -> str:
-        return spell_points(self.format, self.points)
+    def points_text(self) -> str:
+        return format_points(self.format, self.points)
 
     @property
     def bytes(self) -> int:
@@ -278,33 +282,33 @@ class Compensation(BeforeAfter, Result):
         yield from u95_lines(self.field_uncertainty and self.field_uncertainty.errors, named)
         if (rms := self.expected.get("expected_rms_um")) is not None:
             yield f"  expected on the machine: RMS {rms:.2f} µm, as its errors are not known better"
-        yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_words}"
+        yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_text}"
         yield from (f"  assumed: {text}" for text in self.assumed)
         yield from (f"  {text}" for text in self.notes)
 
 
-def spell_points(kind: Format, points: Mapping[str, int]) -> str:
+def format_points(kind: Format, points: Mapping[str, int]) -> str:
     if kind.grid.startswith("none"):
         return "no grid"
     return ", ".join(f"{axis} {count}" for axis, count in points.items()) + " points"
 
 
-def table_points(kind: Format, scene: Scene, asked: Points | None) -> dict[str, int]:
+def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str, int]:
     axes = [axis for axis in scene.machine.axes if axis in scene.workspace.volume_axes]
     if not axes:
         raise OptionError(f"{scene.name}: no axis has a range in [workspace]; nothing to correct")
-    if isinstance(asked, tuple):
-        by_axis = dict(asked)
+    if isinstance(points, tuple):
+        by_axis = dict(points)
         for axis in by_axis:
             if axis not in axes:
                 raise OptionError(f"{{points}} {axis}: expected one of {', '.join(axes)}")
         given = {axis: by_axis.get(axis, kind.points) for axis in axes}
     else:
-        given = dict.fromkeys(axes, asked or kind.points)
+        given = dict.fromkeys(axes, points or kind.points)
     for axis, count in given.items():
-        if not 2 <= count <= kind.most_points:
+        if not 2 <= count <= kind.max_points:
             raise OptionError(
-                f"{{points}} {axis}={count}: {kind.name} takes 2 to {kind.most_points} points an"
+                f"{{points}} {axis}={count}: {kind.name} takes 2 to {kind.max_points} points an"
                 " axis"
             )
     return given
@@ -312,50 +316,54 @@ def table_points(kind: Format, scene: Scene, asked: Points | None) -> dict[str, 
 
 def compensate(
     scene: Scene,
-    asked: Compensate,
+    options: Compensate,
     nodes: int = NODES,
     *,
-    watch: Callable[[], None] = lambda: None,
+    check_cancelled: Callable[[], None] = lambda: None,
 ) -> Compensation:
-    kind, loop, sign = find_format(asked.formats[0]), asked.loop or "", asked.sign or ""
+    kind, loop, sign = find_format(options.formats[0]), options.loop or "", options.sign or ""
     if kind.write is None:
         raise OptionError(
             f"{kind.name} is read only; `warpspace import --formats` lists what can be written"
         )
-    if asked.orientation and not kind.orientation:
+    if options.orientation and not kind.orientation:
         raise OptionError(f"{{orientation}}: {kind.name} corrects the position only")
     if sign and (sign not in SIGNS or kind.tables is None):
         raise OptionError(f"{{sign}} {sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
         scene = in_direction(scene, TravelDirection.MEAN)
     scene = placed_for([kind], scene, loop)
-    corrector = build_corrector(scene, loop, orientation=asked.orientation)
-    points = table_points(kind, scene, asked.points)
-    wanted = RequiredCorrections(scene, corrector, points, asked.resolution, sign, asked.stem)
-    watch()
+    corrector = build_corrector(scene, loop, orientation=options.orientation)
+    points = table_points(kind, scene, options.points)
+    corrections = RequiredCorrections(
+        scene, corrector, points, options.resolution, sign, options.stem
+    )
+    check_cancelled()
     if kind.tables is not None:
-        wanted = replace(wanted, corrector=_placed(kind, kind.write, wanted, watch))
-    files = kind.write(wanted)
-    watch()
+        corrections = replace(
+            corrections, corrector=_placed(kind, kind.write, corrections, check_cancelled)
+        )
+    files = kind.write(corrections)
+    check_cancelled()
     grid = build_grid(scene.model, scene.workspace, nodes)
-    label = f"{kind.title.partition(',')[0]} ({spell_points(kind, points)})"
-    controller = read_back(kind, files, wanted, label)
-    watch()
-    own = evaluated(controller, grid, scene.model.direction)
-    watch()
+    label = f"{kind.title.partition(',')[0]} ({format_points(kind, points)})"
+    controller = read_back(kind, files, corrections, label)
+    check_cancelled()
+    own = evaluate_before_after(controller, grid, scene.model.direction)
+    check_cancelled()
     directions: dict[str, BeforeAfter] = {}
     reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
         there, back = (
-            evaluated(controller, grid, way)
+            evaluate_before_after(controller, grid, way)
             for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
         directions = {"forward": there, "backward": back}
         reversal = reversal_notes(there, back, scene.errors, scene.model.direction)
-        watch()
+        check_cancelled()
     return Compensation(
         own.before, own.after, grid, own.field_uncertainty, kind, files, points, controller, directions,
-        reversal, asked.resolution,
+        reversal, options.resolution,
     )  # fmt: skip
 
 
@@ -450,7 +458,7 @@ class Sweep(Result):
         ]
         yield Table(columns, rows)
         if any(one.placed for one in self.steps):
-            yield f"  assumed: {PLACED}"
+            yield f"  assumed: {PLACED_ASSUMPTION}"
         yield from (f"  left out: {text}" for text in self.left_out)
         for words, of in (("largest", "max_um"), ("mean over the volume", "mean_um")):
             title = f"Left over the working volume: {words}"
@@ -460,44 +468,44 @@ class Sweep(Result):
 
     def _curves(self, of: str) -> tuple[Curve, ...]:
         sizes = [max(one.numbers, 1) for one in self.steps]
-        before = np.full(2, max(getattr(self.before, of), LEAST_UM))
+        before = np.full(2, max(getattr(self.before, of), MIN_CHART_UM))
         curves = [Curve("before", np.array([min(sizes), max(sizes)], float), before, style="thin")]
         for number, kind in enumerate(dict.fromkeys(one.format for one in self.steps)):
             own = [one for one in self.steps if one.format == kind]
             x = np.array([max(one.numbers, 1) for one in own], float)
-            y = np.array([max(getattr(one.after, of), LEAST_UM) for one in own])
+            y = np.array([max(getattr(one.after, of), MIN_CHART_UM) for one in own])
             curves += [Curve(kind, x, y, number), Curve("", x, y, number, "dots")]
         return tuple(curves)
 
 
-def sweep(scene: Scene, asked: Compensate) -> Sweep:
-    names = list(dict.fromkeys(asked.formats)) or [*TABLES, *FEW]
+def sweep(scene: Scene, options: Compensate) -> Sweep:
+    names = list(dict.fromkeys(options.formats)) or [*TABLES, *GRIDLESS]
     wanted: list[tuple[str, int]] = []
     for name in names:
-        kind, sizes = find_format(name), asked.sweep or SIZES
+        kind, sizes = find_format(name), options.sweep or SIZES
         gridless = kind.grid.startswith("none")
-        counts = [0] if gridless else [count for count in sizes if 2 <= count <= kind.most_points]
+        counts = [0] if gridless else [count for count in sizes if 2 <= count <= kind.max_points]
         wanted += [(name, count) for count in counts]
-    if len(wanted) > MOST:
-        raise OptionError(f"{{sweep}} of {len(wanted)} tables; expected at most {MOST}")
+    if len(wanted) > MAX_TABLES:
+        raise OptionError(f"{{sweep}} of {len(wanted)} tables; expected at most {MAX_TABLES}")
     title = scene.title
-    scene = placed_for([find_format(name) for name in names], scene, asked.loop or "")
+    scene = placed_for([find_format(name) for name in names], scene, options.loop or "")
     before: Statistics | None = None
     steps: list[SweepStep] = []
     left_out: dict[str, str] = {}
     for name, count in wanted:
         kind = find_format(name)
         own = replace(
-            asked,
+            options,
             formats=(name,),
             points=count or None,
-            resolution=0.0 if kind.parametric else asked.resolution,
-            sign=asked.sign if kind.tables else None,
+            resolution=0.0 if kind.parametric else options.resolution,
+            sign=options.sign if kind.tables else None,
         )
         try:
             found = compensate(scene, own)
         except OptionError as error:
-            if asked.formats:
+            if options.formats:
                 raise
             left_out[name] = str(error)
             continue

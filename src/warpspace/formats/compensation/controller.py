@@ -9,7 +9,7 @@ from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_u
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, fit_placement
 from warpspace.field.grid import Grid, build_grid
-from warpspace.formats.compensation.corrections import Corrector, Moved, RequiredCorrections
+from warpspace.formats.compensation.corrections import Corrector, MovedPoints, RequiredCorrections
 from warpspace.formats.registry import Files, Format, Reading, ReadOptions
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables
@@ -19,44 +19,46 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene, in_direction
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
-WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
+TRAVEL_SIGN = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
 
 
 @dataclass(frozen=True)
-class Corrected:
+class CorrectedPoints:
     """Points that a controller moves a machine to, before the errors of the machine count."""
 
     nominal_mm: Array  # [..., 3]
-    moved: Moved
-    held: Moved | None = None  # the point that is held still; None for absolute errors
+    points: MovedPoints
+    reference: MovedPoints | None = None  # the point that is held still; None for absolute errors
     # what is subtracted: the way back, where the difference of both directions is looked at
-    less: "Corrected | None" = None
+    subtracted: "CorrectedPoints | None" = None
     # or None; nodes over which the placement of the workpiece is fitted out; None leaves it in
-    volume: "tuple[Grid, Corrected] | None" = None
+    placement_nodes: "tuple[Grid, CorrectedPoints] | None" = None
 
     def field(self, errors: ErrorSet) -> ErrorField:
         placement = None
-        if self.volume is not None:
-            grid, nodes = self.volume
-            placement = fit_placement(self.moved.model, grid, nodes.field(errors).error_um)
-        position, orientation = self.moved.without(placement, *self.moved.residual(errors))
-        if self.held is not None:
-            position = position - self.held.without(placement, *self.held.residual(errors))[0]
+        if self.placement_nodes is not None:
+            grid, nodes = self.placement_nodes
+            placement = fit_placement(self.points.model, grid, nodes.field(errors).error_um)
+        position, orientation = self.points.without(placement, *self.points.residual(errors))
+        if self.reference is not None:
+            position = (
+                position - self.reference.without(placement, *self.reference.residual(errors))[0]
+            )
         shape = np.broadcast_shapes(position.shape, self.nominal_mm.shape)
         found = ErrorField(
             np.broadcast_to(self.nominal_mm, shape),
             np.broadcast_to(position, shape) * UM_PER_MM,
             np.broadcast_to(orientation, shape) * URAD_PER_RAD,
         )
-        return found if self.less is None else found - self.less.field(errors)
+        return found if self.subtracted is None else found - self.subtracted.field(errors)
 
     @property
     def nbytes(self) -> int:
-        moved = self.moved
+        moved = self.points
         arrays = (*moved.coordinates.values(), moved.point_mm, moved.shift_mm, moved.turn_rad)
         own = sum(array.nbytes for array in arrays)
-        own += 0 if self.volume is None else self.volume[1].nbytes
-        return own + (0 if self.less is None else self.less.nbytes)
+        own += 0 if self.placement_nodes is None else self.placement_nodes[1].nbytes
+        return own + (0 if self.subtracted is None else self.subtracted.nbytes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +79,7 @@ class Controller:
         """Give what it adds to commanded positions."""
         way = TravelDirection(direction or self.scene.model.direction)
         if self.tables is not None:
-            return dict(self.tables.corrections(coordinates, WAYS.get(way, 0)))
+            return dict(self.tables.corrections(coordinates, TRAVEL_SIGN.get(way, 0)))
         own = self.corrector
         return replace(own, model=replace(own.model, direction=way)).moves(coordinates)
 
@@ -88,7 +90,7 @@ class Controller:
         scene: Scene | None = None,
         loop: Loop | None = None,
         point_mm: Array | None = None,
-    ) -> Corrected:
+    ) -> CorrectedPoints:
         """Work out all of a field that does not depend on the errors; see `field`."""
         scene, loop = scene or self.scene, loop or self.loop
         way = TravelDirection(scene.model.direction)
@@ -105,11 +107,11 @@ class Controller:
             grid, absolute = build_grid(scene.model, over), replace(scene, reference=None)
             at = (grid.coordinates, grid.nominal_mm, replace(absolute, placed=False), loop)
             volume = grid, self.at(*at, grid.point_mm)
-        return Corrected(
+        return CorrectedPoints(
             nominal_mm,
             machine.move(coordinates, self.moves(coordinates, way), point_mm),
             None if held is None else machine.move(held, self.moves(held, way)),
-            volume=volume,
+            placement_nodes=volume,
         )
 
     def field(
@@ -136,7 +138,7 @@ def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | Non
 
 
 def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: str) -> Controller:
-    from warpspace.formats.to_scene import into_scene
+    from warpspace.formats.to_scene import build_imported_scene
 
     scene, corrector = wanted.scene, wanted.corrector
     sources = [
@@ -158,7 +160,9 @@ def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: st
         )
     found = kind.errors(sources, options)
     bare = replace(scene, errors=ErrorSet(), uncertainty={}, measured={})
-    held = into_scene(Reading(found, kind, recognised=True), bare, scene.title, scene.name).scene
+    held = build_imported_scene(
+        Reading(found, kind, recognised=True), bare, scene.title, scene.name
+    ).scene
     errors = held.errors
     if wanted.resolution:
         raise OptionError(
@@ -192,9 +196,9 @@ def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: st
     )
 
 
-HELD = 0.05
+MAX_REVERSAL_SHARE = 0.05
 """Share of the reversal that may be left where a format holds it: the steps of its table."""
-LEAST_UM = 0.01  # A reversal below it is none
+MIN_REVERSAL_UM = 0.01  # A reversal below it is none
 
 
 @dataclass(frozen=True)
@@ -232,7 +236,7 @@ class BeforeAfter:
         return found.mean_um, found.max_um
 
 
-def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
+def evaluate_before_after(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
     at, nominal, scene = grid.coordinates, grid.nominal_mm, controller.scene
     scene = in_direction(scene, direction)
     before = controller.without().field(at, nominal, scene)
@@ -248,7 +252,7 @@ def reversal_notes(
         float((one - other).norm_um.max())
         for one, other in ((there.before, back.before), (there.after, back.after))
     )
-    if after <= max(LEAST_UM, HELD * before):
+    if after <= max(MIN_REVERSAL_UM, MAX_REVERSAL_SHARE * before):
         return ()
     keys = ", ".join(key for key, curve in errors.functions.items() if curve.has_directions)
     words = DIRECTION_WORDS[TravelDirection(direction)]

@@ -18,13 +18,13 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
-STEPS = 2  # newton steps: an error grows by a ten-thousandth of the correction at most
+NEWTON_STEPS = 2  # newton steps: an error grows by a ten-thousandth of the correction at most
 SMALL_MM, SMALL_DEG = 1e-2, 1e-3  # moves by which the response of the tool to an axis is measured
-CUT = 1e-3  # moves that act less than this share of the best one are not used
+RELATIVE_CUTOFF = 1e-3  # moves that act less than this share of the best one are not used
 
 
 @dataclass(frozen=True)
-class Moved:
+class MovedPoints:
     """Points of a machine whose axes were moved, before its errors count."""
 
     model: Model
@@ -80,10 +80,10 @@ class Corrector:
 
     def move(
         self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
-    ) -> "Moved":
+    ) -> "MovedPoints":
         """Work out all of a residual that does not depend on the errors; see `residual`."""
         after = {axis: q + moves[axis] if axis in moves else q for axis, q in coordinates.items()}
-        return Moved(
+        return MovedPoints(
             self.model, self.loop, after, *self._nominal_motion(coordinates, after, point_mm)
         )
 
@@ -127,7 +127,7 @@ class Corrector:
         back = _inverse(shift)
         carried, turn = self._response(coordinates, self.tilting)
         upright = _inverse(turn)
-        for _ in range(STEPS):
+        for _ in range(NEWTON_STEPS):
             position, orientation = self.residual(coordinates, total)
             if self.tilting:
                 tilt = -_times(upright, orientation)
@@ -161,7 +161,7 @@ class Corrector:
 def _inverse(matrix: Array) -> Array:
     if not matrix.shape[-1]:
         return np.swapaxes(matrix, -1, -2)
-    return np.asarray(np.linalg.pinv(matrix, rcond=CUT), dtype=np.float64)
+    return np.asarray(np.linalg.pinv(matrix, rcond=RELATIVE_CUTOFF), dtype=np.float64)
 
 
 def _times(matrix: Array, vector: Array) -> Array:
@@ -226,7 +226,7 @@ class RequiredCorrections:
         spanning = self.scene.workspace.volume_axes
         return tuple(axis for axis in self.scene.machine.axes if axis in spanning)
 
-    def places(self, axis: str) -> Array:
+    def positions(self, axis: str) -> Array:
         return np.linspace(*self.scene.workspace.ranges[axis], self.points[axis])
 
     def factor(self, usual: str) -> float:
@@ -239,13 +239,13 @@ class RequiredCorrections:
         return np.round(given / step) * step if step else given
 
     @property
-    def directed(self) -> tuple[str, ...]:
+    def directional_axes(self) -> tuple[str, ...]:
         """Those of `axes` that have errors by direction of travel."""
         functions = self.corrector.errors.functions
         found = {parameter(key).axis for key, curve in functions.items() if curve.has_directions}
         return tuple(axis for axis in self.axes if axis in found)
 
-    def toward(self, direction: str, axis: str = "") -> "RequiredCorrections":
+    def for_direction(self, direction: str, axis: str = "") -> "RequiredCorrections":
         """Give what is wanted for one direction of travel, of all axes or of one alone."""
         model, errors = self.corrector.model, self.corrector.errors
         if not axis:
@@ -267,17 +267,17 @@ class RequiredCorrections:
         coordinates |= dict(zip(self.axes, meshed, strict=True))
         return self.corrector.moves(coordinates)
 
-    def averaged(self, kept: Sequence[str]) -> dict[str, Array]:
+    def averaged(self, axes: Sequence[str]) -> dict[str, Array]:
         places = {
-            axis: self.places(axis)
-            if axis in kept
+            axis: self.positions(axis)
+            if axis in axes
             else np.linspace(*self.scene.workspace.ranges[axis], OTHER_NODES)
             for axis in self.axes
         }
         weights = shares(OTHER_NODES)
         found = self.corrections(places)
         for index in reversed(range(len(self.axes))):
-            if self.axes[index] not in kept:
+            if self.axes[index] not in axes:
                 found = {
                     axis: np.moveaxis(value, index, -1) @ weights for axis, value in found.items()
                 }

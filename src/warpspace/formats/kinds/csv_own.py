@@ -10,7 +10,7 @@ import numpy as np
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, described
+from warpspace.formats.registry import Files, Format, ReadOptions, format_description
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
@@ -18,9 +18,9 @@ from warpspace.formats.source import (
     URAD_PER,
     Source,
     SourceLine,
-    shown,
+    format_number,
+    quote,
     source_of_text,
-    spell,
 )
 from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
@@ -28,12 +28,12 @@ from warpspace.scene.text_files import CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
-SIGNS = {measured.FORWARD: "+", measured.BACKWARD: "-", measured.BOTH: ""}
+SIGNS = {measured.FORWARD: "+", measured.BACKWARD: "-", measured.UNDIRECTED: ""}
 DIGITS = 6  # behind the point of a value, µm or µrad
 UNITS = "# Units stand in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
 
 
-def usual_places(axis: str) -> tuple[float, ...]:
+def default_positions(axis: str) -> tuple[float, ...]:
     """Give positions of a table to fill in, mm or degrees."""
     return (-250, -125, 0, 125, 250) if is_linear(axis) else (0, 90, 180, 270, 360)
 
@@ -63,7 +63,7 @@ def surface_template(axes: tuple[str, str], places: tuple[Sequence[float], Seque
 
 
 def template(axis: str, places: Sequence[float] = ()) -> str:
-    spans = places or usual_places(axis)
+    spans = places or default_positions(axis)
     lines = [
         f"# Errors of the {axis} axis: actual - nominal, a row a position of a run.",
         "# run: 1, 2, 3 …; direction: + towards growing positions, - towards falling ones.",
@@ -91,12 +91,14 @@ def _to_fill_in(
 def write(wanted: RequiredCorrections) -> Files:
     """Write the errors of a scene: constants in the main file, one file an axis beside it."""
     files: dict[str, str] = {}
-    for table in measured.tables_of(measured.sampled(wanted)):
+    for table in measured.build_error_tables(measured.sample_errors(wanted)):
         directed = [DIRECTION] if table.directed else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
         for at, way, values in table.rows:
             told = [SIGNS[way]] if directed else []
-            rows.append([*map(repr, at), *told, *(spell(value, DIGITS) for value in values)])
+            rows.append(
+                [*map(repr, at), *told, *(format_number(value, DIGITS) for value in values)]
+            )
         name = ("constant", *table.axes[:1], table.keys[0])[len(table.axes)]
         files[f"_{name}.csv"] = _lines(rows)
     if not files:
@@ -108,8 +110,8 @@ def write(wanted: RequiredCorrections) -> Files:
 NAME = "csv"
 POSITION, ERROR, UNCERTAINTY = "position", "error", "uncertainty"
 DIRECTIONS: Mapping[str, int] = {
-    "": measured.BOTH,
-    "0": measured.BOTH,
+    "": measured.UNDIRECTED,
+    "0": measured.UNDIRECTED,
     "+": measured.FORWARD,
     "1": measured.FORWARD,
     "+1": measured.FORWARD,
@@ -138,17 +140,17 @@ class _CsvColumn:
         if self.role == DIRECTION:
             way = unguard_cell(cell).lower()
             if way not in DIRECTIONS:
-                at.refuse(f"direction {shown(cell)}", "+, - or nothing")
+                at.refuse(f"direction {quote(cell)}", "+, - or nothing")
             return DIRECTIONS[way]
         if self.role == RUN:
-            return at.whole(cell, RUN, 0, 10**9)
+            return at.integer(cell, RUN, 0, 10**9)
         if not cell and self.role != POSITION:
             return math.nan
         value = self.factor * table.number(cell, at.line, self.name)
         if self.role == POSITION:
             return at.checked_position(value, self.name)
         if self.role == UNCERTAINTY and value <= 0.0:
-            at.refuse(f"u({self.name}) {shown(cell)}", "a standard uncertainty above 0")
+            at.refuse(f"u({self.name}) {quote(cell)}", "a standard uncertainty above 0")
         return at.checked_error(value, self.name)
 
 
@@ -164,11 +166,11 @@ class _CsvTable:
     columns: tuple[_CsvColumn, ...]
     rows: tuple[_Row, ...]
 
-    def of(self, role: str) -> list[str]:
+    def names_with_role(self, role: str) -> list[str]:
         return [one.name for one in self.columns if one.role == role]
 
-    def ways(self) -> list[int]:
-        return [int(row.get((DIRECTION, DIRECTION), measured.BOTH)) for _, row in self.rows]
+    def directions(self) -> list[int]:
+        return [int(row.get((DIRECTION, DIRECTION), measured.UNDIRECTED)) for _, row in self.rows]
 
 
 def recognise(head: str, name: str) -> bool:
@@ -200,7 +202,7 @@ def _column(at: SourceLine, part: str) -> _CsvColumn:
     matched = _heading(part)
     if matched is None:
         expected = "headings such as X [mm], EXX [um], u(EXX) [um], run, direction"
-        at.refuse(f"column {shown(part)}", expected)
+        at.refuse(f"column {quote(part)}", expected)
     uncertain, name = bool(matched[1]), matched[2].upper()
     unit = (matched[3] or matched[4] or matched[5] or "").strip()
     if name in PARAMETERS:
@@ -211,19 +213,19 @@ def _column(at: SourceLine, part: str) -> _CsvColumn:
     else:
         errors = (f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")
         hint = near_miss(name, [*"XYZABCUVW", *errors])
-        at.refuse(f"column {shown(part)}", f"an axis, an error, u(error), run or direction{hint}")
+        at.refuse(f"column {quote(part)}", f"an axis, an error, u(error), run or direction{hint}")
     if not unit:
         units = ", ".join(one for one in known if one.isascii())
         at.refuse(f"column {name} has no unit", f"{name} [unit], of {units}")
     return _CsvColumn(role, name, at.unit(unit, known, name), unit)
 
 
-def read(sources: Sequence[Source], options: ReadOptions) -> measured.Imported:
+def read(sources: Sequence[Source], options: ReadOptions) -> measured.ImportedErrors:
     del options
     return measured.merge([_read_one(source) for source in sources])
 
 
-def _read_one(source: Source) -> measured.Imported:
+def _read_one(source: Source) -> measured.ImportedErrors:
     given = source.rows(MAX_POINTS)
     if not given.header:
         source.refuse("has no header", "one such as X [mm],EXX [um]")
@@ -246,8 +248,8 @@ def _read_one(source: Source) -> measured.Imported:
     return replace(found, units=units, notes=(*notes, *found.notes))
 
 
-def _errors(table: _CsvTable) -> measured.Imported:
-    errors, positions = table.of(ERROR), table.of(POSITION)
+def _errors(table: _CsvTable) -> measured.ImportedErrors:
+    errors, positions = table.names_with_role(ERROR), table.names_with_role(POSITION)
     if not positions:
         return _constants(table)
     if constant := next((key for key in errors if parameter(key).is_constant), ""):
@@ -264,24 +266,24 @@ def _errors(table: _CsvTable) -> measured.Imported:
     return _series(table, axis)
 
 
-def _constants(table: _CsvTable) -> measured.Imported:
+def _constants(table: _CsvTable) -> measured.ImportedErrors:
     if len(table.rows) != 1:
         expected = "one, or a column of positions such as X [mm]"
         table.head.refuse(f"{len(table.rows)} rows of errors without positions", expected)
     ((at, row),) = table.rows
-    constants = {key: row[ERROR, key] for key in table.of(ERROR)}
+    constants = {key: row[ERROR, key] for key in table.names_with_role(ERROR)}
     if empty := next((key for key, value in constants.items() if math.isnan(value)), ""):
         at.refuse(f"{empty} is empty", "a number")
-    uncertain = {key: row[UNCERTAINTY, key] for key in table.of(UNCERTAINTY)}
+    uncertain = {key: row[UNCERTAINTY, key] for key in table.names_with_role(UNCERTAINTY)}
     given = {key: value for key, value in uncertain.items() if not math.isnan(value)}
-    return measured.Imported(NAME, constants=constants, uncertainty=given)
+    return measured.ImportedErrors(NAME, constants=constants, uncertainty=given)
 
 
-def _series(table: _CsvTable, axis: str) -> measured.Imported:
+def _series(table: _CsvTable, axis: str) -> measured.ImportedErrors:
     at = np.array([row[POSITION, axis] for _, row in table.rows])
-    places = measured.distinct(at)
+    places = measured.distinct_positions(at)
     runs = [int(row.get((RUN, RUN), 1)) for _, row in table.rows]
-    ways = list(zip(runs, table.ways(), strict=True))
+    ways = list(zip(runs, table.directions(), strict=True))
     known = list(dict.fromkeys(ways))
     if len(known) > MAX_RUNS:
         table.source.refuse(f"has {len(known)} runs", f"at most {MAX_RUNS}")
@@ -293,7 +295,7 @@ def _series(table: _CsvTable, axis: str) -> measured.Imported:
             line.refuse(found, "columns run and direction to tell them apart")
         taken[way, place] = line.line
     series: list[measured.ErrorSeries] = []
-    for key in table.of(ERROR):
+    for key in table.names_with_role(ERROR):
         values = {way: np.full(len(places), math.nan) for way in known}
         uncertain = np.zeros(len(places))
         for place, way, (_, row) in zip(index, ways, table.rows, strict=True):
@@ -315,7 +317,7 @@ def _series(table: _CsvTable, axis: str) -> measured.Imported:
         )
     sorted_rows = len(known) == 1 and np.any(np.diff(at) < 0.0)
     notes = (f"rows were sorted by the position of {axis}",) if sorted_rows else ()
-    return measured.Imported(NAME, tuple(series), notes=notes)
+    return measured.ImportedErrors(NAME, tuple(series), notes=notes)
 
 
 def _check_holes(
@@ -340,29 +342,29 @@ def _check_holes(
             source.refuse(found, "every direction at every position")
 
 
-def _planes(table: _CsvTable) -> measured.Imported:
-    first, second = table.of(POSITION)
+def _planes(table: _CsvTable) -> measured.ImportedErrors:
+    first, second = table.names_with_role(POSITION)
     if unknown := next((one for one in table.columns if one.role in (RUN, UNCERTAINTY)), None):
         what = RUN if unknown.role == RUN else f"u({unknown.name})"
         expected = "positions, direction and errors over two axes: one value a point"
         table.head.refuse(f"column {what}", expected)
     planes: list[measured.ErrorSurface] = []
-    for key in table.of(ERROR):
+    for key in table.names_with_role(ERROR):
         own = parameter(key).axis
         if own not in (first, second):
             expected = f"errors of {first} or {second}"
             table.head.refuse(f"column {key} is an error of {own}", expected)
         other = second if own == first else first
         points: dict[int, list[measured.Point]] = {}
-        for way, (at, row) in zip(table.ways(), table.rows, strict=True):
+        for way, (at, row) in zip(table.directions(), table.rows, strict=True):
             point = (at, row[POSITION, own], row[POSITION, other], row[ERROR, key])
             points.setdefault(way, []).append(point)
-        planes.append(measured.plane_by_ways(key, (own, other), points, table.source))
-    return measured.Imported(NAME, planes=tuple(planes))
+        planes.append(measured.build_surface_by_direction(key, (own, other), points, table.source))
+    return measured.ImportedErrors(NAME, surfaces=tuple(planes))
 
 
 FORMAT = Format(
-    **described(NAME),
+    **format_description(NAME),
     limits=f"{MAX_POINTS:,} rows",
     recognise=recognise,
     read=read,

@@ -12,20 +12,27 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import CORRECTION, Files, Format, ReadOptions, described, has
-from warpspace.formats.source import MM_PER, Source, spell_comment
+from warpspace.formats.registry import (
+    CORRECTION,
+    Files,
+    Format,
+    ReadOptions,
+    format_description,
+    head_matcher,
+)
+from warpspace.formats.source import MM_PER, Source, format_comment
 from warpspace.formats.terms import Grid3, Tables
 
 MARK = "# three-dimensional error compensation"
 DETECTION_MM = 1e-3  # detection unit where none is asked for: a micrometre (IS-B)
-MOST_COUNT = 127  # of a correction in detection units, times the magnification
-MOST_MAGNIFICATION = 100
-MOST_POINTS = 25
+MAX_COUNT = 127  # of a correction in detection units, times the magnification
+MAX_MAGNIFICATION = 100
+MAX_AXIS_POINTS = 25
 STEP_SHARE = 1e-4
 HEADINGS = ("point", "X [mm]", "Y [mm]", "Z [mm]", "CX", "CY", "CZ")
 LIMITS = (
-    f"counts within ±{MOST_COUNT} times a magnification of at most {MOST_MAGNIFICATION} and"
-    f" {MOST_POINTS} points an axis are taken for the limits of the control: check its parameters"
+    f"counts within ±{MAX_COUNT} times a magnification of at most {MAX_MAGNIFICATION} and"
+    f" {MAX_AXIS_POINTS} points an axis are taken for the limits of the control: check its parameters"
 )
 
 
@@ -39,13 +46,13 @@ def _settings(source: Source) -> tuple[float, int]:
             if not 1e-7 <= unit <= 1.0:
                 at.refuse(f"{key} {value}", "0.0000001 … 1 mm")
         elif key == "magnification":
-            magnification = at.whole(value, key, 1, MOST_MAGNIFICATION)
+            magnification = at.integer(value, key, 1, MAX_MAGNIFICATION)
     return unit, magnification
 
 
 def _grid(source: Source, options: ReadOptions) -> Grid3:
     unit, magnification = _settings(source)
-    given = source.rows(MOST_POINTS**3)
+    given = source.rows(MAX_AXIS_POINTS**3)
     if not given.header:
         source.refuse("has no table", f"the columns {', '.join(HEADINGS)}")
     if tuple(given.header) != HEADINGS:
@@ -53,10 +60,10 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
     rows: list[list[float]] = []
     for count, (number, parts) in enumerate(given, start=1):
         at = source.at(number)
-        at.whole(parts[0], "point", count, count)
+        at.integer(parts[0], "point", count, count)
         numbers = (given.number(part, number, "position") for part in parts[1:4])
         place = [at.checked_position(value, "position") for value in numbers]
-        counts = [at.whole(part, "correction", -MOST_COUNT - 1, MOST_COUNT) for part in parts[4:]]
+        counts = [at.integer(part, "correction", -MAX_COUNT - 1, MAX_COUNT) for part in parts[4:]]
         rows.append([*place, *(float(c) for c in counts)])
     given.check()
     table = np.array(rows).reshape(-1, 6)
@@ -65,8 +72,8 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
     if len(table) != np.prod(shape) or min(shape) < 2:
         found = f"{len(table)} points for a grid of {' × '.join(map(str, shape))}"
         source.refuse(found, "every point of a grid once (is the file cut off?)")
-    if max(shape) > MOST_POINTS:
-        expected = f"at most {MOST_POINTS}, as the control takes"
+    if max(shape) > MAX_AXIS_POINTS:
+        expected = f"at most {MAX_AXIS_POINTS}, as the control takes"
         source.refuse(f"{max(shape)} points along an axis", expected)
     for places, axis in zip(along, "XYZ", strict=True):
         steps = np.diff(places)
@@ -97,20 +104,20 @@ def write(wanted: RequiredCorrections) -> Files:
             f" {', '.join(wanted.axes)}"
         )
     unit = wanted.resolution or DETECTION_MM
-    places = {axis: wanted.places(axis) for axis in axes}
+    places = {axis: wanted.positions(axis) for axis in axes}
     needed = wanted.corrections(places)
     values = wanted.factor(CORRECTION) * np.stack([needed[axis] for axis in axes], -1)
     largest = float(np.abs(values).max())
-    magnification = max(1, int(np.ceil(largest / unit / MOST_COUNT - 1e-9)))
-    if magnification > MOST_MAGNIFICATION:
+    magnification = max(1, int(np.ceil(largest / unit / MAX_COUNT - 1e-9)))
+    if magnification > MAX_MAGNIFICATION:
         raise OptionError(
-            f"fanuc-3d: corrections reach {largest:.3g} mm, more than {MOST_COUNT} ×"
-            f" {MOST_MAGNIFICATION} × {unit:g} mm; expected a larger {{resolution}}"
+            f"fanuc-3d: corrections reach {largest:.3g} mm, more than {MAX_COUNT} ×"
+            f" {MAX_MAGNIFICATION} × {unit:g} mm; expected a larger {{resolution}}"
         )
     counts = np.rint(values / (unit * magnification)).astype(int)
-    counts = np.clip(counts, -MOST_COUNT - 1, MOST_COUNT)
+    counts = np.clip(counts, -MAX_COUNT - 1, MAX_COUNT)
     lines = [
-        spell_comment(f"{MARK}, ", wanted.scene.title),
+        format_comment(f"{MARK}, ", wanted.scene.title),
         f"# detection unit = {unit:.9f}".rstrip("0") + " mm",
         f"# magnification = {magnification}",
         f"# {'values are ' + wanted.sign + 's' if wanted.sign else 'values are added'}",
@@ -125,10 +132,10 @@ def write(wanted: RequiredCorrections) -> Files:
     return {"": "\n".join(lines) + "\n"}
 
 
-LARGEST = f"{MOST_POINTS} points an axis, ±{MOST_COUNT} detection units times the magnification"
+LARGEST = f"{MAX_AXIS_POINTS} points an axis, ±{MAX_COUNT} detection units times the magnification"
 FORMATS = (
     Format(
-        **described("fanuc-3d"), limits=LARGEST, recognise=has(rf"\A\s*{MARK}"),
-        tables=read_tables, write=write, most_points=MOST_POINTS,
+        **format_description("fanuc-3d"), limits=LARGEST, recognise=head_matcher(rf"\A\s*{MARK}"),
+        tables=read_tables, write=write, max_points=MAX_AXIS_POINTS,
     ),
 )  # fmt: skip

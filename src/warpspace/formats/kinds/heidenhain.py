@@ -11,13 +11,13 @@ from itertools import pairwise
 import numpy as np
 
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described
+from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, format_description
 from warpspace.formats.source import Source, SourceLine
-from warpspace.formats.terms import HELD, AxisTable, Tables
+from warpspace.formats.terms import HOLD_ENDS, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
-MOST_POINTS = 256  # entries of one table (TNC 407 Technical Manual, module 9095, error 3)
+MAX_TABLE_POINTS = 256  # entries of one table (TNC 407 Technical Manual, module 9095, error 3)
 RESOLUTION = 1e-4  # mm or degrees, as the tables are printed
 STEP_SHARE = 1e-3
 SIGN = (
@@ -52,9 +52,9 @@ def _rows(source: Source) -> list[tuple[SourceLine, Cells]]:
     names = head.lstrip("#").split()
     if not lines[-1][1].strip().upper().startswith("[END]"):
         lines[-1][0].refuse("is not the end", "[END] (is the file cut off?)")
-    if len(lines) - 2 > MOST_POINTS:
-        expected = f"at most {MOST_POINTS}, as the control takes"
-        lines[MOST_POINTS + 1][0].refuse(f"has {len(lines) - 2} rows", expected)
+    if len(lines) - 2 > MAX_TABLE_POINTS:
+        expected = f"at most {MAX_TABLE_POINTS}, as the control takes"
+        lines[MAX_TABLE_POINTS + 1][0].refuse(f"has {len(lines) - 2} rows", expected)
     starts, end = [0], 0
     for before, name in pairwise(names):
         end = head.index(before, end) + len(before)
@@ -66,7 +66,7 @@ def _rows(source: Source) -> list[tuple[SourceLine, Cells]]:
             ends = [*starts[1:], len(text) + 1]
             parts = [text[low:high].strip() for low, high in zip(starts, ends, strict=True)]
             if any(" " in part for part in parts):
-                at.refuse(at.shown, f"{len(names)} columns: {' '.join(names)}")
+                at.refuse(at.quoted, f"{len(names)} columns: {' '.join(names)}")
         rows.append((at, dict(zip(names, parts, strict=True))))
     return rows
 
@@ -135,7 +135,9 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
                 for at, cells in rows
             )
         lines.append(
-            AxisTable(along, target, tuple(places.tolist()), tuple(values.tolist()), HELD, backward)
+            AxisTable(
+                along, target, tuple(places.tolist()), tuple(values.tolist()), HOLD_ENDS, backward
+            )
         )
     return lines
 
@@ -162,7 +164,7 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
         if any(term.source == along for term in terms):
             source.refuse(f"is a second table over {along}", "one active table an axis")
         terms += _lines(source, along, options)
-    return Tables(tuple(terms), (options.said_sign(SIGN), TRAVEL))
+    return Tables(tuple(terms), (options.sign_statement(SIGN), TRAVEL))
 
 
 def write(wanted: RequiredCorrections) -> Files:
@@ -171,7 +173,7 @@ def write(wanted: RequiredCorrections) -> Files:
     mean = {axis: float(value) for axis, value in wanted.averaged([]).items()}
     targets = wanted.corrector.moved
     for axis in wanted.axes:
-        places = wanted.places(axis)
+        places = wanted.positions(axis)
         values = wanted.averaged([axis])
         home = {target: target if target in wanted.axes else wanted.axes[0] for target in targets}
         taken = {target: 0.0 if home[target] == axis else mean[target] for target in targets}
@@ -189,9 +191,9 @@ def write(wanted: RequiredCorrections) -> Files:
         columns = _with_backlash(wanted, axis, spelled) or spelled(values)
         rows = [(POSITION, *columns)]
         rows += [(f"{q:+.4f}", *found) for q, *found in zip(places, *columns.values(), strict=True)]
-        files[f"_{axis}.COM"] = _spelled(f"{stem}_{axis}.COM", rows)
+        files[f"_{axis}.COM"] = _format_table(f"{stem}_{axis}.COM", rows)
     header = (ACTIVE, *wanted.axes)
-    files[""] = _spelled(
+    files[""] = _format_table(
         f"{stem}.CMA", [header, ("*", *(f"{stem}_{axis}" for axis in wanted.axes))], width=24
     )
     return files
@@ -205,10 +207,10 @@ def _with_backlash(
     Empty where they do not depend on the direction, and where several axes are corrected over the
     one: which of them BACKLASH belongs to is not published then.
     """
-    if axis not in wanted.directed:
+    if axis not in wanted.directional_axes:
         return {}
     there, back = (
-        spelled(wanted.toward(way, axis).averaged([axis]))
+        spelled(wanted.for_direction(way, axis).averaged([axis]))
         for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
     )
     used = [
@@ -219,7 +221,7 @@ def _with_backlash(
     return {BACKLASH: back[used[0]], used[0]: there[used[0]]}
 
 
-def _spelled(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
+def _format_table(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
     lines = [f"BEGIN {name} MM"]
     for number, row in enumerate(rows):
         first = NUMBER if number == 0 else str(number - 1)
@@ -228,10 +230,10 @@ def _spelled(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> st
 
 
 FORMAT = Format(
-    **described("heidenhain"),
+    **format_description("heidenhain"),
     recognise=recognise,
     tables=read_tables,
     write=write,
-    most_points=MOST_POINTS,
+    max_points=MAX_TABLE_POINTS,
 )
 FORMATS = (FORMAT,)

@@ -17,12 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, shown, spell, spell_comment
-from warpspace.formats.terms import HELD, Affine, AxisTable, Tables
+from warpspace.formats.registry import Files, Format, ReadOptions, format_description, head_matcher
+from warpspace.formats.source import Source, format_comment, format_number, quote
+from warpspace.formats.terms import HOLD_ENDS, Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
 
-MOST_POINTS = 256
+MAX_ROWS = 256
 DIGITS = 6
 JOINTS = "XYZABCUVW"
 """Axes of the joints 0 to 8, where ``coordinates=`` of KINEMATICS does not name them (trivkins)."""
@@ -73,7 +73,7 @@ def _assignment(
             if key == "COMP_FILE":
                 file = value.rsplit("/", 1)[-1]
             elif key == "COMP_FILE_TYPE":
-                kind = f"type-{at.whole(value, key, 0, 1)}"
+                kind = f"type-{at.integer(value, key, 0, 1)}"
     return known, tables
 
 
@@ -84,25 +84,25 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
         if found is None:
             left = sum(_ROW.match(one) is not None for one in source.lines[number:])
             if not rows:
-                stops = f"LinuxCNC stops here, at {at.shown}, and has no table"
+                stops = f"LinuxCNC stops here, at {at.quoted}, and has no table"
                 at.refuse(stops, "three numbers: nominal forward reverse")
             if left:
                 notes.append(
-                    f"{source.name}: LinuxCNC stops at line {number}, {at.shown}: {left} rows"
+                    f"{source.name}: LinuxCNC stops at line {number}, {at.quoted}: {left} rows"
                     " behind it are not read"
                 )
             break
         if found[4].strip():
             notes.append(
-                f"{source.name}: line {number}: {shown(found[4])} behind three numbers is not read"
+                f"{source.name}: line {number}: {quote(found[4])} behind three numbers is not read"
             )
         row = [per_unit * at.number(found[n], "value") for n in (1, 2, 3)]
         if rows and row[0] <= rows[-1][0]:
             expected = "ascending positions, as LinuxCNC does"
             at.refuse(f"nominal {row[0]:g} after {rows[-1][0]:g}", expected)
         rows.append([at.checked_position(value, "value") for value in row])
-        if len(rows) > MOST_POINTS:
-            at.refuse(f"has more than {MOST_POINTS} rows; LinuxCNC takes {MOST_POINTS}")
+        if len(rows) > MAX_ROWS:
+            at.refuse(f"has more than {MAX_ROWS} rows; LinuxCNC takes {MAX_ROWS}")
     return np.array(rows)
 
 
@@ -138,7 +138,7 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
         nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
         backward = () if forward == reverse else reverse
-        terms.append(AxisTable(axis, axis, nominal, forward, HELD, backward))
+        terms.append(AxisTable(axis, axis, nominal, forward, HOLD_ENDS, backward))
     if not terms:
         sources[0].refuse("names files", "the files of its COMP_FILE lines beside it")
     return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))
@@ -146,18 +146,19 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
 def _write_comp(wanted: RequiredCorrections) -> Files:
     files: dict[str, str] = {}
-    lines = [spell_comment("# ", wanted.scene.title)]
+    lines = [format_comment("# ", wanted.scene.title)]
     lines += [f"# joints counted as {JOINTS}: trivkins without coordinates="]
     for axis in wanted.axes:
         if axis not in wanted.corrector.moved or axis not in JOINTS:
             continue
-        places = wanted.places(axis)
+        places = wanted.positions(axis)
         ways = (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         forward, backward = (
-            wanted.round(wanted.toward(way, axis).averaged([axis])[axis]).tolist() for way in ways
+            wanted.round(wanted.for_direction(way, axis).averaged([axis])[axis]).tolist()
+            for way in ways
         )
         files[f"_{axis}.comp"] = "".join(
-            f"{spell(q, DIGITS)} {spell(there, DIGITS)} {spell(back, DIGITS)}\n"
+            f"{format_number(q, DIGITS)} {format_number(there, DIGITS)} {format_number(back, DIGITS)}\n"
             for q, there, back in zip(places.tolist(), forward, backward, strict=True)
         )
         lines += [
@@ -169,7 +170,7 @@ def _write_comp(wanted: RequiredCorrections) -> Files:
 
 
 MATRIX_DIGITS = 9
-MOST = 0.1  # of a coefficient's distance from the identity: 0.1 rad or 10 %
+MAX_COEFFICIENT = 0.1  # of a coefficient's distance from the identity: 0.1 rad or 10 %
 _SETP = re.compile(r"setp\s+matrixkins\.C_([xyz])([xyz])\s+(\S+)", re.IGNORECASE)
 
 
@@ -186,11 +187,11 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
                 continue
             matched = _SETP.fullmatch(bare)
             if matched is None:
-                at.refuse(at.shown, "setp matrixkins.C_xy NUMBER")
+                at.refuse(at.quoted, "setp matrixkins.C_xy NUMBER")
             row, column = matched[1].upper(), matched[2].upper()
             value = at.number(matched[3], f"C_{matched[1]}{matched[2]}") - float(row == column)
-            if abs(value) > MOST:
-                at.refuse(at.shown, f"a matrix within ±{MOST:g} of the identity")
+            if abs(value) > MAX_COEFFICIENT:
+                at.refuse(at.quoted, f"a matrix within ±{MAX_COEFFICIENT:g} of the identity")
             if (row, column) in found:
                 at.refuse(f"C_{row.lower()}{column.lower()} is set twice", "it once")
             for axis in (row, column):
@@ -205,25 +206,25 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
 def _write_matrix(wanted: RequiredCorrections) -> Files:
     allowed = [(row, column) for row in AXES for column in AXES]
     found = wanted.linear_fit(allowed)
-    lines = [spell_comment("# ", wanted.scene.title)]
+    lines = [format_comment("# ", wanted.scene.title)]
     for row, column in allowed:
         value = float(row == column) + found.get((row, column), 0.0)
-        text = spell(float(wanted.round(value)), MATRIX_DIGITS)
+        text = format_number(float(wanted.round(value)), MATRIX_DIGITS)
         lines.append(f"setp matrixkins.C_{row.lower()}{column.lower()} {text}")
     return {"": "\n".join(lines) + "\n"}
 
 
 COMP = Format(
-    **described("linuxcnc-comp"),
+    **format_description("linuxcnc-comp"),
     recognise=_is_comp,
     tables=_read_comp,
     write=_write_comp,
-    most_points=MOST_POINTS,
+    max_points=MAX_ROWS,
     variants=(POSITIONS, OFFSETS),
 )
 MATRIX = Format(
-    **described("linuxcnc-matrix"),
-    recognise=has(r"matrixkins\.C_"),
+    **format_description("linuxcnc-matrix"),
+    recognise=head_matcher(r"matrixkins\.C_"),
     tables=_read_matrix,
     write=_write_matrix,
 )

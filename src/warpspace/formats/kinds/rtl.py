@@ -10,8 +10,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, Imported, MeasuredRun, merge
-from warpspace.formats.registry import Format, ReadOptions, described, has
+from warpspace.formats.measured import (
+    BACKWARD,
+    FORWARD,
+    ErrorSeries,
+    ImportedErrors,
+    MeasuredRun,
+    merge,
+)
+from warpspace.formats.registry import Format, ReadOptions, format_description, head_matcher
 from warpspace.formats.source import Source, SourceLine
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
@@ -23,7 +30,7 @@ INFERRED = (
     " nominal; runs with odd numbers forward, even ones backward"
 )
 ONE_WAY = "the flags say one direction: runs with even numbers hold nothing, left out"
-KNOWN = "Filetype, Target-count, Targets and Flags"
+TARGET_KEYS = "Filetype, Target-count, Targets and Flags"
 _SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 _KEY = re.compile(r"[A-Za-z][A-Za-z0-9 _-]*")
 Lines = list[tuple[SourceLine, str]]
@@ -41,7 +48,7 @@ def _sections(source: Source) -> dict[str, Lines]:
                 at.refuse(f"section {name} stands there twice", "it once")
             lines = found.setdefault(name, [])
         elif lines is None:
-            at.refuse(f"{at.shown} before any section", "HEADER::")
+            at.refuse(f"{at.quoted} before any section", "HEADER::")
         else:
             lines.append((at, bare))
     for name in ("TARGET DATA", "RUNS", "DEVIATIONS"):
@@ -64,19 +71,19 @@ def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:
         pair = _pair(text)
         if pair is None:
             if not within:
-                at.refuse(f"{at.shown} is not understood", KNOWN)
+                at.refuse(f"{at.quoted} is not understood", TARGET_KEYS)
             values += [at.position(part, "target") for part in text.split()]
             continue
         key, value = pair
         within = key == "targets"
         if key == "target-count":
-            count = at.whole(value, key, 2, MAX_POINTS)
+            count = at.integer(value, key, 2, MAX_POINTS)
         elif key == "flags":
-            flags = [at.whole(part, key, -9, 99) for part in value.split()]
+            flags = [at.integer(part, key, -9, 99) for part in value.split()]
         elif key == "targets":
             values += [at.number(part, "target") for part in value.split()]
         elif key != "filetype":
-            at.refuse(f"{at.shown} is not understood", KNOWN)
+            at.refuse(f"{at.quoted} is not understood", TARGET_KEYS)
     end = lines[-1][0] if lines else source
     if len(values) != count:
         end.refuse(f"{len(values)} targets", f"{count} as Target-count says")
@@ -101,7 +108,7 @@ def _run_count(source: Source, lines: Lines) -> int:
     for at, text in lines:
         key, value = _pair(text) or ("", "")
         if key == "run-count":
-            stated = at.whole(value, "Run-count", 1, MAX_RUNS)
+            stated = at.integer(value, "Run-count", 1, MAX_RUNS)
     if not stated:
         source.refuse("section RUNS has no Run-count", "Run-count: number")
     return stated
@@ -114,9 +121,9 @@ def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray
             continue
         parts = text.split()
         if len(parts) != 3:
-            at.refuse(at.shown, "run, target, deviation")
-        run = at.whole(parts[0], "run", 1, MAX_RUNS)
-        target = at.whole(parts[1], "target", 1, MAX_POINTS)
+            at.refuse(at.quoted, "run, target, deviation")
+        run = at.integer(parts[0], "run", 1, MAX_RUNS)
+        target = at.integer(parts[1], "target", 1, MAX_POINTS)
         rows.append((at, run, target, at.error(parts[2], "deviation")))
     table: dict[int, np.ndarray] = {}
     for at, run, target, value in rows:
@@ -131,7 +138,7 @@ def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray
     return table
 
 
-def _read_one(source: Source, options: ReadOptions) -> Imported:
+def _read_one(source: Source, options: ReadOptions) -> ImportedErrors:
     sections = _sections(source)
     targets, flags = _targets(source, sections["TARGET DATA"])
     stated = _run_count(source, sections["RUNS"])
@@ -156,17 +163,17 @@ def _read_one(source: Source, options: ReadOptions) -> Imported:
     air = [text for _, text in sections.get("ENVIRONMENT", [])]
     notes = (*source.notes, *([f"environment: {'; '.join(air)}"] if air else []))
     assumed = (INFERRED, *((ONE_WAY,) if one_way else ()))
-    return Imported(NAME, (series,), units=("mm", "µm"), assumed=assumed, notes=notes)
+    return ImportedErrors(NAME, (series,), units=("mm", "µm"), assumed=assumed, notes=notes)
 
 
-def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
+def read(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
     return merge([_read_one(source, options) for source in sources])
 
 
 FORMATS = (
     Format(
-        **described(NAME),
-        recognise=has(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
+        **format_description(NAME),
+        recognise=head_matcher(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
         read=read,
     ),
 )

@@ -22,9 +22,16 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import shares
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, SourceLine, shown, spell, spell_comment
-from warpspace.formats.terms import HELD, MODULO, AxisTable, Product, Tables, Term
+from warpspace.formats.registry import (
+    ERROR,
+    Files,
+    Format,
+    ReadOptions,
+    format_description,
+    head_matcher,
+)
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
+from warpspace.formats.terms import HOLD_ENDS, MODULO, AxisTable, Product, Tables, Term
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
@@ -32,7 +39,7 @@ ENC, CEC = "AA_ENC_COMP", "AN_CEC"
 AXES = ("INPUT_AXIS", "OUTPUT_AXIS")
 RANGE = ("STEP", "MIN", "MAX")
 DIRECTION, FACTOR, IS_MODULO = "DIRECTION", "MULT_BY_TABLE", "IS_MODULO"
-MOST_TABLES = 62  # twice the axes of an NC (manual, "Compensation table index")
+MAX_TABLES = 62  # twice the axes of an NC (manual, "Compensation table index")
 SIGN = "a positive value makes the axis move in the negative direction (manual, page 238)"
 CEC_SIGN = (
     "a positive value makes the corrected axis move in the negative direction, as page 238 of the"
@@ -42,12 +49,12 @@ CEC_SIGN = (
 UNITS = "lengths mm, angles degrees (metric system)"
 DIGITS = 7  # digits behind the point of a value: a tenth of a nanometre
 STEP_SHARE = 1e-4  # share of a step by which start, end and step may disagree
-MOST_INDEX = 100_000
-MOST_PRODUCTS = 3  # pairs of tables for one axis over two others
-LEAST_MM = 1e-5  # A product of tables below it is not worth two tables
-SWITCHES = {DIRECTION: (-1, 1), FACTOR: (0, MOST_TABLES), IS_MODULO: (0, 1)}
+MAX_INDEX = 100_000
+MAX_PRODUCTS = 3  # pairs of tables for one axis over two others
+MIN_PRODUCT_MM = 1e-5  # A product of tables below it is not worth two tables
+SWITCHES = {DIRECTION: (-1, 1), FACTOR: (0, MAX_TABLES), IS_MODULO: (0, 1)}
 """Whole numbers of a table, each between limits."""
-Needed = Mapping[tuple[str, ...], Array]
+CorrectionsByAxes = Mapping[tuple[str, ...], Array]
 """Corrections by the axis that is corrected and those that they are over."""
 _ASSIGNMENT = re.compile(r"\$([A-Z_]+)\s*\[([^\]]*)\]\s*=\s*(.+)")
 _QUIET = re.compile(r"(%.*|CHANDATA\(\d+\)|M17|M30|M02|N\d+)", re.IGNORECASE)
@@ -64,7 +71,9 @@ class AssignmentTable:
     switches: dict[str, int] = field(default_factory=dict[str, int])
     axes: dict[str, str] = field(default_factory=dict[str, str])  # where the file names them
 
-    def line(self, axes: tuple[str, str], prefix: str, what: str, factor: float) -> AxisTable:
+    def to_axis_table(
+        self, axes: tuple[str, str], prefix: str, what: str, factor: float
+    ) -> AxisTable:
         for setting in RANGE:
             if setting not in self.numbers:
                 found = f"{what}: ${prefix}_{setting} is missing"
@@ -77,8 +86,8 @@ class AssignmentTable:
         if abs(steps - round(steps)) > STEP_SHARE:
             found = f"{what}: {start:g} to {end:g} is no whole number of steps of {step:g}"
             self.at.refuse(f"{found} ({steps:.4g})", "equal steps from start to end")
-        if round(steps) > MOST_INDEX:
-            self.at.refuse(f"{what}: {round(steps):,} steps", f"at most {MOST_INDEX:,}")
+        if round(steps) > MAX_INDEX:
+            self.at.refuse(f"{what}: {round(steps):,} steps", f"at most {MAX_INDEX:,}")
         last = round(steps)
         missing = next((index for index in range(last + 1) if index not in self.values), None)
         if missing is not None:
@@ -91,13 +100,13 @@ class AssignmentTable:
             *axes,
             tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
             tuple(factor * self.values[index] for index in range(last + 1)),
-            MODULO if self.switches.get(IS_MODULO) else HELD,
+            MODULO if self.switches.get(IS_MODULO) else HOLD_ENDS,
             direction=self.switches.get("DIRECTION", 0),
         )
 
 
 def _assigns(name: str) -> Callable[[str, str], bool]:
-    return has(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
+    return head_matcher(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
 
 
 def _assignments(
@@ -112,7 +121,7 @@ def _assignments(
             continue
         matched = _ASSIGNMENT.fullmatch(bare)
         if matched is None:
-            at.refuse(at.shown, "$VARIABLE[index, …] = value")
+            at.refuse(at.quoted, "$VARIABLE[index, …] = value")
         name, inner, value = matched.groups()
         if name not in names:
             at.refuse(f"variable ${name}", f"one of {', '.join(f'${known}' for known in names)}")
@@ -127,18 +136,20 @@ def _assignments(
 
 
 def _index(text: str, at: SourceLine) -> int:
-    return at.whole(text, "index", 0, MOST_INDEX)
+    return at.integer(text, "index", 0, MAX_INDEX)
 
 
 def _axis_name(text: str, at: SourceLine) -> str:
     bare = text.strip().strip("()").strip().strip('"').strip()
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9]{0,15}", bare):
-        at.refuse(f"axis {shown(text)}", "the name of an axis")
+        at.refuse(f"axis {quote(text)}", "the name of an axis")
     return bare.upper()
 
 
 def _point_lines(prefix: str, point: Callable[[int], str], values: Array) -> list[str]:
-    return [f"${prefix}[{point(i)}]={spell(v, DIGITS)}" for i, v in enumerate(values.tolist())]
+    return [
+        f"${prefix}[{point(i)}]={format_number(v, DIGITS)}" for i, v in enumerate(values.tolist())
+    ]
 
 
 def _range_lines(prefix: str, index: str, places: Array) -> list[str]:
@@ -148,7 +159,7 @@ def _range_lines(prefix: str, index: str, places: Array) -> list[str]:
 
 
 def _archive(name: str, wanted: RequiredCorrections, sign: str, body: Sequence[str]) -> Files:
-    remark = spell_comment("; ", f"written by warpspace for {wanted.scene.title}")
+    remark = format_comment("; ", f"written by warpspace for {wanted.scene.title}")
     head = [f"%_N_{name}_INI", "CHANDATA(1)", remark]
     head.append(f"; {'sign: ' + wanted.sign if wanted.sign else sign}")
     return {"": "\n".join([*head, *body, "M17"]) + "\n"}
@@ -171,7 +182,7 @@ def _read(
         elif setting in RANGE:
             table.numbers[setting] = at.number(value, name)
         elif setting:
-            table.switches[setting] = at.whole(value, name, *SWITCHES[setting])
+            table.switches[setting] = at.integer(value, name, *SWITCHES[setting])
         elif (index := _index(parts[1], at)) in table.values:
             at.refuse(f"{what}: interpolation point {index} is given twice", "it once")
         else:
@@ -193,10 +204,10 @@ def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
             what = f"table of {name}"
             if any(term.source == axis for term in terms):
                 table.at.refuse(f"{what}: {axis} has a table already", "one an axis")
-            terms.append(table.line((axis, axis), ENC, what, options.factor(ERROR)))
+            terms.append(table.to_axis_table((axis, axis), ENC, what, options.factor(ERROR)))
             if encoder:
                 notes.append(f"{name}: the table of measuring system {encoder + 1} was taken")
-    return Tables(tuple(terms), (options.said_sign(SIGN), UNITS), tuple(notes))
+    return Tables(tuple(terms), (options.sign_statement(SIGN), UNITS), tuple(notes))
 
 
 def _write_enc(wanted: RequiredCorrections) -> Files:
@@ -204,7 +215,7 @@ def _write_enc(wanted: RequiredCorrections) -> Files:
     for axis in wanted.axes:
         if axis not in wanted.corrector.moved:
             continue
-        places = wanted.places(axis)
+        places = wanted.positions(axis)
         values = wanted.factor(ERROR) * wanted.averaged([axis])[axis]
         body += [
             f"; MD38000 $MA_MM_ENC_COMP_MAX_POINTS[0,{axis}] >= {len(places)}",
@@ -221,8 +232,8 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
 
     def key_of(parts: list[str], at: SourceLine) -> tuple[int, str]:
         index = _index(parts[0], at)
-        if index >= MOST_TABLES:
-            at.refuse(f"table {index}", f"at most {MOST_TABLES - 1}")
+        if index >= MAX_TABLES:
+            at.refuse(f"table {index}", f"at most {MAX_TABLES - 1}")
         return index, f"table {index}"
 
     for source in sources:
@@ -236,7 +247,7 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
                     found = f"{what}: ${CEC}_{setting} is missing"
                     table.at.refuse(found, "it (is the file cut off?)")
             along, target = (options.axis_named(table.axes[one], table.at) for one in AXES)
-            lines[index] = table.line((along, target), CEC, what, factor)
+            lines[index] = table.to_axis_table((along, target), CEC, what, factor)
         terms += lines.values()
         for index, table in tables.items():
             other = table.switches.get(FACTOR, 0) - 1
@@ -246,19 +257,19 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
                 found = f"table {index} is multiplied by table number {other + 1}"
                 table.at.refuse(f"{found}, which the file does not have")
             terms.append(Product(lines[index], lines[other], factor))
-    return Tables(tuple(terms), (options.said_sign(CEC_SIGN), UNITS))
+    return Tables(tuple(terms), (options.sign_statement(CEC_SIGN), UNITS))
 
 
 def _write_cec(wanted: RequiredCorrections) -> Files:
-    tables = _cross_tables(wanted, wanted.factor(ERROR), MOST_TABLES)
-    if len(tables) > MOST_TABLES:
+    tables = _cross_tables(wanted, wanted.factor(ERROR), MAX_TABLES)
+    if len(tables) > MAX_TABLES:
         raise OptionError(
-            f"sinumerik-cec: {len(tables)} tables; expected at most {MOST_TABLES}, as the control"
+            f"sinumerik-cec: {len(tables)} tables; expected at most {MAX_TABLES}, as the control"
             " takes: correct fewer axes"
         )
     body: list[str] = []
     for index, table in enumerate(tables):
-        places = wanted.places(table.along)
+        places = wanted.positions(table.along)
         body += [
             f"; MD18342 $MN_MM_CEC_MAX_POINTS[{index}] = {len(places)}",
             *_point_lines(CEC, f"{index},{{}}".format, wanted.round(table.values)),
@@ -285,14 +296,14 @@ class CrossTable:
 
 
 def _cross_tables(wanted: RequiredCorrections, factor: float, most: int) -> list[CrossTable]:
-    mean, axes = wanted.toward(TravelDirection.MEAN), wanted.axes
+    mean, axes = wanted.for_direction(TravelDirection.MEAN), wanted.axes
     needed = {
         (target, *group): values
         for group in ((), *((axis,) for axis in axes), *combinations(axes, 2))
         for target, values in mean.averaged(group).items()
     }
-    halves = {axis: _half_reversals(wanted, axis) for axis in wanted.directed}
-    for most_products in (MOST_PRODUCTS, 0):
+    halves = {axis: _half_reversals(wanted, axis) for axis in wanted.directional_axes}
+    for most_products in (MAX_PRODUCTS, 0):
         tables = [
             table
             for target in wanted.corrector.moved
@@ -301,13 +312,15 @@ def _cross_tables(wanted: RequiredCorrections, factor: float, most: int) -> list
         if len(tables) <= most:
             break
     # where there is nothing to correct: a table of zeros
-    zeros = np.zeros(len(wanted.places(axes[0])))
+    zeros = np.zeros(len(wanted.positions(axes[0])))
     return tables or [CrossTable(axes[0], wanted.corrector.moved[0], zeros)]
 
 
-def _half_reversals(wanted: RequiredCorrections, axis: str) -> Needed:
-    base = wanted.toward(TravelDirection.MEAN)
-    ways = [base.toward(way, axis) for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)]
+def _half_reversals(wanted: RequiredCorrections, axis: str) -> CorrectionsByAxes:
+    base = wanted.for_direction(TravelDirection.MEAN)
+    ways = [
+        base.for_direction(way, axis) for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+    ]
     found: dict[tuple[str, ...], Array] = {}
     for other in ("", *wanted.axes):
         if other == axis:
@@ -325,8 +338,8 @@ def _tables_for(
     wanted: RequiredCorrections,
     factor: float,
     target: str,
-    needed: Needed,
-    halves: Mapping[str, Needed],
+    needed: CorrectionsByAxes,
+    halves: Mapping[str, CorrectionsByAxes],
     most_products: int,
 ) -> list[CrossTable]:
     axes = wanted.axes
@@ -337,7 +350,7 @@ def _tables_for(
     products: list[CrossTable] = []
     for first, second in combinations(axes, 2):
         for one, other in _factors(
-            factor * _interaction(needed[target, first, second]), MOST_PRODUCTS
+            factor * _interaction(needed[target, first, second]), MAX_PRODUCTS
         ):
             # both tables also act by themselves: their axis' own table takes that back
             along[first] = along[first] - factor * one
@@ -361,13 +374,13 @@ def _tables_for(
     own: list[CrossTable] = []
     for axis, values in along.items():
         turned = half.get(axis, np.zeros(()))
-        if np.abs(turned).max() > LEAST_MM / 100.0:
+        if np.abs(turned).max() > MIN_PRODUCT_MM / 100.0:
             own += [
                 CrossTable(axis, target, factor * (values + way * turned), way) for way in (1, -1)
             ]
         else:
             own.append(CrossTable(axis, target, factor * values))
-    kept = [table for table in own if np.abs(table.values).max() > LEAST_MM / 100.0]
+    kept = [table for table in own if np.abs(table.values).max() > MIN_PRODUCT_MM / 100.0]
     return [*kept, *products]
 
 
@@ -375,7 +388,7 @@ def _factors(both: Array, most: int) -> Iterator[tuple[Array, Array]]:
     left, sizes, right = np.linalg.svd(both)
     for rank, size in enumerate(sizes[:most].tolist()):
         one, other = left[:, rank] * np.sqrt(size), right[rank] * np.sqrt(size)
-        if np.abs(one).max() * np.abs(other).max() < LEAST_MM:
+        if np.abs(one).max() * np.abs(other).max() < MIN_PRODUCT_MM:
             return
         yield one, other
 
@@ -388,13 +401,13 @@ def _interaction(both: Array) -> Array:
 
 FORMATS = (
     Format(
-        **described("sinumerik-enc"),
+        **format_description("sinumerik-enc"),
         recognise=_assigns(ENC),
         tables=_read_enc,
         write=_write_enc,
     ),
     Format(
-        **described("sinumerik-cec"),
+        **format_description("sinumerik-cec"),
         recognise=_assigns(CEC),
         tables=_read_cec,
         write=_write_cec,

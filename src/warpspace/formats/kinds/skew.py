@@ -19,15 +19,15 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.measured import BOTH, ErrorSeries, Imported, MeasuredRun, merge
-from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, SourceLine, spell, spell_comment
-from warpspace.formats.terms import Affine, Tables, errors_of
+from warpspace.formats.measured import UNDIRECTED, ErrorSeries, ImportedErrors, MeasuredRun, merge
+from warpspace.formats.registry import Files, Format, ReadOptions, format_description, head_matcher
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number
+from warpspace.formats.terms import Affine, Tables, errors_from_tables
 from warpspace.units import URAD_PER_RAD
 
 PLANES = ("XY", "XZ", "YZ")
-MOST = 1.0  # of a factor (Marlin, SKEW_FACTOR_MAX)
-OPEN = 0.02
+MAX_FACTOR = 1.0  # of a factor (Marlin, SKEW_FACTOR_MAX)
+CLOSURE_TOLERANCE = 0.02
 """Share by which the side that two diagonals and a side give may differ from that side, unsaid."""
 SIDE_MM = 100.0  # side of the part that a factor is spelled by
 
@@ -45,11 +45,11 @@ def other_side(ac: float, bd: float, ad: float) -> float:
     return math.sqrt(2.0 * ac * ac + 2.0 * bd * bd - 4.0 * ad * ad) / 2.0
 
 
-def open_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str, ...]:
+def closure_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str, ...]:
     """Say where the lengths of a part do not close for a square one."""
     ac, bd, ad = lengths
     side = other_side(ac, bd, ad)
-    if abs(side / ad - 1.0) < OPEN:
+    if abs(side / ad - 1.0) < CLOSURE_TOLERANCE:
         return ()
     shown = f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm close only with a side AB of"
     share = 100.0 * (side / ad - 1.0)
@@ -86,7 +86,7 @@ def fitted_factors(wanted: RequiredCorrections) -> dict[str, float]:
     return {"XY": xy, "XZ": xz, "YZ": yz}
 
 
-LEAST_OFFSET_MM = 1.0  # between probe and nozzle: below it a twist cannot be told from the height
+MIN_OFFSET_MM = 1.0  # between probe and nozzle: below it a twist cannot be told from the height
 PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
 _PROFILE = re.compile(r"\[skew_correction\s++([^\]]+)\]")
@@ -129,7 +129,7 @@ def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str
                     at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
                 ac, bd, ad = (at.number(part, plane) for part in parts)
                 found[plane] = factor_of((ac, bd, ad), at, plane)
-                notes += open_notes((ac, bd, ad), plane)
+                notes += closure_notes((ac, bd, ad), plane)
         elif matched := _SAVED.fullmatch(bare):
             value = at.number(matched[2], matched[1])
             profiles.setdefault(name, {})[matched[1].upper()] = value
@@ -160,7 +160,7 @@ def _klipper_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
 
 
-def _twist(source: Source, options: ReadOptions) -> Imported | None:
+def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
     sections = _sections(source)
     twist = sections.get("axis_twist_compensation", {})
     if "z_compensations" not in twist:
@@ -184,8 +184,8 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
         at.refuse("[axis_twist_compensation] without a probe", expected)
     place, given = sections[probe]["y_offset"]
     offset = place.number(given, "y_offset")
-    if abs(offset) < LEAST_OFFSET_MM:
-        place.refuse(f"y_offset {offset:g} mm", f"{LEAST_OFFSET_MM:g} mm or more to tell a twist")
+    if abs(offset) < MIN_OFFSET_MM:
+        place.refuse(f"y_offset {offset:g} mm", f"{MIN_OFFSET_MM:g} mm or more to tell a twist")
     options.axis_named("X", at)
     places = np.linspace(ends[0], ends[1], len(heights))
     values = np.array(heights) / offset * URAD_PER_RAD
@@ -194,19 +194,19 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
         " roll of X; their mean is not in the file"
     )
     series = ErrorSeries(
-        "EAX", tuple(places.tolist()), (MeasuredRun(1, BOTH, tuple(values.tolist())),)
+        "EAX", tuple(places.tolist()), (MeasuredRun(1, UNDIRECTED, tuple(values.tolist())),)
     )
-    return Imported("klipper", (series,), units=("mm",), assumed=(said,))
+    return ImportedErrors("klipper", (series,), units=("mm",), assumed=(said,))
 
 
-def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> Imported:
-    parts: list[Imported] = []
+def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
+    parts: list[ImportedErrors] = []
     for source in sources:
         twist = _twist(source, options)
         parts += [twist] if twist else []
         if not twist or _factors(source, options, []):
             tables = _klipper_tables([source], options)
-            parts.append(errors_of(tables, "klipper", source, options.machine))
+            parts.append(errors_from_tables(tables, "klipper", source, options.machine))
     return merge(parts)
 
 
@@ -215,7 +215,7 @@ def _write_klipper(wanted: RequiredCorrections) -> Files:
         f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
         for plane, factor in fitted_factors(wanted).items()
     ]
-    head = spell_comment("# ", wanted.scene.title)
+    head = format_comment("# ", wanted.scene.title)
     head += "\n# [skew_correction] must stand in printer.cfg\n"
     return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
 
@@ -269,13 +269,13 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
                 at, ac = settings["DIAG_AC"]
                 lengths = (ac, settings["DIAG_BD"][1], side[1])
                 found[plane] = (at, factor_of(lengths, at, plane))
-                notes += open_notes(lengths, plane)
+                notes += closure_notes(lengths, plane)
             else:
                 expected = f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side"
                 at.refuse(f"{plane}: {', '.join(settings)}", expected)
         for plane, (at, factor) in found.items():
-            if abs(factor) > MOST:
-                at.refuse(f"factor {factor:g} of {plane}", f"at most ±{MOST:g}")
+            if abs(factor) > MAX_FACTOR:
+                at.refuse(f"factor {factor:g} of {plane}", f"at most ±{MAX_FACTOR:g}")
             for axis in plane:
                 options.axis_named(axis, at)
     if not found:
@@ -287,11 +287,11 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
 def _write_marlin(wanted: RequiredCorrections) -> Files:
     factors = fitted_factors(wanted)
     words = [
-        f"{letter}{spell(float(wanted.round(factors[plane])), DIGITS)}"
+        f"{letter}{format_number(float(wanted.round(factors[plane])), DIGITS)}"
         for letter, plane in zip("IJK", PLANES, strict=True)
     ]
     lines = [
-        spell_comment("; ", wanted.scene.title),
+        format_comment("; ", wanted.scene.title),
         "; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled",
         f"M852 {' '.join(words)}\n",
     ]
@@ -299,15 +299,15 @@ def _write_marlin(wanted: RequiredCorrections) -> Files:
 
 
 KLIPPER = Format(
-    **described("klipper"),
+    **format_description("klipper"),
     limits=f"three factors: {', '.join(PLANES)}",
-    recognise=has(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
+    recognise=head_matcher(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
     read=_read_klipper,
     tables=_klipper_tables,
     write=_write_klipper,
 )
 MARLIN = Format(
-    **described("marlin"),
+    **format_description("marlin"),
     recognise=_is_marlin,
     tables=_marlin_tables,
     write=_write_marlin,

@@ -22,8 +22,8 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, described
-from warpspace.formats.source import Source, SourceLine, spell, spell_comment
+from warpspace.formats.registry import Files, Format, ReadOptions, format_description
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.units import UM_PER_MM, URAD_PER_RAD
@@ -38,7 +38,7 @@ ASSUMED = (
     "errors of a linear axis ride on it, those of a rotary axis act in fixed directions",
     "values beyond the points are held",
 )
-OTHER = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
+IGNORED = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
 FINE_DEG = 1.0  # steps of a table that a wave is added to
 
 
@@ -61,16 +61,16 @@ def factor_of(key: str) -> float:
     return URAD_PER_RAD if parameter(key).is_rotation else UM_PER_MM
 
 
-def left_out(names: Sequence[str]) -> tuple[str, ...]:
+def ignored_notes(names: Sequence[str]) -> tuple[str, ...]:
     return (f"{', '.join(names)}: no errors, left out",) if names else ()
 
 
-def check_axes(held: measured.Imported, name: str) -> None:
+def check_axes(held: measured.ImportedErrors, name: str) -> None:
     if other := next((axis for axis in held.axes if axis not in ARGUMENTS), ""):
         raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
 
 
-def _finished(found: measured.Imported, options: ReadOptions) -> measured.Imported:
+def _finished(found: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
     found = replace(
         found,
         units=("mm", "rad", "degrees for rotary positions"),
@@ -89,8 +89,8 @@ def _finished(found: measured.Imported, options: ReadOptions) -> measured.Import
 
 
 def _about_distorted_axis(
-    found: measured.Imported, axis: str, options: ReadOptions
-) -> measured.Imported:
+    found: measured.ImportedErrors, axis: str, options: ReadOptions
+) -> measured.ImportedErrors:
     """Take back, turned with the axis, what the constant errors of a rotary axis move at zero.
 
     A rotation R about an axis that is displaced by E₀ is E₀·R·E₀⁻¹: to first order the constant
@@ -112,8 +112,12 @@ def _about_distorted_axis(
 
 
 def _plus(
-    found: measured.Imported, key: str, offset: float = 0.0, cosine: float = 0.0, sine: float = 0.0
-) -> measured.Imported:
+    found: measured.ImportedErrors,
+    key: str,
+    offset: float = 0.0,
+    cosine: float = 0.0,
+    sine: float = 0.0,
+) -> measured.ImportedErrors:
     size = math.hypot(cosine, sine)
     if not size and not offset:
         return found
@@ -128,15 +132,17 @@ def _plus(
     values = np.interp(at, present.positions, present.values) + offset
     values = values + cosine * np.cos(np.deg2rad(at)) + sine * np.sin(np.deg2rad(at))
     changed = measured.ErrorSeries(
-        key, tuple(at.tolist()), (measured.MeasuredRun(1, measured.BOTH, tuple(values.tolist())),)
+        key,
+        tuple(at.tolist()),
+        (measured.MeasuredRun(1, measured.UNDIRECTED, tuple(values.tolist())),),
     )
     series = tuple(changed if one.key == key else one for one in found.series)
     return replace(found, series=series)
 
 
 def _read_with(
-    read_one: Callable[[Source], Sequence[measured.Imported]],
-) -> Callable[[Sequence[Source], ReadOptions], measured.Imported]:
+    read_one: Callable[[Source], Sequence[measured.ImportedErrors]],
+) -> Callable[[Sequence[Source], ReadOptions], measured.ImportedErrors]:
     return lambda sources, options: _finished(
         measured.merge([part for source in sources for part in read_one(source)]), options
     )
@@ -174,8 +180,8 @@ def _blocks(source: Source) -> list[Block]:
     return [block for block in blocks if block]
 
 
-def _read_isg(source: Source) -> list[measured.Imported]:
-    found: list[measured.Imported] = []
+def _read_isg(source: Source) -> list[measured.ImportedErrors]:
+    found: list[measured.ImportedErrors] = []
     known: set[str] = set()
     for block in _blocks(source):
         part = _read_block(source, block)
@@ -190,10 +196,10 @@ def _read_isg(source: Source) -> list[measured.Imported]:
     return found
 
 
-def _read_block(source: Source, block: Block) -> measured.Imported:
+def _read_block(source: Source, block: Block) -> measured.ImportedErrors:
     at, names = block[0]
     arguments = [name for name in names if name in ARGUMENTS]
-    left = [name for name in names if OTHER.fullmatch(name)]
+    left = [name for name in names if IGNORED.fullmatch(name)]
     key_of = {name: error_name(name) for name in names}
     for name in names:
         if name not in (*arguments, *left) and not key_of[name]:
@@ -218,19 +224,21 @@ def _read_block(source: Source, block: Block) -> measured.Imported:
             elif key := key_of[name]:
                 row[key] = place.checked_error(value * factor_of(key), name)
         rows.append((place, row))
-    notes = (*source.notes, *left_out(left))
+    notes = (*source.notes, *ignored_notes(left))
     keys = [key for name in names if (key := key_of[name])]
     if not arguments and len(rows) > 1:
         rows[1][0].refuse(f"{len(rows)} records without arguments", "one")
     for key in keys:
         _check_arguments(at, key, arguments)
     if not arguments:
-        return measured.Imported(ISG, constants={key: rows[0][1][key] for key in keys}, notes=notes)
+        return measured.ImportedErrors(
+            ISG, constants={key: rows[0][1][key] for key in keys}, notes=notes
+        )
     if len(arguments) == 2:
         planes = tuple(_isg_plane(source, key, arguments, rows) for key in keys)
-        return measured.Imported(ISG, planes=planes, notes=notes)
+        return measured.ImportedErrors(ISG, surfaces=planes, notes=notes)
     series = tuple(_isg_series(key, arguments[0], rows) for key in keys)
-    return measured.Imported(ISG, series, notes=notes)
+    return measured.ImportedErrors(ISG, series, notes=notes)
 
 
 def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None:
@@ -250,7 +258,7 @@ def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.ErrorS
         if row[argument] <= before[argument]:
             found = f"{argument} {row[argument]:g} after {before[argument]:g}"
             at.refuse(found, "ascending positions")
-    run = measured.MeasuredRun(1, measured.BOTH, tuple(row[key] for _, row in rows))
+    run = measured.MeasuredRun(1, measured.UNDIRECTED, tuple(row[key] for _, row in rows))
     return measured.ErrorSeries(key, tuple(row[argument] for _, row in rows), (run,))
 
 
@@ -260,18 +268,18 @@ def _isg_plane(
     own = parameter(key).axis
     other = next(axis for axis in arguments if axis != own)
     points = [(at, row[own], row[other], row[key]) for at, row in rows]
-    return measured.plane_of(key, (own, other), points, source)
+    return measured.build_surface(key, (own, other), points, source)
 
 
 def _write_isg(wanted: RequiredCorrections) -> Files:
-    held = measured.in_one_direction(measured.sampled(wanted), wanted)
+    held = measured.to_single_direction(measured.sample_errors(wanted), wanted)
     check_axes(held, ISG)
 
     def spelled(value: float, key: str) -> str:
-        return spell(value / factor_of(key), DIGITS)
+        return format_number(value / factor_of(key), DIGITS)
 
     blocks: list[list[list[str]]] = []
-    for table in measured.tables_of(held):
+    for table in measured.build_error_tables(held):
         names = [*reversed(table.axes), *map(file_name, table.keys)]
         ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis runs fastest
         rows = [
@@ -284,7 +292,7 @@ def _write_isg(wanted: RequiredCorrections) -> Files:
         blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
     return {
-        "": f"{spell_comment('// ', wanted.scene.title)}\n// mm, rad, degrees\n"
+        "": f"{format_comment('// ', wanted.scene.title)}\n// mm, rad, degrees\n"
         + "\n#\n".join(texts)
         + "\n"
     }
@@ -302,7 +310,7 @@ def _is_iso(head: str, name: str) -> bool:
     return bool(blocks) and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))
 
 
-def _read_iso(source: Source) -> measured.Imported:
+def _read_iso(source: Source) -> measured.ImportedErrors:
     constants: dict[str, float] = {}
     series: list[measured.ErrorSeries] = []
     left: list[str] = []
@@ -320,21 +328,21 @@ def _read_iso(source: Source) -> measured.Imported:
                     places, values = zip(*rows, strict=True)
                     series.append(
                         measured.ErrorSeries(
-                            key, places, (measured.MeasuredRun(1, measured.BOTH, values),)
+                            key, places, (measured.MeasuredRun(1, measured.UNDIRECTED, values),)
                         )
                     )
                 opened, rows = None, []
         elif matched := _SECTION.fullmatch(bare):
             name = matched[1].upper()
             key = error_name(name)
-            if not key and not OTHER.fullmatch(name):
+            if not key and not IGNORED.fullmatch(name):
                 at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
             if not key:
                 left.append(name)
             elif key in constants or any(one.key == key for one in series):
                 at.refuse(f"[{name}] is given twice", "it once")
         elif not name:
-            at.refuse(at.shown, "a block such as [EXY]")
+            at.refuse(at.quoted, "a block such as [EXY]")
         elif matched := _VALUE.fullmatch(bare):
             value = at.number(matched[1], f"VALUE of {name}")
             if key and not parameter(key).is_constant:
@@ -346,11 +354,11 @@ def _read_iso(source: Source) -> measured.Imported:
                 at.refuse(f"[{name}] has Gridpoints", "VALUE = number")
             opened = at
         elif bare != "{":
-            at.refuse(at.shown, "VALUE = number or Gridpoints = {")
+            at.refuse(at.quoted, "VALUE = number or Gridpoints = {")
     if opened:
         opened.refuse(f"Gridpoints of [{name}] do not end", "} (is the file cut off?)")
-    notes = (*source.notes, *left_out(left))
-    return measured.Imported(ISO, tuple(series), constants=constants, notes=notes)
+    notes = (*source.notes, *ignored_notes(left))
+    return measured.ImportedErrors(ISO, tuple(series), constants=constants, notes=notes)
 
 
 def _iso_row(
@@ -359,7 +367,7 @@ def _iso_row(
     if not parts:
         return
     if len(parts) != 2:
-        at.refuse(f"{len(parts)} numbers in {at.shown}", "position and value")
+        at.refuse(f"{len(parts)} numbers in {at.quoted}", "position and value")
     position = at.position(parts[0], "position")
     if rows and position <= rows[-1][0]:
         found = f"position {position:g} of {name} after {rows[-1][0]:g}"
@@ -370,10 +378,10 @@ def _iso_row(
 
 
 def _write_iso(wanted: RequiredCorrections) -> Files:
-    held = measured.in_one_direction(measured.sampled(wanted), wanted)
+    held = measured.to_single_direction(measured.sample_errors(wanted), wanted)
     check_axes(held, ISO)
-    lines = [spell_comment("// ", wanted.scene.title), "// mm, rad, degrees; variant Vendor"]
-    for plane in held.planes:
+    lines = [format_comment("// ", wanted.scene.title), "// mm, rad, degrees; variant Vendor"]
+    for plane in held.surfaces:
         axes = " and ".join(plane.axes)
         lines.append(f"// {plane.key} over {axes}: has no place here, left out")
     for key, value in held.constants.items():
@@ -391,14 +399,14 @@ def _write_iso(wanted: RequiredCorrections) -> Files:
 
 
 ISO_FORMAT = Format(
-    **described(ISO),
+    **format_description(ISO),
     recognise=_is_iso,
     read=_read_with(lambda source: [_read_iso(source)]),
     write=_write_iso,
     variants=VARIANTS,
 )
 ISG_FORMAT = Format(
-    **described(ISG),
+    **format_description(ISG),
     recognise=_is_isg,
     read=_read_with(_read_isg),
     write=_write_isg,

@@ -124,7 +124,7 @@ PLANES = ((0, 1), (0, 2), (1, 2))  # axes across and up of each slice
 def compensation_chart(found: "Compensation") -> Figure:
     """Draw |E| before, after on the same colours, and what is left on its own, in slices."""
     title = f"Compensation · {found.controller.scene.title}"
-    subtitle = f"{found.format.title} · loop {found.loop} · {found.points_words}"
+    subtitle = f"{found.format.title} · loop {found.loop} · {found.points_text}"
     planes, fields = _planes(found), _fields(found)
     with style():
         height = 1.3 + PLANE_IN * max(len(planes), 1)
