@@ -51,8 +51,8 @@ class ErrorSeries:
 
         Forward it is x̄ᵢ↑ of ISO 230-2, backward x̄ᵢ↓.
         """
-        found = self._runs(direction)
-        return np.nanmean(found, axis=0) if len(found) else None
+        runs = self._runs(direction)
+        return np.nanmean(runs, axis=0) if len(runs) else None
 
     def in_direction(self, direction: int) -> Array:
         """Give the mean in a direction of travel, [n]; of both where there are no such runs."""
@@ -77,8 +77,8 @@ class ErrorSeries:
 
     def deviation(self, direction: int) -> Array | None:
         """Estimate the standard deviation in a direction, [n] (sᵢ); None below two runs."""
-        found = self._runs(direction)
-        return np.nanstd(found, axis=0, ddof=1) if len(found) > 1 else None
+        runs = self._runs(direction)
+        return np.nanstd(runs, axis=0, ddof=1) if len(runs) > 1 else None
 
     @property
     def repeatability(self) -> Array | None:
@@ -90,8 +90,8 @@ class ErrorSeries:
         if up is None or down is None or reversal is None:
             return None
         half = REPEATABILITY / 2.0
-        both = half * (up + down) + np.abs(reversal)
-        return np.max([both, REPEATABILITY * up, REPEATABILITY * down], axis=0)
+        bidirectional = half * (up + down) + np.abs(reversal)
+        return np.max([bidirectional, REPEATABILITY * up, REPEATABILITY * down], axis=0)
 
 
 @dataclass(frozen=True)
@@ -169,16 +169,16 @@ class ImportedErrors:
 
 
 def merge(parts: Sequence[ImportedErrors]) -> ImportedErrors:
-    found: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
+    merged: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
     for name in (entry.name for entry in fields(ImportedErrors)[1:]):
         values = [getattr(part, name) for part in parts]
         if isinstance(values[0], Mapping):
-            found[name] = {key: value for table in values for key, value in table.items()}
+            merged[name] = {key: value for table in values for key, value in table.items()}
         else:
-            every = [one for value in values for one in value]
+            entries = [one for value in values for one in value]
             # an error that is given twice is refused later
-            found[name] = tuple(every if name in ("series", "planes") else dict.fromkeys(every))
-    return ImportedErrors(**found)
+            merged[name] = tuple(entries if name in ("series", "surfaces") else dict.fromkeys(entries))
+    return ImportedErrors(**merged)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,8 +224,8 @@ def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
             )
         )
     for key, value in imported.constants.items():
-        own = imported.uncertainty.get(key)
-        row = ErrorSummary(key=key, kind="constant", smallest=value, largest=value, uncertainty=own)
+        standard_uncertainty = imported.uncertainty.get(key)
+        row = ErrorSummary(key=key, kind="constant", smallest=value, largest=value, uncertainty=standard_uncertainty)
         rows.append(row)
     for key, curve in imported.curves.items():
         ((kind, numbers),) = curve.items()
@@ -261,23 +261,23 @@ def summary_table(imported: ImportedErrors) -> blocks.Table:
     return blocks.Table(columns, rows)
 
 
-def _of_series(one: ErrorSeries) -> ErrorSummary:
-    values, reversal, repeatability = one.values, one.reversal, one.repeatability
+def _of_series(series: ErrorSeries) -> ErrorSummary:
+    values, reversal, repeatability = series.values, series.reversal, series.repeatability
     if repeatability is not None and np.isnan(repeatability).all():
         repeatability = None
-    ways = {run.direction for run in one.runs}
+    directions = {run.direction for run in series.runs}
     return ErrorSummary(
-        key=one.key,
+        key=series.key,
         kind="table" if reversal is None else "by direction",
-        points=len(one.positions),
-        runs=len(one.runs),
-        directions=" ".join(sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in ways),
-        range=(one.positions[0], one.positions[-1]),
+        points=len(series.positions),
+        runs=len(series.runs),
+        directions=" ".join(sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in directions),
+        range=(series.positions[0], series.positions[-1]),
         smallest=float(values.min()),
         largest=float(values.max()),
         mean_reversal=None if reversal is None else float(reversal.mean()),
         repeatability=None if repeatability is None else float(np.nanmax(repeatability)),
-        uncertainty=max(one.uncertainty) if one.uncertainty else None,
+        uncertainty=max(series.uncertainty) if series.uncertainty else None,
     )
 
 
@@ -321,9 +321,9 @@ def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
             continue
         count = corrections.points.get(row.axis) or max(corrections.points.values())
         at = np.linspace(*scene.axis_span(row.axis), count)
-        ways = _curves_by_direction(curve)
+        curves = _curves_by_direction(curve)
         other = _second_axis(curve)
-        tabled = all(isinstance(one, TableCurve | TwoArguments) for one in ways.values() or [curve])
+        tabled = all(isinstance(one, TableCurve | TwoArguments) for one in curves.values() or [curve])
         if tabled and (other is not None or len(curve.kinks) <= count):
             at = np.array(curve.kinks)
         elif other is not None:
@@ -334,7 +334,7 @@ def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
                     part.evaluate_at(row.axis, {row.axis: at[:, None], other[0]: other[1]})
                 )
                 + np.zeros((len(at), len(other[1])))
-                for way, part in {FORWARD: curve, BACKWARD: curve, **ways}.items()
+                for way, part in {FORWARD: curve, BACKWARD: curve, **curves}.items()
             }
             planes.append(
                 surface_from_directions(key, (row.axis, other[0]), (at, other[1]), tables)
@@ -342,7 +342,7 @@ def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
         else:
             runs = tuple(
                 MeasuredRun(1, way, tuple(np.asarray(part.evaluate(at)).tolist()))
-                for way, part in (ways or {UNDIRECTED: curve}).items()
+                for way, part in (curves or {UNDIRECTED: curve}).items()
             )
             series.append(ErrorSeries(key, tuple(at.tolist()), runs))
     return ImportedErrors("scene", tuple(series), tuple(planes), constants)
@@ -352,7 +352,7 @@ def to_single_direction(
     imported: ImportedErrors, corrections: RequiredCorrections
 ) -> ImportedErrors:
     """Give errors by direction of travel as the scene has them in the direction it looks at."""
-    way = RUN_DIRECTION.get(TravelDirection(corrections.scene.model.direction), UNDIRECTED)
+    direction = RUN_DIRECTION.get(TravelDirection(corrections.scene.model.direction), UNDIRECTED)
 
     return replace(
         imported,
@@ -360,12 +360,12 @@ def to_single_direction(
             ErrorSeries(
                 one.key,
                 one.positions,
-                (MeasuredRun(1, UNDIRECTED, tuple(one.in_direction(way).tolist())),),
+                (MeasuredRun(1, UNDIRECTED, tuple(one.in_direction(direction).tolist())),),
             )
             for one in imported.series
         ),
-        planes=tuple(
-            replace(one, values=tuple(map(tuple, one.table(way).tolist())), backward=())
+        surfaces=tuple(
+            replace(one, values=tuple(map(tuple, one.table(direction).tolist())), backward=())
             for one in imported.surfaces
         ),
     )
@@ -383,11 +383,11 @@ def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
         for one in (curve, *_curves_by_direction(curve).values())
         if isinstance(one, TwoArguments)
     ]
-    others = {one.axes[1] for one in surfaces}
-    if len(others) != 1:
+    axes = {one.axes[1] for one in surfaces}
+    if len(axes) != 1:
         return None
     at = np.unique(np.concatenate([one.positions[1] for one in surfaces]))
-    return others.pop(), at
+    return axes.pop(), at
 
 
 def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
@@ -401,20 +401,20 @@ def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
         at = np.unique(np.concatenate([one.positions for one in series]))
         directed = any(one.reversal is not None for one in series)
         table = ErrorTable((axis,), tuple(one.key for one in series), [])
-        for way in (FORWARD, BACKWARD) if directed else (UNDIRECTED,):
+        for direction in (FORWARD, BACKWARD) if directed else (UNDIRECTED,):
             columns = [
-                np.interp(at, one.positions, one.in_direction(way)).tolist() for one in series
+                np.interp(at, one.positions, one.in_direction(direction)).tolist() for one in series
             ]
             found = zip(at.tolist(), *columns, strict=True)
-            table.rows.extend(((q,), way, values) for q, *values in found)
+            table.rows.extend(((q,), direction, values) for q, *values in found)
         tables.append(table)
     for plane in imported.surfaces:
         table = ErrorTable(plane.axes, (plane.key,), [])
-        for way in (FORWARD, BACKWARD) if plane.backward else (UNDIRECTED,):
-            values = plane.backward if way == BACKWARD else plane.values
+        for direction in (FORWARD, BACKWARD) if plane.backward else (UNDIRECTED,):
+            values = plane.backward if direction == BACKWARD else plane.values
             for first, row in zip(plane.first, values, strict=True):
                 points = zip(plane.second, row, strict=True)
-                table.rows.extend(((first, second), way, (value,)) for second, value in points)
+                table.rows.extend(((first, second), direction, (value,)) for second, value in points)
         tables.append(table)
     return tables
 
@@ -431,18 +431,18 @@ def build_surface(
     second = distinct_positions(np.array([point[2] for point in points]))
     values = np.full((len(first), len(second)), math.nan)
     lines: dict[tuple[int, int], SourceLine] = {}
-    for at, one, other, value in points:
-        i = int(np.abs(first - one).argmin())
-        j = int(np.abs(second - other).argmin())
+    for at, first_position, second_position, value in points:
+        i = int(np.abs(first - first_position).argmin())
+        j = int(np.abs(second - second_position).argmin())
         if (i, j) in lines:
-            found = f"{axes[0]} {one:g}, {axes[1]} {other:g}{where} stands also in line"
-            at.refuse(f"{found} {lines[i, j].line}", "every point once")
+            problem = f"{axes[0]} {first_position:g}, {axes[1]} {second_position:g}{where} stands also in line"
+            at.refuse(f"{problem} {lines[i, j].line}", "every point once")
         lines[i, j] = at
         values[i, j] = value
     if np.isnan(values).any():
         i, j = (int(index) for index in np.argwhere(np.isnan(values))[0])
-        found = f"{key} has no value at {axes[0]} {first[i]:g}, {axes[1]} {second[j]:g}{where}"
-        (lines.get((i, j)) or source).refuse(found, "a value at every point of the grid")
+        problem = f"{key} has no value at {axes[0]} {first[i]:g}, {axes[1]} {second[j]:g}{where}"
+        (lines.get((i, j)) or source).refuse(problem, "a value at every point of the grid")
     rows = tuple(tuple(row) for row in values.tolist())
     return ErrorSurface(key, axes, tuple(first.tolist()), tuple(second.tolist()), rows)
 
@@ -451,16 +451,16 @@ def build_surface_by_direction(
     key: str, axes: tuple[str, str], points: Mapping[int, Sequence[Point]], source: Source
 ) -> ErrorSurface:
     """Build an error of two axes from its points by direction of travel, see `plane_of`."""
-    words = {FORWARD: " forward", BACKWARD: " backward", UNDIRECTED: ""}
-    planes = {way: build_surface(key, axes, own, source, words[way]) for way, own in points.items()}
+    suffixes = {FORWARD: " forward", BACKWARD: " backward", UNDIRECTED: ""}
+    planes = {way: build_surface(key, axes, own, source, suffixes[way]) for way, own in points.items()}
     if len(planes) == 1:
         return next(iter(planes.values()))
     if set(planes) != {FORWARD, BACKWARD}:
         expected = "+ or - in every row, or in none"
         points[UNDIRECTED][0][0].refuse("has no direction", expected)
-    there, back = planes[FORWARD], planes[BACKWARD]
-    if (there.first, there.second) != (back.first, back.second):
-        found = f"{key} has other points backward than forward"
-        points[BACKWARD][0][0].refuse(found, "the same")
+    forward, backward = planes[FORWARD], planes[BACKWARD]
+    if (forward.first, forward.second) != (backward.first, backward.second):
+        problem = f"{key} has other points backward than forward"
+        points[BACKWARD][0][0].refuse(problem, "the same")
     tables = {way: plane.table(UNDIRECTED) for way, plane in planes.items()}
-    return surface_from_directions(key, axes, (there.first, there.second), tables)
+    return surface_from_directions(key, axes, (forward.first, forward.second), tables)

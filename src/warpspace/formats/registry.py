@@ -51,19 +51,19 @@ class ReadOptions:
     def axis_named(self, name: str, at: Source | SourceLine) -> str:
         """Find the axis of the machine behind a name in a file: X1, MX1 and X mean X."""
         bare = name.strip().strip('"').upper()
-        given = self.names.get(bare, "")
-        candidates = [given] if given else _candidates(bare)
-        known = [axis for axis in candidates if len(axis) == 1 or given]
+        assigned = self.names.get(bare, "")
+        candidates = [assigned] if assigned else _candidates(bare)
+        matches = [axis for axis in candidates if len(axis) == 1 or assigned]
         if self.machine is not None:
-            known = [axis for axis in candidates if axis in self.machine.axes]
-        if not known:
+            matches = [axis for axis in candidates if axis in self.machine.axes]
+        if not matches:
             says = f"--axis {bare or 'NAME'}=AXIS says which one it is"
             if self.machine is None:
                 at.refuse(f"axis {bare!r} is not known", f"X Y Z U V W A B C; {says}")
             chain, axes = self.machine.chain, ", ".join(self.machine.axes)
-            found = f"axis {bare!r} is none of the machine {chain}, which has {axes}"
-            at.refuse(found if given else f"{found} ({says})")
-        return known[0]
+            problem = f"axis {bare!r} is none of the machine {chain}, which has {axes}"
+            at.refuse(problem if assigned else f"{problem} ({says})")
+        return matches[0]
 
 
 @dataclass(frozen=True)
@@ -111,11 +111,11 @@ class Format:
         if self.tables is None:
             raise OptionError(f"{self.name} is written only; expected another format")
         parts = [[source] for source in sources] if self.independent_files else [sources]
-        found = [
+        imports = [
             errors_from_tables(self.tables(part, options), self.name, part[0], options.machine)
             for part in parts
         ]
-        return merge(found) if len(found) > 1 else found[0]
+        return merge(imports) if len(imports) > 1 else imports[0]
 
 
 @cache
@@ -124,35 +124,35 @@ def _catalogue() -> dict[str, Any]:
 
 
 def format_description(name: str) -> dict[str, Any]:
-    words = _catalogue()["formats"][name]
-    return {**words, "name": name, "endings": tuple(words["endings"])}
+    description = _catalogue()["formats"][name]
+    return {**description, "name": name, "endings": tuple(description["endings"])}
 
 
 def head_matcher(pattern: str) -> Callable[[str, str], bool]:
     """Tell files by a pattern in their first lines, whatever their name."""
-    found = re.compile(pattern, re.MULTILINE)
-    return lambda head, _: found.search(head) is not None
+    expression = re.compile(pattern, re.MULTILINE)
+    return lambda head, _: expression.search(head) is not None
 
 
 def _candidates(bare: str) -> list[str]:
-    found = [bare] if is_axis_name(bare) else []
+    candidates = [bare] if is_axis_name(bare) else []
     stem = bare.removeprefix("M").rstrip("0123456789")
-    if len(stem) == 1 and is_axis_name(stem) and stem not in found:
-        found.append(stem)
-    return found
+    if len(stem) == 1 and is_axis_name(stem) and stem not in candidates:
+        candidates.append(stem)
+    return candidates
 
 
 def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
     axis, names = "", {}
     for text in texts:
         name, equals, target = text.partition("=")
-        found = (target if equals else name).strip().upper()
-        if not is_axis_name(found):
+        axis_name = (target if equals else name).strip().upper()
+        if not is_axis_name(axis_name):
             raise OptionError(f"--axis {text!r}; expected an axis (X) or NAME=AXIS (AX1=X)")
         if equals:
-            names[name.strip().upper()] = found
+            names[name.strip().upper()] = axis_name
         else:
-            axis = found
+            axis = axis_name
     return axis, names
 
 
@@ -183,25 +183,25 @@ def unregister_format(name: str) -> None:
 
 
 def recognise(sources: Sequence[Source]) -> Format:
-    found: dict[str, Format] = {}
+    recognised: dict[str, Format] = {}
     for source in sources:
         kind = next((one for one in formats() if one.recognise(source.head, source.name)), None)
         if kind is None:
             names = ", ".join(one.name for one in formats())
             first = next((line for line in source.lines if line.strip()), "")
             number = source.lines.index(first) + 1 if first else None
-            said = (
+            problem = (
                 f"{source.at(number).quoted if number else 'nothing'} is of no format that is known"
             )
             expected = (
                 f"one of {names} (--format NAME says which; `warpspace import --formats` lists"
             )
-            (source.at(number) if number else source).refuse(said, f"{expected} what each holds)")
-        found[kind.name] = kind
-        if len(found) > 1:
-            names = " and ".join(found)
+            (source.at(number) if number else source).refuse(problem, f"{expected} what each holds)")
+        recognised[kind.name] = kind
+        if len(recognised) > 1:
+            names = " and ".join(recognised)
             source.refuse(f"files of {names} at once", "one format an import")
-    return next(iter(found.values()))
+    return next(iter(recognised.values()))
 
 
 @dataclass(frozen=True)
@@ -219,8 +219,8 @@ def open_upload(name: str, content: bytes) -> Source:
     for kind in _catalogue()["unpublished"]:
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
         if content.startswith(starts) or lower.endswith(tuple(kind["endings"])):
-            found = f"is {kind['what']}; expected another file: {kind['instead']}"
-            raise SceneError(name, [found])
+            problem = f"is {kind['what']}; expected another file: {kind['instead']}"
+            raise SceneError(name, [problem])
     return source_of_bytes(content, name)
 
 
@@ -233,8 +233,8 @@ def open_files(paths: Sequence[Path]) -> list[Source]:
 def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: str = "") -> Reading:
     kind = find_format(format_name) if format_name else recognise(sources)
     if options.variant not in ("", *kind.variants) and not kind.names_variants:
-        known = ", ".join(kind.variants) or "none"
-        raise OptionError(f"--variant {options.variant!r} of {kind.name}; expected one of: {known}")
+        variants = ", ".join(kind.variants) or "none"
+        raise OptionError(f"--variant {options.variant!r} of {kind.name}; expected one of: {variants}")
     if options.sign and kind.tables is None:
         raise OptionError(f"--sign: {kind.name} holds errors, no table of a controller")
     return Reading(kind.errors(sources, options), kind, not format_name)

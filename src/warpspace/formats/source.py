@@ -50,8 +50,8 @@ def format_number(value: float, digits: int) -> str:
     """Spell a number with at most so many digits behind the point, without needless zeros."""
     text = f"{value:.{digits}f}"
     if "." in text:
-        whole, _, part = text.partition(".")
-        text = f"{whole}.{part.rstrip('0') or '0'}"
+        integer_part, _, part = text.partition(".")
+        text = f"{integer_part}.{part.rstrip('0') or '0'}"
     return "0.0" if text in {"-0.0", "-0"} else text
 
 
@@ -196,8 +196,8 @@ def quote(text: str) -> str:
 
 def source_of_bytes(content: bytes, name: str) -> Source:
     if len(content) > MAX_BYTES:
-        found = f"is {len(content):,} bytes long; expected at most {MAX_BYTES:,} bytes"
-        raise SceneError(name, [found])
+        problem = f"is {len(content):,} bytes long; expected at most {MAX_BYTES:,} bytes"
+        raise SceneError(name, [problem])
     text, notes = _decoded(content, name)
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
@@ -218,8 +218,8 @@ def source_of_text(text: str, name: str, notes: tuple[str, ...] = ()) -> Source:
         lines.pop()
     for number, line in enumerate(lines, start=1):
         if len(line) > MAX_LINE:
-            found = f"is longer than {MAX_LINE:,} characters; expected at most so many"
-            raise SceneError(name, [f"line {number} {found}"])
+            problem = f"is longer than {MAX_LINE:,} characters; expected at most so many"
+            raise SceneError(name, [f"line {number} {problem}"])
     return Source(name, tuple(lines), notes)
 
 
@@ -236,8 +236,8 @@ def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
         try:
             text = content.decode("cp1252")
         except UnicodeDecodeError:
-            found = f"is no text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
-            raise SceneError(name, [f"{found}; expected a text file"]) from None
+            problem = f"is no text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
+            raise SceneError(name, [f"{problem}; expected a text file"]) from None
         return text, ("read as Windows-1252: it is no UTF-8",)
 
 

@@ -51,8 +51,8 @@ class AxisTable:
         if self.backward and direction == 0:
             return (self.at(position, 1) + self.at(position, -1)) / 2.0
         if self.direction and self.direction != direction:
-            own = self.at(position, self.direction)
-            return own / 2.0 if direction == 0 else np.zeros_like(own)
+            correction = self.at(position, self.direction)
+            return correction / 2.0 if direction == 0 else np.zeros_like(correction)
         values = self.backward if self.backward and direction < 0 else self.values
         return interpolate(np.asarray(position, dtype=float), self.positions, values, self.ends)
 
@@ -102,8 +102,8 @@ class Grid3:
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
         del direction
         points = np.broadcast_arrays(*(coordinates[axis] for axis in self.axes))
-        found = trilinear(points, self.positions, self.values)
-        return {axis: found[..., index] for index, axis in enumerate(self.axes)}
+        interpolated = trilinear(points, self.positions, self.values)
+        return {axis: interpolated[..., index] for index, axis in enumerate(self.axes)}
 
 
 @dataclass(frozen=True)
@@ -132,15 +132,15 @@ Term: TypeAlias = AxisTable | Product | Grid3 | Affine
 
 
 def interpolate(position: Array, at: Sequence[float], values: Sequence[float], ends: str) -> Array:
-    places, found = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
+    places, nodes = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
     if ends == MODULO and len(places) > 1:
         period = places[-1] - places[0]
         position = places[0] + np.mod(position - places[0], period)
-    inside = np.interp(position, places, found)
+    inside = np.interp(position, places, nodes)
     if ends != EXTRAPOLATE or len(places) < 2:
         return inside
-    low = (found[1] - found[0]) / (places[1] - places[0])
-    high = (found[-1] - found[-2]) / (places[-1] - places[-2])
+    low = (nodes[1] - nodes[0]) / (places[1] - places[0])
+    high = (nodes[-1] - nodes[-2]) / (places[-1] - places[-2])
     below = np.minimum(position - places[0], 0.0) * low
     return inside + below + np.maximum(position - places[-1], 0.0) * high
 
@@ -151,9 +151,9 @@ def trilinear(
     """Interpolate in a grid of three axes; beyond it its border is held."""
     from scipy.interpolate import RegularGridInterpolator
 
-    both = zip(points, positions, strict=True)
-    held = np.stack([np.clip(point, along[0], along[-1]) for point, along in both], axis=-1)
-    return RegularGridInterpolator(tuple(map(np.array, positions)), values)(held)
+    pairs = zip(points, positions, strict=True)
+    clipped = np.stack([np.clip(point, along[0], along[-1]) for point, along in pairs], axis=-1)
+    return RegularGridInterpolator(tuple(map(np.array, positions)), values)(clipped)
 
 
 @dataclass(frozen=True)
@@ -192,11 +192,11 @@ def errors_from_tables(
     notes = list(tables.notes)
     for term in tables.terms:
         if isinstance(term, Grid3):
-            found, left = _grid_planes(term, machine)
-            planes += found
-            if left > NEGLIGIBLE:
+            grid_surfaces, ignored_um = _grid_planes(term, machine)
+            planes += grid_surfaces
+            if ignored_um > NEGLIGIBLE:
                 notes.append(
-                    f"up to {left:.3g} µm depend on all three axes together, which no error of two"
+                    f"up to {ignored_um:.3g} µm depend on all three axes together, which no error of two"
                     " axes holds: left out"
                 )
     series, planes = _joined(series, planes, source)
@@ -205,8 +205,8 @@ def errors_from_tables(
     for term in tables.terms:
         if isinstance(term, Affine):
             _affine(term, machine, constants, curves)
-    side = "" if machine is not None else " (all axes taken to carry the tool)"
-    assumed = (*tables.assumed, f"what the table corrects is taken for the whole error{side}")
+    note = "" if machine is not None else " (all axes taken to carry the tool)"
+    assumed = (*tables.assumed, f"what the table corrects is taken for the whole error{note}")
     return measured.ImportedErrors(
         name,
         tuple(
@@ -247,7 +247,7 @@ def _factor(machine: Machine | None, source_axis: str, target: str) -> float:
 
 
 def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTable]]:
-    found: defaultdict[str, list[AxisTable]] = defaultdict(list)
+    lines_by_key: defaultdict[str, list[AxisTable]] = defaultdict(list)
     for line in lines:
         if not is_linear(line.target) and line.source != line.target:
             source.refuse(
@@ -255,60 +255,60 @@ def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTa
                 " is such a correction",
                 "tables of linear axes, or of a rotary axis itself",
             )
-        found[error_key(line.source, line.target)].append(line)
-    return found
+        lines_by_key[error_key(line.source, line.target)].append(line)
+    return lines_by_key
 
 
 def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> measured.ErrorSeries:
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
-        ways = {
+        values_by_direction = {
             way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in DIRECTIONS
         }
-    if np.array_equal(ways[measured.FORWARD], ways[measured.BACKWARD]):
+    if np.array_equal(values_by_direction[measured.FORWARD], values_by_direction[measured.BACKWARD]):
         runs = (
-            measured.MeasuredRun(1, measured.UNDIRECTED, tuple(ways[measured.FORWARD].tolist())),
+            measured.MeasuredRun(1, measured.UNDIRECTED, tuple(values_by_direction[measured.FORWARD].tolist())),
         )
     else:
         runs = tuple(
-            measured.MeasuredRun(1, way, tuple(values.tolist())) for way, values in ways.items()
+            measured.MeasuredRun(1, way, tuple(values.tolist())) for way, values in values_by_direction.items()
         )
     return measured.ErrorSeries(key, tuple(at.tolist()), runs)
 
 
 def _plane(term: Product, machine: Machine | None, source: Source) -> measured.ErrorSurface:
-    one, other = term.first, term.second
-    if one.source == other.source or not is_linear(one.target):
+    first_table, second_table = term.first, term.second
+    if first_table.source == second_table.source or not is_linear(first_table.target):
         source.refuse(
-            f"multiplies tables over {one.source} and {other.source} for {one.target}",
+            f"multiplies tables over {first_table.source} and {second_table.source} for {first_table.target}",
             "tables over two axes that correct a linear axis",
         )
-    factor = _factor(machine, one.source, one.target)
-    first, second = np.meshgrid(one.positions, other.positions, indexing="ij")
+    factor = _factor(machine, first_table.source, first_table.target)
+    first, second = np.meshgrid(first_table.positions, second_table.positions, indexing="ij")
     tables = {way: factor * term.at(first, second, way) for way in DIRECTIONS}
-    key = error_key(one.source, one.target)
+    key = error_key(first_table.source, first_table.target)
     return measured.surface_from_directions(
-        key, (one.source, other.source), (one.positions, other.positions), tables
+        key, (first_table.source, second_table.source), (first_table.positions, second_table.positions), tables
     )
 
 
 def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.ErrorSurface], float]:
     planes: list[measured.ErrorSurface] = []
-    left = 0.0
+    ignored_um = 0.0
     for index, target in enumerate(term.axes):
         values = term.values[..., index]
-        over = {
+        means = {
             axes: values.mean(axis=axes, keepdims=True)
             for axes in ((0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2))
         }
         parts = {
-            (0, 1): over[2,],
-            (1, 2): over[0,] - over[0, 2],
-            (2, 0): over[1,] - over[1, 2] - over[0, 1] + over[0, 1, 2],
+            (0, 1): means[2,],
+            (1, 2): means[0,] - means[0, 2],
+            (2, 0): means[1,] - means[1, 2] - means[0, 1] + means[0, 1, 2],
         }
-        rest = np.abs(values - sum(parts.values())).max()
-        left = max(left, float(rest) * UM_PER_MM)
+        remainder = np.abs(values - sum(parts.values())).max()
+        ignored_um = max(ignored_um, float(remainder) * UM_PER_MM)
         for (first, second), part in parts.items():
             flat = part.squeeze(axis=3 - first - second)
             table = flat if first < second else flat.T
@@ -319,7 +319,7 @@ def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.Er
             planes.append(
                 measured.surface_from_directions(error_key(axes[0], target), axes, places, tables)
             )
-    return [plane for plane in planes if np.abs(plane.values).max() > NEGLIGIBLE], left
+    return [plane for plane in planes if np.abs(plane.values).max() > NEGLIGIBLE], ignored_um
 
 
 def _joined(
@@ -332,28 +332,28 @@ def _joined(
     keys = [key for key, _ in joined]
     if twice := next((key for key in keys if keys.count(key) > 1), ""):
         source.refuse(f"has products of {twice} with two other axes", "one for each error")
-    left: list[measured.ErrorSeries] = []
-    for one in series:
-        place = next((place for place in joined if place[0] == one.key), None)
+    single_axis: list[measured.ErrorSeries] = []
+    for error_series in series:
+        place = next((place for place in joined if place[0] == error_series.key), None)
         if place is None:
-            left.append(one)
+            single_axis.append(error_series)
             continue
         ends = (joined[place].second[0], joined[place].second[-1])
-        columns = {way: np.repeat(one.in_direction(way)[:, None], 2, axis=1) for way in DIRECTIONS}
-        own = measured.surface_from_directions(one.key, place[1], (one.positions, ends), columns)
-        joined[place] = _added(joined[place], own)
-    return left, list(joined.values())
+        columns = {way: np.repeat(error_series.in_direction(way)[:, None], 2, axis=1) for way in DIRECTIONS}
+        surface = measured.surface_from_directions(error_series.key, place[1], (error_series.positions, ends), columns)
+        joined[place] = _added(joined[place], surface)
+    return single_axis, list(joined.values())
 
 
-def _added(one: measured.ErrorSurface, other: measured.ErrorSurface) -> measured.ErrorSurface:
-    first = np.union1d(one.first, other.first)
-    second = np.union1d(one.second, other.second)
+def _added(surface: measured.ErrorSurface, other: measured.ErrorSurface) -> measured.ErrorSurface:
+    first = np.union1d(surface.first, other.first)
+    second = np.union1d(surface.second, other.second)
     totals = {
-        way: _resampled(one, way, first, second) + _resampled(other, way, first, second)
+        way: _resampled(surface, way, first, second) + _resampled(other, way, first, second)
         for way in DIRECTIONS
     }
     return measured.surface_from_directions(
-        one.key, one.axes, (first.tolist(), second.tolist()), totals
+        surface.key, surface.axes, (first.tolist(), second.tolist()), totals
     )
 
 

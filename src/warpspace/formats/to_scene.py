@@ -47,14 +47,14 @@ def base_scene(machine: str) -> Scene:
     return load_scene(machine)
 
 
-def default_scene(found: ImportedErrors) -> Scene:
-    other = [axis for axis in found.axes if axis not in ("X", "Y", "Z")]
+def default_scene(imported: ImportedErrors) -> Scene:
+    other = [axis for axis in imported.axes if axis not in ("X", "Y", "Z")]
     if other:
         raise OptionError(
-            f"the errors are of {', '.join(found.axes)}; expected --machine: how {other[0]} stands"
+            f"the errors are of {', '.join(imported.axes)}; expected --machine: how {other[0]} stands"
             " in a machine is not in the files"
         )
-    spans = {axis: ends for axis, ends in _ranges(found).items() if ends[1] - ends[0] > MIN_SPAN}
+    spans = {axis: ends for axis, ends in _ranges(imported).items() if ends[1] - ends[0] > MIN_SPAN}
     travel = "".join(f"{axis} = [{low!r}, {high!r}]\n" for axis, (low, high) in spans.items())
     text = f'title = "imported"\n[machine]\nchain = "wFXYZt"\n[machine.travel]\n{travel}'
     return parse_scene(text, "imported")
@@ -63,29 +63,29 @@ def default_scene(found: ImportedErrors) -> Scene:
 def build_imported_scene(
     reading: Reading, base: Scene | None, title: str, name: str
 ) -> ImportedScene:
-    found = reading.imported
+    imported = reading.imported
     notes: list[str] = []
     if base is None:
-        base = default_scene(found)
+        base = default_scene(imported)
         base = replace(base, title=one_line(title)[:MAX_TEXT])
         notes.append("no machine named: X, Y and Z carry the tool, travels are those of the data")
-    _check_keys(found, base, name)
-    _check_travel(found, base, name)
-    notes += _plausibility_notes(found, base)
-    curves = _curves(found, base, name)
+    _check_keys(imported, base, name)
+    _check_travel(imported, base, name)
+    notes += _plausibility_notes(imported, base)
+    curves = _curves(imported, base, name)
     replaced = [key for key in curves if key in base.errors]
     if replaced:
         notes.append(f"replaced: {', '.join(replaced)}")
-    kept = [key for key in base.errors if key not in curves]
-    if kept:
-        notes.append(f"kept from {base.name}: {', '.join(kept)}")
-    uncertainty, measured = _measured(found, base, keep_runs=reading.format.measured)
-    model, said = _convention(found, base)
-    said_by = [*reading.imported.assumed, *notes, *said, *found.notes]
-    description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
+    retained = [key for key in base.errors if key not in curves]
+    if retained:
+        notes.append(f"kept from {base.name}: {', '.join(retained)}")
+    uncertainty, measured = _measured(imported, base, keep_runs=reading.format.measured)
+    model, convention_notes = _convention(imported, base)
+    description_lines = [*reading.imported.assumed, *notes, *convention_notes, *imported.notes]
+    description = "\n".join([f"Imported from {name} ({reading.format.name}).", *description_lines])[:MAX_TEXT]
     covariance = base.covariance and base.covariance.without(curves)
     if uncertainty:
-        covariance = (covariance or Covariance((), ())).extended(_ranges(found))
+        covariance = (covariance or Covariance((), ())).extended(_ranges(imported))
     scene = replace(
         base,
         model=model,
@@ -101,18 +101,18 @@ def build_imported_scene(
         found_text = f"gives a scene of {size:.1f} MB"
         raise SceneError(name, [f"{found_text}; expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"])
     parsed = parse_scene(text, base.name, name)
-    return ImportedScene(parsed, text, (*notes, *said))
+    return ImportedScene(parsed, text, (*notes, *convention_notes))
 
 
 def _without(table: Mapping[str, T], curves: Mapping[str, ErrorFunction]) -> dict[str, T]:
     return {key: value for key, value in table.items() if key not in curves}
 
 
-def _check_keys(found: ImportedErrors, base: Scene, name: str) -> None:
+def _check_keys(imported: ImportedErrors, base: Scene, name: str) -> None:
     machine = base.machine
     expected = f"expected errors of {', '.join(machine.axes)}"
-    needed = [(key, parameter(key).axis) for key in found.keys]
-    needed += [(plane.key, axis) for plane in found.surfaces for axis in plane.axes]
+    needed = [(key, parameter(key).axis) for key in imported.keys]
+    needed += [(plane.key, axis) for plane in imported.surfaces for axis in plane.axes]
     problems = [
         f"{key}: the machine {machine.chain} has no axis {axis}; {expected}"
         for key, axis in needed
@@ -122,61 +122,61 @@ def _check_keys(found: ImportedErrors, base: Scene, name: str) -> None:
         raise SceneError(name, list(dict.fromkeys(problems)))
 
 
-def _ranges(found: ImportedErrors) -> dict[str, tuple[float, float]]:
+def _ranges(imported: ImportedErrors) -> dict[str, tuple[float, float]]:
     at: dict[str, list[float]] = {}
-    for one in found.series:
-        at.setdefault(parameter(one.key).axis, []).extend(one.positions)
-    for plane in found.surfaces:
+    for series in imported.series:
+        at.setdefault(parameter(series.key).axis, []).extend(series.positions)
+    for plane in imported.surfaces:
         for axis, places in zip(plane.axes, (plane.first, plane.second), strict=True):
             at.setdefault(axis, []).extend(places)
     return {axis: (min(places), max(places)) for axis, places in at.items()}
 
 
-def _check_travel(found: ImportedErrors, base: Scene, name: str) -> None:
+def _check_travel(imported: ImportedErrors, base: Scene, name: str) -> None:
     problems: list[str] = []
-    for axis, (low, high) in _ranges(found).items():
-        one = base.machine.axes[axis]
-        if not is_linear(axis) and one.travel[1] - one.travel[0] >= 360.0 - TRAVEL_TOLERANCE:
+    for axis, (low, high) in _ranges(imported).items():
+        axis_definition = base.machine.axes[axis]
+        if not is_linear(axis) and axis_definition.travel[1] - axis_definition.travel[0] >= 360.0 - TRAVEL_TOLERANCE:
             continue
-        if low < one.travel[0] - TRAVEL_TOLERANCE or high > one.travel[1] + TRAVEL_TOLERANCE:
-            unit = f" {one.unit}" if is_linear(axis) else one.unit
+        if low < axis_definition.travel[0] - TRAVEL_TOLERANCE or high > axis_definition.travel[1] + TRAVEL_TOLERANCE:
+            unit = f" {axis_definition.unit}" if is_linear(axis) else axis_definition.unit
             problems.append(
                 f"positions of {axis} {low:g} … {high:g}{unit} reach beyond its travel"
-                f" {one.travel[0]:g} … {one.travel[1]:g}{unit}; expected positions within it (is it"
+                f" {axis_definition.travel[0]:g} … {axis_definition.travel[1]:g}{unit}; expected positions within it (is it"
                 " the right machine, are the units right?)"
             )
     if problems:
         raise SceneError(name, problems)
 
 
-def _plausibility_notes(found: ImportedErrors, base: Scene) -> list[str]:
-    notes = list(coverage_notes(base, _ranges(found)))
-    for one in found.series:
-        if not is_linear(axis := parameter(one.key).axis):
-            notes += radian_notes({f"{one.key} over {axis}_deg": one.positions})
-    largest = {one.key: float(np.abs(one.values).max()) for one in (*found.series, *found.surfaces)}
-    largest |= {key: abs(value) for key, value in found.constants.items()}
+def _plausibility_notes(imported: ImportedErrors, base: Scene) -> list[str]:
+    notes = list(coverage_notes(base, _ranges(imported)))
+    for series in imported.series:
+        if not is_linear(axis := parameter(series.key).axis):
+            notes += radian_notes({f"{series.key} over {axis}_deg": series.positions})
+    largest = {one.key: float(np.abs(one.values).max()) for one in (*imported.series, *imported.surfaces)}
+    largest |= {key: abs(value) for key, value in imported.constants.items()}
     for key, value in largest.items():
         if value > IMPLAUSIBLE[parameter(key).is_rotation]:
-            units = f", read in {', '.join(found.units)}" if found.units else ""
+            units = f", read in {', '.join(imported.units)}" if imported.units else ""
             notes.append(
                 f"{key} reaches {value:g} {parameter(key).unit}{units}: is the file in this unit?"
             )
     return notes
 
 
-def _curves(found: ImportedErrors, base: Scene, name: str) -> dict[str, ErrorFunction]:
+def _curves(imported: ImportedErrors, base: Scene, name: str) -> dict[str, ErrorFunction]:
     curves: dict[str, ErrorFunction] = {}
-    for key, value in found.constants.items():
+    for key, value in imported.constants.items():
         curves[key] = Constant(base.axis_span(parameter(key).axis), value)
-    for one in (*found.series, *found.surfaces):
-        if one.key in curves:
-            raise SceneError(name, [f"{one.key} is given twice; expected each error once"])
-        curves[one.key] = (
-            _curve(one, base) if isinstance(one, ErrorSeries) else _surface(one, base, name)
+    for error in (*imported.series, *imported.surfaces):
+        if error.key in curves:
+            raise SceneError(name, [f"{error.key} is given twice; expected each error once"])
+        curves[error.key] = (
+            _curve(error, base) if isinstance(error, ErrorSeries) else _surface(error, base, name)
         )
     problems = Problems()
-    for key, value in found.curves.items():
+    for key, value in imported.curves.items():
         axis = parameter(key).axis
         curve = CurveReader(problems, base.axis_span(axis), axis).read(value, key)
         if curve is not None:
@@ -186,15 +186,15 @@ def _curves(found: ImportedErrors, base: Scene, name: str) -> dict[str, ErrorFun
     return curves
 
 
-def _curve(one: ErrorSeries, base: Scene) -> ErrorFunction:
-    span = base.axis_span(parameter(one.key).axis)
-    forward, backward = one.mean(FORWARD), one.mean(BACKWARD)
+def _curve(series: ErrorSeries, base: Scene) -> ErrorFunction:
+    span = base.axis_span(parameter(series.key).axis)
+    forward, backward = series.mean(FORWARD), series.mean(BACKWARD)
     if forward is not None and backward is not None and np.any(forward != backward):
-        there, back = (
-            _table(span, one.positions, values.tolist()) for values in (forward, backward)
+        forward_curve, backward_curve = (
+            _table(span, series.positions, values.tolist()) for values in (forward, backward)
         )
-        return Directional(span, there, back)
-    return _table(span, one.positions, one.values.tolist())
+        return Directional(span, forward_curve, backward_curve)
+    return _table(span, series.positions, series.values.tolist())
 
 
 def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[float]) -> TableCurve:
@@ -203,8 +203,8 @@ def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[floa
 
 def _surface(plane: ErrorSurface, base: Scene, name: str) -> ErrorFunction:
     if len(plane.first) * len(plane.second) > MAX_POINTS:
-        found = f"{plane.key} has {len(plane.first)} × {len(plane.second)} values"
-        raise SceneError(name, [f"{found}; expected at most {MAX_POINTS:,}"])
+        problem = f"{plane.key} has {len(plane.first)} × {len(plane.second)} values"
+        raise SceneError(name, [f"{problem}; expected at most {MAX_POINTS:,}"])
     span = base.axis_span(parameter(plane.key).axis)
     at = (plane.first, plane.second)
     forward = TwoArguments(span, plane.axes, at, plane.values)
@@ -214,23 +214,23 @@ def _surface(plane: ErrorSurface, base: Scene, name: str) -> ErrorFunction:
 
 
 def _measured(
-    found: ImportedErrors, base: Scene, *, keep_runs: bool
+    imported: ImportedErrors, base: Scene, *, keep_runs: bool
 ) -> tuple[dict[str, ErrorFunction], dict[str, Measurement]]:
     uncertainty: dict[str, ErrorFunction] = {
         key: Constant(base.axis_span(parameter(key).axis), value)
-        for key, value in found.uncertainty.items()
+        for key, value in imported.uncertainty.items()
     }
     measured: dict[str, Measurement] = {}
-    for one in found.series:
-        if one.uncertainty:
-            span = base.axis_span(parameter(one.key).axis)
-            uncertainty[one.key] = _table(span, one.positions, one.uncertainty)
-        if keep_runs and len(one.runs) > 1:
+    for series in imported.series:
+        if series.uncertainty:
+            span = base.axis_span(parameter(series.key).axis)
+            uncertainty[series.key] = _table(span, series.positions, series.uncertainty)
+        if keep_runs and len(series.runs) > 1:
             runs = [
-                (SIGNS.get(run.direction, ""), zip(one.positions, run.values, strict=True))
-                for run in one.runs
+                (SIGNS.get(run.direction, ""), zip(series.positions, run.values, strict=True))
+                for run in series.runs
             ]
-            measured[one.key] = Measurement(
+            measured[series.key] = Measurement(
                 tuple(
                     TravelRun(sign, tuple((q, value) for q, value in pairs if not np.isnan(value)))
                     for sign, pairs in runs
@@ -239,16 +239,16 @@ def _measured(
     return uncertainty, measured
 
 
-def _convention(found: ImportedErrors, base: Scene) -> tuple[Model, list[str]]:
+def _convention(imported: ImportedErrors, base: Scene) -> tuple[Model, list[str]]:
     model = base.model
-    own = dict(model.own_component_errors)
-    said: list[str] = []
+    conventions = dict(model.own_component_errors)
+    notes: list[str] = []
     axes = dict.fromkeys(
-        parameter(key).axis for key in found.keys if not parameter(key).is_constant
+        parameter(key).axis for key in imported.keys if not parameter(key).is_constant
     )
     for axis in axes:
-        wanted = found.convention.get("linear" if is_linear(axis) else "rotary", "")
-        if wanted and model.convention(axis).name != wanted:
-            own[axis] = wanted
-            said.append(f"component errors of {axis}: {wanted}, as the file has them")
-    return replace(model, own_component_errors=tuple(own.items())), said
+        convention = imported.convention.get("linear" if is_linear(axis) else "rotary", "")
+        if convention and model.convention(axis).name != convention:
+            conventions[axis] = convention
+            notes.append(f"component errors of {axis}: {convention}, as the file has them")
+    return replace(model, own_component_errors=tuple(conventions.items())), notes

@@ -71,12 +71,12 @@ def _read_format(text: str, _scene: Scene) -> str:
 
 def _read_sizes(text: str, _scene: Scene) -> tuple[int, ...]:
     try:
-        found = tuple(dict.fromkeys(parse_whole(part) for part in text.split(",")))
+        sizes = tuple(dict.fromkeys(parse_whole(part) for part in text.split(",")))
     except ValueError:
-        found = ()
-    if not found or not all(2 <= count <= 1000 for count in found):
+        sizes = ()
+    if not sizes or not all(2 <= count <= 1000 for count in sizes):
         raise ValueError("expected numbers of points with commas between, for instance 3,5,9,17")
-    return found
+    return sizes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,11 +150,11 @@ class Compensate(Analysis):
         return self if stem is None else replace(self, stem=stem)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "Compensation | Sweep":
-        asked = replace(self, loop="relative") if self.placed and self.loop is None else self
-        scene = placed_in(scene, asked.loop or "", placed=self.placed)
+        options = replace(self, loop="relative") if self.placed and self.loop is None else self
+        scene = placed_in(scene, options.loop or "", placed=self.placed)
         if self.sweep:
-            return sweep(scene, asked)
-        return compensate(scene, asked, check_cancelled=lambda: watch(0.0))
+            return sweep(scene, options)
+        return compensate(scene, options, check_cancelled=lambda: watch(0.0))
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class Compensation(BeforeAfter, Result):
             (1, "the positive direction, as ISO 841 has it"),
             (-1, "the negative direction, against ISO 841"),
         )
-        said = (
+        senses_text = (
             f"positive {', '.join(axes)}: the tool moves over the workpiece in {words}"
             for sense, words in senses
             if (axes := [axis for axis in self.axes if machine.sense(axis) == sense])
@@ -201,7 +201,7 @@ class Compensation(BeforeAfter, Result):
             if self.placed
             else []
         )
-        return (*self.controller.assumed, *said, *placed)
+        return (*self.controller.assumed, *senses_text, *placed)
 
     @property
     def placed(self) -> bool:
@@ -302,16 +302,16 @@ def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str,
         for axis in by_axis:
             if axis not in axes:
                 raise OptionError(f"{{points}} {axis}: expected one of {', '.join(axes)}")
-        given = {axis: by_axis.get(axis, kind.points) for axis in axes}
+        counts = {axis: by_axis.get(axis, kind.points) for axis in axes}
     else:
-        given = dict.fromkeys(axes, points or kind.points)
-    for axis, count in given.items():
+        counts = dict.fromkeys(axes, points or kind.points)
+    for axis, count in counts.items():
         if not 2 <= count <= kind.max_points:
             raise OptionError(
                 f"{{points}} {axis}={count}: {kind.name} takes 2 to {kind.max_points} points an"
                 " axis"
             )
-    return given
+    return counts
 
 
 def compensate(
@@ -349,20 +349,20 @@ def compensate(
     label = f"{kind.title.partition(',')[0]} ({format_points(kind, points)})"
     controller = read_back(kind, files, corrections, label)
     check_cancelled()
-    own = evaluate_before_after(controller, grid, scene.model.direction)
+    comparison = evaluate_before_after(controller, grid, scene.model.direction)
     check_cancelled()
     directions: dict[str, BeforeAfter] = {}
     reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
-        there, back = (
+        forward, backward = (
             evaluate_before_after(controller, grid, way)
             for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
-        directions = {"forward": there, "backward": back}
-        reversal = reversal_notes(there, back, scene.errors, scene.model.direction)
+        directions = {"forward": forward, "backward": backward}
+        reversal = reversal_notes(forward, backward, scene.errors, scene.model.direction)
         check_cancelled()
     return Compensation(
-        own.before, own.after, grid, own.field_uncertainty, kind, files, points, controller, directions,
+        comparison.before, comparison.after, grid, comparison.field_uncertainty, kind, files, points, controller, directions,
         reversal, options.resolution,
     )  # fmt: skip
 
@@ -378,37 +378,37 @@ def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
 def _placed(
     kind: Format,
     write: Callable[[RequiredCorrections], Files],
-    wanted: RequiredCorrections,
-    watch: Callable[[], None],
+    corrections: RequiredCorrections,
+    check_cancelled: Callable[[], None],
 ) -> Corrector:
     """Let the corrector leave alone where the workpiece lies, if that is fitted out.
 
     What a table does to the errors changes which placement fits best what it leaves. Both are
     linear: seven small tables tell it. What a table could make of any placement stays as it is.
     """
-    scene, corrector = wanted.scene, wanted.corrector
+    scene, corrector = corrections.scene, corrections.corrector
     view = replace(scene.view(corrector.loop), reference=None)
     start = find_placement(corrector.model, corrector.errors, view, exact=True)
     if start is None:
         return corrector
     bare = replace(scene, placed=False, reference=None)
     grid = build_grid(scene.model, scene.workspace, SMALL_NODES)
-    coarse = {axis: min(count, SMALL_NODES) for axis, count in wanted.points.items()}
+    coarse = {axis: min(count, SMALL_NODES) for axis, count in corrections.points.items()}
 
     def fitted(placement: Array) -> Array:
-        watch()
-        own = replace(corrector, placement=placement)
-        asked = replace(wanted, corrector=own, points=coarse, resolution=0.0)
-        controller = read_back(kind, write(asked), asked, kind.name)
+        check_cancelled()
+        placed_corrector = replace(corrector, placement=placement)
+        trial = replace(corrections, corrector=placed_corrector, points=coarse, resolution=0.0)
+        controller = read_back(kind, write(trial), trial, kind.name)
         field = controller.field(grid.coordinates, grid.nominal_mm, bare)
         return fit_placement(scene.model, grid, field.error_um)
 
     base = fitted(start)
     slopes = [(fitted(start + STEP * one) - base) / STEP for one in np.eye(6)]
-    left, sizes, right = np.linalg.svd(np.eye(6) - np.array(slopes).T)
-    back = np.divide(1.0, sizes, out=np.zeros(6), where=sizes > MOVABLE)
-    found = start + right.T @ (back * (left.T @ (base - start)))
-    return replace(corrector, placement=found)
+    left_vectors, sizes, right_vectors = np.linalg.svd(np.eye(6) - np.array(slopes).T)
+    reciprocals = np.divide(1.0, sizes, out=np.zeros(6), where=sizes > MOVABLE)
+    placement_fit = start + right_vectors.T @ (reciprocals * (left_vectors.T @ (base - start)))
+    return replace(corrector, placement=placement_fit)
 
 
 @dataclass(frozen=True)
@@ -460,42 +460,42 @@ class Sweep(Result):
         if any(one.placed for one in self.steps):
             yield f"  assumed: {PLACED_ASSUMPTION}"
         yield from (f"  left out: {text}" for text in self.left_out)
-        for words, of in (("largest", "max_um"), ("mean over the volume", "mean_um")):
-            title = f"Left over the working volume: {words}"
+        for label, statistic in (("largest", "max_um"), ("mean over the volume", "mean_um")):
+            title = f"Left over the working volume: {label}"
             yield Lines(
-                "lines", title, "numbers in the controller", "|E| [µm]", self._curves(of), log=True
+                "lines", title, "numbers in the controller", "|E| [µm]", self._curves(statistic), log=True
             )
 
-    def _curves(self, of: str) -> tuple[Curve, ...]:
+    def _curves(self, statistic: str) -> tuple[Curve, ...]:
         sizes = [max(one.numbers, 1) for one in self.steps]
-        before = np.full(2, max(getattr(self.before, of), MIN_CHART_UM))
+        before = np.full(2, max(getattr(self.before, statistic), MIN_CHART_UM))
         curves = [Curve("before", np.array([min(sizes), max(sizes)], float), before, style="thin")]
         for number, kind in enumerate(dict.fromkeys(one.format for one in self.steps)):
-            own = [one for one in self.steps if one.format == kind]
-            x = np.array([max(one.numbers, 1) for one in own], float)
-            y = np.array([max(getattr(one.after, of), MIN_CHART_UM) for one in own])
+            steps = [one for one in self.steps if one.format == kind]
+            x = np.array([max(one.numbers, 1) for one in steps], float)
+            y = np.array([max(getattr(one.after, statistic), MIN_CHART_UM) for one in steps])
             curves += [Curve(kind, x, y, number), Curve("", x, y, number, "dots")]
         return tuple(curves)
 
 
 def sweep(scene: Scene, options: Compensate) -> Sweep:
     names = list(dict.fromkeys(options.formats)) or [*TABLES, *GRIDLESS]
-    wanted: list[tuple[str, int]] = []
+    tables: list[tuple[str, int]] = []
     for name in names:
         kind, sizes = find_format(name), options.sweep or SIZES
         gridless = kind.grid.startswith("none")
         counts = [0] if gridless else [count for count in sizes if 2 <= count <= kind.max_points]
-        wanted += [(name, count) for count in counts]
-    if len(wanted) > MAX_TABLES:
-        raise OptionError(f"{{sweep}} of {len(wanted)} tables; expected at most {MAX_TABLES}")
+        tables += [(name, count) for count in counts]
+    if len(tables) > MAX_TABLES:
+        raise OptionError(f"{{sweep}} of {len(tables)} tables; expected at most {MAX_TABLES}")
     title = scene.title
     scene = placed_for([find_format(name) for name in names], scene, options.loop or "")
     before: Statistics | None = None
     steps: list[SweepStep] = []
     left_out: dict[str, str] = {}
-    for name, count in wanted:
+    for name, count in tables:
         kind = find_format(name)
-        own = replace(
+        single = replace(
             options,
             formats=(name,),
             points=count or None,
@@ -503,25 +503,25 @@ def sweep(scene: Scene, options: Compensate) -> Sweep:
             sign=options.sign if kind.tables else None,
         )
         try:
-            found = compensate(scene, own)
+            compensation = compensate(scene, single)
         except OptionError as error:
             if options.formats:
                 raise
             left_out[name] = str(error)
             continue
-        before = found.before_statistics
-        steps.append(_step(scene, found, count))
+        before = compensation.before_statistics
+        steps.append(_step(scene, compensation, count))
     if before is None:
         raise OptionError(f"{{sweep}}: no table can be made: {'; '.join(left_out.values())}")
-    words = tuple(f"{name}: {why}" for name, why in left_out.items())
-    return Sweep(title=title, before=before, steps=tuple(steps), left_out=words)
+    reasons = tuple(f"{name}: {why}" for name, why in left_out.items())
+    return Sweep(title=title, before=before, steps=tuple(steps), left_out=reasons)
 
 
-def _step(scene: Scene, found: Compensation, count: int) -> SweepStep:
+def _step(scene: Scene, compensation: Compensation, count: int) -> SweepStep:
     spans = [
         (scene.workspace.ranges[axis][1] - scene.workspace.ranges[axis][0]) / (number - 1)
-        for axis, number in found.points.items()
+        for axis, number in compensation.points.items()
     ]
     pitch = max(spans) if count else 0.0
-    size, after = (found.size, found.bytes), found.after_statistics
-    return SweepStep(found.format.name, count, *size, pitch, after, found.placed)
+    size, after = (compensation.size, compensation.bytes), compensation.after_statistics
+    return SweepStep(compensation.format.name, count, *size, pitch, after, compensation.placed)

@@ -56,9 +56,9 @@ class CorrectedPoints:
     def nbytes(self) -> int:
         moved = self.points
         arrays = (*moved.coordinates.values(), moved.point_mm, moved.shift_mm, moved.turn_rad)
-        own = sum(array.nbytes for array in arrays)
-        own += 0 if self.placement_nodes is None else self.placement_nodes[1].nbytes
-        return own + (0 if self.subtracted is None else self.subtracted.nbytes)
+        total = sum(array.nbytes for array in arrays)
+        total += 0 if self.placement_nodes is None else self.placement_nodes[1].nbytes
+        return total + (0 if self.subtracted is None else self.subtracted.nbytes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +77,11 @@ class Controller:
 
     def moves(self, coordinates: Coordinates, direction: str = "") -> dict[str, Array]:
         """Give what it adds to commanded positions."""
-        way = TravelDirection(direction or self.scene.model.direction)
+        travel = TravelDirection(direction or self.scene.model.direction)
         if self.tables is not None:
-            return dict(self.tables.corrections(coordinates, TRAVEL_SIGN.get(way, 0)))
-        own = self.corrector
-        return replace(own, model=replace(own.model, direction=way)).moves(coordinates)
+            return dict(self.tables.corrections(coordinates, TRAVEL_SIGN.get(travel, 0)))
+        corrector = self.corrector
+        return replace(corrector, model=replace(corrector.model, direction=travel)).moves(coordinates)
 
     def at(
         self,
@@ -93,24 +93,24 @@ class Controller:
     ) -> CorrectedPoints:
         """Work out all of a field that does not depend on the errors; see `field`."""
         scene, loop = scene or self.scene, loop or self.loop
-        way = TravelDirection(scene.model.direction)
-        if way is TravelDirection.DIFFERENCE:
-            there, back = (
+        travel = TravelDirection(scene.model.direction)
+        if travel is TravelDirection.DIFFERENCE:
+            forward, backward = (
                 self.at(coordinates, nominal_mm, in_direction(scene, one), loop, point_mm)
                 for one in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
             )
-            return replace(there, less=back)
+            return replace(forward, subtracted=backward)
         machine = Corrector(scene.model, scene.errors, loop, ())
-        held = _reference(scene, coordinates)
-        over, volume = scene.view(loop).placed_over, None
-        if over is not None:
-            grid, absolute = build_grid(scene.model, over), replace(scene, reference=None)
+        reference = _reference(scene, coordinates)
+        placement_volume, volume = scene.view(loop).placed_over, None
+        if placement_volume is not None:
+            grid, absolute = build_grid(scene.model, placement_volume), replace(scene, reference=None)
             at = (grid.coordinates, grid.nominal_mm, replace(absolute, placed=False), loop)
             volume = grid, self.at(*at, grid.point_mm)
         return CorrectedPoints(
             nominal_mm,
-            machine.move(coordinates, self.moves(coordinates, way), point_mm),
-            None if held is None else machine.move(held, self.moves(held, way)),
+            machine.move(coordinates, self.moves(coordinates, travel), point_mm),
+            None if reference is None else machine.move(reference, self.moves(reference, travel)),
             placement_nodes=volume,
         )
 
@@ -137,15 +137,15 @@ def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | Non
     return {axis: np.asarray(still.get(axis, at)) for axis, at in coordinates.items()}
 
 
-def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: str) -> Controller:
+def read_back(kind: Format, files: Files, corrections: RequiredCorrections, label: str) -> Controller:
     from warpspace.formats.to_scene import build_imported_scene
 
-    scene, corrector = wanted.scene, wanted.corrector
+    scene, corrector = corrections.scene, corrections.corrector
     sources = [
-        source_of_text(text, f"{wanted.stem}{add}{'' if add else kind.endings[0]}")
+        source_of_text(text, f"{corrections.stem}{add}{'' if add else kind.endings[0]}")
         for add, text in files.items()
     ]
-    options = ReadOptions(scene.machine, sign=wanted.sign)
+    options = ReadOptions(scene.machine, sign=corrections.sign)
     if kind.tables is not None:
         tables = kind.tables(sources, options)
         return Controller(
@@ -158,19 +158,19 @@ def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: st
             tables.assumed,
             tables.notes,
         )
-    found = kind.errors(sources, options)
+    imported = kind.errors(sources, options)
     bare = replace(scene, errors=ErrorSet(), uncertainty={}, measured={})
-    held = build_imported_scene(
-        Reading(found, kind, recognised=True), bare, scene.title, scene.name
+    imported_scene = build_imported_scene(
+        Reading(imported, kind, recognised=True), bare, scene.title, scene.name
     ).scene
-    errors = held.errors
-    if wanted.resolution:
+    errors = imported_scene.errors
+    if corrections.resolution:
         raise OptionError(
-            f"{{resolution}} {wanted.resolution:g}: formats of error parameters have as many digits"
+            f"{{resolution}} {corrections.resolution:g}: formats of error parameters have as many digits"
             " as they print; expected a table of corrections"
         )
-    model = replace(held.model, direction=scene.model.direction)
-    notes = list(found.notes)
+    model = replace(imported_scene.model, direction=scene.model.direction)
+    notes = list(imported.notes)
     lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
     if lost:
         notes.append(f"has no place for {', '.join(lost)}")
@@ -192,7 +192,7 @@ def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: st
         )
     knows = replace(corrector, model=model, errors=errors)
     return Controller(
-        scene, corrector.loop, label, knows, None, found.size, found.assumed, tuple(notes)
+        scene, corrector.loop, label, knows, None, imported.size, imported.assumed, tuple(notes)
     )
 
 
@@ -221,19 +221,19 @@ class BeforeAfter:
         return self._summed_up(self.after)
 
     def _summed_up(self, field: ErrorField) -> Statistics:
-        found = volume_statistics(field, self.grid)
+        statistics = volume_statistics(field, self.grid)
         return (
             replace(self.field_uncertainty, error_um=field.error_um).with_expanded_uncertainty(
-                found
+                statistics
             )
             if self.field_uncertainty
-            else found
+            else statistics
         )
 
     def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
         """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""
-        found = volume_statistics(field.tilts, self.grid)
-        return found.mean_um, found.max_um
+        statistics = volume_statistics(field.tilts, self.grid)
+        return statistics.mean_um, statistics.max_um
 
 
 def evaluate_before_after(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
@@ -241,24 +241,24 @@ def evaluate_before_after(controller: Controller, grid: Grid, direction: str) ->
     scene = in_direction(scene, direction)
     before = controller.without().field(at, nominal, scene)
     view = scene.view(controller.loop)
-    sure = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
-    return BeforeAfter(before, controller.field(at, nominal, scene), grid, sure)
+    uncertainty = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
+    return BeforeAfter(before, controller.field(at, nominal, scene), grid, uncertainty)
 
 
 def reversal_notes(
-    there: BeforeAfter, back: BeforeAfter, errors: ErrorSet, direction: str
+    forward: BeforeAfter, backward: BeforeAfter, errors: ErrorSet, direction: str
 ) -> tuple[str, ...]:
     before, after = (
         float((one - other).norm_um.max())
-        for one, other in ((there.before, back.before), (there.after, back.after))
+        for one, other in ((forward.before, backward.before), (forward.after, backward.after))
     )
     if after <= max(MIN_REVERSAL_UM, MAX_REVERSAL_SHARE * before):
         return ()
     keys = ", ".join(key for key, curve in errors.functions.items() if curve.has_directions)
-    words = DIRECTION_WORDS[TravelDirection(direction)]
-    said = (
+    description = DIRECTION_WORDS[TravelDirection(direction)]
+    note = (
         f"direction of travel is not held here, or not all of it: by {keys} forward and backward"
         f" differ by up to {before:.3g} µm before and {after:.3g} µm after (where one value stands"
-        f" for both: {words})"
+        f" for both: {description})"
     )
-    return (said,)
+    return (note,)

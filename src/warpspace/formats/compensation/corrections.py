@@ -124,7 +124,7 @@ class Corrector:
         shape = batch_shape(coordinates)
         total = {axis: np.zeros(shape) for axis in self.moved}
         shift, _ = self._response(coordinates, self.axes)
-        back = _inverse(shift)
+        inverse_shift = _inverse(shift)
         carried, turn = self._response(coordinates, self.tilting)
         upright = _inverse(turn)
         for _ in range(NEWTON_STEPS):
@@ -133,7 +133,7 @@ class Corrector:
                 tilt = -_times(upright, orientation)
                 position = position + _times(carried, tilt)
                 total |= {a: total[a] + tilt[..., i] for i, a in enumerate(self.tilting)}
-            step = -_times(back, position)
+            step = -_times(inverse_shift, position)
             total |= {a: total[a] + step[..., i] for i, a in enumerate(self.axes)}
         return total
 
@@ -149,8 +149,8 @@ class Corrector:
                 )
                 for way in (1.0, -1.0)
             )
-            for found, one, other in ((shifts, up[1], down[1]), (turns, up[2], down[2])):
-                found.append(np.broadcast_to((one - other) / (2.0 * small), shape))
+            for derivatives, one, other in ((shifts, up[1], down[1]), (turns, up[2], down[2])):
+                derivatives.append(np.broadcast_to((one - other) / (2.0 * small), shape))
         none = np.zeros((*shape, 0))
         return (
             np.stack(shifts, -1) if shifts else none,
@@ -197,10 +197,10 @@ def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) 
 
 def _independent(linear: Sequence[str], scene: Scene) -> tuple[str, ...]:
     spanning = scene.workspace.volume_axes
-    found: dict[int, str] = {}
+    axis_by_direction: dict[int, str] = {}
     for axis in sorted(linear, key=lambda name: name not in spanning):
-        found.setdefault(direction_index(axis), axis)
-    return tuple(axis for axis in linear if axis in found.values())
+        axis_by_direction.setdefault(direction_index(axis), axis)
+    return tuple(axis for axis in linear if axis in axis_by_direction.values())
 
 
 AXES = ("X", "Y", "Z")
@@ -235,15 +235,15 @@ class RequiredCorrections:
 
     def round(self, values: ArrayLike) -> Array:
         step = self.resolution
-        given = np.asarray(values, dtype=float)
-        return np.round(given / step) * step if step else given
+        numbers = np.asarray(values, dtype=float)
+        return np.round(numbers / step) * step if step else numbers
 
     @property
     def directional_axes(self) -> tuple[str, ...]:
         """Those of `axes` that have errors by direction of travel."""
         functions = self.corrector.errors.functions
-        found = {parameter(key).axis for key, curve in functions.items() if curve.has_directions}
-        return tuple(axis for axis in self.axes if axis in found)
+        directional = {parameter(key).axis for key, curve in functions.items() if curve.has_directions}
+        return tuple(axis for axis in self.axes if axis in directional)
 
     def for_direction(self, direction: str, axis: str = "") -> "RequiredCorrections":
         """Give what is wanted for one direction of travel, of all axes or of one alone."""
@@ -251,12 +251,12 @@ class RequiredCorrections:
         if not axis:
             corrector = replace(self.corrector, model=replace(model, direction=direction))
             return replace(self, corrector=corrector)
-        own = {
+        curves = {
             key: curve.forward if direction == TravelDirection.FORWARD else curve.backward
             for key, curve in errors.functions.items()
             if isinstance(curve, Directional) and parameter(key).axis == axis
         }
-        changed = ErrorSet({**errors.functions, **own})
+        changed = ErrorSet({**errors.functions, **curves})
         return replace(self, corrector=replace(self.corrector, errors=changed))
 
     def corrections(self, places: Mapping[str, Array]) -> dict[str, Array]:
@@ -275,13 +275,13 @@ class RequiredCorrections:
             for axis in self.axes
         }
         weights = shares(OTHER_NODES)
-        found = self.corrections(places)
+        averages = self.corrections(places)
         for index in reversed(range(len(self.axes))):
             if self.axes[index] not in axes:
-                found = {
-                    axis: np.moveaxis(value, index, -1) @ weights for axis, value in found.items()
+                averages = {
+                    axis: np.moveaxis(value, index, -1) @ weights for axis, value in averages.items()
                 }
-        return found
+        return averages
 
     def linear_fit(self, allowed: Sequence[tuple[str, str]]) -> dict[tuple[str, str], float]:
         """Fit corrections of one axis in proportion to the position of another."""
@@ -300,17 +300,17 @@ class RequiredCorrections:
             weights = weights[..., None] * shares(OTHER_NODES)
         root = np.sqrt(weights).ravel()
         at = dict(zip(self.axes, np.meshgrid(*places.values(), indexing="ij"), strict=True))
-        held = scene.reference or {}
-        if held:
-            still = {**scene.workspace.positions, **held}
-            there = self.corrector.moves({axis: np.asarray(still[axis]) for axis in machine.axes})
-            needed = {target: values - there[target] for target, values in needed.items()}
-        found: dict[tuple[str, str], float] = {}
+        reference = scene.reference or {}
+        if reference:
+            still = {**scene.workspace.positions, **reference}
+            reference_corrections = self.corrector.moves({axis: np.asarray(still[axis]) for axis in machine.axes})
+            needed = {target: values - reference_corrections[target] for target, values in needed.items()}
+        coefficients: dict[tuple[str, str], float] = {}
         for target in dict.fromkeys(target for target, _ in allowed):
             sources = [axis for one, axis in allowed if one == target and axis in at]
             if target in needed and sources:
-                columns = [at[axis] - held.get(axis, 0.0) for axis in sources]
+                columns = [at[axis] - reference.get(axis, 0.0) for axis in sources]
                 matrix = np.stack([column.ravel() * root for column in columns], -1)
                 solved = np.linalg.lstsq(matrix, needed[target].ravel() * root, rcond=None)[0]
-                found |= {(target, axis): float(v) for axis, v in zip(sources, solved, strict=True)}
-        return found
+                coefficients |= {(target, axis): float(v) for axis, v in zip(sources, solved, strict=True)}
+        return coefficients

@@ -42,9 +42,9 @@ def _position(axis: str) -> str:
     return f"{axis} [{'mm' if is_linear(axis) else 'deg'}]"
 
 
-def _value(key: str, spelled: str = "{}") -> str:
+def _value(key: str, template: str = "{}") -> str:
     unit = "urad" if parameter(key).is_rotation else "um"
-    return f"{spelled.format(key)} [{unit}]"
+    return f"{template.format(key)} [{unit}]"
 
 
 def _lines(rows: Iterable[Iterable[str]]) -> str:
@@ -75,7 +75,7 @@ def template(axis: str, places: Sequence[float] = ()) -> str:
 
 def _to_fill_in(
     axis: str,
-    words: list[str],
+    comments: list[str],
     columns: Iterable[str],
     cells: list[str],
     *,
@@ -83,26 +83,26 @@ def _to_fill_in(
 ) -> str:
     keys = [f"E{letter}{axis}" for letter in "XYZABC"]
     values = [*map(_value, keys), *(_value(key, "u({})") for key in keys if uncertain)]
-    lines = [words[0], UNITS, *words[1:], *(f"# {key}: {parameter(key).name}" for key in keys)]
+    lines = [comments[0], UNITS, *comments[1:], *(f"# {key}: {parameter(key).name}" for key in keys)]
     lines += [",".join([*columns, *values]), *(row + "," * len(values) for row in cells)]
     return "\n".join(lines) + "\n"
 
 
-def write(wanted: RequiredCorrections) -> Files:
+def write(corrections: RequiredCorrections) -> Files:
     """Write the errors of a scene: constants in the main file, one file an axis beside it."""
     files: dict[str, str] = {}
-    for table in measured.build_error_tables(measured.sample_errors(wanted)):
+    for table in measured.build_error_tables(measured.sample_errors(corrections)):
         directed = [DIRECTION] if table.directed else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
-        for at, way, values in table.rows:
-            told = [SIGNS[way]] if directed else []
+        for at, direction, values in table.rows:
+            sign_cells = [SIGNS[direction]] if directed else []
             rows.append(
-                [*map(repr, at), *told, *(format_number(value, DIGITS) for value in values)]
+                [*map(repr, at), *sign_cells, *(format_number(value, DIGITS) for value in values)]
             )
         name = ("constant", *table.axes[:1], table.keys[0])[len(table.axes)]
         files[f"_{name}.csv"] = _lines(rows)
     if not files:
-        return {"": _lines([[_value(measured.zero_key(wanted.scene))], ["0.0"]])}
+        return {"": _lines([[_value(measured.zero_key(corrections.scene))], ["0.0"]])}
     files[""] = files.pop(next(iter(files)))
     return files
 
@@ -138,10 +138,10 @@ class _CsvColumn:
 
     def value(self, cell: str, at: SourceLine, table: CsvRows) -> float:
         if self.role == DIRECTION:
-            way = unguard_cell(cell).lower()
-            if way not in DIRECTIONS:
+            direction = unguard_cell(cell).lower()
+            if direction not in DIRECTIONS:
                 at.refuse(f"direction {quote(cell)}", "+, - or nothing")
-            return DIRECTIONS[way]
+            return DIRECTIONS[direction]
         if self.role == RUN:
             return at.integer(cell, RUN, 0, 10**9)
         if not cell and self.role != POSITION:
@@ -178,46 +178,46 @@ def recognise(head: str, name: str) -> bool:
         header = source_of_text(head, name).rows(1).header
     except SceneError:
         return False
-    found = [matched for part in header if (matched := _heading(part))]
-    has_unit = any(one[3] or one[4] or one[5] for one in found)
-    return has_unit and any(one[2] in PARAMETERS for one in found)
+    headings = [matched for part in header if (matched := _heading(part))]
+    has_unit = any(one[3] or one[4] or one[5] for one in headings)
+    return has_unit and any(one[2] in PARAMETERS for one in headings)
 
 
 def _heading(part: str) -> re.Match[str] | None:
     return _HEADING.fullmatch(" ".join(part.split()))  # runs of blanks would be tried by all parts
 
 
-def _columns(at: SourceLine, parts: Sequence[str]) -> tuple[_CsvColumn, ...]:
-    found = [_column(at, part) for part in parts]
-    seen = [(one.role, one.name) for one in found]
-    if twice := next((one for one in seen if seen.count(one) > 1), None):
+def _columns(at: SourceLine, headings: Sequence[str]) -> tuple[_CsvColumn, ...]:
+    columns = [_column(at, part) for part in headings]
+    names = [(one.role, one.name) for one in columns]
+    if twice := next((one for one in names if names.count(one) > 1), None):
         at.refuse(f"column {twice[1]} stands there twice", "it once")
-    return tuple(found)
+    return tuple(columns)
 
 
-def _column(at: SourceLine, part: str) -> _CsvColumn:
-    lower = part.strip().lower()
+def _column(at: SourceLine, heading: str) -> _CsvColumn:
+    lower = heading.strip().lower()
     if lower in (RUN, DIRECTION):
         return _CsvColumn(lower, lower)
-    matched = _heading(part)
+    matched = _heading(heading)
     if matched is None:
         expected = "headings such as X [mm], EXX [um], u(EXX) [um], run, direction"
-        at.refuse(f"column {quote(part)}", expected)
+        at.refuse(f"column {quote(heading)}", expected)
     uncertain, name = bool(matched[1]), matched[2].upper()
     unit = (matched[3] or matched[4] or matched[5] or "").strip()
     if name in PARAMETERS:
-        known = URAD_PER if parameter(name).is_rotation else UM_PER
+        factors = URAD_PER if parameter(name).is_rotation else UM_PER
         role = UNCERTAINTY if uncertain else ERROR
     elif is_axis_name(name) and not uncertain:
-        known, role = MM_PER if is_linear(name) else DEG_PER, POSITION
+        factors, role = MM_PER if is_linear(name) else DEG_PER, POSITION
     else:
         errors = (f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")
         hint = near_miss(name, [*"XYZABCUVW", *errors])
-        at.refuse(f"column {quote(part)}", f"an axis, an error, u(error), run or direction{hint}")
+        at.refuse(f"column {quote(heading)}", f"an axis, an error, u(error), run or direction{hint}")
     if not unit:
-        units = ", ".join(one for one in known if one.isascii())
+        units = ", ".join(one for one in factors if one.isascii())
         at.refuse(f"column {name} has no unit", f"{name} [unit], of {units}")
-    return _CsvColumn(role, name, at.unit(unit, known, name), unit)
+    return _CsvColumn(role, name, at.unit(unit, factors, name), unit)
 
 
 def read(sources: Sequence[Source], options: ReadOptions) -> measured.ImportedErrors:
@@ -226,26 +226,26 @@ def read(sources: Sequence[Source], options: ReadOptions) -> measured.ImportedEr
 
 
 def _read_one(source: Source) -> measured.ImportedErrors:
-    given = source.rows(MAX_POINTS)
-    if not given.header:
+    csv_rows = source.rows(MAX_POINTS)
+    if not csv_rows.header:
         source.refuse("has no header", "one such as X [mm],EXX [um]")
-    head = source.at(given.line)
-    columns = _columns(head, given.header)
+    head = source.at(csv_rows.line)
+    columns = _columns(head, csv_rows.header)
     if not any(one.role == ERROR for one in columns):
         head.refuse("has no column of an error", "for instance EXX [um]")
     rows: list[_Row] = []
-    for number, cells in given:
+    for number, cells in csv_rows:
         at = source.at(number)
         pairs = zip(columns, cells, strict=True)
-        rows.append((at, {(one.role, one.name): one.value(cell, at, given) for one, cell in pairs}))
-    given.check()
+        rows.append((at, {(one.role, one.name): one.value(cell, at, csv_rows) for one, cell in pairs}))
+    csv_rows.check()
     if not rows:
         head.refuse("has no rows below its header", "at least one")
     table = _CsvTable(source, head, columns, tuple(rows))
     units = tuple(dict.fromkeys(one.unit for one in columns if one.unit))
-    notes = (*source.notes, *given.notes)
-    found = _errors(table)
-    return replace(found, units=units, notes=(*notes, *found.notes))
+    notes = (*source.notes, *csv_rows.notes)
+    imported = _errors(table)
+    return replace(imported, units=units, notes=(*notes, *imported.notes))
 
 
 def _errors(table: _CsvTable) -> measured.ImportedErrors:
@@ -275,47 +275,47 @@ def _constants(table: _CsvTable) -> measured.ImportedErrors:
     if empty := next((key for key, value in constants.items() if math.isnan(value)), ""):
         at.refuse(f"{empty} is empty", "a number")
     uncertain = {key: row[UNCERTAINTY, key] for key in table.names_with_role(UNCERTAINTY)}
-    given = {key: value for key, value in uncertain.items() if not math.isnan(value)}
-    return measured.ImportedErrors(NAME, constants=constants, uncertainty=given)
+    stated = {key: value for key, value in uncertain.items() if not math.isnan(value)}
+    return measured.ImportedErrors(NAME, constants=constants, uncertainty=stated)
 
 
 def _series(table: _CsvTable, axis: str) -> measured.ImportedErrors:
     at = np.array([row[POSITION, axis] for _, row in table.rows])
     places = measured.distinct_positions(at)
     runs = [int(row.get((RUN, RUN), 1)) for _, row in table.rows]
-    ways = list(zip(runs, table.directions(), strict=True))
-    known = list(dict.fromkeys(ways))
-    if len(known) > MAX_RUNS:
-        table.source.refuse(f"has {len(known)} runs", f"at most {MAX_RUNS}")
+    row_runs = list(zip(runs, table.directions(), strict=True))
+    distinct_runs = list(dict.fromkeys(row_runs))
+    if len(distinct_runs) > MAX_RUNS:
+        table.source.refuse(f"has {len(distinct_runs)} runs", f"at most {MAX_RUNS}")
     index = np.searchsorted((places[1:] + places[:-1]) / 2.0, at).tolist()
-    taken: dict[tuple[tuple[int, int], int], int] = {}
-    for place, way, (line, _) in zip(index, ways, table.rows, strict=True):
-        if (way, place) in taken:
-            found = f"position {places[place]:g} of {axis} stands also in line {taken[way, place]}"
-            line.refuse(found, "columns run and direction to tell them apart")
-        taken[way, place] = line.line
+    line_of_reading: dict[tuple[tuple[int, int], int], int] = {}
+    for place, run, (line, _) in zip(index, row_runs, table.rows, strict=True):
+        if (run, place) in line_of_reading:
+            problem = f"position {places[place]:g} of {axis} stands also in line {line_of_reading[run, place]}"
+            line.refuse(problem, "columns run and direction to tell them apart")
+        line_of_reading[run, place] = line.line
     series: list[measured.ErrorSeries] = []
     for key in table.names_with_role(ERROR):
-        values = {way: np.full(len(places), math.nan) for way in known}
+        values = {way: np.full(len(places), math.nan) for way in distinct_runs}
         uncertain = np.zeros(len(places))
-        for place, way, (_, row) in zip(index, ways, table.rows, strict=True):
-            values[way][place] = row[ERROR, key]
+        for place, run, (_, row) in zip(index, row_runs, table.rows, strict=True):
+            values[run][place] = row[ERROR, key]
             uncertain[place] = np.fmax(uncertain[place], row.get((UNCERTAINTY, key), 0.0))
-        given = {way: own for way, own in values.items() if not np.isnan(own).all()}
-        if not given:
+        values_by_run = {way: own for way, own in values.items() if not np.isnan(own).all()}
+        if not values_by_run:
             table.source.refuse(f"column {key} is empty", "numbers, or no such column")
-        _check_holes(table.source, key, given, places, axis)
+        _check_holes(table.source, key, values_by_run, places, axis)
         series.append(
             measured.ErrorSeries(
                 key,
                 tuple(places.tolist()),
                 tuple(
-                    measured.MeasuredRun(*way, tuple(own.tolist())) for way, own in given.items()
+                    measured.MeasuredRun(*way, tuple(own.tolist())) for way, own in values_by_run.items()
                 ),
                 tuple(uncertain.tolist()) if uncertain.any() else (),
             )
         )
-    sorted_rows = len(known) == 1 and np.any(np.diff(at) < 0.0)
+    sorted_rows = len(distinct_runs) == 1 and np.any(np.diff(at) < 0.0)
     notes = (f"rows were sorted by the position of {axis}",) if sorted_rows else ()
     return measured.ImportedErrors(NAME, tuple(series), notes=notes)
 
@@ -323,23 +323,23 @@ def _series(table: _CsvTable, axis: str) -> measured.ImportedErrors:
 def _check_holes(
     source: Source,
     key: str,
-    given: Mapping[tuple[int, int], Array],
+    values_by_run: Mapping[tuple[int, int], Array],
     places: Array,
     axis: str,
 ) -> None:
-    holes = np.isnan(np.array(list(given.values()))).all(axis=0)
+    holes = np.isnan(np.array(list(values_by_run.values()))).all(axis=0)
     if holes.any():
-        found = f"{key} has no value at {axis} {places[holes][0]:g}"
-        source.refuse(found, "one at every position")
-    for direction in {way for _, way in given}:
-        own = np.array([values for (_, way), values in given.items() if way == direction])
-        holes = np.isnan(own).all(axis=0)
+        problem = f"{key} has no value at {axis} {places[holes][0]:g}"
+        source.refuse(problem, "one at every position")
+    for direction in {way for _, way in values_by_run}:
+        readings = np.array([values for (_, way), values in values_by_run.items() if way == direction])
+        holes = np.isnan(readings).all(axis=0)
         if holes.any():
-            said = {measured.FORWARD: "forward", measured.BACKWARD: "backward"}.get(
+            direction_name = {measured.FORWARD: "forward", measured.BACKWARD: "backward"}.get(
                 direction, "any"
             )
-            found = f"{key} has no value at {axis} {places[holes][0]:g} in {said} direction"
-            source.refuse(found, "every direction at every position")
+            problem = f"{key} has no value at {axis} {places[holes][0]:g} in {direction_name} direction"
+            source.refuse(problem, "every direction at every position")
 
 
 def _planes(table: _CsvTable) -> measured.ImportedErrors:
@@ -350,16 +350,16 @@ def _planes(table: _CsvTable) -> measured.ImportedErrors:
         table.head.refuse(f"column {what}", expected)
     planes: list[measured.ErrorSurface] = []
     for key in table.names_with_role(ERROR):
-        own = parameter(key).axis
-        if own not in (first, second):
+        axis = parameter(key).axis
+        if axis not in (first, second):
             expected = f"errors of {first} or {second}"
-            table.head.refuse(f"column {key} is an error of {own}", expected)
-        other = second if own == first else first
+            table.head.refuse(f"column {key} is an error of {axis}", expected)
+        other = second if axis == first else first
         points: dict[int, list[measured.Point]] = {}
-        for way, (at, row) in zip(table.directions(), table.rows, strict=True):
-            point = (at, row[POSITION, own], row[POSITION, other], row[ERROR, key])
-            points.setdefault(way, []).append(point)
-        planes.append(measured.build_surface_by_direction(key, (own, other), points, table.source))
+        for direction, (at, row) in zip(table.directions(), table.rows, strict=True):
+            point = (at, row[POSITION, axis], row[POSITION, other], row[ERROR, key])
+            points.setdefault(direction, []).append(point)
+        planes.append(measured.build_surface_by_direction(key, (axis, other), points, table.source))
     return measured.ImportedErrors(NAME, surfaces=tuple(planes))
 
 

@@ -52,34 +52,34 @@ def _settings(source: Source) -> tuple[float, int]:
 
 def _grid(source: Source, options: ReadOptions) -> Grid3:
     unit, magnification = _settings(source)
-    given = source.rows(MAX_AXIS_POINTS**3)
-    if not given.header:
+    csv_rows = source.rows(MAX_AXIS_POINTS**3)
+    if not csv_rows.header:
         source.refuse("has no table", f"the columns {', '.join(HEADINGS)}")
-    if tuple(given.header) != HEADINGS:
-        source.at(given.line).refuse(f"columns {', '.join(given.header)}", ", ".join(HEADINGS))
+    if tuple(csv_rows.header) != HEADINGS:
+        source.at(csv_rows.line).refuse(f"columns {', '.join(csv_rows.header)}", ", ".join(HEADINGS))
     rows: list[list[float]] = []
-    for count, (number, parts) in enumerate(given, start=1):
+    for count, (number, parts) in enumerate(csv_rows, start=1):
         at = source.at(number)
         at.integer(parts[0], "point", count, count)
-        numbers = (given.number(part, number, "position") for part in parts[1:4])
+        numbers = (csv_rows.number(part, number, "position") for part in parts[1:4])
         place = [at.checked_position(value, "position") for value in numbers]
         counts = [at.integer(part, "correction", -MAX_COUNT - 1, MAX_COUNT) for part in parts[4:]]
         rows.append([*place, *(float(c) for c in counts)])
-    given.check()
+    csv_rows.check()
     table = np.array(rows).reshape(-1, 6)
     along = [np.unique(table[:, index]) for index in range(3)]
     shape = tuple(len(places) for places in along)
     if len(table) != np.prod(shape) or min(shape) < 2:
-        found = f"{len(table)} points for a grid of {' × '.join(map(str, shape))}"
-        source.refuse(found, "every point of a grid once (is the file cut off?)")
+        problem = f"{len(table)} points for a grid of {' × '.join(map(str, shape))}"
+        source.refuse(problem, "every point of a grid once (is the file cut off?)")
     if max(shape) > MAX_AXIS_POINTS:
         expected = f"at most {MAX_AXIS_POINTS}, as the control takes"
         source.refuse(f"{max(shape)} points along an axis", expected)
     for places, axis in zip(along, "XYZ", strict=True):
         steps = np.diff(places)
         if np.ptp(steps) > STEP_SHARE * steps.max():
-            found = f"steps of {steps.min():g} to {steps.max():g} mm along {axis}"
-            source.refuse(found, "equal steps, as the control has")
+            problem = f"steps of {steps.min():g} to {steps.max():g} mm along {axis}"
+            source.refuse(problem, "equal steps, as the control has")
     ordered = table[np.lexsort(table[:, :3].T[::-1])].reshape(*shape, 6)
     first, second, third = (options.axis_named(axis, source) for axis in "XYZ")
     values = options.factor(CORRECTION) * ordered[..., 3:] * unit * magnification
@@ -90,23 +90,23 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     if len(sources) > 1:
         sources[1].refuse("is a second grid", "one")
-    said = options.sign or "values are added to the commanded position"
-    assumed = (f"sign: {said}", "beyond the grid its border is held", LIMITS)
+    sign = options.sign or "values are added to the commanded position"
+    assumed = (f"sign: {sign}", "beyond the grid its border is held", LIMITS)
     return Tables((_grid(sources[0], options),), assumed, (), ("mm", "detection units"))
 
 
-def write(wanted: RequiredCorrections) -> Files:
+def write(required: RequiredCorrections) -> Files:
     """Write the grid; the magnification grows until every correction fits."""
     axes = ("X", "Y", "Z")
-    if tuple(wanted.axes) != axes or not set(axes) <= set(wanted.corrector.moved):
+    if tuple(required.axes) != axes or not set(axes) <= set(required.corrector.moved):
         raise OptionError(
             f"fanuc-3d corrects X, Y and Z over a volume of X, Y and Z; that of the scene is of"
-            f" {', '.join(wanted.axes)}"
+            f" {', '.join(required.axes)}"
         )
-    unit = wanted.resolution or DETECTION_MM
-    places = {axis: wanted.positions(axis) for axis in axes}
-    needed = wanted.corrections(places)
-    values = wanted.factor(CORRECTION) * np.stack([needed[axis] for axis in axes], -1)
+    unit = required.resolution or DETECTION_MM
+    places = {axis: required.positions(axis) for axis in axes}
+    needed = required.corrections(places)
+    values = required.factor(CORRECTION) * np.stack([needed[axis] for axis in axes], -1)
     largest = float(np.abs(values).max())
     magnification = max(1, int(np.ceil(largest / unit / MAX_COUNT - 1e-9)))
     if magnification > MAX_MAGNIFICATION:
@@ -117,18 +117,18 @@ def write(wanted: RequiredCorrections) -> Files:
     counts = np.rint(values / (unit * magnification)).astype(int)
     counts = np.clip(counts, -MAX_COUNT - 1, MAX_COUNT)
     lines = [
-        format_comment(f"{MARK}, ", wanted.scene.title),
+        format_comment(f"{MARK}, ", required.scene.title),
         f"# detection unit = {unit:.9f}".rstrip("0") + " mm",
         f"# magnification = {magnification}",
-        f"# {'values are ' + wanted.sign + 's' if wanted.sign else 'values are added'}",
+        f"# {'values are ' + required.sign + 's' if required.sign else 'values are added'}",
         ",".join(HEADINGS),
     ]
     # the first axis runs fastest, as compensation points are numbered
     shape = [len(places[axis]) for axis in reversed(axes)]
     for point, (k, j, i) in enumerate(np.ndindex(*shape), start=1):
         at = [places[axis][index] for axis, index in zip(axes, (i, j, k), strict=True)]
-        spelled = [f"{q:.6f}".rstrip("0").rstrip(".") for q in at]
-        lines.append(",".join([str(point), *spelled, *map(str, counts[i, j, k].tolist())]))
+        coordinates = [f"{q:.6f}".rstrip("0").rstrip(".") for q in at]
+        lines.append(",".join([str(point), *coordinates, *map(str, counts[i, j, k].tolist())]))
     return {"": "\n".join(lines) + "\n"}
 
 

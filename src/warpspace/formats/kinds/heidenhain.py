@@ -97,11 +97,11 @@ def _looked_up(source: Source, axes: dict[str, list[str]], options: ReadOptions)
     if len(named) > 1:
         source.refuse(f"is entered for {', '.join(named)}", "one axis a table")
     last = last if len(last) == 1 and last in "XYZUVWABC" else ""
-    found = (named or [options.axis or last])[0]
-    if not found:
+    axis = (named or [options.axis or last])[0]
+    if not axis:
         expected = "its .CMA file beside it, or --axis X"
         source.refuse("does not say over which axis", expected)
-    return options.axis_named(found, source)
+    return options.axis_named(axis, source)
 
 
 def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
@@ -119,12 +119,12 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
         if all(not cells[column] for _, cells in rows):
             continue
         target = options.axis_named(column, rows[0][0])
-        known = [
+        points = [
             (q, at.position(cells[column], column))
             for q, (at, cells) in zip(places, rows, strict=True)
             if cells[column]
         ]
-        values = factor * np.interp(places, *np.array(known).T)
+        values = factor * np.interp(places, *np.array(points).T)
         backward: tuple[float, ...] = ()
         if any(cells.get(BACKLASH) for _, cells in rows):
             if len(columns) > 1:
@@ -147,8 +147,8 @@ def _check_steps(places: np.ndarray, rows: Sequence[tuple[SourceLine, Cells]]) -
     for index, step in enumerate(steps):
         at, _ = rows[index + 1]
         if step <= 0.0:
-            found = f"{POSITION} {places[index + 1]:g} after {places[index]:g}"
-            at.refuse(found, "ascending positions")
+            problem = f"{POSITION} {places[index + 1]:g} after {places[index]:g}"
+            at.refuse(problem, "ascending positions")
         if abs(step - steps[0]) > max(STEP_SHARE * steps[0], 2.0 * RESOLUTION):
             expected = "equal steps, as the control does"
             at.refuse(f"step of {step:g} after steps of {steps[0]:g}", expected)
@@ -167,58 +167,58 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables(tuple(terms), (options.sign_statement(SIGN), TRAVEL))
 
 
-def write(wanted: RequiredCorrections) -> Files:
-    stem = wanted.stem.upper()
+def write(required: RequiredCorrections) -> Files:
+    stem = required.stem.upper()
     files: dict[str, str] = {}
-    mean = {axis: float(value) for axis, value in wanted.averaged([]).items()}
-    targets = wanted.corrector.moved
-    for axis in wanted.axes:
-        places = wanted.positions(axis)
-        values = wanted.averaged([axis])
-        home = {target: target if target in wanted.axes else wanted.axes[0] for target in targets}
-        taken = {target: 0.0 if home[target] == axis else mean[target] for target in targets}
+    mean = {axis: float(value) for axis, value in required.averaged([]).items()}
+    targets = required.corrector.moved
+    for axis in required.axes:
+        places = required.positions(axis)
+        values = required.averaged([axis])
+        home = {target: target if target in required.axes else required.axes[0] for target in targets}
+        elsewhere = {target: 0.0 if home[target] == axis else mean[target] for target in targets}
 
-        def spelled(found: Mapping[str, Array], taken: Mapping[str, float] = taken) -> Columns:
+        def format_columns(found: Mapping[str, Array], taken: Mapping[str, float] = elsewhere) -> Columns:
             """Spell what is needed of each axis, without what stands in another table."""
-            factor = wanted.factor(ERROR)
+            factor = required.factor(ERROR)
             return {
                 target: [
-                    f"{v:+.4f}" for v in wanted.round(factor * (found[target] - taken[target]))
+                    f"{v:+.4f}" for v in required.round(factor * (found[target] - taken[target]))
                 ]
                 for target in targets
             }
 
-        columns = _with_backlash(wanted, axis, spelled) or spelled(values)
+        columns = _with_backlash(required, axis, format_columns) or format_columns(values)
         rows = [(POSITION, *columns)]
         rows += [(f"{q:+.4f}", *found) for q, *found in zip(places, *columns.values(), strict=True)]
         files[f"_{axis}.COM"] = _format_table(f"{stem}_{axis}.COM", rows)
-    header = (ACTIVE, *wanted.axes)
+    header = (ACTIVE, *required.axes)
     files[""] = _format_table(
-        f"{stem}.CMA", [header, ("*", *(f"{stem}_{axis}" for axis in wanted.axes))], width=24
+        f"{stem}.CMA", [header, ("*", *(f"{stem}_{axis}" for axis in required.axes))], width=24
     )
     return files
 
 
 def _with_backlash(
-    wanted: RequiredCorrections, axis: str, spelled: Callable[[Mapping[str, Array]], Columns]
+    required: RequiredCorrections, axis: str, format_columns: Callable[[Mapping[str, Array]], Columns]
 ) -> Columns:
     """Spell the one column of a table and its values for travel in the negative direction.
 
     Empty where they do not depend on the direction, and where several axes are corrected over the
     one: which of them BACKLASH belongs to is not published then.
     """
-    if axis not in wanted.directional_axes:
+    if axis not in required.directional_axes:
         return {}
-    there, back = (
-        spelled(wanted.for_direction(way, axis).averaged([axis]))
+    forward, backward = (
+        format_columns(required.for_direction(way, axis).averaged([axis]))
         for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
     )
     used = [
-        target for target in there if any(float(value) for value in (*there[target], *back[target]))
+        target for target in forward if any(float(value) for value in (*forward[target], *backward[target]))
     ]
-    if len(used) != 1 or there == back:
+    if len(used) != 1 or forward == backward:
         return {}
-    return {BACKLASH: back[used[0]], used[0]: there[used[0]]}
+    return {BACKLASH: backward[used[0]], used[0]: forward[used[0]]}
 
 
 def _format_table(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:

@@ -49,7 +49,7 @@ def _is_comp(head: str, name: str) -> bool:
 def _assignment(
     sources: Sequence[Source],
 ) -> tuple[dict[str, tuple[str, str, float]], list[Source]]:
-    known: dict[str, tuple[str, str, float]] = {}
+    joint_of_file: dict[str, tuple[str, str, float]] = {}
     tables: list[Source] = []
     for source in sources:
         if not re.search(r"^[ \t]*+COMP_FILE", source.text, re.MULTILINE):
@@ -62,41 +62,41 @@ def _assignment(
         for at, bare in replace(source, lines=(*source.lines, "[END]")).scan("#", ";"):
             if bare.startswith("["):
                 if joint and file:
-                    known[file] = (joint, kind, per_unit if is_linear(joint) else 1.0)
-                found = _SECTION.fullmatch(bare)
-                if found and int(found[1]) >= len(joints):
+                    joint_of_file[file] = (joint, kind, per_unit if is_linear(joint) else 1.0)
+                section = _SECTION.fullmatch(bare)
+                if section and int(section[1]) >= len(joints):
                     expected = f"a joint from 0 to {len(joints) - 1}, {joints}"
                     at.refuse(f"section {bare}", expected)
-                joint, file, kind = (joints[int(found[1])] if found else ""), "", POSITIONS
+                joint, file, kind = (joints[int(section[1])] if section else ""), "", POSITIONS
                 continue
             key, _, value = (part.strip() for part in bare.partition("="))
             if key == "COMP_FILE":
                 file = value.rsplit("/", 1)[-1]
             elif key == "COMP_FILE_TYPE":
                 kind = f"type-{at.integer(value, key, 0, 1)}"
-    return known, tables
+    return joint_of_file, tables
 
 
 def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
     rows: list[list[float]] = []
     for number, line in enumerate(source.lines, start=1):
-        at, found = source.at(number), _ROW.match(line)
-        if found is None:
-            left = sum(_ROW.match(one) is not None for one in source.lines[number:])
+        at, match = source.at(number), _ROW.match(line)
+        if match is None:
+            unread = sum(_ROW.match(one) is not None for one in source.lines[number:])
             if not rows:
                 stops = f"LinuxCNC stops here, at {at.quoted}, and has no table"
                 at.refuse(stops, "three numbers: nominal forward reverse")
-            if left:
+            if unread:
                 notes.append(
-                    f"{source.name}: LinuxCNC stops at line {number}, {at.quoted}: {left} rows"
+                    f"{source.name}: LinuxCNC stops at line {number}, {at.quoted}: {unread} rows"
                     " behind it are not read"
                 )
             break
-        if found[4].strip():
+        if match[4].strip():
             notes.append(
-                f"{source.name}: line {number}: {quote(found[4])} behind three numbers is not read"
+                f"{source.name}: line {number}: {quote(match[4])} behind three numbers is not read"
             )
-        row = [per_unit * at.number(found[n], "value") for n in (1, 2, 3)]
+        row = [per_unit * at.number(match[n], "value") for n in (1, 2, 3)]
         if rows and row[0] <= rows[-1][0]:
             expected = "ascending positions, as LinuxCNC does"
             at.refuse(f"nominal {row[0]:g} after {rows[-1][0]:g}", expected)
@@ -106,24 +106,24 @@ def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
     return np.array(rows)
 
 
-def _kind(rows: np.ndarray, given: str) -> tuple[str, tuple[str, ...]]:
-    if given:
-        return given, ()
+def _kind(rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
+    if stated:
+        return stated, ()
     span = max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
     positions = np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * span
     kind = POSITIONS if positions and np.abs(rows[:, 1]).max() > NEAR * span else OFFSETS
-    said = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
-    return kind, (f"second and third column taken for {said}; --variant says otherwise",)
+    description = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
+    return kind, (f"second and third column taken for {description}; --variant says otherwise",)
 
 
 def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    known, tables = _assignment(sources)
+    joint_of_file, tables = _assignment(sources)
     terms: list[AxisTable] = []
-    inches = any(size != 1.0 for _, _, size in known.values())
+    inches = any(size != 1.0 for _, _, size in joint_of_file.values())
     assumed: list[str] = [f"machine units {'inches' if inches else 'mm'} and degrees"]
     notes: list[str] = []
     for source in tables:
-        axis, kind, per_unit = known.get(source.base, ("", "", 1.0))
+        axis, kind, per_unit = joint_of_file.get(source.base, ("", "", 1.0))
         if not axis:
             letter = source.stem.upper().rsplit("_", 1)[-1]
             axis = options.axis or (letter if len(letter) == 1 and letter in JOINTS else "")
@@ -133,8 +133,8 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
         if any(term.source == axis for term in terms):
             source.refuse(f"is a second table of {axis}", "one a joint, as LinuxCNC takes")
         rows = _rows(source, per_unit, notes)
-        kind, said = _kind(rows, options.variant or kind)
-        assumed += said
+        kind, assumptions = _kind(rows, options.variant or kind)
+        assumed += assumptions
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
         nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
         backward = () if forward == reverse else reverse
@@ -144,18 +144,18 @@ def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))
 
 
-def _write_comp(wanted: RequiredCorrections) -> Files:
+def _write_comp(corrections: RequiredCorrections) -> Files:
     files: dict[str, str] = {}
-    lines = [format_comment("# ", wanted.scene.title)]
+    lines = [format_comment("# ", corrections.scene.title)]
     lines += [f"# joints counted as {JOINTS}: trivkins without coordinates="]
-    for axis in wanted.axes:
-        if axis not in wanted.corrector.moved or axis not in JOINTS:
+    for axis in corrections.axes:
+        if axis not in corrections.corrector.moved or axis not in JOINTS:
             continue
-        places = wanted.positions(axis)
-        ways = (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        places = corrections.positions(axis)
+        directions = (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         forward, backward = (
-            wanted.round(wanted.for_direction(way, axis).averaged([axis])[axis]).tolist()
-            for way in ways
+            corrections.round(corrections.for_direction(way, axis).averaged([axis])[axis]).tolist()
+            for way in directions
         )
         files[f"_{axis}.comp"] = "".join(
             f"{format_number(q, DIGITS)} {format_number(there, DIGITS)} {format_number(back, DIGITS)}\n"
@@ -163,7 +163,7 @@ def _write_comp(wanted: RequiredCorrections) -> Files:
         )
         lines += [
             f"[JOINT_{JOINTS.index(axis)}]",
-            f"COMP_FILE = {wanted.stem}_{axis}.comp",
+            f"COMP_FILE = {corrections.stem}_{axis}.comp",
             "COMP_FILE_TYPE = 1",
         ]
     return {"": "\n".join(lines) + "\n", **files}
@@ -180,7 +180,7 @@ def squareness(first_diagonal_mm: float, second_diagonal_mm: float) -> float:
 
 
 def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    found: dict[tuple[str, str], float] = {}
+    coefficients: dict[tuple[str, str], float] = {}
     for source in sources:
         for at, bare in source.scan("#"):
             if "matrixkins.C_" not in bare:
@@ -192,24 +192,24 @@ def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
             value = at.number(matched[3], f"C_{matched[1]}{matched[2]}") - float(row == column)
             if abs(value) > MAX_COEFFICIENT:
                 at.refuse(at.quoted, f"a matrix within ±{MAX_COEFFICIENT:g} of the identity")
-            if (row, column) in found:
+            if (row, column) in coefficients:
                 at.refuse(f"C_{row.lower()}{column.lower()} is set twice", "it once")
             for axis in (row, column):
                 options.axis_named(axis, at)
-            found[row, column] = value
-        if not found:
+            coefficients[row, column] = value
+        if not coefficients:
             source.refuse("sets no coefficient", "setp matrixkins.C_xx … C_zz")
-    matrix = tuple(tuple(found.get((row, axis), 0.0) for axis in AXES) for row in AXES)
+    matrix = tuple(tuple(coefficients.get((row, axis), 0.0) for axis in AXES) for row in AXES)
     return Tables((Affine(AXES, matrix),), (), (), ("mm/mm",))
 
 
-def _write_matrix(wanted: RequiredCorrections) -> Files:
+def _write_matrix(corrections: RequiredCorrections) -> Files:
     allowed = [(row, column) for row in AXES for column in AXES]
-    found = wanted.linear_fit(allowed)
-    lines = [format_comment("# ", wanted.scene.title)]
+    coefficients = corrections.linear_fit(allowed)
+    lines = [format_comment("# ", corrections.scene.title)]
     for row, column in allowed:
-        value = float(row == column) + found.get((row, column), 0.0)
-        text = format_number(float(wanted.round(value)), MATRIX_DIGITS)
+        value = float(row == column) + coefficients.get((row, column), 0.0)
+        text = format_number(float(corrections.round(value)), MATRIX_DIGITS)
         lines.append(f"setp matrixkins.C_{row.lower()}{column.lower()} {text}")
     return {"": "\n".join(lines) + "\n"}
 

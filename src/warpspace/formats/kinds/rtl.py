@@ -37,24 +37,24 @@ Lines = list[tuple[SourceLine, str]]
 
 
 def _sections(source: Source) -> dict[str, Lines]:
-    found: dict[str, Lines] = {}
+    sections: dict[str, Lines] = {}
     lines: Lines | None = None
     for at, bare in source.scan():
         if matched := _SECTION.fullmatch(bare):
             name = matched[1].strip()
             if name not in SECTIONS:
                 at.refuse(f"section {name!r} is not understood", f"one of {', '.join(SECTIONS)}")
-            if name in found:
+            if name in sections:
                 at.refuse(f"section {name} stands there twice", "it once")
-            lines = found.setdefault(name, [])
+            lines = sections.setdefault(name, [])
         elif lines is None:
             at.refuse(f"{at.quoted} before any section", "HEADER::")
         else:
             lines.append((at, bare))
     for name in ("TARGET DATA", "RUNS", "DEVIATIONS"):
-        if name not in found:
+        if name not in sections:
             source.refuse(f"has no section {name}", "it (is the file cut off?)")
-    return found
+    return sections
 
 
 def _pair(text: str) -> tuple[str, str] | None:
@@ -145,16 +145,16 @@ def _read_one(source: Source, options: ReadOptions) -> ImportedErrors:
     one_way = len(flags) > 1 and flags[1] == 1
     axis = _axis(source, sections, options)
     table = _deviations(sections["DEVIATIONS"], len(targets), stated)
-    kept = {run: row for run, row in sorted(table.items()) if run % 2 or not one_way}
+    rows_by_run = {run: row for run, row in sorted(table.items()) if run % 2 or not one_way}
     expected = [run for run in range(1, stated + 1) if run % 2 or not one_way]
-    if list(kept) != expected or any(np.isnan(row).any() for row in kept.values()):
-        counted = sum(int((~np.isnan(row)).sum()) for row in kept.values())
-        wanted = f"{len(expected) * len(targets)}: {len(expected)} runs of {len(targets)} targets"
-        source.refuse(f"{counted} readings", f"{wanted} (is the file cut off?)")
+    if list(rows_by_run) != expected or any(np.isnan(row).any() for row in rows_by_run.values()):
+        counted = sum(int((~np.isnan(row)).sum()) for row in rows_by_run.values())
+        required = f"{len(expected) * len(targets)}: {len(expected)} runs of {len(targets)} targets"
+        source.refuse(f"{counted} readings", f"{required} (is the file cut off?)")
     order = np.argsort(targets)
     runs = tuple(
         MeasuredRun((run + 1) // 2, FORWARD if run % 2 else BACKWARD, tuple(row[order].tolist()))
-        for run, row in kept.items()
+        for run, row in rows_by_run.items()
     )
     if not is_linear(axis):
         source.refuse(f"is for the rotary axis {axis}; its units are not known: expected a CSV")

@@ -72,30 +72,30 @@ class AssignmentTable:
     axes: dict[str, str] = field(default_factory=dict[str, str])  # where the file names them
 
     def to_axis_table(
-        self, axes: tuple[str, str], prefix: str, what: str, factor: float
+        self, axes: tuple[str, str], prefix: str, label: str, factor: float
     ) -> AxisTable:
         for setting in RANGE:
             if setting not in self.numbers:
-                found = f"{what}: ${prefix}_{setting} is missing"
-                self.at.refuse(found, "it (is the file cut off?)")
+                problem = f"{label}: ${prefix}_{setting} is missing"
+                self.at.refuse(problem, "it (is the file cut off?)")
         step, start, end = (self.numbers[setting] for setting in RANGE)
         if step <= 0.0 or end <= start:
-            found = f"{what}: step {step:g} from {start:g} to {end:g}"
-            self.at.refuse(found, "a step above 0 and an end above the start")
+            problem = f"{label}: step {step:g} from {start:g} to {end:g}"
+            self.at.refuse(problem, "a step above 0 and an end above the start")
         steps = (end - start) / step
         if abs(steps - round(steps)) > STEP_SHARE:
-            found = f"{what}: {start:g} to {end:g} is no whole number of steps of {step:g}"
-            self.at.refuse(f"{found} ({steps:.4g})", "equal steps from start to end")
+            problem = f"{label}: {start:g} to {end:g} is no whole number of steps of {step:g}"
+            self.at.refuse(f"{problem} ({steps:.4g})", "equal steps from start to end")
         if round(steps) > MAX_INDEX:
-            self.at.refuse(f"{what}: {round(steps):,} steps", f"at most {MAX_INDEX:,}")
+            self.at.refuse(f"{label}: {round(steps):,} steps", f"at most {MAX_INDEX:,}")
         last = round(steps)
         missing = next((index for index in range(last + 1) if index not in self.values), None)
         if missing is not None:
             expected = f"points 0 … {last}, as start, end and step say"
-            self.at.refuse(f"{what}: interpolation point {missing} has no value", expected)
+            self.at.refuse(f"{label}: interpolation point {missing} has no value", expected)
         if len(self.values) > last + 1:
-            found = f"{what}: interpolation point {max(self.values)}"
-            self.at.refuse(found, f"the last one to be {last} at the end position")
+            problem = f"{label}: interpolation point {max(self.values)}"
+            self.at.refuse(problem, f"the last one to be {last} at the end position")
         return AxisTable(
             *axes,
             tuple((start + step * np.arange(last + 1, dtype=np.float64)).tolist()),
@@ -158,10 +158,10 @@ def _range_lines(prefix: str, index: str, places: Array) -> list[str]:
     return [f"${prefix}_{setting}[{index}]={float(number)!r}" for setting, number in bounds]
 
 
-def _archive(name: str, wanted: RequiredCorrections, sign: str, body: Sequence[str]) -> Files:
-    remark = format_comment("; ", f"written by warpspace for {wanted.scene.title}")
+def _archive(name: str, corrections: RequiredCorrections, sign: str, body: Sequence[str]) -> Files:
+    remark = format_comment("; ", f"written by warpspace for {corrections.scene.title}")
     head = [f"%_N_{name}_INI", "CHANDATA(1)", remark]
-    head.append(f"; {'sign: ' + wanted.sign if wanted.sign else sign}")
+    head.append(f"; {'sign: ' + corrections.sign if corrections.sign else sign}")
     return {"": "\n".join([*head, *body, "M17"]) + "\n"}
 
 
@@ -172,11 +172,11 @@ def _read(
     key_of: Callable[[list[str], SourceLine], tuple[Any, str]],
     settings: Sequence[str] = (*RANGE, IS_MODULO),
 ) -> dict[Any, AssignmentTable]:
-    found: dict[Any, AssignmentTable] = {}
+    tables: dict[Any, AssignmentTable] = {}
     for at, setting, parts, value in _assignments(source, prefix, settings, indices):
         name = f"${prefix}_{setting}" if setting else f"${prefix}"
         key, what = key_of(parts, at)
-        table = found.setdefault(key, AssignmentTable(at))
+        table = tables.setdefault(key, AssignmentTable(at))
         if setting in AXES:
             table.axes[setting] = _axis_name(value, at)
         elif setting in RANGE:
@@ -187,7 +187,7 @@ def _read(
             at.refuse(f"{what}: interpolation point {index} is given twice", "it once")
         else:
             table.values[index] = at.number(value, name)
-    return found
+    return tables
 
 
 def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -210,20 +210,20 @@ def _read_enc(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables(tuple(terms), (options.sign_statement(SIGN), UNITS), tuple(notes))
 
 
-def _write_enc(wanted: RequiredCorrections) -> Files:
+def _write_enc(corrections: RequiredCorrections) -> Files:
     body: list[str] = []
-    for axis in wanted.axes:
-        if axis not in wanted.corrector.moved:
+    for axis in corrections.axes:
+        if axis not in corrections.corrector.moved:
             continue
-        places = wanted.positions(axis)
-        values = wanted.factor(ERROR) * wanted.averaged([axis])[axis]
+        places = corrections.positions(axis)
+        values = corrections.factor(ERROR) * corrections.averaged([axis])[axis]
         body += [
             f"; MD38000 $MA_MM_ENC_COMP_MAX_POINTS[0,{axis}] >= {len(places)}",
-            *_point_lines(ENC, f"0,{{}},{axis}".format, wanted.round(values)),
+            *_point_lines(ENC, f"0,{{}},{axis}".format, corrections.round(values)),
             *_range_lines(ENC, f"0,{axis}", places),
             f"${ENC}_{IS_MODULO}[0,{axis}]=0",
         ]
-    return _archive("AX_EEC", wanted, SIGN, body)
+    return _archive("AX_EEC", corrections, SIGN, body)
 
 
 def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -244,8 +244,8 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
             what = f"table {index}"
             for setting in AXES:
                 if setting not in table.axes:
-                    found = f"{what}: ${CEC}_{setting} is missing"
-                    table.at.refuse(found, "it (is the file cut off?)")
+                    problem = f"{what}: ${CEC}_{setting} is missing"
+                    table.at.refuse(problem, "it (is the file cut off?)")
             along, target = (options.axis_named(table.axes[one], table.at) for one in AXES)
             lines[index] = table.to_axis_table((along, target), CEC, what, factor)
         terms += lines.values()
@@ -254,14 +254,14 @@ def _read_cec(sources: Sequence[Source], options: ReadOptions) -> Tables:
             if other < 0:
                 continue
             if other not in lines:
-                found = f"table {index} is multiplied by table number {other + 1}"
-                table.at.refuse(f"{found}, which the file does not have")
+                problem = f"table {index} is multiplied by table number {other + 1}"
+                table.at.refuse(f"{problem}, which the file does not have")
             terms.append(Product(lines[index], lines[other], factor))
     return Tables(tuple(terms), (options.sign_statement(CEC_SIGN), UNITS))
 
 
-def _write_cec(wanted: RequiredCorrections) -> Files:
-    tables = _cross_tables(wanted, wanted.factor(ERROR), MAX_TABLES)
+def _write_cec(corrections: RequiredCorrections) -> Files:
+    tables = _cross_tables(corrections, corrections.factor(ERROR), MAX_TABLES)
     if len(tables) > MAX_TABLES:
         raise OptionError(
             f"sinumerik-cec: {len(tables)} tables; expected at most {MAX_TABLES}, as the control"
@@ -269,10 +269,10 @@ def _write_cec(wanted: RequiredCorrections) -> Files:
         )
     body: list[str] = []
     for index, table in enumerate(tables):
-        places = wanted.positions(table.along)
+        places = corrections.positions(table.along)
         body += [
             f"; MD18342 $MN_MM_CEC_MAX_POINTS[{index}] = {len(places)}",
-            *_point_lines(CEC, f"{index},{{}}".format, wanted.round(table.values)),
+            *_point_lines(CEC, f"{index},{{}}".format, corrections.round(table.values)),
             f"${CEC}_INPUT_AXIS[{index}]=({table.along})",
             f"${CEC}_OUTPUT_AXIS[{index}]=({table.target})",
             *_range_lines(CEC, str(index), places),
@@ -280,7 +280,7 @@ def _write_cec(wanted: RequiredCorrections) -> Files:
             f"${CEC}_MULT_BY_TABLE[{index}]={index + table.number + 1 if table.number else 0}",
             f"${CEC}_IS_MODULO[{index}]=0",
         ]
-    return _archive("NC_CEC", wanted, CEC_SIGN, body)
+    return _archive("NC_CEC", corrections, CEC_SIGN, body)
 
 
 @dataclass(frozen=True)
@@ -295,108 +295,108 @@ class CrossTable:
     number: int = 0  # how many tables further the other factor of a product stands, 0 for none
 
 
-def _cross_tables(wanted: RequiredCorrections, factor: float, most: int) -> list[CrossTable]:
-    mean, axes = wanted.for_direction(TravelDirection.MEAN), wanted.axes
+def _cross_tables(corrections: RequiredCorrections, factor: float, max_tables: int) -> list[CrossTable]:
+    mean, axes = corrections.for_direction(TravelDirection.MEAN), corrections.axes
     needed = {
         (target, *group): values
         for group in ((), *((axis,) for axis in axes), *combinations(axes, 2))
         for target, values in mean.averaged(group).items()
     }
-    halves = {axis: _half_reversals(wanted, axis) for axis in wanted.directional_axes}
+    halves = {axis: _half_reversals(corrections, axis) for axis in corrections.directional_axes}
     for most_products in (MAX_PRODUCTS, 0):
         tables = [
             table
-            for target in wanted.corrector.moved
-            for table in _tables_for(wanted, factor, target, needed, halves, most_products)
+            for target in corrections.corrector.moved
+            for table in _tables_for(corrections, factor, target, needed, halves, most_products)
         ]
-        if len(tables) <= most:
+        if len(tables) <= max_tables:
             break
     # where there is nothing to correct: a table of zeros
-    zeros = np.zeros(len(wanted.positions(axes[0])))
-    return tables or [CrossTable(axes[0], wanted.corrector.moved[0], zeros)]
+    zeros = np.zeros(len(corrections.positions(axes[0])))
+    return tables or [CrossTable(axes[0], corrections.corrector.moved[0], zeros)]
 
 
-def _half_reversals(wanted: RequiredCorrections, axis: str) -> CorrectionsByAxes:
-    base = wanted.for_direction(TravelDirection.MEAN)
-    ways = [
+def _half_reversals(corrections: RequiredCorrections, axis: str) -> CorrectionsByAxes:
+    base = corrections.for_direction(TravelDirection.MEAN)
+    directions = [
         base.for_direction(way, axis) for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
     ]
     found: dict[tuple[str, ...], Array] = {}
-    for other in ("", *wanted.axes):
+    for other in ("", *corrections.axes):
         if other == axis:
             continue
-        group = tuple(name for name in wanted.axes if name in (axis, other))
-        there, back = (way.averaged(group) for way in ways)
-        for target in there:
-            half = (there[target] - back[target]) / 2.0
+        group = tuple(name for name in corrections.axes if name in (axis, other))
+        forward, backward = (way.averaged(group) for way in directions)
+        for target in forward:
+            half = (forward[target] - backward[target]) / 2.0
             half = half.T if other and group[0] != axis else half
             found[(target, axis, other) if other else (target, axis)] = half
     return found
 
 
 def _tables_for(
-    wanted: RequiredCorrections,
+    corrections: RequiredCorrections,
     factor: float,
     target: str,
     needed: CorrectionsByAxes,
     halves: Mapping[str, CorrectionsByAxes],
     most_products: int,
 ) -> list[CrossTable]:
-    axes = wanted.axes
+    axes = corrections.axes
     mean = float(needed[target,])
     along = {axis: needed[target, axis] - mean for axis in axes}
     home = target if target in axes else axes[0]
     along[home] = along[home] + mean
     products: list[CrossTable] = []
     for first, second in combinations(axes, 2):
-        for one, other in _factors(
+        for first_factor, second_factor in _factors(
             factor * _interaction(needed[target, first, second]), MAX_PRODUCTS
         ):
             # both tables also act by themselves: their axis' own table takes that back
-            along[first] = along[first] - factor * one
-            along[second] = along[second] - factor * other
+            along[first] = along[first] - factor * first_factor
+            along[second] = along[second] - factor * second_factor
             products += [
-                CrossTable(first, target, one, number=1),
-                CrossTable(second, target, other),
+                CrossTable(first, target, first_factor, number=1),
+                CrossTable(second, target, second_factor),
             ]
     half = {axis: groups[target, axis] for axis, groups in halves.items()}
     for axis, groups in halves.items():
         for second in (other for other in axes if other != axis):
-            rest = groups[target, axis, second] - groups[target, axis][:, None]
-            for one, other in _factors(factor * rest, most_products):
-                half[axis] = half[axis] - factor * one
-                along[second] = along[second] - factor * other
+            interaction = groups[target, axis, second] - groups[target, axis][:, None]
+            for first_factor, second_factor in _factors(factor * interaction, most_products):
+                half[axis] = half[axis] - factor * first_factor
+                along[second] = along[second] - factor * second_factor
                 products += [
-                    CrossTable(axis, target, one, 1, number=2),
-                    CrossTable(axis, target, -one, -1, number=1),
-                    CrossTable(second, target, other),
+                    CrossTable(axis, target, first_factor, 1, number=2),
+                    CrossTable(axis, target, -first_factor, -1, number=1),
+                    CrossTable(second, target, second_factor),
                 ]
-    own: list[CrossTable] = []
+    axis_tables: list[CrossTable] = []
     for axis, values in along.items():
-        turned = half.get(axis, np.zeros(()))
-        if np.abs(turned).max() > MIN_PRODUCT_MM / 100.0:
-            own += [
-                CrossTable(axis, target, factor * (values + way * turned), way) for way in (1, -1)
+        reversal = half.get(axis, np.zeros(()))
+        if np.abs(reversal).max() > MIN_PRODUCT_MM / 100.0:
+            axis_tables += [
+                CrossTable(axis, target, factor * (values + way * reversal), way) for way in (1, -1)
             ]
         else:
-            own.append(CrossTable(axis, target, factor * values))
-    kept = [table for table in own if np.abs(table.values).max() > MIN_PRODUCT_MM / 100.0]
-    return [*kept, *products]
+            axis_tables.append(CrossTable(axis, target, factor * values))
+    single_tables = [table for table in axis_tables if np.abs(table.values).max() > MIN_PRODUCT_MM / 100.0]
+    return [*single_tables, *products]
 
 
-def _factors(both: Array, most: int) -> Iterator[tuple[Array, Array]]:
-    left, sizes, right = np.linalg.svd(both)
-    for rank, size in enumerate(sizes[:most].tolist()):
-        one, other = left[:, rank] * np.sqrt(size), right[rank] * np.sqrt(size)
-        if np.abs(one).max() * np.abs(other).max() < MIN_PRODUCT_MM:
+def _factors(matrix: Array, max_rank: int) -> Iterator[tuple[Array, Array]]:
+    left_vectors, sizes, right_vectors = np.linalg.svd(matrix)
+    for rank, size in enumerate(sizes[:max_rank].tolist()):
+        first_factor, second_factor = left_vectors[:, rank] * np.sqrt(size), right_vectors[rank] * np.sqrt(size)
+        if np.abs(first_factor).max() * np.abs(second_factor).max() < MIN_PRODUCT_MM:
             return
-        yield one, other
+        yield first_factor, second_factor
 
 
-def _interaction(both: Array) -> Array:
-    one, other = (shares(count) for count in both.shape)
-    first, second = both @ other, one @ both
-    return both - first[:, None] - second + one @ first
+def _interaction(matrix: Array) -> Array:
+    first_weights, second_weights = (shares(count) for count in matrix.shape)
+    first, second = matrix @ second_weights, first_weights @ matrix
+    return matrix - first[:, None] - second + first_weights @ first
 
 
 FORMATS = (

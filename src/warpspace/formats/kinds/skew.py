@@ -51,10 +51,10 @@ def closure_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str,
     side = other_side(ac, bd, ad)
     if abs(side / ad - 1.0) < CLOSURE_TOLERANCE:
         return ()
-    shown = f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm close only with a side AB of"
+    description = f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm close only with a side AB of"
     share = 100.0 * (side / ad - 1.0)
     return (
-        f"{shown} {side:.4g} mm, {share:+.1f} % from AD: is the part square, is none mistyped?",
+        f"{description} {side:.4g} mm, {share:+.1f} % from AD: is the part square, is none mistyped?",
     )
 
 
@@ -68,8 +68,8 @@ def factor_of(lengths: tuple[float, float, float], at: SourceLine, what: str) ->
     ac, bd, ad = lengths
     # the diagonals of a parallelogram are together longer than twice a side, and differ by less
     if not (min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd)):
-        found = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
-        at.refuse(found, "two diagonals and a side")
+        problem = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
+        at.refuse(problem, "two diagonals and a side")
     return skew_factor(ac, bd, ad)
 
 
@@ -78,11 +78,11 @@ def skew_term(factors: Mapping[str, float]) -> Affine:
     return Affine(AXES, ((0.0, -xy, -(xz - xy * yz)), (0.0, 0.0, -yz), (0.0, 0.0, 0.0)))
 
 
-def fitted_factors(wanted: RequiredCorrections) -> dict[str, float]:
+def fitted_factors(corrections: RequiredCorrections) -> dict[str, float]:
     """Give the factors that leave the smallest RMS over the volume."""
-    found = wanted.linear_fit((("X", "Y"), ("X", "Z"), ("Y", "Z")))
-    xy, yz = -found.get(("X", "Y"), 0.0), -found.get(("Y", "Z"), 0.0)
-    xz = -found.get(("X", "Z"), 0.0) + xy * yz
+    coefficients = corrections.linear_fit((("X", "Y"), ("X", "Z"), ("Y", "Z")))
+    xy, yz = -coefficients.get(("X", "Y"), 0.0), -coefficients.get(("Y", "Z"), 0.0)
+    xz = -coefficients.get(("X", "Z"), 0.0) + xy * yz
     return {"XY": xy, "XZ": xz, "YZ": yz}
 
 
@@ -176,8 +176,8 @@ def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
         place, given = twist[named]
         ends.append(place.number(given, named))
     if len(heights) < 2 or ends[1] <= ends[0]:
-        found = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
-        at.refuse(found, "two or more along a range")
+        problem = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
+        at.refuse(problem, "two or more along a range")
     probe = next((name for name in PROBES if "y_offset" in sections.get(name, {})), None)
     if probe is None:
         expected = "y_offset in [probe]: without it a height tells no twist"
@@ -189,14 +189,14 @@ def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
     options.axis_named("X", at)
     places = np.linspace(ends[0], ends[1], len(heights))
     values = np.array(heights) / offset * URAD_PER_RAD
-    said = (
+    assumption = (
         f"the heights that the probe is off by, {offset:g} mm behind the nozzle, are taken for"
         " roll of X; their mean is not in the file"
     )
     series = ErrorSeries(
         "EAX", tuple(places.tolist()), (MeasuredRun(1, UNDIRECTED, tuple(values.tolist())),)
     )
-    return ImportedErrors("klipper", (series,), units=("mm",), assumed=(said,))
+    return ImportedErrors("klipper", (series,), units=("mm",), assumed=(assumption,))
 
 
 def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
@@ -210,12 +210,12 @@ def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedEr
     return merge(parts)
 
 
-def _write_klipper(wanted: RequiredCorrections) -> Files:
+def _write_klipper(corrections: RequiredCorrections) -> Files:
     parts = [
         f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
-        for plane, factor in fitted_factors(wanted).items()
+        for plane, factor in fitted_factors(corrections).items()
     ]
-    head = format_comment("# ", wanted.scene.title)
+    head = format_comment("# ", corrections.scene.title)
     head += "\n# [skew_correction] must stand in printer.cfg\n"
     return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
 
@@ -229,8 +229,8 @@ _COMMENT = re.compile(r"/\*.*?(?:\*/|$)|//[^\n]*", re.DOTALL)
 
 
 def _is_marlin(head: str, name: str) -> bool:
-    known = re.search(r"^\s*M852\b|SKEW_CORRECTION", head, re.MULTILINE)
-    return known is not None or name.endswith("Configuration.h")
+    match = re.search(r"^\s*M852\b|SKEW_CORRECTION", head, re.MULTILINE)
+    return match is not None or name.endswith("Configuration.h")
 
 
 def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -284,16 +284,16 @@ def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
 
 
-def _write_marlin(wanted: RequiredCorrections) -> Files:
-    factors = fitted_factors(wanted)
-    words = [
-        f"{letter}{format_number(float(wanted.round(factors[plane])), DIGITS)}"
+def _write_marlin(corrections: RequiredCorrections) -> Files:
+    factors = fitted_factors(corrections)
+    parameters = [
+        f"{letter}{format_number(float(corrections.round(factors[plane])), DIGITS)}"
         for letter, plane in zip("IJK", PLANES, strict=True)
     ]
     lines = [
-        format_comment("; ", wanted.scene.title),
+        format_comment("; ", corrections.scene.title),
         "; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled",
-        f"M852 {' '.join(words)}\n",
+        f"M852 {' '.join(parameters)}\n",
     ]
     return {"": "\n".join(lines)}
 

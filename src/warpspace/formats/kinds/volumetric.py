@@ -65,31 +65,31 @@ def ignored_notes(names: Sequence[str]) -> tuple[str, ...]:
     return (f"{', '.join(names)}: no errors, left out",) if names else ()
 
 
-def check_axes(held: measured.ImportedErrors, name: str) -> None:
-    if other := next((axis for axis in held.axes if axis not in ARGUMENTS), ""):
+def check_axes(imported: measured.ImportedErrors, name: str) -> None:
+    if other := next((axis for axis in imported.axes if axis not in ARGUMENTS), ""):
         raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
 
 
-def _finished(found: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
-    found = replace(
-        found,
+def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
+    imported = replace(
+        imported,
         units=("mm", "rad", "degrees for rotary positions"),
-        assumed=(*found.assumed, *ASSUMED),
+        assumed=(*imported.assumed, *ASSUMED),
         convention=CONVENTION,
     )
     if options.variant != ALTERNATIVE:
-        said = "rotation about the nominal axis (alternative_model 0); --variant says otherwise"
-        return replace(found, assumed=(*found.assumed, said))
-    said = "rotation about the distorted axis (alternative_model 1)"
-    found = replace(found, assumed=(*found.assumed, said))
-    for axis in dict.fromkeys(parameter(key).axis for key in found.constants):
+        assumption = "rotation about the nominal axis (alternative_model 0); --variant says otherwise"
+        return replace(imported, assumed=(*imported.assumed, assumption))
+    assumption = "rotation about the distorted axis (alternative_model 1)"
+    imported = replace(imported, assumed=(*imported.assumed, assumption))
+    for axis in dict.fromkeys(parameter(key).axis for key in imported.constants):
         if not is_linear(axis):
-            found = _about_distorted_axis(found, axis, options)
-    return found
+            imported = _about_distorted_axis(imported, axis, options)
+    return imported
 
 
 def _about_distorted_axis(
-    found: measured.ImportedErrors, axis: str, options: ReadOptions
+    imported: measured.ImportedErrors, axis: str, options: ReadOptions
 ) -> measured.ImportedErrors:
     """Take back, turned with the axis, what the constant errors of a rotary axis move at zero.
 
@@ -97,22 +97,22 @@ def _about_distorted_axis(
     error minus the same error turned by R, which is one wave a turn of its component errors.
     """
     machine = options.machine
-    way = machine.axes[axis].direction if machine is not None and axis in machine.axes else 1
-    own = direction_index(axis)
-    first, second = (own + 1) % 3, (own + 2) % 3
+    sense = machine.axes[axis].direction if machine is not None and axis in machine.axes else 1
+    axis_index = direction_index(axis)
+    first, second = (axis_index + 1) % 3, (axis_index + 2) % 3
     for letters in ("XYZ", "ABC"):
         one, other = (
-            found.constants.get(f"E{letters[index]}0{axis}", 0.0) for index in (first, second)
+            imported.constants.get(f"E{letters[index]}0{axis}", 0.0) for index in (first, second)
         )
-        along = found.constants.get(f"E{letters[own]}0{axis}", 0.0)
-        found = _plus(found, f"E{letters[first]}{axis}", 0.0, -one, way * other)
-        found = _plus(found, f"E{letters[second]}{axis}", 0.0, -other, -way * one)
-        found = _plus(found, f"E{letters[own]}{axis}", -along)
-    return found
+        along = imported.constants.get(f"E{letters[axis_index]}0{axis}", 0.0)
+        imported = _plus(imported, f"E{letters[first]}{axis}", 0.0, -one, sense * other)
+        imported = _plus(imported, f"E{letters[second]}{axis}", 0.0, -other, -sense * one)
+        imported = _plus(imported, f"E{letters[axis_index]}{axis}", -along)
+    return imported
 
 
 def _plus(
-    found: measured.ImportedErrors,
+    imported: measured.ImportedErrors,
     key: str,
     offset: float = 0.0,
     cosine: float = 0.0,
@@ -120,12 +120,12 @@ def _plus(
 ) -> measured.ImportedErrors:
     size = math.hypot(cosine, sine)
     if not size and not offset:
-        return found
-    present = next((one for one in found.series if one.key == key), None)
+        return imported
+    present = next((one for one in imported.series if one.key == key), None)
     if present is None:
         phase = math.degrees(math.atan2(sine, cosine))
         curve = {"harmonics": [[1, size, phase]]} if size else {"poly": [offset]}
-        return replace(found, curves={**found.curves, key: curve})
+        return replace(imported, curves={**imported.curves, key: curve})
     at = np.array(present.positions)
     if size:
         at = np.union1d(at, np.arange(at[0], at[-1], FINE_DEG))
@@ -136,8 +136,8 @@ def _plus(
         tuple(at.tolist()),
         (measured.MeasuredRun(1, measured.UNDIRECTED, tuple(values.tolist())),),
     )
-    series = tuple(changed if one.key == key else one for one in found.series)
-    return replace(found, series=series)
+    series = tuple(changed if one.key == key else one for one in imported.series)
+    return replace(imported, series=series)
 
 
 def _read_with(
@@ -161,8 +161,8 @@ def _is_isg(head: str, name: str) -> bool:
         if not bare or bare == "#":
             continue
         names = [part for part in _SPLIT.split(bare) if part]
-        known = [part for part in names if error_name(part)]
-        return bool(known) and len(known) + sum(part in ARGUMENTS for part in names) == len(names)
+        parameters = [part for part in names if error_name(part)]
+        return bool(parameters) and len(parameters) + sum(part in ARGUMENTS for part in names) == len(names)
     return False
 
 
@@ -181,19 +181,19 @@ def _blocks(source: Source) -> list[Block]:
 
 
 def _read_isg(source: Source) -> list[measured.ImportedErrors]:
-    found: list[measured.ImportedErrors] = []
-    known: set[str] = set()
+    imports: list[measured.ImportedErrors] = []
+    keys: set[str] = set()
     for block in _blocks(source):
         part = _read_block(source, block)
         for key in part.keys:
-            if key in known:
+            if key in keys:
                 name = file_name(key)
                 block[0][0].refuse(f"{name} stands in two blocks", "it in one")
-            known.add(key)
-        found.append(part)
-    if not known:
+            keys.add(key)
+        imports.append(part)
+    if not keys:
         source.refuse("has no errors", "a header such as X EXX EYX")
-    return found
+    return imports
 
 
 def _read_block(source: Source, block: Block) -> measured.ImportedErrors:
@@ -256,8 +256,8 @@ def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None
 def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.ErrorSeries:
     for (_, before), (at, row) in pairwise(rows):
         if row[argument] <= before[argument]:
-            found = f"{argument} {row[argument]:g} after {before[argument]:g}"
-            at.refuse(found, "ascending positions")
+            problem = f"{argument} {row[argument]:g} after {before[argument]:g}"
+            at.refuse(problem, "ascending positions")
     run = measured.MeasuredRun(1, measured.UNDIRECTED, tuple(row[key] for _, row in rows))
     return measured.ErrorSeries(key, tuple(row[argument] for _, row in rows), (run,))
 
@@ -271,28 +271,28 @@ def _isg_plane(
     return measured.build_surface(key, (own, other), points, source)
 
 
-def _write_isg(wanted: RequiredCorrections) -> Files:
-    held = measured.to_single_direction(measured.sample_errors(wanted), wanted)
-    check_axes(held, ISG)
+def _write_isg(corrections: RequiredCorrections) -> Files:
+    imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
+    check_axes(imported, ISG)
 
-    def spelled(value: float, key: str) -> str:
+    def format_value(value: float, key: str) -> str:
         return format_number(value / factor_of(key), DIGITS)
 
     blocks: list[list[list[str]]] = []
-    for table in measured.build_error_tables(held):
+    for table in measured.build_error_tables(imported):
         names = [*reversed(table.axes), *map(file_name, table.keys)]
         ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis runs fastest
         rows = [
-            [*map(repr, reversed(at)), *map(spelled, values, table.keys)]
+            [*map(repr, reversed(at)), *map(format_value, values, table.keys)]
             for at, _, values in ordered
         ]
         blocks.append([names, *rows])
     if not blocks:
-        key = measured.zero_key(wanted.scene)
+        key = measured.zero_key(corrections.scene)
         blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
     return {
-        "": f"{format_comment('// ', wanted.scene.title)}\n// mm, rad, degrees\n"
+        "": f"{format_comment('// ', corrections.scene.title)}\n// mm, rad, degrees\n"
         + "\n#\n".join(texts)
         + "\n"
     }
@@ -370,31 +370,31 @@ def _iso_row(
         at.refuse(f"{len(parts)} numbers in {at.quoted}", "position and value")
     position = at.position(parts[0], "position")
     if rows and position <= rows[-1][0]:
-        found = f"position {position:g} of {name} after {rows[-1][0]:g}"
-        at.refuse(found, "ascending positions")
+        problem = f"position {position:g} of {name} after {rows[-1][0]:g}"
+        at.refuse(problem, "ascending positions")
     rows.append((position, at.error(parts[1], name, factor_of(key) if key else 1.0)))
     if len(rows) > MAX_POINTS:
         at.refuse(f"{name} has more points than {MAX_POINTS:,}", "at most so many")
 
 
-def _write_iso(wanted: RequiredCorrections) -> Files:
-    held = measured.to_single_direction(measured.sample_errors(wanted), wanted)
-    check_axes(held, ISO)
-    lines = [format_comment("// ", wanted.scene.title), "// mm, rad, degrees; variant Vendor"]
-    for plane in held.surfaces:
+def _write_iso(corrections: RequiredCorrections) -> Files:
+    imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
+    check_axes(imported, ISO)
+    lines = [format_comment("// ", corrections.scene.title), "// mm, rad, degrees; variant Vendor"]
+    for plane in imported.surfaces:
         axes = " and ".join(plane.axes)
         lines.append(f"// {plane.key} over {axes}: has no place here, left out")
-    for key, value in held.constants.items():
+    for key, value in imported.constants.items():
         scaled = value / factor_of(key)
         lines += [f"[{file_name(key)}]", f"VALUE = {scaled:.{DIGITS}f}"]
-    for one in held.series:
-        lines += [f"[{one.key}]", "Gridpoints = {"]
-        scale = factor_of(one.key)
+    for error_series in imported.series:
+        lines += [f"[{error_series.key}]", "Gridpoints = {"]
+        scale = factor_of(error_series.key)
         lines += [
             f"  {position!r} {value / scale:.{DIGITS}f}"
-            for position, value in zip(one.positions, one.values.tolist(), strict=True)
+            for position, value in zip(error_series.positions, error_series.values.tolist(), strict=True)
         ]
-        lines.append(f"}}  // end of {one.key}")
+        lines.append(f"}}  // end of {error_series.key}")
     return {"": "\n".join(lines) + "\n"}
 
 
