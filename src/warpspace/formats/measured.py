@@ -177,7 +177,9 @@ def merge(parts: Sequence[ImportedErrors]) -> ImportedErrors:
         else:
             entries = [one for value in values for one in value]
             # an error that is given twice is refused later
-            merged[name] = tuple(entries if name in ("series", "surfaces") else dict.fromkeys(entries))
+            merged[name] = tuple(
+                entries if name in ("series", "surfaces") else dict.fromkeys(entries)
+            )
     return ImportedErrors(**merged)
 
 
@@ -225,7 +227,13 @@ def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
         )
     for key, value in imported.constants.items():
         standard_uncertainty = imported.uncertainty.get(key)
-        row = ErrorSummary(key=key, kind="constant", smallest=value, largest=value, uncertainty=standard_uncertainty)
+        row = ErrorSummary(
+            key=key,
+            kind="constant",
+            smallest=value,
+            largest=value,
+            uncertainty=standard_uncertainty,
+        )
         rows.append(row)
     for key, curve in imported.curves.items():
         ((kind, numbers),) = curve.items()
@@ -271,7 +279,9 @@ def _of_series(series: ErrorSeries) -> ErrorSummary:
         kind="table" if reversal is None else "by direction",
         points=len(series.positions),
         runs=len(series.runs),
-        directions=" ".join(sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in directions),
+        directions=" ".join(
+            sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in directions
+        ),
         range=(series.positions[0], series.positions[-1]),
         smallest=float(values.min()),
         largest=float(values.max()),
@@ -323,7 +333,9 @@ def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
         at = np.linspace(*scene.axis_span(row.axis), count)
         curves = _curves_by_direction(curve)
         other = _second_axis(curve)
-        tabled = all(isinstance(one, TableCurve | TwoArguments) for one in curves.values() or [curve])
+        tabled = all(
+            isinstance(one, TableCurve | TwoArguments) for one in curves.values() or [curve]
+        )
         if tabled and (other is not None or len(curve.kinks) <= count):
             at = np.array(curve.kinks)
         elif other is not None:
@@ -414,7 +426,9 @@ def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
             values = plane.backward if direction == BACKWARD else plane.values
             for first, row in zip(plane.first, values, strict=True):
                 points = zip(plane.second, row, strict=True)
-                table.rows.extend(((first, second), direction, (value,)) for second, value in points)
+                table.rows.extend(
+                    ((first, second), direction, (value,)) for second, value in points
+                )
         tables.append(table)
     return tables
 
@@ -452,7 +466,9 @@ def build_surface_by_direction(
 ) -> ErrorSurface:
     """Build an error of two axes from its points by direction of travel, see `plane_of`."""
     suffixes = {FORWARD: " forward", BACKWARD: " backward", UNDIRECTED: ""}
-    planes = {way: build_surface(key, axes, own, source, suffixes[way]) for way, own in points.items()}
+    planes = {
+        way: build_surface(key, axes, own, source, suffixes[way]) for way, own in points.items()
+    }
     if len(planes) == 1:
         return next(iter(planes.values()))
     if set(planes) != {FORWARD, BACKWARD}:

@@ -196,7 +196,9 @@ def recognise(sources: Sequence[Source]) -> Format:
             expected = (
                 f"one of {names} (--format NAME says which; `warpspace import --formats` lists"
             )
-            (source.at(number) if number else source).refuse(problem, f"{expected} what each holds)")
+            (source.at(number) if number else source).refuse(
+                problem, f"{expected} what each holds)"
+            )
         recognised[kind.name] = kind
         if len(recognised) > 1:
             names = " and ".join(recognised)
@@ -234,7 +236,9 @@ def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: st
     kind = find_format(format_name) if format_name else recognise(sources)
     if options.variant not in ("", *kind.variants) and not kind.names_variants:
         variants = ", ".join(kind.variants) or "none"
-        raise OptionError(f"--variant {options.variant!r} of {kind.name}; expected one of: {variants}")
+        raise OptionError(
+            f"--variant {options.variant!r} of {kind.name}; expected one of: {variants}"
+        )
     if options.sign and kind.tables is None:
         raise OptionError(f"--sign: {kind.name} holds errors, no table of a controller")
     return Reading(kind.errors(sources, options), kind, not format_name)

@@ -266,13 +266,18 @@ def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> me
         values_by_direction = {
             way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in DIRECTIONS
         }
-    if np.array_equal(values_by_direction[measured.FORWARD], values_by_direction[measured.BACKWARD]):
+    if np.array_equal(
+        values_by_direction[measured.FORWARD], values_by_direction[measured.BACKWARD]
+    ):
         runs = (
-            measured.MeasuredRun(1, measured.UNDIRECTED, tuple(values_by_direction[measured.FORWARD].tolist())),
+            measured.MeasuredRun(
+                1, measured.UNDIRECTED, tuple(values_by_direction[measured.FORWARD].tolist())
+            ),
         )
     else:
         runs = tuple(
-            measured.MeasuredRun(1, way, tuple(values.tolist())) for way, values in values_by_direction.items()
+            measured.MeasuredRun(1, way, tuple(values.tolist()))
+            for way, values in values_by_direction.items()
         )
     return measured.ErrorSeries(key, tuple(at.tolist()), runs)
 
@@ -289,7 +294,10 @@ def _plane(term: Product, machine: Machine | None, source: Source) -> measured.E
     tables = {way: factor * term.at(first, second, way) for way in DIRECTIONS}
     key = error_key(first_table.source, first_table.target)
     return measured.surface_from_directions(
-        key, (first_table.source, second_table.source), (first_table.positions, second_table.positions), tables
+        key,
+        (first_table.source, second_table.source),
+        (first_table.positions, second_table.positions),
+        tables,
     )
 
 
@@ -339,8 +347,12 @@ def _joined(
             single_axis.append(error_series)
             continue
         ends = (joined[place].second[0], joined[place].second[-1])
-        columns = {way: np.repeat(error_series.in_direction(way)[:, None], 2, axis=1) for way in DIRECTIONS}
-        surface = measured.surface_from_directions(error_series.key, place[1], (error_series.positions, ends), columns)
+        columns = {
+            way: np.repeat(error_series.in_direction(way)[:, None], 2, axis=1) for way in DIRECTIONS
+        }
+        surface = measured.surface_from_directions(
+            error_series.key, place[1], (error_series.positions, ends), columns
+        )
         joined[place] = _added(joined[place], surface)
     return single_axis, list(joined.values())
 

@@ -82,7 +82,9 @@ def build_imported_scene(
     uncertainty, measured = _measured(imported, base, keep_runs=reading.format.measured)
     model, convention_notes = _convention(imported, base)
     description_lines = [*reading.imported.assumed, *notes, *convention_notes, *imported.notes]
-    description = "\n".join([f"Imported from {name} ({reading.format.name}).", *description_lines])[:MAX_TEXT]
+    description = "\n".join([f"Imported from {name} ({reading.format.name}).", *description_lines])[
+        :MAX_TEXT
+    ]
     covariance = base.covariance and base.covariance.without(curves)
     if uncertainty:
         covariance = (covariance or Covariance((), ())).extended(_ranges(imported))
@@ -136,9 +138,15 @@ def _check_travel(imported: ImportedErrors, base: Scene, name: str) -> None:
     problems: list[str] = []
     for axis, (low, high) in _ranges(imported).items():
         axis_definition = base.machine.axes[axis]
-        if not is_linear(axis) and axis_definition.travel[1] - axis_definition.travel[0] >= 360.0 - TRAVEL_TOLERANCE:
+        if (
+            not is_linear(axis)
+            and axis_definition.travel[1] - axis_definition.travel[0] >= 360.0 - TRAVEL_TOLERANCE
+        ):
             continue
-        if low < axis_definition.travel[0] - TRAVEL_TOLERANCE or high > axis_definition.travel[1] + TRAVEL_TOLERANCE:
+        if (
+            low < axis_definition.travel[0] - TRAVEL_TOLERANCE
+            or high > axis_definition.travel[1] + TRAVEL_TOLERANCE
+        ):
             unit = f" {axis_definition.unit}" if is_linear(axis) else axis_definition.unit
             problems.append(
                 f"positions of {axis} {low:g} … {high:g}{unit} reach beyond its travel"
@@ -154,7 +162,9 @@ def _plausibility_notes(imported: ImportedErrors, base: Scene) -> list[str]:
     for series in imported.series:
         if not is_linear(axis := parameter(series.key).axis):
             notes += radian_notes({f"{series.key} over {axis}_deg": series.positions})
-    largest = {one.key: float(np.abs(one.values).max()) for one in (*imported.series, *imported.surfaces)}
+    largest = {
+        one.key: float(np.abs(one.values).max()) for one in (*imported.series, *imported.surfaces)
+    }
     largest |= {key: abs(value) for key, value in imported.constants.items()}
     for key, value in largest.items():
         if value > IMPLAUSIBLE[parameter(key).is_rotation]:

@@ -107,7 +107,7 @@ def test_cross_tables_correct_an_angle_with_its_lever_by_a_product():
 
 
 def test_a_full_grid_leaves_the_square_of_its_pitch(monkeypatch):
-    monkeypatch.setattr(fanuc_3d, "MOST_COUNT", 10**6)  # no rounding beside the interpolation
+    monkeypatch.setattr(fanuc_3d, "MAX_COUNT", 10**6)  # no rounding beside the interpolation
     scene = scene_with(
         "EXX = { harmonics = [[1, 20, 0]] }\nEYY = { harmonics = [[1, 15, 40]] }"
         "\nEAZ = { ramp = 9 }"

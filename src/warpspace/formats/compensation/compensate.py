@@ -463,7 +463,12 @@ class Sweep(Result):
         for label, statistic in (("largest", "max_um"), ("mean over the volume", "mean_um")):
             title = f"Left over the working volume: {label}"
             yield Lines(
-                "lines", title, "numbers in the controller", "|E| [µm]", self._curves(statistic), log=True
+                "lines",
+                title,
+                "numbers in the controller",
+                "|E| [µm]",
+                self._curves(statistic),
+                log=True,
             )
 
     def _curves(self, statistic: str) -> tuple[Curve, ...]:

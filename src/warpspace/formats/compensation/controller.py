@@ -81,7 +81,9 @@ class Controller:
         if self.tables is not None:
             return dict(self.tables.corrections(coordinates, TRAVEL_SIGN.get(travel, 0)))
         corrector = self.corrector
-        return replace(corrector, model=replace(corrector.model, direction=travel)).moves(coordinates)
+        return replace(corrector, model=replace(corrector.model, direction=travel)).moves(
+            coordinates
+        )
 
     def at(
         self,
@@ -104,7 +106,10 @@ class Controller:
         reference = _reference(scene, coordinates)
         placement_volume, volume = scene.view(loop).placed_over, None
         if placement_volume is not None:
-            grid, absolute = build_grid(scene.model, placement_volume), replace(scene, reference=None)
+            grid, absolute = (
+                build_grid(scene.model, placement_volume),
+                replace(scene, reference=None),
+            )
             at = (grid.coordinates, grid.nominal_mm, replace(absolute, placed=False), loop)
             volume = grid, self.at(*at, grid.point_mm)
         return CorrectedPoints(
@@ -137,7 +142,9 @@ def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | Non
     return {axis: np.asarray(still.get(axis, at)) for axis, at in coordinates.items()}
 
 
-def read_back(kind: Format, files: Files, corrections: RequiredCorrections, label: str) -> Controller:
+def read_back(
+    kind: Format, files: Files, corrections: RequiredCorrections, label: str
+) -> Controller:
     from warpspace.formats.to_scene import build_imported_scene
 
     scene, corrector = corrections.scene, corrections.corrector

@@ -242,7 +242,9 @@ class RequiredCorrections:
     def directional_axes(self) -> tuple[str, ...]:
         """Those of `axes` that have errors by direction of travel."""
         functions = self.corrector.errors.functions
-        directional = {parameter(key).axis for key, curve in functions.items() if curve.has_directions}
+        directional = {
+            parameter(key).axis for key, curve in functions.items() if curve.has_directions
+        }
         return tuple(axis for axis in self.axes if axis in directional)
 
     def for_direction(self, direction: str, axis: str = "") -> "RequiredCorrections":
@@ -279,7 +281,8 @@ class RequiredCorrections:
         for index in reversed(range(len(self.axes))):
             if self.axes[index] not in axes:
                 averages = {
-                    axis: np.moveaxis(value, index, -1) @ weights for axis, value in averages.items()
+                    axis: np.moveaxis(value, index, -1) @ weights
+                    for axis, value in averages.items()
                 }
         return averages
 
@@ -303,8 +306,12 @@ class RequiredCorrections:
         reference = scene.reference or {}
         if reference:
             still = {**scene.workspace.positions, **reference}
-            reference_corrections = self.corrector.moves({axis: np.asarray(still[axis]) for axis in machine.axes})
-            needed = {target: values - reference_corrections[target] for target, values in needed.items()}
+            reference_corrections = self.corrector.moves(
+                {axis: np.asarray(still[axis]) for axis in machine.axes}
+            )
+            needed = {
+                target: values - reference_corrections[target] for target, values in needed.items()
+            }
         coefficients: dict[tuple[str, str], float] = {}
         for target in dict.fromkeys(target for target, _ in allowed):
             sources = [axis for one, axis in allowed if one == target and axis in at]
@@ -312,5 +319,7 @@ class RequiredCorrections:
                 columns = [at[axis] - reference.get(axis, 0.0) for axis in sources]
                 matrix = np.stack([column.ravel() * root for column in columns], -1)
                 solved = np.linalg.lstsq(matrix, needed[target].ravel() * root, rcond=None)[0]
-                coefficients |= {(target, axis): float(v) for axis, v in zip(sources, solved, strict=True)}
+                coefficients |= {
+                    (target, axis): float(v) for axis, v in zip(sources, solved, strict=True)
+                }
         return coefficients

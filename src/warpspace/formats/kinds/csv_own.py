@@ -83,7 +83,12 @@ def _to_fill_in(
 ) -> str:
     keys = [f"E{letter}{axis}" for letter in "XYZABC"]
     values = [*map(_value, keys), *(_value(key, "u({})") for key in keys if uncertain)]
-    lines = [comments[0], UNITS, *comments[1:], *(f"# {key}: {parameter(key).name}" for key in keys)]
+    lines = [
+        comments[0],
+        UNITS,
+        *comments[1:],
+        *(f"# {key}: {parameter(key).name}" for key in keys),
+    ]
     lines += [",".join([*columns, *values]), *(row + "," * len(values) for row in cells)]
     return "\n".join(lines) + "\n"
 
@@ -213,7 +218,9 @@ def _column(at: SourceLine, heading: str) -> _CsvColumn:
     else:
         errors = (f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")
         hint = near_miss(name, [*"XYZABCUVW", *errors])
-        at.refuse(f"column {quote(heading)}", f"an axis, an error, u(error), run or direction{hint}")
+        at.refuse(
+            f"column {quote(heading)}", f"an axis, an error, u(error), run or direction{hint}"
+        )
     if not unit:
         units = ", ".join(one for one in factors if one.isascii())
         at.refuse(f"column {name} has no unit", f"{name} [unit], of {units}")
@@ -237,7 +244,9 @@ def _read_one(source: Source) -> measured.ImportedErrors:
     for number, cells in csv_rows:
         at = source.at(number)
         pairs = zip(columns, cells, strict=True)
-        rows.append((at, {(one.role, one.name): one.value(cell, at, csv_rows) for one, cell in pairs}))
+        rows.append(
+            (at, {(one.role, one.name): one.value(cell, at, csv_rows) for one, cell in pairs})
+        )
     csv_rows.check()
     if not rows:
         head.refuse("has no rows below its header", "at least one")
@@ -310,7 +319,8 @@ def _series(table: _CsvTable, axis: str) -> measured.ImportedErrors:
                 key,
                 tuple(places.tolist()),
                 tuple(
-                    measured.MeasuredRun(*way, tuple(own.tolist())) for way, own in values_by_run.items()
+                    measured.MeasuredRun(*way, tuple(own.tolist()))
+                    for way, own in values_by_run.items()
                 ),
                 tuple(uncertain.tolist()) if uncertain.any() else (),
             )
@@ -332,13 +342,17 @@ def _check_holes(
         problem = f"{key} has no value at {axis} {places[holes][0]:g}"
         source.refuse(problem, "one at every position")
     for direction in {way for _, way in values_by_run}:
-        readings = np.array([values for (_, way), values in values_by_run.items() if way == direction])
+        readings = np.array(
+            [values for (_, way), values in values_by_run.items() if way == direction]
+        )
         holes = np.isnan(readings).all(axis=0)
         if holes.any():
             direction_name = {measured.FORWARD: "forward", measured.BACKWARD: "backward"}.get(
                 direction, "any"
             )
-            problem = f"{key} has no value at {axis} {places[holes][0]:g} in {direction_name} direction"
+            problem = (
+                f"{key} has no value at {axis} {places[holes][0]:g} in {direction_name} direction"
+            )
             source.refuse(problem, "every direction at every position")
 
 

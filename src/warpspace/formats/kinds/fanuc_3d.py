@@ -56,7 +56,9 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
     if not csv_rows.header:
         source.refuse("has no table", f"the columns {', '.join(HEADINGS)}")
     if tuple(csv_rows.header) != HEADINGS:
-        source.at(csv_rows.line).refuse(f"columns {', '.join(csv_rows.header)}", ", ".join(HEADINGS))
+        source.at(csv_rows.line).refuse(
+            f"columns {', '.join(csv_rows.header)}", ", ".join(HEADINGS)
+        )
     rows: list[list[float]] = []
     for count, (number, parts) in enumerate(csv_rows, start=1):
         at = source.at(number)

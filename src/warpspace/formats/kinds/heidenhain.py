@@ -175,10 +175,14 @@ def write(required: RequiredCorrections) -> Files:
     for axis in required.axes:
         places = required.positions(axis)
         values = required.averaged([axis])
-        home = {target: target if target in required.axes else required.axes[0] for target in targets}
+        home = {
+            target: target if target in required.axes else required.axes[0] for target in targets
+        }
         elsewhere = {target: 0.0 if home[target] == axis else mean[target] for target in targets}
 
-        def format_columns(found: Mapping[str, Array], taken: Mapping[str, float] = elsewhere) -> Columns:
+        def format_columns(
+            found: Mapping[str, Array], taken: Mapping[str, float] = elsewhere
+        ) -> Columns:
             """Spell what is needed of each axis, without what stands in another table."""
             factor = required.factor(ERROR)
             return {
@@ -200,7 +204,9 @@ def write(required: RequiredCorrections) -> Files:
 
 
 def _with_backlash(
-    required: RequiredCorrections, axis: str, format_columns: Callable[[Mapping[str, Array]], Columns]
+    required: RequiredCorrections,
+    axis: str,
+    format_columns: Callable[[Mapping[str, Array]], Columns],
 ) -> Columns:
     """Spell the one column of a table and its values for travel in the negative direction.
 
@@ -214,7 +220,9 @@ def _with_backlash(
         for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
     )
     used = [
-        target for target in forward if any(float(value) for value in (*forward[target], *backward[target]))
+        target
+        for target in forward
+        if any(float(value) for value in (*forward[target], *backward[target]))
     ]
     if len(used) != 1 or forward == backward:
         return {}

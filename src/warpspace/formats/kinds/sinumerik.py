@@ -295,7 +295,9 @@ class CrossTable:
     number: int = 0  # how many tables further the other factor of a product stands, 0 for none
 
 
-def _cross_tables(corrections: RequiredCorrections, factor: float, max_tables: int) -> list[CrossTable]:
+def _cross_tables(
+    corrections: RequiredCorrections, factor: float, max_tables: int
+) -> list[CrossTable]:
     mean, axes = corrections.for_direction(TravelDirection.MEAN), corrections.axes
     needed = {
         (target, *group): values
@@ -380,14 +382,19 @@ def _tables_for(
             ]
         else:
             axis_tables.append(CrossTable(axis, target, factor * values))
-    single_tables = [table for table in axis_tables if np.abs(table.values).max() > MIN_PRODUCT_MM / 100.0]
+    single_tables = [
+        table for table in axis_tables if np.abs(table.values).max() > MIN_PRODUCT_MM / 100.0
+    ]
     return [*single_tables, *products]
 
 
 def _factors(matrix: Array, max_rank: int) -> Iterator[tuple[Array, Array]]:
     left_vectors, sizes, right_vectors = np.linalg.svd(matrix)
     for rank, size in enumerate(sizes[:max_rank].tolist()):
-        first_factor, second_factor = left_vectors[:, rank] * np.sqrt(size), right_vectors[rank] * np.sqrt(size)
+        first_factor, second_factor = (
+            left_vectors[:, rank] * np.sqrt(size),
+            right_vectors[rank] * np.sqrt(size),
+        )
         if np.abs(first_factor).max() * np.abs(second_factor).max() < MIN_PRODUCT_MM:
             return
         yield first_factor, second_factor

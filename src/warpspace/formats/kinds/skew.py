@@ -94,6 +94,7 @@ _LOAD = re.compile(r"\bSKEW_PROFILE\s+LOAD=\"?([^\s\"]+)")
 _SAVED = re.compile(r"(xy|xz|yz)_skew\s*[=:]\s*(\S+)")
 _SECTION = re.compile(r"\[([a-z_]+)(?:\s[^\]]*)?\]")
 Section = dict[str, tuple[SourceLine, str]]
+Settings = dict[str, tuple[SourceLine, float]]
 
 
 def _sections(source: Source) -> dict[str, Section]:
@@ -109,45 +110,56 @@ def _sections(source: Source) -> dict[str, Section]:
 
 
 def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str, float]:
-    found: dict[str, float] = {}
+    factors: dict[str, float] = {}
     profiles: dict[str, dict[str, float]] = {}
-    loaded, name = options.variant, ""
+    loaded, profile = options.variant, ""
     for number, text in enumerate(source.lines, start=1):
         at, bare = source.at(number), text.removeprefix("#*#").strip()
-        commented = bare.startswith((";", "#"))
-        if matched := _PROFILE.fullmatch(bare):
-            name = matched[1].rstrip()
-        elif not commented and (matched := _LOAD.search(bare)):
-            loaded = options.variant or matched[1]
-        elif "SET_SKEW" in bare and not commented:
-            if re.search(r"CLEAR\s*=\s*1", bare):
-                found.clear()
-                continue
-            for plane, value in _SET.findall(bare):
-                parts = value.split(",")
-                if len(parts) != 3:
-                    at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
-                ac, bd, ad = (at.number(part, plane) for part in parts)
-                found[plane] = factor_of((ac, bd, ad), at, plane)
-                notes += closure_notes((ac, bd, ad), plane)
-        elif matched := _SAVED.fullmatch(bare):
-            value = at.number(matched[2], matched[1])
-            profiles.setdefault(name, {})[matched[1].upper()] = value
-    if profiles and (loaded or not found):
-        names = ", ".join(profiles)
-        if len(profiles) == 1 and not loaded:
-            (loaded,) = profiles
-        elif not loaded or loaded not in profiles:
-            which = f"no profile {loaded!r} among" if loaded else "several skew profiles:"
-            source.refuse(f"{which} {names}", "one of them (--variant NAME)")
-        found |= profiles[loaded]
-        notes.append(
-            f"profile {loaded!r} is taken as loaded: Klipper loads none by itself, only"
-            f" SKEW_PROFILE LOAD={loaded} does"
-        )
-    for axis in "".join(found):
+        is_command = not bare.startswith((";", "#"))
+        section, load, saved = _PROFILE.fullmatch(bare), _LOAD.search(bare), _SAVED.fullmatch(bare)
+        if section:
+            profile = section[1].rstrip()
+        elif load and is_command:
+            loaded = options.variant or load[1]
+        elif "SET_SKEW" in bare and is_command:
+            _set_skew(at, bare, factors, notes)
+        elif saved:
+            factor = at.number(saved[2], saved[1])
+            profiles.setdefault(profile, {})[saved[1].upper()] = factor
+    if profiles and (loaded or not factors):
+        factors |= _loaded_profile(source, profiles, loaded, notes)
+    for axis in "".join(factors):
         options.axis_named(axis, source)
-    return found
+    return factors
+
+
+def _set_skew(at: SourceLine, command: str, factors: dict[str, float], notes: list[str]) -> None:
+    if re.search(r"CLEAR\s*=\s*1", command):
+        factors.clear()
+        return
+    for plane, value in _SET.findall(command):
+        parts = value.split(",")
+        if len(parts) != 3:
+            at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
+        ac, bd, ad = (at.number(part, plane) for part in parts)
+        factors[plane] = factor_of((ac, bd, ad), at, plane)
+        notes += closure_notes((ac, bd, ad), plane)
+
+
+def _loaded_profile(
+    source: Source, profiles: Mapping[str, dict[str, float]], loaded: str, notes: list[str]
+) -> dict[str, float]:
+    names = ", ".join(profiles)
+    if len(profiles) == 1 and not loaded:
+        loaded = names
+    if loaded not in profiles:
+        problem = f"no profile {loaded!r} among" if loaded else "several skew profiles:"
+        source.refuse(f"{problem} {names}", "one of them (--variant NAME)")
+    notes.append(
+        f"profile {loaded!r} is assumed to be loaded: Klipper loads no profile without"
+        f" SKEW_PROFILE LOAD={loaded}"
+    )
+    return profiles[loaded]
 
 
 def _klipper_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -234,54 +246,74 @@ def _is_marlin(head: str, name: str) -> bool:
 
 
 def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    found: dict[str, tuple[SourceLine, float]] = {}
-    defined: dict[str, dict[str, tuple[SourceLine, float]]] = {}
+    factors: Settings = {}
+    defined: dict[str, Settings] = {}
     notes: list[str] = []
     for source in sources:
-        switches: set[str] = set()
-        text = _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), source.text)
-        for at, bare in replace(source, lines=tuple(text.split("\n"))).scan(";"):
-            if matched := _SWITCH.match(bare):
-                switches.add(matched[1])
-            elif re.match(r"M852\b", bare):
-                for letter, value in _WORD.findall(bare[4:]):
-                    if letter not in LETTERS:
-                        at.refuse(f"M852 {letter}", "I, J, K or S")
-                    found[LETTERS[letter]] = (at, at.number(value, f"M852 {letter}"))
-            elif matched := _DEFINE.match(bare):
-                value = at.number(matched[3].rstrip("f"), matched[2])
-                defined.setdefault(matched[1], {})[matched[2]] = (at, value)
-        if defined and "SKEW_CORRECTION" not in switches:
-            at, _ = next(iter(next(iter(defined.values())).values()))
-            expected = "#define SKEW_CORRECTION, not commented out"
-            at.refuse("Marlin does not use these lengths", expected)
-        for plane in [plane for plane in defined if plane != "XY"]:
-            if "SKEW_CORRECTION_FOR_Z" not in switches:
-                del defined[plane]
-                notes.append(f"{plane}: not read, SKEW_CORRECTION_FOR_Z is not defined")
+        switches = _read_marlin(source, factors, defined)
+        _check_switches(switches, defined, notes)
         for plane, settings in defined.items():
-            side = defined.get("XY", {}).get("SIDE_AD") if plane == "XZ" else None
-            side = settings.get("SIDE_AD", side)
-            at, _ = next(iter(settings.values()))
-            if "SKEW_FACTOR" in settings:
-                found[plane] = settings["SKEW_FACTOR"]
-            elif {"DIAG_AC", "DIAG_BD"} <= settings.keys() and side:
-                at, ac = settings["DIAG_AC"]
-                lengths = (ac, settings["DIAG_BD"][1], side[1])
-                found[plane] = (at, factor_of(lengths, at, plane))
-                notes += closure_notes(lengths, plane)
-            else:
-                expected = f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side"
-                at.refuse(f"{plane}: {', '.join(settings)}", expected)
-        for plane, (at, factor) in found.items():
+            factors[plane] = _defined_factor(plane, settings, defined, notes)
+        for plane, (at, factor) in factors.items():
             if abs(factor) > MAX_FACTOR:
                 at.refuse(f"factor {factor:g} of {plane}", f"at most ±{MAX_FACTOR:g}")
             for axis in plane:
                 options.axis_named(axis, at)
-    if not found:
+    if not factors:
         sources[0].refuse("has no skew factors", "M852 I… J… K… or XY_SKEW_FACTOR")
-    factors = {plane: factor for plane, (_, factor) in found.items()}
-    return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
+    skew = skew_term({plane: factor for plane, (_, factor) in factors.items()})
+    return Tables((skew,), (), tuple(notes), ("mm", "rad"))
+
+
+def _read_marlin(source: Source, factors: Settings, defined: dict[str, Settings]) -> set[str]:
+    """Read the factors of M852 and the lengths by plane; return the switches that are defined."""
+    switches: set[str] = set()
+    text = _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), source.text)
+    for at, bare in replace(source, lines=tuple(text.split("\n"))).scan(";"):
+        switch, define = _SWITCH.match(bare), _DEFINE.match(bare)
+        if switch:
+            switches.add(switch[1])
+        elif define:
+            number = at.number(define[3].rstrip("f"), define[2])
+            defined.setdefault(define[1], {})[define[2]] = (at, number)
+        elif re.match(r"M852\b", bare):
+            for letter, number in _WORD.findall(bare[4:]):
+                if letter not in LETTERS:
+                    at.refuse(f"M852 {letter}", "I, J, K or S")
+                factors[LETTERS[letter]] = (at, at.number(number, f"M852 {letter}"))
+    return switches
+
+
+def _check_switches(switches: set[str], defined: dict[str, Settings], notes: list[str]) -> None:
+    """Check that Marlin uses the lengths, and drop those of planes that it ignores."""
+    if defined and "SKEW_CORRECTION" not in switches:
+        at, _ = next(iter(next(iter(defined.values())).values()))
+        expected = "#define SKEW_CORRECTION, not commented out"
+        at.refuse("Marlin does not use these lengths", expected)
+    if "SKEW_CORRECTION_FOR_Z" in switches:
+        return
+    for plane in [plane for plane in defined if plane != "XY"]:
+        del defined[plane]
+        notes.append(f"{plane}: ignored, SKEW_CORRECTION_FOR_Z is not defined")
+
+
+def _defined_factor(
+    plane: str, settings: Settings, defined: Mapping[str, Settings], notes: list[str]
+) -> tuple[SourceLine, float]:
+    if "SKEW_FACTOR" in settings:
+        return settings["SKEW_FACTOR"]
+    side = settings.get("SIDE_AD")
+    if side is None and plane == "XZ":
+        side = defined.get("XY", {}).get("SIDE_AD")
+    if side is None or not {"DIAG_AC", "DIAG_BD"} <= settings.keys():
+        at, _ = next(iter(settings.values()))
+        expected = f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side"
+        at.refuse(f"{plane}: {', '.join(settings)}", expected)
+    at, ac = settings["DIAG_AC"]
+    lengths = (ac, settings["DIAG_BD"][1], side[1])
+    factor = factor_of(lengths, at, plane)
+    notes += closure_notes(lengths, plane)
+    return at, factor
 
 
 def _write_marlin(corrections: RequiredCorrections) -> Files:

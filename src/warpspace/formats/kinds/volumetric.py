@@ -14,7 +14,7 @@ by #; columns part by blanks; two arguments make an error of two axes. Etalon ex
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -78,7 +78,9 @@ def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measur
         convention=CONVENTION,
     )
     if options.variant != ALTERNATIVE:
-        assumption = "rotation about the nominal axis (alternative_model 0); --variant says otherwise"
+        assumption = (
+            "rotation about the nominal axis (alternative_model 0); --variant says otherwise"
+        )
         return replace(imported, assumed=(*imported.assumed, assumption))
     assumption = "rotation about the distorted axis (alternative_model 1)"
     imported = replace(imported, assumed=(*imported.assumed, assumption))
@@ -162,7 +164,9 @@ def _is_isg(head: str, name: str) -> bool:
             continue
         names = [part for part in _SPLIT.split(bare) if part]
         parameters = [part for part in names if error_name(part)]
-        return bool(parameters) and len(parameters) + sum(part in ARGUMENTS for part in names) == len(names)
+        return bool(parameters) and len(parameters) + sum(
+            part in ARGUMENTS for part in names
+        ) == len(names)
     return False
 
 
@@ -185,11 +189,10 @@ def _read_isg(source: Source) -> list[measured.ImportedErrors]:
     keys: set[str] = set()
     for block in _blocks(source):
         part = _read_block(source, block)
-        for key in part.keys:
-            if key in keys:
-                name = file_name(key)
-                block[0][0].refuse(f"{name} stands in two blocks", "it in one")
-            keys.add(key)
+        repeated = next((key for key in part.keys if key in keys), "")
+        if repeated:
+            block[0][0].refuse(f"{file_name(repeated)} stands in two blocks", "it in one")
+        keys.update(part.keys)
         imports.append(part)
     if not keys:
         source.refuse("has no errors", "a header such as X EXX EYX")
@@ -199,46 +202,53 @@ def _read_isg(source: Source) -> list[measured.ImportedErrors]:
 def _read_block(source: Source, block: Block) -> measured.ImportedErrors:
     at, names = block[0]
     arguments = [name for name in names if name in ARGUMENTS]
-    left = [name for name in names if IGNORED.fullmatch(name)]
-    key_of = {name: error_name(name) for name in names}
-    for name in names:
-        if name not in (*arguments, *left) and not key_of[name]:
-            expected = "arguments X Y Z A B C and parameters such as EXX or C0B"
-            at.refuse(f"column {name!r}", expected)
-    if twice := next((name for name in names if names.count(name) > 1), ""):
-        at.refuse(f"column {twice} stands there twice", "it once")
-    if len(arguments) > 2:
-        expected = "one or two: no error here depends on more"
-        at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
+    ignored = [name for name in names if IGNORED.fullmatch(name)]
+    _check_header(at, names, arguments, ignored)
     if len(block) < 2:
         at.refuse("a header without records", "at least one")
-    rows: list[Row] = []
-    for place, parts in block[1:]:
-        if len(parts) != len(names):
-            place.refuse(f"{len(parts)} fields", f"{len(names)} as in the header")
-        row: dict[str, float] = {}
-        for name, part in zip(names, parts, strict=True):
-            value = place.number(part, name)
-            if name in arguments:
-                row[name] = place.checked_position(value, name)
-            elif key := key_of[name]:
-                row[key] = place.checked_error(value * factor_of(key), name)
-        rows.append((place, row))
-    notes = (*source.notes, *ignored_notes(left))
-    keys = [key for name in names if (key := key_of[name])]
+    rows = [_read_record(place, names, parts) for place, parts in block[1:]]
+    notes = (*source.notes, *ignored_notes(ignored))
+    keys = [key for key in map(error_name, names) if key]
     if not arguments and len(rows) > 1:
         rows[1][0].refuse(f"{len(rows)} records without arguments", "one")
     for key in keys:
         _check_arguments(at, key, arguments)
     if not arguments:
-        return measured.ImportedErrors(
-            ISG, constants={key: rows[0][1][key] for key in keys}, notes=notes
-        )
+        constants = {key: rows[0][1][key] for key in keys}
+        return measured.ImportedErrors(ISG, constants=constants, notes=notes)
     if len(arguments) == 2:
-        planes = tuple(_isg_plane(source, key, arguments, rows) for key in keys)
-        return measured.ImportedErrors(ISG, surfaces=planes, notes=notes)
+        surfaces = tuple(_isg_surface(source, key, arguments, rows) for key in keys)
+        return measured.ImportedErrors(ISG, surfaces=surfaces, notes=notes)
     series = tuple(_isg_series(key, arguments[0], rows) for key in keys)
     return measured.ImportedErrors(ISG, series, notes=notes)
+
+
+def _check_header(
+    at: SourceLine, names: Sequence[str], arguments: Sequence[str], ignored: Sequence[str]
+) -> None:
+    for name in names:
+        if name not in (*arguments, *ignored) and not error_name(name):
+            expected = "arguments X Y Z A B C and parameters such as EXX or C0B"
+            at.refuse(f"column {name!r}", expected)
+    repeated = next((name for name in names if names.count(name) > 1), "")
+    if repeated:
+        at.refuse(f"column {repeated} stands there twice", "it once")
+    if len(arguments) > 2:
+        expected = "one or two: no error parameter depends on more"
+        at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
+
+
+def _read_record(at: SourceLine, names: Sequence[str], parts: Sequence[str]) -> Row:
+    if len(parts) != len(names):
+        at.refuse(f"{len(parts)} fields", f"{len(names)} as in the header")
+    row: dict[str, float] = {}
+    for name, part in zip(names, parts, strict=True):
+        number, key = at.number(part, name), error_name(name)
+        if name in ARGUMENTS:
+            row[name] = at.checked_position(number, name)
+        elif key:
+            row[key] = at.checked_error(number * factor_of(key), name)
+    return at, row
 
 
 def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None:
@@ -262,7 +272,7 @@ def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.ErrorS
     return measured.ErrorSeries(key, tuple(row[argument] for _, row in rows), (run,))
 
 
-def _isg_plane(
+def _isg_surface(
     source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]
 ) -> measured.ErrorSurface:
     own = parameter(key).axis
@@ -310,71 +320,88 @@ def _is_iso(head: str, name: str) -> bool:
     return bool(blocks) and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))
 
 
-def _read_iso(source: Source) -> measured.ImportedErrors:
-    constants: dict[str, float] = {}
-    series: list[measured.ErrorSeries] = []
-    left: list[str] = []
-    key, name = "", ""
-    opened: SourceLine | None = None
-    rows: list[tuple[float, float]] = []
-    for at, bare in source.scan("//"):
-        if opened:
-            body, closed, _ = bare.partition("}")
-            _iso_row(at, body.replace("{", " ").split(), rows, name, key)
-            if closed:
-                if not rows:
-                    at.refuse(f"[{name}] has no points", "position and value")
-                if key:
-                    places, values = zip(*rows, strict=True)
-                    series.append(
-                        measured.ErrorSeries(
-                            key, places, (measured.MeasuredRun(1, measured.UNDIRECTED, values),)
-                        )
-                    )
-                opened, rows = None, []
-        elif matched := _SECTION.fullmatch(bare):
-            name = matched[1].upper()
-            key = error_name(name)
-            if not key and not IGNORED.fullmatch(name):
-                at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
-            if not key:
-                left.append(name)
-            elif key in constants or any(one.key == key for one in series):
-                at.refuse(f"[{name}] is given twice", "it once")
-        elif not name:
+@dataclass
+class _IsoReader:
+    """State while a text with ISO names is read: its errors and the current block."""
+
+    constants: dict[str, float] = field(default_factory=dict[str, float])
+    series: dict[str, measured.ErrorSeries] = field(default_factory=dict[str, measured.ErrorSeries])
+    ignored: list[str] = field(default_factory=list[str])
+    name: str = ""  # of the current block
+    key: str = ""  # its error parameter; empty where the block is ignored
+    opened: SourceLine | None = None  # where its grid points begin, until they end
+    points: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+
+    def read_line(self, at: SourceLine, bare: str) -> None:
+        section, constant = _SECTION.fullmatch(bare), _VALUE.fullmatch(bare)
+        if self.opened:
+            self._read_point(at, bare)
+        elif section:
+            self._begin_block(at, section[1].upper())
+        elif not self.name:
             at.refuse(at.quoted, "a block such as [EXY]")
-        elif matched := _VALUE.fullmatch(bare):
-            value = at.number(matched[1], f"VALUE of {name}")
-            if key and not parameter(key).is_constant:
-                at.refuse(f"[{name}] has one VALUE", "Gridpoints = { position value … }")
-            if key:
-                constants[key] = at.checked_error(value * factor_of(key), name)
+        elif constant:
+            self._read_constant(at, constant[1])
         elif _OPEN.fullmatch(bare):
-            if key and parameter(key).is_constant:
-                at.refuse(f"[{name}] has Gridpoints", "VALUE = number")
-            opened = at
+            if self.key and parameter(self.key).is_constant:
+                at.refuse(f"[{self.name}] has Gridpoints", "VALUE = number")
+            self.opened = at
         elif bare != "{":
             at.refuse(at.quoted, "VALUE = number or Gridpoints = {")
-    if opened:
-        opened.refuse(f"Gridpoints of [{name}] do not end", "} (is the file cut off?)")
-    notes = (*source.notes, *ignored_notes(left))
-    return measured.ImportedErrors(ISO, tuple(series), constants=constants, notes=notes)
+
+    def _begin_block(self, at: SourceLine, name: str) -> None:
+        self.name, self.key = name, error_name(name)
+        if self.key in self.constants or self.key in self.series:
+            at.refuse(f"[{name}] is given twice", "it once")
+        if not self.key and not IGNORED.fullmatch(name):
+            at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
+        if not self.key:
+            self.ignored.append(name)
+
+    def _read_constant(self, at: SourceLine, text: str) -> None:
+        number = at.number(text, f"VALUE of {self.name}")
+        if self.key and not parameter(self.key).is_constant:
+            at.refuse(f"[{self.name}] has one VALUE", "Gridpoints = { position value … }")
+        if self.key:
+            self.constants[self.key] = at.checked_error(number * factor_of(self.key), self.name)
+
+    def _read_point(self, at: SourceLine, bare: str) -> None:
+        body, closed, _ = bare.partition("}")
+        parts = body.replace("{", " ").split()
+        if parts:
+            self.points.append(self._point(at, parts))
+        if len(self.points) > MAX_POINTS:
+            at.refuse(f"{self.name} has more points than {MAX_POINTS:,}", "at most so many")
+        if not closed:
+            return
+        if not self.points:
+            at.refuse(f"[{self.name}] has no points", "position and value")
+        if self.key:
+            positions, values = zip(*self.points, strict=True)
+            run = measured.MeasuredRun(1, measured.UNDIRECTED, values)
+            self.series[self.key] = measured.ErrorSeries(self.key, positions, (run,))
+        self.opened, self.points = None, []
+
+    def _point(self, at: SourceLine, parts: Sequence[str]) -> tuple[float, float]:
+        if len(parts) != 2:
+            at.refuse(f"{len(parts)} numbers in {at.quoted}", "position and value")
+        position = at.position(parts[0], "position")
+        if self.points and position <= self.points[-1][0]:
+            problem = f"position {position:g} of {self.name} after {self.points[-1][0]:g}"
+            at.refuse(problem, "ascending positions")
+        return position, at.error(parts[1], self.name, factor_of(self.key) if self.key else 1.0)
 
 
-def _iso_row(
-    at: SourceLine, parts: list[str], rows: list[tuple[float, float]], name: str, key: str
-) -> None:
-    if not parts:
-        return
-    if len(parts) != 2:
-        at.refuse(f"{len(parts)} numbers in {at.quoted}", "position and value")
-    position = at.position(parts[0], "position")
-    if rows and position <= rows[-1][0]:
-        problem = f"position {position:g} of {name} after {rows[-1][0]:g}"
-        at.refuse(problem, "ascending positions")
-    rows.append((position, at.error(parts[1], name, factor_of(key) if key else 1.0)))
-    if len(rows) > MAX_POINTS:
-        at.refuse(f"{name} has more points than {MAX_POINTS:,}", "at most so many")
+def _read_iso(source: Source) -> measured.ImportedErrors:
+    reader = _IsoReader()
+    for at, bare in source.scan("//"):
+        reader.read_line(at, bare)
+    if reader.opened:
+        problem = f"Gridpoints of [{reader.name}] do not end"
+        reader.opened.refuse(problem, "} (is the file cut off?)")
+    notes = (*source.notes, *ignored_notes(reader.ignored))
+    series = tuple(reader.series.values())
+    return measured.ImportedErrors(ISO, series, constants=reader.constants, notes=notes)
 
 
 def _write_iso(corrections: RequiredCorrections) -> Files:
@@ -392,7 +419,9 @@ def _write_iso(corrections: RequiredCorrections) -> Files:
         scale = factor_of(error_series.key)
         lines += [
             f"  {position!r} {value / scale:.{DIGITS}f}"
-            for position, value in zip(error_series.positions, error_series.values.tolist(), strict=True)
+            for position, value in zip(
+                error_series.positions, error_series.values.tolist(), strict=True
+            )
         ]
         lines.append(f"}}  // end of {error_series.key}")
     return {"": "\n".join(lines) + "\n"}
