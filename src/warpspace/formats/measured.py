@@ -1,8 +1,9 @@
-"""What a file of errors holds, whatever its format: the neutral form of imports and of scenes."""
+"""Imported errors independent of the file format, and their exchange with scenes."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import chain, product
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,18 +20,18 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 FORWARD, BACKWARD, UNDIRECTED = 1, -1, 0
-"""Direction of travel in which a value was taken; both where a file does not tell."""
+"""Direction of travel of a reading; undirected where a file does not state it."""
 REPEATABILITY = 4.0  # ISO 230-2, 3.17: unidirectional repeatability in standard deviations
 Matrix = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
 class MeasuredRun:
-    """One run over the positions of a series."""
+    """One measuring run over the positions of a series."""
 
     number: int
-    direction: int  # 1 forward, −1 backward, 0 where not told
-    values: tuple[float, ...]  # (n,), µm or µrad; not a number where a position was left out
+    direction: int  # 1 forward, −1 backward, 0 where not stated
+    values: tuple[float, ...]  # (n,), µm or µrad; not a number at positions without a reading
 
 
 @dataclass(frozen=True)
@@ -40,14 +41,20 @@ class ErrorSeries:
     key: str  # parameter
     positions: tuple[float, ...]  # (n,), mm or degrees; ascending
     runs: tuple[MeasuredRun, ...]  # at least one
-    # (n,), µm or µrad; standard uncertainties (k = 1); empty where none are given
+    # (n,), µm or µrad; standard uncertainties (k = 1); empty where none are stated
     uncertainty: tuple[float, ...] = ()
+
+    @classmethod
+    def undirected(cls, key: str, positions: ArrayLike, values: ArrayLike) -> "ErrorSeries":
+        """Build a series of one run without direction of travel."""
+        run = MeasuredRun(1, UNDIRECTED, tuple(np.asarray(values, dtype=float).tolist()))
+        return cls(key, tuple(np.asarray(positions, dtype=float).tolist()), (run,))
 
     def _runs(self, direction: int) -> Array:
         return np.array([run.values for run in self.runs if run.direction == direction])
 
     def mean(self, direction: int) -> Array | None:
-        """Give the mean of the runs in one direction, [n]; None where there are none.
+        """Return the mean of the runs in one direction, [n]; None without such runs.
 
         Forward it is x̄ᵢ↑ of ISO 230-2, backward x̄ᵢ↓.
         """
@@ -55,19 +62,15 @@ class ErrorSeries:
         return np.nanmean(runs, axis=0) if len(runs) else None
 
     def in_direction(self, direction: int) -> Array:
-        """Give the mean in a direction of travel, [n]; of both where there are no such runs."""
+        """Return the mean in a direction of travel, [n]; without such runs that of all."""
         mean = self.mean(direction)
         return self.values if mean is None else mean
 
     @property
     def values(self) -> Array:
-        """Mean bidirectional error, [n], µm or µrad (x̄ᵢ); the mean of what there is otherwise."""
-        means = [
-            found
-            for way in (FORWARD, BACKWARD, UNDIRECTED)
-            if (found := self.mean(way)) is not None
-        ]
-        return np.mean(means, axis=0)
+        """Mean bidirectional error, [n], µm or µrad (x̄ᵢ); else the mean of the existing runs."""
+        means = [self.mean(direction) for direction in (FORWARD, BACKWARD, UNDIRECTED)]
+        return np.mean([mean for mean in means if mean is not None], axis=0)
 
     @property
     def reversal(self) -> Array | None:
@@ -108,7 +111,7 @@ class ErrorSurface:
     backward: Matrix = ()
 
     def table(self, direction: int) -> Array:
-        """Give the values of a direction of travel, the mean of both for 0, (first, second)."""
+        """Return the values of a direction of travel, the mean of both for 0, (first, second)."""
         forward = np.array(self.values)
         backward = np.array(self.backward) if self.backward else forward
         return {FORWARD: forward, BACKWARD: backward, UNDIRECTED: (forward + backward) / 2.0}[
@@ -122,17 +125,16 @@ def surface_from_directions(
     positions: tuple[ArrayLike, ArrayLike],
     tables: Mapping[int, Array],
 ) -> ErrorSurface:
-    """Build an error over two axes of its values in both directions of travel."""
-    forward, backward = (
-        tuple(tuple(row) for row in tables[way].tolist()) for way in (FORWARD, BACKWARD)
-    )
+    """Build an error over two axes from its values in both directions of travel."""
+    forward = tuple(map(tuple, tables[FORWARD].tolist()))
+    backward = tuple(map(tuple, tables[BACKWARD].tolist()))
     first, second = (tuple(np.asarray(at, dtype=float).tolist()) for at in positions)
     return ErrorSurface(key, axes, first, second, forward, () if backward == forward else backward)
 
 
 @dataclass(frozen=True)
 class ImportedErrors:
-    """What a file holds."""
+    """Contents of a file of errors."""
 
     format: str  # name of its format
     series: tuple[ErrorSeries, ...] = ()
@@ -140,52 +142,55 @@ class ImportedErrors:
     constants: Mapping[str, float] = field(default_factory=dict[str, float])  # µm or µrad
     # µm or µrad; standard uncertainty of constants
     uncertainty: Mapping[str, float] = field(default_factory=dict[str, float])
-    units: tuple[str, ...] = ()  # units that the file has its numbers in
-    # what the file does not say and was taken for granted, a sentence each
+    units: tuple[str, ...] = ()  # of the numbers in the file
+    # about facts that the file does not state, a sentence each
     assumed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()  # what else a user should know
-    # where its component errors act, by kind of axis; empty where the file does not tell
+    notes: tuple[str, ...] = ()  # for the user
+    # convention of its component errors, by kind of axis; empty where the file does not state it
     convention: Mapping[str, str] = field(default_factory=dict[str, str])
-    # errors that no table but another spelling of a scene file holds: {"poly": […]}
+    # errors in another form of a scene file than a table: {"poly": […]}
     curves: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def keys(self) -> tuple[str, ...]:
-        own = [one.key for one in (*self.series, *self.surfaces)]
-        return tuple(dict.fromkeys((*own, *self.constants, *self.curves)))
+        tabulated = [error.key for error in (*self.series, *self.surfaces)]
+        return tuple(dict.fromkeys((*tabulated, *self.constants, *self.curves)))
 
     @property
     def axes(self) -> tuple[str, ...]:
-        own = [parameter(key).axis for key in self.keys]
-        return tuple(dict.fromkeys((*own, *(axis for one in self.surfaces for axis in one.axes))))
+        axes = dict.fromkeys(parameter(key).axis for key in self.keys)
+        for surface in self.surfaces:
+            axes |= dict.fromkeys(surface.axes)
+        return tuple(axes)
 
     @property
     def size(self) -> int:
-        series = sum(len(run.values) for one in self.series for run in one.runs)
-        planes = sum(
-            len(one.first) * len(one.second) * (2 if one.backward else 1) for one in self.surfaces
+        series = sum(len(run.values) for series in self.series for run in series.runs)
+        surfaces = sum(
+            len(surface.first) * len(surface.second) * (2 if surface.backward else 1)
+            for surface in self.surfaces
         )
-        return series + planes + len(self.constants)
+        return series + surfaces + len(self.constants)
 
 
 def merge(parts: Sequence[ImportedErrors]) -> ImportedErrors:
     merged: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
-    for name in (entry.name for entry in fields(ImportedErrors)[1:]):
+    for name in (column.name for column in fields(ImportedErrors)[1:]):
         values = [getattr(part, name) for part in parts]
         if isinstance(values[0], Mapping):
             merged[name] = {key: value for table in values for key, value in table.items()}
         else:
-            entries = [one for value in values for one in value]
-            # an error that is given twice is refused later
+            members = [member for group in values for member in group]
+            # a repeated error is refused later
             merged[name] = tuple(
-                entries if name in ("series", "surfaces") else dict.fromkeys(entries)
+                members if name in ("series", "surfaces") else dict.fromkeys(members)
             )
     return ImportedErrors(**merged)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorSummary:
-    """One error."""
+    """Summary of one error for lists."""
 
     keys: ClassVar[tuple[str, ...]] = (
         "key", "unit", "kind", "points", "runs", "directions", "range", "smallest", "largest",
@@ -196,7 +201,7 @@ class ErrorSummary:
     kind: str
     points: int = 1
     runs: int = 0
-    directions: str = ""  # "+", "-", "+ -", or empty where not told
+    directions: str = ""  # "+", "-", "+ -", or empty where not stated
     range: tuple[float, float] | None = None  # first and last position, mm or degrees
     smallest: float  # of the mean
     largest: float
@@ -211,30 +216,25 @@ class ErrorSummary:
 
 
 def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
-    rows = [_of_series(one) for one in imported.series]
-    for plane in imported.surfaces:
-        values = plane.table(UNDIRECTED)
+    rows = [_series_summary(series) for series in imported.series]
+    for surface in imported.surfaces:
+        values = surface.table(UNDIRECTED)
         rows.append(
             ErrorSummary(
-                key=plane.key,
-                kind=f"over {plane.axes[1]}{', by direction' if plane.backward else ''}",
+                key=surface.key,
+                kind=f"over {surface.axes[1]}{', by direction' if surface.backward else ''}",
                 points=values.size,
-                directions="+ -" if plane.backward else "",
-                range=(plane.first[0], plane.first[-1]),
+                directions="+ -" if surface.backward else "",
+                range=(surface.first[0], surface.first[-1]),
                 smallest=float(values.min()),
                 largest=float(values.max()),
             )
         )
-    for key, value in imported.constants.items():
-        standard_uncertainty = imported.uncertainty.get(key)
-        row = ErrorSummary(
-            key=key,
-            kind="constant",
-            smallest=value,
-            largest=value,
-            uncertainty=standard_uncertainty,
+    for key, error in imported.constants.items():
+        u = imported.uncertainty.get(key)
+        rows.append(
+            ErrorSummary(key=key, kind="constant", smallest=error, largest=error, uncertainty=u)
         )
-        rows.append(row)
     for key, curve in imported.curves.items():
         ((kind, numbers),) = curve.items()
         last = numbers[-1][1] if kind == "harmonics" else numbers[-1]
@@ -245,14 +245,14 @@ def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
 
 
 def summary_table(imported: ImportedErrors) -> blocks.Table:
-    """List all errors of an import."""
+    """Return the table of all errors of an import."""
     rows = [
         (
-            one.key, one.kind, one.points, one.runs or None, one.directions,
-            f"{one.range[0]:g} … {one.range[1]:g}" if one.range else "",
-            one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
+            error.key, error.kind, error.points, error.runs or None, error.directions,
+            f"{error.range[0]:g} … {error.range[1]:g}" if error.range else "",
+            error.smallest, error.largest, error.unit, error.mean_reversal, error.uncertainty,
         )
-        for one in summarise_errors(imported)
+        for error in summarise_errors(imported)
     ]  # fmt: skip
     columns = (
         blocks.Column("error", leads=True),
@@ -269,7 +269,7 @@ def summary_table(imported: ImportedErrors) -> blocks.Table:
     return blocks.Table(columns, rows)
 
 
-def _of_series(series: ErrorSeries) -> ErrorSummary:
+def _series_summary(series: ErrorSeries) -> ErrorSummary:
     values, reversal, repeatability = series.values, series.reversal, series.repeatability
     if repeatability is not None and np.isnan(repeatability).all():
         repeatability = None
@@ -280,7 +280,7 @@ def _of_series(series: ErrorSeries) -> ErrorSummary:
         points=len(series.positions),
         runs=len(series.runs),
         directions=" ".join(
-            sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in directions
+            sign for sign, code in (("+", FORWARD), ("-", BACKWARD)) if code in directions
         ),
         range=(series.positions[0], series.positions[-1]),
         smallest=float(values.min()),
@@ -292,15 +292,15 @@ def _of_series(series: ErrorSeries) -> ErrorSummary:
 
 
 RUN_DIRECTION = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
-POSITION_TOLERANCE = 1e-9  # mm or degrees: positions nearer than this are one
+POSITION_TOLERANCE = 1e-9  # mm or degrees; nearer positions are equal
 Point = tuple[SourceLine, float, float, float]  # line, position of both axes, value
 
 
 @dataclass(frozen=True)
 class ErrorTable:
-    """Errors side by side: constants, those of one axis, or one over two axes."""
+    """Errors in the columns of a table: constants, those of one axis, or one over two axes."""
 
-    axes: tuple[str, ...]  # that they are over; none for constants
+    axes: tuple[str, ...]  # arguments; none for constants
     keys: tuple[str, ...]
     # positions, direction, and a value for each key
     rows: list[tuple[tuple[float, ...], int, Sequence[float]]]
@@ -311,17 +311,17 @@ class ErrorTable:
 
 
 def zero_key(scene: Scene) -> str:
-    """Give an error of the machine for a file of a scene without any: its value is zero."""
+    """Return an error parameter of the machine, to be written as zero for a scene without errors."""
     axis = next(iter(scene.machine.axes))
     return f"E{'XYZABC'[direction_index(axis) + (0 if is_linear(axis) else 3)]}{axis}"
 
 
 def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
-    """Sample the errors of a scene at the points of a table."""
+    """Compute the errors of a scene at the points of a table."""
     scene = corrections.scene
     constants: dict[str, float] = {}
     series: list[ErrorSeries] = []
-    planes: list[ErrorSurface] = []
+    surfaces: list[ErrorSurface] = []
     for key, curve in scene.errors.functions.items():
         row = parameter(key)
         if row.axis not in scene.machine.axes:
@@ -334,53 +334,44 @@ def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
         curves = _curves_by_direction(curve)
         other = _second_axis(curve)
         tabled = all(
-            isinstance(one, TableCurve | TwoArguments) for one in curves.values() or [curve]
+            isinstance(part, TableCurve | TwoArguments) for part in curves.values() or [curve]
         )
         if tabled and (other is not None or len(curve.kinks) <= count):
             at = np.array(curve.kinks)
         elif other is not None:
             at = np.union1d(at, curve.kinks)
         if other is not None:
+            axis, places = other
+            arguments = {row.axis: at[:, None], axis: places}
+            shape = (len(at), len(places))
             tables = {
-                way: np.asarray(
-                    part.evaluate_at(row.axis, {row.axis: at[:, None], other[0]: other[1]})
-                )
-                + np.zeros((len(at), len(other[1])))
-                for way, part in {FORWARD: curve, BACKWARD: curve, **curves}.items()
+                direction: np.broadcast_to(part.evaluate_at(row.axis, arguments), shape)
+                for direction, part in {FORWARD: curve, BACKWARD: curve, **curves}.items()
             }
-            planes.append(
-                surface_from_directions(key, (row.axis, other[0]), (at, other[1]), tables)
-            )
+            surfaces.append(surface_from_directions(key, (row.axis, axis), (at, places), tables))
         else:
             runs = tuple(
-                MeasuredRun(1, way, tuple(np.asarray(part.evaluate(at)).tolist()))
-                for way, part in (curves or {UNDIRECTED: curve}).items()
+                MeasuredRun(1, direction, tuple(np.asarray(part.evaluate(at)).tolist()))
+                for direction, part in (curves or {UNDIRECTED: curve}).items()
             )
             series.append(ErrorSeries(key, tuple(at.tolist()), runs))
-    return ImportedErrors("scene", tuple(series), tuple(planes), constants)
+    return ImportedErrors("scene", tuple(series), tuple(surfaces), constants)
 
 
 def to_single_direction(
     imported: ImportedErrors, corrections: RequiredCorrections
 ) -> ImportedErrors:
-    """Give errors by direction of travel as the scene has them in the direction it looks at."""
+    """Return errors by direction of travel as values for the direction of the scene."""
     direction = RUN_DIRECTION.get(TravelDirection(corrections.scene.model.direction), UNDIRECTED)
-
-    return replace(
-        imported,
-        series=tuple(
-            ErrorSeries(
-                one.key,
-                one.positions,
-                (MeasuredRun(1, UNDIRECTED, tuple(one.in_direction(direction).tolist())),),
-            )
-            for one in imported.series
-        ),
-        surfaces=tuple(
-            replace(one, values=tuple(map(tuple, one.table(direction).tolist())), backward=())
-            for one in imported.surfaces
-        ),
-    )
+    series = [
+        ErrorSeries.undirected(error.key, error.positions, error.in_direction(direction))
+        for error in imported.series
+    ]
+    surfaces = [
+        replace(error, values=tuple(map(tuple, error.table(direction).tolist())), backward=())
+        for error in imported.surfaces
+    ]
+    return replace(imported, series=tuple(series), surfaces=tuple(surfaces))
 
 
 def _curves_by_direction(curve: ErrorFunction) -> dict[int, ErrorFunction]:
@@ -390,45 +381,41 @@ def _curves_by_direction(curve: ErrorFunction) -> dict[int, ErrorFunction]:
 
 
 def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
-    surfaces = [
-        one
-        for one in (curve, *_curves_by_direction(curve).values())
-        if isinstance(one, TwoArguments)
-    ]
-    axes = {one.axes[1] for one in surfaces}
+    curves = (curve, *_curves_by_direction(curve).values())
+    surfaces = [part for part in curves if isinstance(part, TwoArguments)]
+    axes = {surface.axes[1] for surface in surfaces}
     if len(axes) != 1:
         return None
-    at = np.unique(np.concatenate([one.positions[1] for one in surfaces]))
-    return axes.pop(), at
+    return axes.pop(), np.unique(np.concatenate([surface.positions[1] for surface in surfaces]))
 
 
 def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
-    """Put errors over the same axes side by side, those of one axis at all their positions."""
+    """Build tables of errors with the same arguments, those of one axis at all their positions."""
     tables: list[ErrorTable] = []
     if imported.constants:
         row = ((), UNDIRECTED, tuple(imported.constants.values()))
         tables.append(ErrorTable((), tuple(imported.constants), [row]))
-    for axis in dict.fromkeys(parameter(one.key).axis for one in imported.series):
-        series = [one for one in imported.series if parameter(one.key).axis == axis]
-        at = np.unique(np.concatenate([one.positions for one in series]))
-        directed = any(one.reversal is not None for one in series)
-        table = ErrorTable((axis,), tuple(one.key for one in series), [])
+    for axis in dict.fromkeys(parameter(error.key).axis for error in imported.series):
+        errors = [error for error in imported.series if parameter(error.key).axis == axis]
+        at = np.unique(np.concatenate([error.positions for error in errors]))
+        directed = any(error.reversal is not None for error in errors)
+        table = ErrorTable((axis,), tuple(error.key for error in errors), [])
         for direction in (FORWARD, BACKWARD) if directed else (UNDIRECTED,):
             columns = [
-                np.interp(at, one.positions, one.in_direction(direction)).tolist() for one in series
+                np.interp(at, error.positions, error.in_direction(direction)) for error in errors
             ]
-            found = zip(at.tolist(), *columns, strict=True)
-            table.rows.extend(((q,), direction, values) for q, *values in found)
+            numbers = np.stack(columns, axis=-1).tolist()
+            rows = zip(at.tolist(), numbers, strict=True)
+            table.rows.extend(((q,), direction, row) for q, row in rows)
         tables.append(table)
-    for plane in imported.surfaces:
-        table = ErrorTable(plane.axes, (plane.key,), [])
-        for direction in (FORWARD, BACKWARD) if plane.backward else (UNDIRECTED,):
-            values = plane.backward if direction == BACKWARD else plane.values
-            for first, row in zip(plane.first, values, strict=True):
-                points = zip(plane.second, row, strict=True)
-                table.rows.extend(
-                    ((first, second), direction, (value,)) for second, value in points
-                )
+    for surface in imported.surfaces:
+        table = ErrorTable(surface.axes, (surface.key,), [])
+        points = list(product(surface.first, surface.second))
+        for direction in (FORWARD, BACKWARD) if surface.backward else (UNDIRECTED,):
+            matrix = surface.backward if direction == BACKWARD else surface.values
+            cells = chain.from_iterable(matrix)
+            rows = zip(points, cells, strict=True)
+            table.rows.extend((point, direction, (error,)) for point, error in rows)
         tables.append(table)
     return tables
 
@@ -445,14 +432,13 @@ def build_surface(
     second = distinct_positions(np.array([point[2] for point in points]))
     values = np.full((len(first), len(second)), math.nan)
     lines: dict[tuple[int, int], SourceLine] = {}
-    for at, first_position, second_position, value in points:
-        i = int(np.abs(first - first_position).argmin())
-        j = int(np.abs(second - second_position).argmin())
+    for at, q1, q2, error in points:
+        i, j = int(np.abs(first - q1).argmin()), int(np.abs(second - q2).argmin())
         if (i, j) in lines:
-            problem = f"{axes[0]} {first_position:g}, {axes[1]} {second_position:g}{where} stands also in line"
-            at.refuse(f"{problem} {lines[i, j].line}", "every point once")
+            problem = f"{axes[0]} {q1:g}, {axes[1]} {q2:g}{where} repeats line {lines[i, j].line}"
+            at.refuse(problem, "every point once")
         lines[i, j] = at
-        values[i, j] = value
+        values[i, j] = error
     if np.isnan(values).any():
         i, j = (int(index) for index in np.argwhere(np.isnan(values))[0])
         problem = f"{key} has no value at {axes[0]} {first[i]:g}, {axes[1]} {second[j]:g}{where}"
@@ -464,19 +450,20 @@ def build_surface(
 def build_surface_by_direction(
     key: str, axes: tuple[str, str], points: Mapping[int, Sequence[Point]], source: Source
 ) -> ErrorSurface:
-    """Build an error of two axes from its points by direction of travel, see `plane_of`."""
+    """Build an error over two axes from its points by direction of travel; see `build_surface`."""
     suffixes = {FORWARD: " forward", BACKWARD: " backward", UNDIRECTED: ""}
-    planes = {
-        way: build_surface(key, axes, own, source, suffixes[way]) for way, own in points.items()
+    surfaces = {
+        direction: build_surface(key, axes, in_direction, source, suffixes[direction])
+        for direction, in_direction in points.items()
     }
-    if len(planes) == 1:
-        return next(iter(planes.values()))
-    if set(planes) != {FORWARD, BACKWARD}:
+    if len(surfaces) == 1:
+        return next(iter(surfaces.values()))
+    if set(surfaces) != {FORWARD, BACKWARD}:
         expected = "+ or - in every row, or in none"
         points[UNDIRECTED][0][0].refuse("has no direction", expected)
-    forward, backward = planes[FORWARD], planes[BACKWARD]
+    forward, backward = surfaces[FORWARD], surfaces[BACKWARD]
     if (forward.first, forward.second) != (backward.first, backward.second):
-        problem = f"{key} has other points backward than forward"
-        points[BACKWARD][0][0].refuse(problem, "the same")
-    tables = {way: plane.table(UNDIRECTED) for way, plane in planes.items()}
+        problem = f"{key} has different points backward and forward"
+        points[BACKWARD][0][0].refuse(problem, "the same points")
+    tables = {direction: surface.table(UNDIRECTED) for direction, surface in surfaces.items()}
     return surface_from_directions(key, axes, (forward.first, forward.second), tables)

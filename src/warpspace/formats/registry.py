@@ -1,4 +1,4 @@
-"""What a format is and can, the formats there are, and from files to the errors in them."""
+"""The file formats: their description, their registry, and reading errors from files."""
 
 import re
 import tomllib
@@ -21,31 +21,31 @@ from warpspace.plugins import Registry
 from warpspace.scene.text_files import read_bytes
 
 ERROR, CORRECTION = "error", "correction"
-"""What the numbers of a controller's table are: the error, which it subtracts, or what it adds."""
+"""Sign of a controller's table: the error, which it subtracts, or the correction, which it adds."""
 SIGNS = (ERROR, CORRECTION)
 Files = Mapping[str, str]
-"""Text of each file by what is added to the name that the user gives: "" is that file itself."""
+"""Text of each file by its suffix to the name from the user; "" is the main file."""
 MAX_FILES = 64
 
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What a user says about a file that the file itself does not."""
+    """Facts about a file that it does not state itself."""
 
-    machine: Machine | None = None  # that its errors are for; None where none is named
-    axis: str = ""  # axis of a file that names none
+    machine: Machine | None = None  # that has the errors; None where it is not named
+    axis: str = ""  # axis of a file that does not name one
     # axis of the machine by its name in the file
     names: Mapping[str, str] = field(default_factory=dict[str, str])
-    sign: str = ""  # "error" or "correction"; empty for what the documentation of the format says
-    # which of the published variants of a format it is; empty for the usual one
+    sign: str = ""  # "error" or "correction"; empty for the sign in the documentation of the format
+    # published variant of the format; empty for the usual one
     variant: str = ""
 
     def factor(self, usual: str) -> float:
-        """Give the factor from a number of a table to a correction: −1 where it is an error."""
+        """Return the factor from a number of a table to a correction: −1 where it is an error."""
         return -1.0 if (self.sign or usual) == ERROR else 1.0
 
     def sign_statement(self, usual: str) -> str:
-        """Say what the numbers are: what the user says, else the documentation of the format."""
+        """Return the assumption about the sign: from the user, else from the documentation."""
         return f"sign: {self.sign}" if self.sign else usual
 
     def axis_named(self, name: str, at: Source | SourceLine) -> str:
@@ -57,48 +57,48 @@ class ReadOptions:
         if self.machine is not None:
             matches = [axis for axis in candidates if axis in self.machine.axes]
         if not matches:
-            says = f"--axis {bare or 'NAME'}=AXIS says which one it is"
+            advice = f"--axis {bare or 'NAME'}=AXIS assigns it"
             if self.machine is None:
-                at.refuse(f"axis {bare!r} is not known", f"X Y Z U V W A B C; {says}")
+                at.refuse(f"axis {bare!r} is unknown", f"X Y Z U V W A B C; {advice}")
             chain, axes = self.machine.chain, ", ".join(self.machine.axes)
-            problem = f"axis {bare!r} is none of the machine {chain}, which has {axes}"
-            at.refuse(problem if assigned else f"{problem} ({says})")
+            problem = f"the machine {chain} has no axis {bare!r}, it has {axes}"
+            at.refuse(problem if assigned else f"{problem} ({advice})")
         return matches[0]
 
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file: what it holds, how it is recognised, read, written and evaluated."""
+    """A file format: its contents, and how it is recognised, read, written and evaluated."""
 
     name: str
     title: str
     source: str  # where its structure is published
     endings: tuple[str, ...]  # usual endings of its files
-    holds: str  # for the list of formats, as the next three
+    holds: str  # contents, for the list of formats, like the next three
     units: str
     grid: str
     limits: str
     recognise: Callable[[str, str], bool]  # by the first lines of a file and its name
-    # the errors that files hold; None for those that `tables` correct
+    # the errors in files; None where they follow from `tables`
     read: Callable[[Sequence[Source], ReadOptions], ImportedErrors] | None = None
-    # what the controller evaluates after reading them; None where it is no controller's
+    # the tables that the controller evaluates; None for formats without a controller
     tables: Callable[[Sequence[Source], ReadOptions], Tables] | None = None
-    write: Callable[[RequiredCorrections], Files] | None = None  # the files that compensate
-    independent_files: bool = False  # whether each of its files is a table by itself
-    points: int = 21  # per axis where none are asked for
-    max_points: int = 10_000  # per axis that the controller takes
-    # whether it holds error parameters, from which the controller works out its corrections
+    write: Callable[[RequiredCorrections], Files] | None = None  # the compensation files
+    independent_files: bool = False  # each of its files is a complete table
+    points: int = 21  # per axis, by default
+    max_points: int = 10_000  # per axis, limit of the controller
+    # it contains error parameters, from which the controller computes its corrections
     parametric: bool = False
     variants: tuple[str, ...] = ()  # published ones, the usual one first
-    names_variants: bool = False  # whether its files name variants of their own, such as profiles
-    orientation: bool = False  # whether corrections of rotary axes have a place in it
-    # whether it can move all positions by the same; where not, a part that lies elsewhere cannot be
-    # corrected, and its placement is fitted out of relative errors
+    names_variants: bool = False  # its files name variants, such as profiles
+    orientation: bool = False  # it can contain corrections of rotary axes
+    # it can contain constant corrections; otherwise the placement of the workpiece cannot be
+    # corrected, and is fitted out of relative errors
     offsets: bool = True
-    measured: bool = False  # whether its runs are readings, which are kept with the scene
+    measured: bool = False  # its runs are readings, which the scene stores
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Go to another process by name: what reads and writes stays where it is."""
+        """Pickle by name: another process looks up the functions in its registry."""
         return find_format, (self.name,)
 
     @property
@@ -109,7 +109,7 @@ class Format:
         if self.read is not None:
             return self.read(sources, options)
         if self.tables is None:
-            raise OptionError(f"{self.name} is written only; expected another format")
+            raise OptionError(f"{self.name} cannot be read; expected another format")
         parts = [[source] for source in sources] if self.independent_files else [sources]
         imports = [
             errors_from_tables(self.tables(part, options), self.name, part[0], options.machine)
@@ -129,7 +129,7 @@ def format_description(name: str) -> dict[str, Any]:
 
 
 def head_matcher(pattern: str) -> Callable[[str, str], bool]:
-    """Tell files by a pattern in their first lines, whatever their name."""
+    """Return a predicate that matches the first lines of a file, ignoring its name."""
     expression = re.compile(pattern, re.MULTILINE)
     return lambda head, _: expression.search(head) is not None
 
@@ -161,8 +161,8 @@ _KINDS = ["csv_own", "volumetric", "rtl", "sinumerik", "heidenhain", "fanuc_3d",
 
 @cache
 def _registry() -> Registry[Format]:
-    kinds = (resolve_name(f"{__package__}.kinds.{kind}:FORMATS") for kind in _KINDS)
-    return Registry("format", {one.name: one for kind in kinds for one in kind})
+    groups = (resolve_name(f"{__package__}.kinds.{module}:FORMATS") for module in _KINDS)
+    return Registry("format", {kind.name: kind for group in groups for kind in group})
 
 
 def formats() -> tuple[Format, ...]:
@@ -174,7 +174,7 @@ def find_format(name: str) -> Format:
 
 
 def register_format(new_format: Format) -> None:
-    """Add a format; it is then recognised, listed, read and written."""
+    """Register a format to be recognised, listed, read and written."""
     _registry().register(new_format)
 
 
@@ -185,38 +185,39 @@ def unregister_format(name: str) -> None:
 def recognise(sources: Sequence[Source]) -> Format:
     recognised: dict[str, Format] = {}
     for source in sources:
-        kind = next((one for one in formats() if one.recognise(source.head, source.name)), None)
+        head, name = source.head, source.name
+        kind = next((kind for kind in formats() if kind.recognise(head, name)), None)
         if kind is None:
-            names = ", ".join(one.name for one in formats())
+            names = ", ".join(kind.name for kind in formats())
             first = next((line for line in source.lines if line.strip()), "")
             number = source.lines.index(first) + 1 if first else None
             problem = (
-                f"{source.at(number).quoted if number else 'nothing'} is of no format that is known"
+                f"{source.at(number).quoted if number else 'nothing'} matches no known format"
             )
             expected = (
-                f"one of {names} (--format NAME says which; `warpspace import --formats` lists"
+                f"one of {names} (--format NAME selects it; `warpspace import --formats` lists"
             )
             (source.at(number) if number else source).refuse(
-                problem, f"{expected} what each holds)"
+                problem, f"{expected} their contents)"
             )
         recognised[kind.name] = kind
         if len(recognised) > 1:
             names = " and ".join(recognised)
-            source.refuse(f"files of {names} at once", "one format an import")
+            source.refuse(f"files of {names} at once", "one format per import")
     return next(iter(recognised.values()))
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read, and as what."""
+    """Imported errors and their format."""
 
     imported: ImportedErrors
     format: Format
-    recognised: bool  # whether the format was found in the files; if not, the user said it
+    recognised: bool  # from the files; otherwise the user stated the format
 
 
 def open_upload(name: str, content: bytes) -> Source:
-    """Take in a file; one whose structure nobody has published is refused."""
+    """Read an uploaded file; formats whose structure is not published are refused."""
     lower = name.lower()
     for kind in _catalogue()["unpublished"]:
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
@@ -228,7 +229,7 @@ def open_upload(name: str, content: bytes) -> Source:
 
 def open_files(paths: Sequence[Path]) -> list[Source]:
     if len(paths) > MAX_FILES:
-        raise OptionError(f"{len(paths)} files; expected at most {MAX_FILES} an import")
+        raise OptionError(f"{len(paths)} files; expected at most {MAX_FILES} per import")
     return [open_upload(str(path), read_bytes(path, MAX_BYTES)) for path in paths]
 
 
@@ -240,5 +241,5 @@ def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: st
             f"--variant {options.variant!r} of {kind.name}; expected one of: {variants}"
         )
     if options.sign and kind.tables is None:
-        raise OptionError(f"--sign: {kind.name} holds errors, no table of a controller")
+        raise OptionError(f"--sign: {kind.name} contains errors, not a table of a controller")
     return Reading(kind.errors(sources, options), kind, not format_name)

@@ -1,6 +1,6 @@
-"""How controllers evaluate their compensation tables, and which errors those tables correct.
+"""Terms of controller compensation: their evaluation, and the errors that they correct.
 
-A term gives, for commanded positions of the axes, the correction of each axis it acts on: the
+A term maps commanded positions of the axes to the correction of each axis that it acts on: the
 interpolation, the behaviour at the ends and the direction of travel are those of the controller.
 """
 
@@ -19,27 +19,26 @@ from warpspace.machine.definition import Machine
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
 HOLD_ENDS, MODULO, EXTRAPOLATE = "held", "modulo", "extended"
-"""What a table does beyond its ends: its end values, its period, or its last straight line."""
+"""Extrapolation of a table: its end values, its period, or its last segment."""
 
 
 @dataclass(frozen=True)
 class AxisTable:
-    """A table of one axis that corrects one axis."""
+    """A table over one axis that corrects one axis."""
 
-    source: str  # the axis whose position is looked up, and the one that is corrected
+    source: str  # axis of the position; the target is the corrected axis
     target: str
     positions: tuple[float, ...]  # (n,), mm or degrees; ascending
-    # (n,), mm or degrees; what is added to the commanded position of the target. Forward values
-    # where `backward` is given.
+    # (n,), mm or degrees; corrections of the target, those for forward travel if `backward` is set
     values: tuple[float, ...]
     ends: str = HOLD_ENDS  # "held", "modulo" (the period is that of the table) or "extended"
-    # (n,); values for travel in the negative direction; empty where they are the same
+    # (n,); values for travel in the negative direction; empty if they are the same
     backward: tuple[float, ...] = ()
-    direction: int = 0  # 1 or −1 where it acts in one direction of travel only, else 0
+    direction: int = 0  # 1 or −1 if it acts in one direction of travel only, else 0
 
     @property
     def size(self) -> int:
-        """How many numbers it takes in the controller."""
+        """Count of numbers in the controller."""
         return len(self.values) + len(self.backward)
 
     @property
@@ -47,7 +46,7 @@ class AxisTable:
         return bool(self.direction or self.backward)
 
     def at(self, position: Array, direction: int = 0) -> Array:
-        """Interpolate linearly, [...]; without a direction of travel the mean of both."""
+        """Interpolate linearly, [...]; for direction 0 the mean of both directions."""
         if self.backward and direction == 0:
             return (self.at(position, 1) + self.at(position, -1)) / 2.0
         if self.direction and self.direction != direction:
@@ -57,21 +56,21 @@ class AxisTable:
         return interpolate(np.asarray(position, dtype=float), self.positions, values, self.ends)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
-        """Give what is added to the commanded positions, mm or degrees, by axis."""
+        """Return the corrections of commanded positions, mm or degrees, by axis."""
         return {self.target: self.at(coordinates[self.source], direction)}
 
 
 @dataclass(frozen=True)
 class Product:
-    """Two tables whose values are multiplied; the product is added to the target of the first."""
+    """The product of two tables, a correction of the target of the first."""
 
-    first: AxisTable  # their own corrections are no part of it
+    first: AxisTable  # the corrections by the tables themselves are not included
     second: AxisTable
-    sign: float = 1.0  # of the product: −1 where the controller subtracts what its tables say
+    sign: float = 1.0  # −1 if the controller subtracts the product
 
     @property
     def size(self) -> int:
-        """None of its own: both tables count already."""
+        """Zero: both tables are counted already."""
         return 0
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
@@ -79,7 +78,7 @@ class Product:
         return {self.first.target: self.at(first, second, direction)}
 
     def at(self, first: Array, second: Array, direction: int = 0) -> Array:
-        """Multiply both tables at positions of their axes; without a direction the mean of both."""
+        """Multiply both tables at positions of their axes; for direction 0 the mean of both."""
         if direction == 0 and (self.first.is_directed or self.second.is_directed):
             return (self.at(first, second, 1) + self.at(first, second, -1)) / 2.0
         return self.sign * self.first.at(first, direction) * self.second.at(second, direction)
@@ -92,7 +91,7 @@ class Grid3:
     axes: tuple[str, str, str]
     # (3, n); ascending, of each axis
     positions: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
-    # [n1, n2, n3, 3], mm; added to the commanded positions. Beyond the grid its border is held.
+    # [n1, n2, n3, 3], mm; corrections; beyond the grid those of its boundary
     values: Array
 
     @property
@@ -111,7 +110,7 @@ class Affine:
     """Corrections that are linear in the commanded positions."""
 
     axes: tuple[str, ...]  # (n,)
-    # (n, n); correction of the axis of the row per position of the axis of the column
+    # (n, n); correction of the row's axis per position of the column's axis
     matrix: tuple[tuple[float, ...], ...]
 
     @property
@@ -128,19 +127,19 @@ class Affine:
 
 
 Term: TypeAlias = AxisTable | Product | Grid3 | Affine
-"""A part of a controller's compensation."""
+"""One additive term of a controller's compensation."""
 
 
 def interpolate(position: Array, at: Sequence[float], values: Sequence[float], ends: str) -> Array:
-    places, nodes = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
+    places, heights = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
     if ends == MODULO and len(places) > 1:
         period = places[-1] - places[0]
         position = places[0] + np.mod(position - places[0], period)
-    inside = np.interp(position, places, nodes)
+    inside = np.interp(position, places, heights)
     if ends != EXTRAPOLATE or len(places) < 2:
         return inside
-    low = (nodes[1] - nodes[0]) / (places[1] - places[0])
-    high = (nodes[-1] - nodes[-2]) / (places[-1] - places[-2])
+    low = (heights[1] - heights[0]) / (places[1] - places[0])
+    high = (heights[-1] - heights[-2]) / (places[-1] - places[-2])
     below = np.minimum(position - places[0], 0.0) * low
     return inside + below + np.maximum(position - places[-1], 0.0) * high
 
@@ -148,7 +147,7 @@ def interpolate(position: Array, at: Sequence[float], values: Sequence[float], e
 def trilinear(
     points: Sequence[Array], positions: Sequence[Sequence[float]], values: Array
 ) -> Array:
-    """Interpolate in a grid of three axes; beyond it its border is held."""
+    """Interpolate in a grid of three axes; beyond it with the values of its boundary."""
     from scipy.interpolate import RegularGridInterpolator
 
     pairs = zip(points, positions, strict=True)
@@ -158,9 +157,9 @@ def trilinear(
 
 @dataclass(frozen=True)
 class Tables:
-    """What a controller holds after it has read its file."""
+    """The compensation of a controller, as read from its files."""
 
-    terms: tuple[Term, ...]  # all corrections add up
+    terms: tuple[Term, ...]  # their corrections are added
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     units: tuple[str, ...] = field(default=("mm",))
@@ -178,7 +177,7 @@ class Tables:
 
 
 SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
-"""Squareness that an error of the first axis in proportion to the second one is, and its sign."""
+"""Squareness, and its sign, of a displacement of the first axis proportional to the second."""
 DIRECTIONS: tuple[int, ...] = (measured.FORWARD, measured.BACKWARD)
 NEGLIGIBLE = 1e-9  # µm or µrad
 
@@ -197,7 +196,7 @@ def errors_from_tables(
             if ignored_um > NEGLIGIBLE:
                 notes.append(
                     f"up to {ignored_um:.3g} µm depend on all three axes together, which no error of two"
-                    " axes holds: left out"
+                    " axes represents: ignored"
                 )
     series, planes = _joined(series, planes, source)
     constants: dict[str, float] = {}
@@ -205,8 +204,8 @@ def errors_from_tables(
     for term in tables.terms:
         if isinstance(term, Affine):
             _affine(term, machine, constants, curves)
-    note = "" if machine is not None else " (all axes taken to carry the tool)"
-    assumed = (*tables.assumed, f"what the table corrects is taken for the whole error{note}")
+    note = "" if machine is not None else " (assumes that all axes carry the tool)"
+    assumed = (*tables.assumed, f"assumes that the table corrects the entire error{note}")
     return measured.ImportedErrors(
         name,
         tuple(
@@ -224,20 +223,20 @@ def errors_from_tables(
 
 
 def error_key(source_axis: str, target: str) -> str:
-    """Name the error of one axis that shows as a displacement of another: EXY for X over Y."""
+    """Return the error of one axis that displaces along another: EXY for X over Y."""
     letters = "XYZ" if is_linear(target) else "ABC"
     return f"E{letters[direction_index(target)]}{source_axis}"
 
 
 def sense(machine: Machine | None, axis: str) -> float:
-    """Give +1 where an axis moves the tool in its direction against the workpiece, else −1."""
+    """Return +1 if an axis moves the tool in its positive direction over the workpiece, else −1."""
     if machine is None or axis not in machine.axes:
         return 1.0
     return float(machine.sense(axis))
 
 
 def side(machine: Machine | None, axis: str) -> float:
-    """Give +1 for an axis that carries the tool, −1 for one that carries the workpiece."""
+    """Return +1 for an axis that carries the tool, −1 for one that carries the workpiece."""
     return -1.0 if machine is not None and axis in machine.chain.workpiece else 1.0
 
 
@@ -262,7 +261,7 @@ def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTa
 def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> measured.ErrorSeries:
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
+    with np.errstate(over="ignore", invalid="ignore"):  # the scene refuses values that are not finite
         values_by_direction = {
             way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in DIRECTIONS
         }
@@ -338,8 +337,9 @@ def _joined(
         place = (plane.key, plane.axes)
         joined[place] = _added(joined[place], plane) if place in joined else plane
     keys = [key for key, _ in joined]
-    if twice := next((key for key in keys if keys.count(key) > 1), ""):
-        source.refuse(f"has products of {twice} with two other axes", "one for each error")
+    repeated = next((key for key in keys if keys.count(key) > 1), "")
+    if repeated:
+        source.refuse(f"has products of {repeated} with two other axes", "one per error")
     single_axis: list[measured.ErrorSeries] = []
     for error_series in series:
         place = next((place for place in joined if place[0] == error_series.key), None)
