@@ -191,15 +191,11 @@ def recognise(sources: Sequence[Source]) -> Format:
             names = ", ".join(kind.name for kind in formats())
             first = next((line for line in source.lines if line.strip()), "")
             number = source.lines.index(first) + 1 if first else None
-            problem = (
-                f"{source.at(number).quoted if number else 'nothing'} matches no known format"
-            )
+            problem = f"{source.at(number).quoted if number else 'nothing'} matches no known format"
             expected = (
                 f"one of {names} (--format NAME selects it; `warpspace import --formats` lists"
             )
-            (source.at(number) if number else source).refuse(
-                problem, f"{expected} their contents)"
-            )
+            (source.at(number) if number else source).refuse(problem, f"{expected} their contents)")
         recognised[kind.name] = kind
         if len(recognised) > 1:
             names = " and ".join(recognised)

@@ -229,7 +229,9 @@ def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
         try:
             return content.decode(encoding), ("read as UTF-16",)
         except UnicodeDecodeError:
-            raise SceneError(name, ["begins as UTF-16 text, but is not valid; expected a text file"]) from None
+            raise SceneError(
+                name, ["begins as UTF-16 text, but is not valid; expected a text file"]
+            ) from None
     try:
         return content.decode("utf-8-sig"), ()
     except UnicodeDecodeError as error:

@@ -187,33 +187,34 @@ def errors_from_tables(
 ) -> measured.ImportedErrors:
     lines = [term for term in tables.terms if isinstance(term, AxisTable)]
     series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
-    planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]
-    notes = list(tables.notes)
-    for term in tables.terms:
-        if isinstance(term, Grid3):
-            grid_surfaces, ignored_um = _grid_planes(term, machine)
-            planes += grid_surfaces
-            if ignored_um > NEGLIGIBLE:
-                notes.append(
-                    f"up to {ignored_um:.3g} µm depend on all three axes together, which no error of two"
-                    " axes represents: ignored"
-                )
-    series, planes = _joined(series, planes, source)
+    surfaces: list[measured.ErrorSurface] = []
     constants: dict[str, float] = {}
     curves: dict[str, object] = {}
+    notes = list(tables.notes)
     for term in tables.terms:
-        if isinstance(term, Affine):
+        if isinstance(term, Product):
+            surfaces.append(_product_surface(term, machine, source))
+        elif isinstance(term, Grid3):
+            grid_surfaces, ignored_um = _grid_surfaces(term, machine)
+            surfaces += grid_surfaces
+            if ignored_um > NEGLIGIBLE:
+                notes.append(
+                    f"ignored up to {ignored_um:.3g} µm that depend on all three axes together: no"
+                    " error parameter does"
+                )
+        elif isinstance(term, Affine):
             _affine(term, machine, constants, curves)
-    note = "" if machine is not None else " (assumes that all axes carry the tool)"
-    assumed = (*tables.assumed, f"assumes that the table corrects the entire error{note}")
+    series, surfaces = _merged(series, surfaces, source)
+    carried = "" if machine is not None else ", and that all axes carry the tool"
+    assumed = (*tables.assumed, f"assumes that the table corrects the entire error{carried}")
     return measured.ImportedErrors(
         name,
         tuple(
-            one
-            for one in series
-            if any(abs(value) > NEGLIGIBLE for run in one.runs for value in run.values)
+            error
+            for error in series
+            if np.any(np.abs([run.values for run in error.runs]) > NEGLIGIBLE)
         ),
-        tuple(planes),
+        tuple(surfaces),
         constants,
         units=tables.units,
         assumed=assumed,
@@ -250,9 +251,9 @@ def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTa
     for line in lines:
         if not is_linear(line.target) and line.source != line.target:
             source.refuse(
-                f"corrects the rotary axis {line.target} over {line.source}: no error parameter"
-                " is such a correction",
-                "tables of linear axes, or of a rotary axis itself",
+                f"corrects the rotary axis {line.target} over {line.source}, which no error"
+                " parameter represents",
+                "tables of linear axes, or of a rotary axis over itself",
             )
         lines_by_key[error_key(line.source, line.target)].append(line)
     return lines_by_key
@@ -261,47 +262,40 @@ def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTa
 def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> measured.ErrorSeries:
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
-    with np.errstate(over="ignore", invalid="ignore"):  # the scene refuses values that are not finite
-        values_by_direction = {
-            way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in DIRECTIONS
-        }
-    if np.array_equal(
-        values_by_direction[measured.FORWARD], values_by_direction[measured.BACKWARD]
-    ):
-        runs = (
-            measured.MeasuredRun(
-                1, measured.UNDIRECTED, tuple(values_by_direction[measured.FORWARD].tolist())
-            ),
+    with np.errstate(over="ignore", invalid="ignore"):  # the scene refuses what is not finite
+        forward, backward = (
+            factor * np.sum([part.at(at, direction) for part in parts], axis=0)
+            for direction in DIRECTIONS
         )
-    else:
-        runs = tuple(
-            measured.MeasuredRun(1, way, tuple(values.tolist()))
-            for way, values in values_by_direction.items()
-        )
+    if np.array_equal(forward, backward):
+        return measured.ErrorSeries.undirected(key, at, forward)
+    runs = (
+        measured.MeasuredRun(1, measured.FORWARD, tuple(forward.tolist())),
+        measured.MeasuredRun(1, measured.BACKWARD, tuple(backward.tolist())),
+    )
     return measured.ErrorSeries(key, tuple(at.tolist()), runs)
 
 
-def _plane(term: Product, machine: Machine | None, source: Source) -> measured.ErrorSurface:
-    first_table, second_table = term.first, term.second
-    if first_table.source == second_table.source or not is_linear(first_table.target):
+def _product_surface(
+    term: Product, machine: Machine | None, source: Source
+) -> measured.ErrorSurface:
+    axes, target = (term.first.source, term.second.source), term.first.target
+    if axes[0] == axes[1] or not is_linear(target):
         source.refuse(
-            f"multiplies tables over {first_table.source} and {second_table.source} for {first_table.target}",
+            f"multiplies tables over {axes[0]} and {axes[1]} for {target}",
             "tables over two axes that correct a linear axis",
         )
-    factor = _factor(machine, first_table.source, first_table.target)
-    first, second = np.meshgrid(first_table.positions, second_table.positions, indexing="ij")
-    tables = {way: factor * term.at(first, second, way) for way in DIRECTIONS}
-    key = error_key(first_table.source, first_table.target)
-    return measured.surface_from_directions(
-        key,
-        (first_table.source, second_table.source),
-        (first_table.positions, second_table.positions),
-        tables,
-    )
+    factor = _factor(machine, axes[0], target)
+    places = (term.first.positions, term.second.positions)
+    first, second = np.meshgrid(*places, indexing="ij")
+    tables = {direction: factor * term.at(first, second, direction) for direction in DIRECTIONS}
+    return measured.surface_from_directions(error_key(axes[0], target), axes, places, tables)
 
 
-def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.ErrorSurface], float]:
-    planes: list[measured.ErrorSurface] = []
+def _grid_surfaces(
+    term: Grid3, machine: Machine | None
+) -> tuple[list[measured.ErrorSurface], float]:
+    surfaces: list[measured.ErrorSurface] = []
     ignored_um = 0.0
     for index, target in enumerate(term.axes):
         values = term.values[..., index]
@@ -323,50 +317,50 @@ def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.Er
             scaled: Array = _factor(machine, axes[0], target) * table
             places = (term.positions[first], term.positions[second])
             tables = dict.fromkeys(DIRECTIONS, scaled)
-            planes.append(
-                measured.surface_from_directions(error_key(axes[0], target), axes, places, tables)
-            )
-    return [plane for plane in planes if np.abs(plane.values).max() > NEGLIGIBLE], ignored_um
+            key = error_key(axes[0], target)
+            surfaces.append(measured.surface_from_directions(key, axes, places, tables))
+    large = [surface for surface in surfaces if np.abs(surface.values).max() > NEGLIGIBLE]
+    return large, ignored_um
 
 
-def _joined(
-    series: list[measured.ErrorSeries], planes: list[measured.ErrorSurface], source: Source
+def _merged(
+    series: list[measured.ErrorSeries], surfaces: list[measured.ErrorSurface], source: Source
 ) -> tuple[list[measured.ErrorSeries], list[measured.ErrorSurface]]:
-    joined: dict[tuple[str, tuple[str, str]], measured.ErrorSurface] = {}
-    for plane in planes:
-        place = (plane.key, plane.axes)
-        joined[place] = _added(joined[place], plane) if place in joined else plane
-    keys = [key for key, _ in joined]
+    """Add surfaces with the same arguments, and each series to the surface of its error."""
+    merged: dict[tuple[str, tuple[str, str]], measured.ErrorSurface] = {}
+    for surface in surfaces:
+        place = (surface.key, surface.axes)
+        merged[place] = _added(merged[place], surface) if place in merged else surface
+    keys = [key for key, _ in merged]
     repeated = next((key for key in keys if keys.count(key) > 1), "")
     if repeated:
         source.refuse(f"has products of {repeated} with two other axes", "one per error")
     single_axis: list[measured.ErrorSeries] = []
-    for error_series in series:
-        place = next((place for place in joined if place[0] == error_series.key), None)
+    for error in series:
+        place = next((place for place in merged if place[0] == error.key), None)
         if place is None:
-            single_axis.append(error_series)
+            single_axis.append(error)
             continue
-        ends = (joined[place].second[0], joined[place].second[-1])
+        ends = (merged[place].second[0], merged[place].second[-1])
         columns = {
-            way: np.repeat(error_series.in_direction(way)[:, None], 2, axis=1) for way in DIRECTIONS
+            direction: np.repeat(error.in_direction(direction)[:, None], 2, axis=1)
+            for direction in DIRECTIONS
         }
-        surface = measured.surface_from_directions(
-            error_series.key, place[1], (error_series.positions, ends), columns
-        )
-        joined[place] = _added(joined[place], surface)
-    return single_axis, list(joined.values())
+        positions = (error.positions, ends)
+        surface = measured.surface_from_directions(error.key, place[1], positions, columns)
+        merged[place] = _added(merged[place], surface)
+    return single_axis, list(merged.values())
 
 
 def _added(surface: measured.ErrorSurface, other: measured.ErrorSurface) -> measured.ErrorSurface:
     first = np.union1d(surface.first, other.first)
     second = np.union1d(surface.second, other.second)
     totals = {
-        way: _resampled(surface, way, first, second) + _resampled(other, way, first, second)
-        for way in DIRECTIONS
+        direction: _resampled(surface, direction, first, second)
+        + _resampled(other, direction, first, second)
+        for direction in DIRECTIONS
     }
-    return measured.surface_from_directions(
-        surface.key, surface.axes, (first.tolist(), second.tolist()), totals
-    )
+    return measured.surface_from_directions(surface.key, surface.axes, (first, second), totals)
 
 
 def _resampled(plane: measured.ErrorSurface, direction: int, first: Array, second: Array) -> Array:

@@ -195,7 +195,9 @@ class Compensation(BeforeAfter, Result):
         for sense, direction in senses:
             axes = ", ".join(axis for axis in self.axes if machine.sense(axis) == sense)
             if axes:
-                assumptions.append(f"positive {axes}: the tool moves over the workpiece in {direction}")
+                assumptions.append(
+                    f"positive {axes}: the tool moves over the workpiece in {direction}"
+                )
         if self.placed:
             assumptions.append(PLACED_ASSUMPTION + ("" if self.format.offsets else NO_OFFSETS))
         return tuple(assumptions)
@@ -293,7 +295,9 @@ def format_points(kind: Format, points: Mapping[str, int]) -> str:
 def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str, int]:
     axes = [axis for axis in scene.machine.axes if axis in scene.workspace.volume_axes]
     if not axes:
-        raise OptionError(f"{scene.name}: no axis has a range in [workspace], so there is nothing to correct")
+        raise OptionError(
+            f"{scene.name}: no axis has a range in [workspace], so there is nothing to correct"
+        )
     if isinstance(points, tuple):
         by_axis = dict(points)
         for axis in by_axis:
@@ -366,7 +370,10 @@ def compensate(
 
 def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
     """Return the scene with best-fit placement if one of the formats has no constant offsets."""
-    if all(kind.offsets for kind in kinds) or build_corrector(scene, loop).loop is not Loop.RELATIVE:
+    if (
+        all(kind.offsets for kind in kinds)
+        or build_corrector(scene, loop).loop is not Loop.RELATIVE
+    ):
         return scene
     return replace(scene, placed=True)
 
@@ -506,7 +513,9 @@ def sweep(scene: Scene, options: Compensate) -> Sweep:
         before = compensation.before_statistics
         steps.append(_step(scene, compensation, count))
     if before is None:
-        raise OptionError(f"{{sweep}}: none of the tables is possible: {'; '.join(left_out.values())}")
+        raise OptionError(
+            f"{{sweep}}: none of the tables is possible: {'; '.join(left_out.values())}"
+        )
     reasons = tuple(f"{name}: {reason}" for name, reason in left_out.items())
     return Sweep(title=title, before=before, steps=tuple(steps), left_out=reasons)
 

@@ -75,7 +75,9 @@ class Controller:
     label: str  # title of the format and points of the table
     # the corrected axes; without a table, with the errors that the files contain
     corrector: Corrector
-    tables: Tables | None  # None where the controller computes its corrections from error parameters
+    tables: (
+        Tables | None
+    )  # None where the controller computes its corrections from error parameters
     size: int  # count of stored numbers
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
