@@ -311,7 +311,7 @@ class ErrorTable:
 
 
 def zero_key(scene: Scene) -> str:
-    """Return an error parameter of the machine, to be written as zero for a scene without errors."""
+    """Return an error parameter of the machine, written as zero for a scene without errors."""
     axis = next(iter(scene.machine.axes))
     return f"E{'XYZABC'[direction_index(axis) + (0 if is_linear(axis) else 3)]}{axis}"
 

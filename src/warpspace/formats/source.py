@@ -55,7 +55,7 @@ def format_number(value: float, digits: int) -> str:
     return "0.0" if text in {"-0.0", "-0"} else text
 
 
-_DELIMITERS = str.maketrans(dict.fromkeys("();#%*\\", " "))  # of comments, and line continuation
+_DELIMITERS = str.maketrans(dict.fromkeys("();#%*\\", " "))  # also of line continuation
 MAX_COMMENT = 200  # characters; LinuxCNC reads lines of 255
 
 

@@ -172,9 +172,7 @@ def _plausibility_notes(imported: ImportedErrors, base: Scene) -> list[str]:
     for key, maximum in maxima.items():
         if maximum > IMPLAUSIBLE[parameter(key).is_rotation]:
             units = f", read in {', '.join(imported.units)}" if imported.units else ""
-            notes.append(
-                f"{key} reaches {maximum:g} {parameter(key).unit}{units}: check the unit of the file"
-            )
+            notes.append(f"{key} reaches {maximum:g} {parameter(key).unit}{units}: check the unit")
     return notes
 
 

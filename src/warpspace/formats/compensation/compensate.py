@@ -280,7 +280,7 @@ class Compensation(BeforeAfter, Result):
         yield from u95_lines(self.field_uncertainty and self.field_uncertainty.errors, named)
         rms = self.expected.get("expected_rms_um")
         if rms is not None:
-            yield f"  expected RMS {rms:.2f} µm on the machine, due to the uncertainty of its errors"
+            yield f"  expected RMS on the machine {rms:.2f} µm, with the uncertainty of its errors"
         yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_text}"
         yield from (f"  assumed: {text}" for text in self.assumed)
         yield from (f"  {text}" for text in self.notes)
@@ -325,7 +325,8 @@ def compensate(
     kind, loop, sign = find_format(options.formats[0]), options.loop or "", options.sign or ""
     if kind.write is None:
         raise OptionError(
-            f"{kind.name} cannot be written; `warpspace import --formats` lists the formats that can"
+            f"{kind.name} cannot be written; expected a format that `warpspace import --formats`"
+            " lists as such"
         )
     if options.orientation and not kind.orientation:
         raise OptionError(f"{{orientation}}: {kind.name} corrects the position only")
@@ -384,7 +385,7 @@ def _with_placement(
     corrections: RequiredCorrections,
     check_cancelled: Callable[[], None],
 ) -> Corrector:
-    """Return the corrector with the placement of the workpiece that best fits the residual error.
+    """Return the corrector with the placement of the workpiece that fits the residual error best.
 
     The table changes the residual error, and so the placement that fits it best. Both are linear:
     seven small tables determine the fit. Placements that the table compensates stay unchanged.

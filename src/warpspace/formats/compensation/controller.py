@@ -188,12 +188,10 @@ def read_back(
         if model.convention(axis).name != scene.model.convention(axis).name
     ]
     if differing:
-        notes.append(
-            f"the format uses another convention for errors of {', '.join(differing)} than the scene"
-        )
+        notes.append(f"the format uses a different convention for errors of {', '.join(differing)}")
     corrector = replace(corrector, model=model, errors=errors)
     return Controller(
-        scene, corrector.loop, label, knows, None, imported.size, imported.assumed, tuple(notes)
+        scene, corrector.loop, label, corrector, None, imported.size, imported.assumed, tuple(notes)
     )
 
 

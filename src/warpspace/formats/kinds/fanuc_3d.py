@@ -1,9 +1,9 @@
 """FANUC three-dimensional error compensation: corrections of X, Y and Z at the points of a grid.
 
 FANUC Series 30i-MODEL A, Three-dimensional error compensation, additional manual A-79351E, page 3:
-the correction at a position is the sum over the eight corners of its cell, trilinear. The file that
-the control itself reads is not published: what is read and written here is a table of the numbers
-that are entered into it, a row a point.
+the correction at a position is the sum over the eight corners of its cell, trilinear. The file of
+the control itself is not published: this module reads and writes a table of the numbers to be
+entered into the control, one row per point.
 """
 
 from collections.abc import Sequence
@@ -24,15 +24,15 @@ from warpspace.formats.source import MM_PER, Source, format_comment
 from warpspace.formats.terms import Grid3, Tables
 
 MARK = "# three-dimensional error compensation"
-DETECTION_MM = 1e-3  # detection unit where none is asked for: a micrometre (IS-B)
+DETECTION_MM = 1e-3  # default of the detection unit: a micrometre (IS-B)
 MAX_COUNT = 127  # of a correction in detection units, times the magnification
 MAX_MAGNIFICATION = 100
 MAX_AXIS_POINTS = 25
 STEP_SHARE = 1e-4
 HEADINGS = ("point", "X [mm]", "Y [mm]", "Z [mm]", "CX", "CY", "CZ")
 LIMITS = (
-    f"counts within ±{MAX_COUNT} times a magnification of at most {MAX_MAGNIFICATION} and"
-    f" {MAX_AXIS_POINTS} points an axis are taken for the limits of the control: check its parameters"
+    f"assumed limits of the control: counts within ±{MAX_COUNT}, a magnification of at most"
+    f" {MAX_MAGNIFICATION}, {MAX_AXIS_POINTS} points per axis; check its parameters"
 )
 
 
@@ -64,7 +64,7 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
         at = source.at(number)
         at.integer(parts[0], "point", count, count)
         numbers = (csv_rows.number(part, number, "position") for part in parts[1:4])
-        place = [at.checked_position(value, "position") for value in numbers]
+        place = [at.checked_position(q, "position") for q in numbers]
         counts = [at.integer(part, "correction", -MAX_COUNT - 1, MAX_COUNT) for part in parts[4:]]
         rows.append([*place, *(float(c) for c in counts)])
     csv_rows.check()
@@ -73,15 +73,15 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
     shape = tuple(len(places) for places in along)
     if len(table) != np.prod(shape) or min(shape) < 2:
         problem = f"{len(table)} points for a grid of {' × '.join(map(str, shape))}"
-        source.refuse(problem, "every point of a grid once (is the file cut off?)")
+        source.refuse(problem, "every point of a grid once (is the file truncated?)")
     if max(shape) > MAX_AXIS_POINTS:
-        expected = f"at most {MAX_AXIS_POINTS}, as the control takes"
+        expected = f"at most {MAX_AXIS_POINTS}, the limit of the control"
         source.refuse(f"{max(shape)} points along an axis", expected)
     for places, axis in zip(along, "XYZ", strict=True):
         steps = np.diff(places)
         if np.ptp(steps) > STEP_SHARE * steps.max():
             problem = f"steps of {steps.min():g} to {steps.max():g} mm along {axis}"
-            source.refuse(problem, "equal steps, as the control has")
+            source.refuse(problem, "equal steps, a requirement of the control")
     ordered = table[np.lexsort(table[:, :3].T[::-1])].reshape(*shape, 6)
     first, second, third = (options.axis_named(axis, source) for axis in "XYZ")
     values = options.factor(CORRECTION) * ordered[..., 3:] * unit * magnification
@@ -93,22 +93,22 @@ def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     if len(sources) > 1:
         sources[1].refuse("is a second grid", "one")
     sign = options.sign or "values are added to the commanded position"
-    assumed = (f"sign: {sign}", "beyond the grid its border is held", LIMITS)
+    assumed = (f"sign: {sign}", "beyond the grid, the values at its boundary apply", LIMITS)
     return Tables((_grid(sources[0], options),), assumed, (), ("mm", "detection units"))
 
 
 def write(required: RequiredCorrections) -> Files:
-    """Write the grid; the magnification grows until every correction fits."""
+    """Write the grid, with the smallest magnification that represents all corrections."""
     axes = ("X", "Y", "Z")
     if tuple(required.axes) != axes or not set(axes) <= set(required.corrector.moved):
         raise OptionError(
-            f"fanuc-3d corrects X, Y and Z over a volume of X, Y and Z; that of the scene is of"
+            "fanuc-3d corrects X, Y and Z; expected a working volume of X, Y and Z instead of"
             f" {', '.join(required.axes)}"
         )
     unit = required.resolution or DETECTION_MM
     places = {axis: required.positions(axis) for axis in axes}
-    needed = required.corrections(places)
-    values = required.factor(CORRECTION) * np.stack([needed[axis] for axis in axes], -1)
+    moves = required.corrections(places)
+    values = required.factor(CORRECTION) * np.stack([moves[axis] for axis in axes], -1)
     largest = float(np.abs(values).max())
     magnification = max(1, int(np.ceil(largest / unit / MAX_COUNT - 1e-9)))
     if magnification > MAX_MAGNIFICATION:
@@ -125,7 +125,7 @@ def write(required: RequiredCorrections) -> Files:
         f"# {'values are ' + required.sign + 's' if required.sign else 'values are added'}",
         ",".join(HEADINGS),
     ]
-    # the first axis runs fastest, as compensation points are numbered
+    # compensation points are numbered with the first axis fastest
     shape = [len(places[axis]) for axis in reversed(axes)]
     for point, (k, j, i) in enumerate(np.ndindex(*shape), start=1):
         at = [places[axis][index] for axis, index in zip(axes, (i, j, k), strict=True)]
@@ -134,7 +134,7 @@ def write(required: RequiredCorrections) -> Files:
     return {"": "\n".join(lines) + "\n"}
 
 
-LARGEST = f"{MAX_AXIS_POINTS} points an axis, ±{MAX_COUNT} detection units times the magnification"
+LARGEST = f"{MAX_AXIS_POINTS} points per axis, ±{MAX_COUNT} detection units times the magnification"
 FORMATS = (
     Format(
         **format_description("fanuc-3d"), limits=LARGEST, recognise=head_matcher(rf"\A\s*{MARK}"),

@@ -6,8 +6,8 @@ tan(π/2 − acos((AC² − side² − AD²) / (2·side·AD))); x is moved by �
 −z·YZ.
 
 Klipper documentation, Skew_Correction: a profile [skew_correction NAME] acts once SKEW_PROFILE
-LOAD=NAME is given; axis_twist_compensation.py: the twist is a height that a probe is off by, along
-X, its mean taken out; it corrects the probe, not the nozzle. Marlin documentation, M852 (I, J, K
+LOAD=NAME is executed; axis_twist_compensation.py: the twist is the height error of a probe along X
+without its mean; it corrects the probe, not the nozzle. Marlin documentation, M852 (I, J, K
 are the factors of XY, XZ, YZ; S that of XY), and Marlin/src/inc/Conditionals_post.h.
 """
 
@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.measured import UNDIRECTED, ErrorSeries, ImportedErrors, MeasuredRun, merge
+from warpspace.formats.measured import ErrorSeries, ImportedErrors, merge
 from warpspace.formats.registry import Files, Format, ReadOptions, format_description, head_matcher
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.formats.terms import Affine, Tables, errors_from_tables
@@ -28,12 +28,12 @@ from warpspace.units import URAD_PER_RAD
 PLANES = ("XY", "XZ", "YZ")
 MAX_FACTOR = 1.0  # of a factor (Marlin, SKEW_FACTOR_MAX)
 CLOSURE_TOLERANCE = 0.02
-"""Share by which the side that two diagonals and a side give may differ from that side, unsaid."""
-SIDE_MM = 100.0  # side of the part that a factor is spelled by
+"""Largest relative difference without a note between a side and the one that closes the part."""
+SIDE_MM = 100.0  # side of the part whose lengths express a factor
 
 
 def skew_factor(ac: float, bd: float, ad: float) -> float:
-    """Give the skew factor of a part from its lengths, mm."""
+    """Compute the skew factor of a part from its lengths, mm."""
     side = other_side(ac, bd, ad)
     return math.tan(
         math.pi / 2.0 - math.acos((ac * ac - side * side - ad * ad) / (2.0 * side * ad))
@@ -41,34 +41,35 @@ def skew_factor(ac: float, bd: float, ad: float) -> float:
 
 
 def other_side(ac: float, bd: float, ad: float) -> float:
-    """Give the side AB that closes a part, mm."""
+    """Compute the side AB that closes a part, mm."""
     return math.sqrt(2.0 * ac * ac + 2.0 * bd * bd - 4.0 * ad * ad) / 2.0
 
 
 def closure_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str, ...]:
-    """Say where the lengths of a part do not close for a square one."""
+    """Return a note if the lengths of a part contradict a square part."""
     ac, bd, ad = lengths
     side = other_side(ac, bd, ad)
     if abs(side / ad - 1.0) < CLOSURE_TOLERANCE:
         return ()
-    description = f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm close only with a side AB of"
     share = 100.0 * (side / ad - 1.0)
-    return (
-        f"{description} {side:.4g} mm, {share:+.1f} % from AD: is the part square, is none mistyped?",
+    note = (
+        f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm imply a side AB of {side:.4g} mm,"
+        f" {share:+.1f} % from AD; check the lengths (the part must be square)"
     )
+    return (note,)
 
 
 def skew_lengths(factor: float) -> tuple[float, float, float]:
-    """Give diagonals and side of a rhombus that has a skew factor, mm: AC, BD, AD."""
+    """Compute diagonals and side of a rhombus with a skew factor, mm: AC, BD, AD."""
     angle = math.pi / 2.0 - math.atan(factor)
     return 2.0 * SIDE_MM * math.cos(angle / 2.0), 2.0 * SIDE_MM * math.sin(angle / 2.0), SIDE_MM
 
 
 def factor_of(lengths: tuple[float, float, float], at: SourceLine, what: str) -> float:
     ac, bd, ad = lengths
-    # the diagonals of a parallelogram are together longer than twice a side, and differ by less
+    # twice a side is shorter than the sum of the diagonals, and longer than their difference
     if not (min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd)):
-        problem = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
+        problem = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm do not form a parallelogram"
         at.refuse(problem, "two diagonals and a side")
     return skew_factor(ac, bd, ad)
 
@@ -79,14 +80,14 @@ def skew_term(factors: Mapping[str, float]) -> Affine:
 
 
 def fitted_factors(corrections: RequiredCorrections) -> dict[str, float]:
-    """Give the factors that leave the smallest RMS over the volume."""
+    """Fit the factors that minimise the RMS residual error over the volume."""
     coefficients = corrections.linear_fit((("X", "Y"), ("X", "Z"), ("Y", "Z")))
     xy, yz = -coefficients.get(("X", "Y"), 0.0), -coefficients.get(("Y", "Z"), 0.0)
     xz = -coefficients.get(("X", "Z"), 0.0) + xy * yz
     return {"XY": xy, "XZ": xz, "YZ": yz}
 
 
-MIN_OFFSET_MM = 1.0  # between probe and nozzle: below it a twist cannot be told from the height
+MIN_OFFSET_MM = 1.0  # between probe and nozzle: with less, a twist is not estimable
 PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
 _PROFILE = re.compile(r"\[skew_correction\s++([^\]]+)\]")
@@ -98,15 +99,16 @@ Settings = dict[str, tuple[SourceLine, float]]
 
 
 def _sections(source: Source) -> dict[str, Section]:
-    found: dict[str, Section] = {}
+    sections: dict[str, Section] = {}
     section: Section = {}
     for number, text in enumerate(source.lines, start=1):
         bare = text.removeprefix("#*#").split(" ;")[0].strip()
-        if matched := _SECTION.fullmatch(bare):
-            section = found.setdefault(matched[1], {})
-        elif not bare.startswith(("#", ";")) and (pair := re.match(r"(\w+)\s*[:=]\s*(.*)", bare)):
-            section[pair[1]] = (source.at(number), pair[2].strip())
-    return found
+        heading, setting = _SECTION.fullmatch(bare), re.match(r"(\w+)\s*[:=]\s*(.*)", bare)
+        if heading:
+            section = sections.setdefault(heading[1], {})
+        elif setting:
+            section[setting[1]] = (source.at(number), setting[2].strip())
+    return sections
 
 
 def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str, float]:
@@ -182,31 +184,30 @@ def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
     ends: list[float] = []
     for key in ("start_x", "end_x"):
         names = (f"compensation_{key}", f"calibrate_{key}", key)
-        named = next((name for name in names if name in twist), None)
-        if named is None:
-            at.refuse(f"[axis_twist_compensation] has no calibrate_{key}", "it")
-        place, given = twist[named]
-        ends.append(place.number(given, named))
+        name = next((name for name in names if name in twist), None)
+        if name is None:
+            at.refuse("[axis_twist_compensation] is incomplete", f"calibrate_{key}")
+        place, text = twist[name]
+        ends.append(place.number(text, name))
     if len(heights) < 2 or ends[1] <= ends[0]:
         problem = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
         at.refuse(problem, "two or more along a range")
     probe = next((name for name in PROBES if "y_offset" in sections.get(name, {})), None)
     if probe is None:
-        expected = "y_offset in [probe]: without it a height tells no twist"
+        expected = "y_offset in [probe], needed to compute the twist"
         at.refuse("[axis_twist_compensation] without a probe", expected)
-    place, given = sections[probe]["y_offset"]
-    offset = place.number(given, "y_offset")
+    place, text = sections[probe]["y_offset"]
+    offset = place.number(text, "y_offset")
     if abs(offset) < MIN_OFFSET_MM:
-        place.refuse(f"y_offset {offset:g} mm", f"{MIN_OFFSET_MM:g} mm or more to tell a twist")
+        place.refuse(
+            f"y_offset {offset:g} mm", f"{MIN_OFFSET_MM:g} mm or more to compute the twist"
+        )
     options.axis_named("X", at)
     places = np.linspace(ends[0], ends[1], len(heights))
-    values = np.array(heights) / offset * URAD_PER_RAD
+    series = ErrorSeries.undirected("EAX", places, np.array(heights) / offset * URAD_PER_RAD)
     assumption = (
-        f"the heights that the probe is off by, {offset:g} mm behind the nozzle, are taken for"
-        " roll of X; their mean is not in the file"
-    )
-    series = ErrorSeries(
-        "EAX", tuple(places.tolist()), (MeasuredRun(1, UNDIRECTED, tuple(values.tolist())),)
+        f"the height errors of the probe, {offset:g} mm behind the nozzle, are due to roll of X;"
+        " their mean is not in the file"
     )
     return ImportedErrors("klipper", (series,), units=("mm",), assumed=(assumption,))
 
@@ -228,11 +229,11 @@ def _write_klipper(corrections: RequiredCorrections) -> Files:
         for plane, factor in fitted_factors(corrections).items()
     ]
     head = format_comment("# ", corrections.scene.title)
-    head += "\n# [skew_correction] must stand in printer.cfg\n"
+    head += "\n# [skew_correction] is required in printer.cfg\n"
     return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
 
 
-DIGITS = 6  # behind the point of a factor, as the firmware reports it
+DIGITS = 6  # decimals of a factor, as in the report of the firmware
 LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}
 _WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
 _DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")

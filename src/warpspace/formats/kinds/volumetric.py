@@ -35,15 +35,20 @@ CONVENTION = {"linear": "after_motion", "rotary": "before_motion"}
 DIGITS = 12
 ASSUMED = (
     "a positive angle follows the right-hand rule, also of a squareness",
-    "errors of a linear axis ride on it, those of a rotary axis act in fixed directions",
-    "values beyond the points are held",
+    "errors of a linear axis move with it, those of a rotary axis act in fixed directions",
+    "beyond the points, the end values apply",
+)
+ROTATION = (
+    f"rotation about the nominal axis (alternative_model 0); --variant {ALTERNATIVE} selects the"
+    " distorted axis",
+    "rotation about the distorted axis (alternative_model 1)",
 )
 IGNORED = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
-FINE_DEG = 1.0  # steps of a table that a wave is added to
+FINE_DEG = 1.0  # step of a table to which a harmonic is added
 
 
 def error_name(name: str) -> str:
-    """Give the key of a parameter of a file; empty where it is no error."""
+    """Return the key of a parameter of a file; empty if it is not an error."""
     upper = name.strip().upper()
     for key in (upper, f"E{upper}"):
         if key in PARAMETERS:
@@ -52,38 +57,35 @@ def error_name(name: str) -> str:
 
 
 def file_name(key: str) -> str:
-    """Give the name that a file has for a key: C0B for EC0B."""
+    """Return the name of an error parameter in files: C0B for EC0B."""
     return key[1:] if parameter(key).is_constant else key
 
 
 def factor_of(key: str) -> float:
-    """Give the factor from mm or rad to µm or µrad."""
+    """Return the factor from mm or rad to µm or µrad."""
     return URAD_PER_RAD if parameter(key).is_rotation else UM_PER_MM
 
 
 def ignored_notes(names: Sequence[str]) -> tuple[str, ...]:
-    return (f"{', '.join(names)}: no errors, left out",) if names else ()
+    return (f"ignored {', '.join(names)}: not errors",) if names else ()
 
 
 def check_axes(imported: measured.ImportedErrors, name: str) -> None:
-    if other := next((axis for axis in imported.axes if axis not in ARGUMENTS), ""):
-        raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
+    other = next((axis for axis in imported.axes if axis not in ARGUMENTS), "")
+    if other:
+        raise OptionError(f"{name} cannot represent axis {other}; expected {', '.join(ARGUMENTS)}")
 
 
 def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
+    is_alternative = options.variant == ALTERNATIVE
     imported = replace(
         imported,
         units=("mm", "rad", "degrees for rotary positions"),
-        assumed=(*imported.assumed, *ASSUMED),
+        assumed=(*imported.assumed, *ASSUMED, ROTATION[is_alternative]),
         convention=CONVENTION,
     )
-    if options.variant != ALTERNATIVE:
-        assumption = (
-            "rotation about the nominal axis (alternative_model 0); --variant says otherwise"
-        )
-        return replace(imported, assumed=(*imported.assumed, assumption))
-    assumption = "rotation about the distorted axis (alternative_model 1)"
-    imported = replace(imported, assumed=(*imported.assumed, assumption))
+    if not is_alternative:
+        return imported
     for axis in dict.fromkeys(parameter(key).axis for key in imported.constants):
         if not is_linear(axis):
             imported = _about_distorted_axis(imported, axis, options)
@@ -93,22 +95,22 @@ def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measur
 def _about_distorted_axis(
     imported: measured.ImportedErrors, axis: str, options: ReadOptions
 ) -> measured.ImportedErrors:
-    """Take back, turned with the axis, what the constant errors of a rotary axis move at zero.
+    """Subtract the constant errors of a rotary axis, rotated with the axis.
 
     A rotation R about an axis that is displaced by E₀ is E₀·R·E₀⁻¹: to first order the constant
-    error minus the same error turned by R, which is one wave a turn of its component errors.
+    error minus the same error rotated by R, which is a first harmonic of its component errors.
     """
     machine = options.machine
     sense = machine.axes[axis].direction if machine is not None and axis in machine.axes else 1
     axis_index = direction_index(axis)
     first, second = (axis_index + 1) % 3, (axis_index + 2) % 3
     for letters in ("XYZ", "ABC"):
-        one, other = (
-            imported.constants.get(f"E{letters[index]}0{axis}", 0.0) for index in (first, second)
+        u, v, along = (
+            imported.constants.get(f"E{letters[index]}0{axis}", 0.0)
+            for index in (first, second, axis_index)
         )
-        along = imported.constants.get(f"E{letters[axis_index]}0{axis}", 0.0)
-        imported = _plus(imported, f"E{letters[first]}{axis}", 0.0, -one, sense * other)
-        imported = _plus(imported, f"E{letters[second]}{axis}", 0.0, -other, -sense * one)
+        imported = _plus(imported, f"E{letters[first]}{axis}", 0.0, -u, sense * v)
+        imported = _plus(imported, f"E{letters[second]}{axis}", 0.0, -v, -sense * u)
         imported = _plus(imported, f"E{letters[axis_index]}{axis}", -along)
     return imported
 
@@ -120,10 +122,11 @@ def _plus(
     cosine: float = 0.0,
     sine: float = 0.0,
 ) -> measured.ImportedErrors:
+    """Add an offset and a first harmonic to an error."""
     size = math.hypot(cosine, sine)
     if not size and not offset:
         return imported
-    present = next((one for one in imported.series if one.key == key), None)
+    present = next((error for error in imported.series if error.key == key), None)
     if present is None:
         phase = math.degrees(math.atan2(sine, cosine))
         curve = {"harmonics": [[1, size, phase]]} if size else {"poly": [offset]}
@@ -133,12 +136,8 @@ def _plus(
         at = np.union1d(at, np.arange(at[0], at[-1], FINE_DEG))
     values = np.interp(at, present.positions, present.values) + offset
     values = values + cosine * np.cos(np.deg2rad(at)) + sine * np.sin(np.deg2rad(at))
-    changed = measured.ErrorSeries(
-        key,
-        tuple(at.tolist()),
-        (measured.MeasuredRun(1, measured.UNDIRECTED, tuple(values.tolist())),),
-    )
-    series = tuple(changed if one.key == key else one for one in imported.series)
+    changed = measured.ErrorSeries.undirected(key, at, values)
+    series = tuple(changed if error is present else error for error in imported.series)
     return replace(imported, series=series)
 
 
@@ -180,7 +179,7 @@ def _blocks(source: Source) -> list[Block]:
         if bare:
             blocks[-1].append((at, [part for part in _SPLIT.split(bare) if part]))
             if len(blocks[-1]) > MAX_POINTS:
-                at.refuse(f"a block has more than {MAX_POINTS:,} rows", "at most so many")
+                at.refuse(f"a block has more than {MAX_POINTS:,} rows", "shorter blocks")
     return [block for block in blocks if block]
 
 
@@ -191,7 +190,7 @@ def _read_isg(source: Source) -> list[measured.ImportedErrors]:
         part = _read_block(source, block)
         repeated = next((key for key in part.keys if key in keys), "")
         if repeated:
-            block[0][0].refuse(f"{file_name(repeated)} stands in two blocks", "it in one")
+            block[0][0].refuse(f"{file_name(repeated)} occurs in two blocks", "it in one")
         keys.update(part.keys)
         imports.append(part)
     if not keys:
@@ -232,7 +231,7 @@ def _check_header(
             at.refuse(f"column {name!r}", expected)
     repeated = next((name for name in names if names.count(name) > 1), "")
     if repeated:
-        at.refuse(f"column {repeated} stands there twice", "it once")
+        at.refuse(f"column {repeated} occurs twice", "it once")
     if len(arguments) > 2:
         expected = "one or two: no error parameter depends on more"
         at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
@@ -255,7 +254,7 @@ def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None
     row = parameter(key)
     if not arguments:
         if not row.is_constant:
-            at.refuse(f"{key} without an argument", f"the argument {row.axis} beside it")
+            at.refuse(f"{key} without an argument", f"the argument {row.axis} with it")
     elif row.is_constant:
         expected = "it in a block without arguments"
         at.refuse(f"{file_name(key)} is constant", expected)
@@ -268,32 +267,32 @@ def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.ErrorS
         if row[argument] <= before[argument]:
             problem = f"{argument} {row[argument]:g} after {before[argument]:g}"
             at.refuse(problem, "ascending positions")
-    run = measured.MeasuredRun(1, measured.UNDIRECTED, tuple(row[key] for _, row in rows))
-    return measured.ErrorSeries(key, tuple(row[argument] for _, row in rows), (run,))
+    positions, errors = [row[argument] for _, row in rows], [row[key] for _, row in rows]
+    return measured.ErrorSeries.undirected(key, positions, errors)
 
 
 def _isg_surface(
     source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]
 ) -> measured.ErrorSurface:
-    own = parameter(key).axis
-    other = next(axis for axis in arguments if axis != own)
-    points = [(at, row[own], row[other], row[key]) for at, row in rows]
-    return measured.build_surface(key, (own, other), points, source)
+    first = parameter(key).axis
+    second = next(axis for axis in arguments if axis != first)
+    points = [(at, row[first], row[second], row[key]) for at, row in rows]
+    return measured.build_surface(key, (first, second), points, source)
 
 
 def _write_isg(corrections: RequiredCorrections) -> Files:
     imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
     check_axes(imported, ISG)
 
-    def format_value(value: float, key: str) -> str:
-        return format_number(value / factor_of(key), DIGITS)
+    def format_error(error: float, key: str) -> str:
+        return format_number(error / factor_of(key), DIGITS)
 
     blocks: list[list[list[str]]] = []
     for table in measured.build_error_tables(imported):
         names = [*reversed(table.axes), *map(file_name, table.keys)]
-        ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis runs fastest
+        ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis fastest
         rows = [
-            [*map(repr, reversed(at)), *map(format_value, values, table.keys)]
+            [*map(repr, reversed(at)), *map(format_error, values, table.keys)]
             for at, _, values in ordered
         ]
         blocks.append([names, *rows])
@@ -352,7 +351,7 @@ class _IsoReader:
     def _begin_block(self, at: SourceLine, name: str) -> None:
         self.name, self.key = name, error_name(name)
         if self.key in self.constants or self.key in self.series:
-            at.refuse(f"[{name}] is given twice", "it once")
+            at.refuse(f"[{name}] occurs twice", "it once")
         if not self.key and not IGNORED.fullmatch(name):
             at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
         if not self.key:
@@ -371,15 +370,14 @@ class _IsoReader:
         if parts:
             self.points.append(self._point(at, parts))
         if len(self.points) > MAX_POINTS:
-            at.refuse(f"{self.name} has more points than {MAX_POINTS:,}", "at most so many")
+            at.refuse(f"{self.name} has more than {MAX_POINTS:,} points", "fewer points")
         if not closed:
             return
         if not self.points:
             at.refuse(f"[{self.name}] has no points", "position and value")
         if self.key:
             positions, values = zip(*self.points, strict=True)
-            run = measured.MeasuredRun(1, measured.UNDIRECTED, values)
-            self.series[self.key] = measured.ErrorSeries(self.key, positions, (run,))
+            self.series[self.key] = measured.ErrorSeries.undirected(self.key, positions, values)
         self.opened, self.points = None, []
 
     def _point(self, at: SourceLine, parts: Sequence[str]) -> tuple[float, float]:
@@ -398,7 +396,7 @@ def _read_iso(source: Source) -> measured.ImportedErrors:
         reader.read_line(at, bare)
     if reader.opened:
         problem = f"Gridpoints of [{reader.name}] do not end"
-        reader.opened.refuse(problem, "} (is the file cut off?)")
+        reader.opened.refuse(problem, "} (is the file truncated?)")
     notes = (*source.notes, *ignored_notes(reader.ignored))
     series = tuple(reader.series.values())
     return measured.ImportedErrors(ISO, series, constants=reader.constants, notes=notes)
@@ -408,22 +406,18 @@ def _write_iso(corrections: RequiredCorrections) -> Files:
     imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
     check_axes(imported, ISO)
     lines = [format_comment("// ", corrections.scene.title), "// mm, rad, degrees; variant Vendor"]
-    for plane in imported.surfaces:
-        axes = " and ".join(plane.axes)
-        lines.append(f"// {plane.key} over {axes}: has no place here, left out")
-    for key, value in imported.constants.items():
-        scaled = value / factor_of(key)
+    for surface in imported.surfaces:
+        axes = " and ".join(surface.axes)
+        lines.append(f"// {surface.key} over {axes}: omitted, not supported by the format")
+    for key, constant in imported.constants.items():
+        scaled = constant / factor_of(key)
         lines += [f"[{file_name(key)}]", f"VALUE = {scaled:.{DIGITS}f}"]
-    for error_series in imported.series:
-        lines += [f"[{error_series.key}]", "Gridpoints = {"]
-        scale = factor_of(error_series.key)
-        lines += [
-            f"  {position!r} {value / scale:.{DIGITS}f}"
-            for position, value in zip(
-                error_series.positions, error_series.values.tolist(), strict=True
-            )
-        ]
-        lines.append(f"}}  // end of {error_series.key}")
+    for series in imported.series:
+        lines += [f"[{series.key}]", "Gridpoints = {"]
+        scaled_errors = series.values / factor_of(series.key)
+        for position, error in zip(series.positions, scaled_errors.tolist(), strict=True):
+            lines.append(f"  {position!r} {error:.{DIGITS}f}")
+        lines.append(f"}}  // end of {series.key}")
     return {"": "\n".join(lines) + "\n"}
 
 
