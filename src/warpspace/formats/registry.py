@@ -123,12 +123,12 @@ def _catalogue() -> dict[str, Any]:
     return tomllib.loads((files("warpspace.formats") / "formats.toml").read_text("utf-8"))
 
 
-def format_description(name: str) -> dict[str, Any]:
+def description_of(name: str) -> dict[str, Any]:
     description = _catalogue()["formats"][name]
     return {**description, "name": name, "endings": tuple(description["endings"])}
 
 
-def head_matcher(pattern: str) -> Callable[[str, str], bool]:
+def has_pattern(pattern: str) -> Callable[[str, str], bool]:
     """Return a predicate that matches the first lines of a file, ignoring its name."""
     expression = re.compile(pattern, re.MULTILINE)
     return lambda head, _: expression.search(head) is not None

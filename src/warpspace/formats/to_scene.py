@@ -76,9 +76,7 @@ def build_imported_scene(
     if base is None:
         base = default_scene(imported)
         base = replace(base, title=one_line(title)[:MAX_TEXT])
-        notes.append(
-            "no machine stated: assumes that X, Y and Z carry the tool, with the travels of the data"
-        )
+        notes.append("assumes that X, Y and Z carry the tool, with the travels of the data")
     _check_keys(imported, base, name)
     _check_travel(imported, base, name)
     notes += _plausibility_notes(imported, base)

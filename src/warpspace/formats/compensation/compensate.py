@@ -128,8 +128,7 @@ class Compensate(Analysis):
     )
     placed: bool = option(False, PLACED_HELP)
     orientation: bool = option(
-        False,
-        "Correct the tool axis too, with the rotary axes, if the format supports it",
+        False, "Correct the tool axis too, with the rotary axes, if the format supports it"
     )
     sweep: Annotated[tuple[int, ...], Grammar("N,N,…", _read_sizes, many=True)] = option(
         (), "Compare tables with these numbers of points per axis instead of writing one"

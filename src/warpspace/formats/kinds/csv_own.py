@@ -11,7 +11,7 @@ import numpy as np
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, format_description
+from warpspace.formats.registry import Files, Format, ReadOptions, description_of
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
@@ -55,9 +55,9 @@ def _lines(rows: Iterable[Iterable[str]]) -> str:
 def surface_template(axes: tuple[str, str], places: tuple[Sequence[float], Sequence[float]]) -> str:
     axis, other = axes
     lines = [
-        f"# Errors of the {axis} axis over {axis} and {other}: actual - nominal, one row per point.",
-        "# Every point of the grid occurs once, in any order. Interpolation is bilinear; beyond the",
-        "# grid, the values of its edge apply. Columns that are not needed may be deleted.",
+        f"# Errors of the {axis} axis over {axis} and {other}: actual - nominal, one row a point.",
+        "# Every point of the grid occurs once, in any order. Interpolation is bilinear; beyond",
+        "# the grid, the values of its edge apply. Columns that are not needed may be deleted.",
     ]
     cells = [f"{first:g},{second:g}" for first in places[0] for second in places[1]]
     return _to_fill_in(axis, lines, map(_position, axes), cells)
@@ -330,11 +330,7 @@ def _series(table: _CsvTable, axis: str) -> measured.ImportedErrors:
 
 
 def _check_complete(
-    source: Source,
-    key: str,
-    readings: Mapping[tuple[int, int], Array],
-    places: Array,
-    axis: str,
+    source: Source, key: str, readings: Mapping[tuple[int, int], Array], places: Array, axis: str
 ) -> None:
     missing = np.isnan(list(readings.values())).all(axis=0)
     if missing.any():
@@ -376,7 +372,7 @@ def _surfaces(table: _CsvTable) -> measured.ImportedErrors:
 
 
 FORMAT = Format(
-    **format_description(NAME),
+    **description_of(NAME),
     limits=f"{MAX_POINTS:,} rows",
     recognise=recognise,
     read=read,

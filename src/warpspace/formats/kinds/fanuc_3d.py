@@ -17,8 +17,8 @@ from warpspace.formats.registry import (
     Files,
     Format,
     ReadOptions,
-    format_description,
-    head_matcher,
+    description_of,
+    has_pattern,
 )
 from warpspace.formats.source import MM_PER, Source, format_comment
 from warpspace.formats.terms import Grid3, Tables
@@ -137,7 +137,7 @@ def write(required: RequiredCorrections) -> Files:
 LARGEST = f"{MAX_AXIS_POINTS} points per axis, ±{MAX_COUNT} detection units times the magnification"
 FORMATS = (
     Format(
-        **format_description("fanuc-3d"), limits=LARGEST, recognise=head_matcher(rf"\A\s*{MARK}"),
+        **description_of("fanuc-3d"), limits=LARGEST, recognise=has_pattern(rf"\A\s*{MARK}"),
         tables=read_tables, write=write, max_points=MAX_AXIS_POINTS,
     ),
 )  # fmt: skip

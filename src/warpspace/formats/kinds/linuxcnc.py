@@ -17,8 +17,8 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, format_description, head_matcher
-from warpspace.formats.source import Source, format_comment, format_number, quote
+from warpspace.formats.registry import Files, Format, ReadOptions, description_of, has_pattern
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
 from warpspace.formats.terms import HOLD_ENDS, Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
 
@@ -223,7 +223,7 @@ def _write_matrix(corrections: RequiredCorrections) -> Files:
 
 
 COMP = Format(
-    **format_description("linuxcnc-comp"),
+    **description_of("linuxcnc-comp"),
     recognise=_is_comp,
     tables=_read_comp,
     write=_write_comp,
@@ -231,8 +231,8 @@ COMP = Format(
     variants=(POSITIONS, OFFSETS),
 )
 MATRIX = Format(
-    **format_description("linuxcnc-matrix"),
-    recognise=head_matcher(r"matrixkins\.C_"),
+    **description_of("linuxcnc-matrix"),
+    recognise=has_pattern(r"matrixkins\.C_"),
     tables=_read_matrix,
     write=_write_matrix,
 )

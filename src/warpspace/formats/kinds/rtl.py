@@ -18,7 +18,7 @@ from warpspace.formats.measured import (
     MeasuredRun,
     merge,
 )
-from warpspace.formats.registry import Format, ReadOptions, format_description, head_matcher
+from warpspace.formats.registry import Format, ReadOptions, description_of, has_pattern
 from warpspace.formats.source import Source, SourceLine
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
@@ -175,8 +175,8 @@ def read(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
 
 FORMATS = (
     Format(
-        **format_description(NAME),
-        recognise=head_matcher(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
+        **description_of(NAME),
+        recognise=has_pattern(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
         read=read,
     ),
 )

@@ -27,8 +27,8 @@ from warpspace.formats.registry import (
     Files,
     Format,
     ReadOptions,
-    format_description,
-    head_matcher,
+    description_of,
+    has_pattern,
 )
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
 from warpspace.formats.terms import HOLD_ENDS, MODULO, AxisTable, Product, Tables, Term
@@ -107,7 +107,7 @@ class AssignmentTable:
 
 
 def _assigns(name: str) -> Callable[[str, str], bool]:
-    return head_matcher(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
+    return has_pattern(rf"^\s*(?:N\d+\s+)?\${name}[A-Z_]*\s*\[")
 
 
 def _assignments(
@@ -384,9 +384,9 @@ def _tables_for(
 
 def _factors(matrix: Array, max_rank: int) -> Iterator[tuple[Array, Array]]:
     """Yield the factors u, v of the products u·vᵀ that add up to a matrix, the largest first."""
-    left, sizes, right = np.linalg.svd(matrix)
+    columns, sizes, rows = np.linalg.svd(matrix)
     for rank, root in enumerate(np.sqrt(sizes[:max_rank])):
-        u, v = left[:, rank] * root, right[rank] * root
+        u, v = columns[:, rank] * root, rows[rank] * root
         if np.abs(u).max() * np.abs(v).max() < MIN_PRODUCT_MM:
             return
         yield u, v
@@ -401,13 +401,13 @@ def _interaction(matrix: Array) -> Array:
 
 FORMATS = (
     Format(
-        **format_description("sinumerik-enc"),
+        **description_of("sinumerik-enc"),
         recognise=_assigns(ENC),
         tables=_read_enc,
         write=_write_enc,
     ),
     Format(
-        **format_description("sinumerik-cec"),
+        **description_of("sinumerik-cec"),
         recognise=_assigns(CEC),
         tables=_read_cec,
         write=_write_cec,

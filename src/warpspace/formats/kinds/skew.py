@@ -20,7 +20,7 @@ import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.measured import ErrorSeries, ImportedErrors, merge
-from warpspace.formats.registry import Files, Format, ReadOptions, format_description, head_matcher
+from warpspace.formats.registry import Files, Format, ReadOptions, description_of, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.formats.terms import Affine, Tables, errors_from_tables
 from warpspace.units import URAD_PER_RAD
@@ -332,17 +332,14 @@ def _write_marlin(corrections: RequiredCorrections) -> Files:
 
 
 KLIPPER = Format(
-    **format_description("klipper"),
+    **description_of("klipper"),
     limits=f"three factors: {', '.join(PLANES)}",
-    recognise=head_matcher(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
+    recognise=has_pattern(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
     read=_read_klipper,
     tables=_klipper_tables,
     write=_write_klipper,
 )
 MARLIN = Format(
-    **format_description("marlin"),
-    recognise=_is_marlin,
-    tables=_marlin_tables,
-    write=_write_marlin,
+    **description_of("marlin"), recognise=_is_marlin, tables=_marlin_tables, write=_write_marlin
 )
 FORMATS = (KLIPPER, MARLIN)

@@ -22,7 +22,7 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, format_description
+from warpspace.formats.registry import Files, Format, ReadOptions, description_of
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
@@ -39,8 +39,7 @@ ASSUMED = (
     "beyond the points, the end values apply",
 )
 ROTATION = (
-    f"rotation about the nominal axis (alternative_model 0); --variant {ALTERNATIVE} selects the"
-    " distorted axis",
+    "rotation about the nominal axis (alternative_model 0), or with --variant the distorted axis",
     "rotation about the distorted axis (alternative_model 1)",
 )
 IGNORED = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
@@ -422,14 +421,14 @@ def _write_iso(corrections: RequiredCorrections) -> Files:
 
 
 ISO_FORMAT = Format(
-    **format_description(ISO),
+    **description_of(ISO),
     recognise=_is_iso,
     read=_read_with(lambda source: [_read_iso(source)]),
     write=_write_iso,
     variants=VARIANTS,
 )
 ISG_FORMAT = Format(
-    **format_description(ISG),
+    **description_of(ISG),
     recognise=_is_isg,
     read=_read_with(_read_isg),
     write=_write_isg,
