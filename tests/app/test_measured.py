@@ -327,7 +327,7 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     assert len(column.part._problem[1]) <= 1500
     column.do("remove", "0")
     column.part.parse("data.dat", b"0\t0.001\t0.002\n")()
-    assert "no format that is known" in column.settle()
+    assert "matches no known format" in column.settle()
     for word, value, said in (
         ("set.format", "linuxcnc-comp", "which axis"),
         ("set.axis", "X", "It adds EXX."),

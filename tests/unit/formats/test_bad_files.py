@@ -69,9 +69,9 @@ JOINT = "[JOINT_9]\nCOMP_FILE = j.comp\nCOMP_FILE_TYPE = 1\n"
         ("x.csv", "X [mm],EXX [um]\n" + "0,1\n" * 100_002, "line 100002: more than 100,000 rows"),
         ("T_X.COM", com(range(257)), "257.*at most 256"),
         ("T_X.COM", com([0] * 100_000), "line 259.* 100000 rows.* at most 256"),
-        ("j_X.comp", COMP, "line 257: has more than 256 rows"),
+        ("j_X.comp", COMP, "line 257: more than 256 rows"),
         ("j_X.comp", "1 0 0\n0 0 0\n", "line 2: nominal 0 after 1"),
-        ("joint.comp", "0 0 0\n1 0 0\n", "which axis"),
+        ("joint.comp", "0 0 0\n1 0 0\n", "its axis"),
         ("machine.ini", JOINT, r"line 1: section \[JOINT_9\]; expected a joint from 0 to 8"),
     ],
     ids=lambda part: part[:20],
@@ -97,7 +97,7 @@ def test_sizes_of_hostile_files():
         source_of_text("a" * 20_000, "long")
     with pytest.raises(SceneError, match="lines"):
         source_of_text("\n" * 2_000_001, "many")
-    with pytest.raises(SceneError, match="no text"):
+    with pytest.raises(SceneError, match="null bytes"):
         source_of_bytes(b"X [mm]\n\x00\x01\x02\x03\n", "binary")
     with pytest.raises(SceneError, match="is empty"):
         source_of_bytes(b" \n\n", "empty")
@@ -186,7 +186,7 @@ def test_lengths_that_do_not_close_are_told():
     text = "SET_SKEW XY=141.4,124.1,100\n"
     found = read_errors([source_of_text(text, "a.cfg")], ReadOptions()).imported
     said = " | ".join((*found.assumed, *found.notes))
-    assert "close only with a side AB of 87.73 mm, -12.3 % from AD" in said
+    assert "imply a side AB of 87.73 mm, -12.3 % from AD" in said
 
 
 @pytest.mark.parametrize("u", ["", ",u(EXX) [um]"])

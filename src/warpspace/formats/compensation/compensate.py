@@ -41,7 +41,7 @@ PLACED_ASSUMPTION = (
     "best-fit placement: three shifts and three small rotations of the workpiece are fitted out"
     " of the errors before and after"
 )
-NO_OFFSETS = ", because the format cannot represent them"
+NO_OFFSETS = ", because the format cannot correct them"
 RESOLUTION = (0.0, 0.1)  # mm or degrees
 SIZES = (3, 5, 9, 17)
 MAX_TABLES = 32  # compensations of one sweep
