@@ -459,8 +459,7 @@ def build_surface_by_direction(
     if len(surfaces) == 1:
         return next(iter(surfaces.values()))
     if set(surfaces) != {FORWARD, BACKWARD}:
-        expected = "+ or - in every row, or in none"
-        points[UNDIRECTED][0][0].refuse("has no direction", expected)
+        points[UNDIRECTED][0][0].refuse("has no direction", "+ or - in every row, or in none")
     forward, backward = surfaces[FORWARD], surfaces[BACKWARD]
     if (forward.first, forward.second) != (backward.first, backward.second):
         problem = f"{key} has different points backward and forward"

@@ -105,6 +105,10 @@ class Format:
     def can_write(self) -> bool:
         return self.write is not None
 
+    @property
+    def has_grid(self) -> bool:
+        return not self.grid.startswith("none")
+
     def errors(self, sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
         if self.read is not None:
             return self.read(sources, options)
@@ -123,7 +127,7 @@ def _catalogue() -> dict[str, Any]:
     return tomllib.loads((files("warpspace.formats") / "formats.toml").read_text("utf-8"))
 
 
-def description_of(name: str) -> dict[str, Any]:
+def describe(name: str) -> dict[str, Any]:
     description = _catalogue()["formats"][name]
     return {**description, "name": name, "endings": tuple(description["endings"])}
 

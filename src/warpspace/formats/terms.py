@@ -205,8 +205,8 @@ def errors_from_tables(
         elif isinstance(term, Affine):
             _affine(term, machine, constants, curves)
     series, surfaces = _merged(series, surfaces, source)
-    carried = "" if machine is not None else ", and that all axes carry the tool"
-    assumed = (*tables.assumed, f"assumes that the table corrects the entire error{carried}")
+    carried = "" if machine is not None else ", and all axes carry the tool"
+    assumed = (*tables.assumed, f"the table corrects the entire error{carried}")
     return measured.ImportedErrors(
         name,
         tuple(

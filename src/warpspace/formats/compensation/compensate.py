@@ -239,7 +239,7 @@ class Compensation(BeforeAfter, Result):
             "format": self.format.name,
             "loop": self.loop,
             "corrected": list(self.axes),
-            "points": dict(self.points) if not self.format.grid.startswith("none") else {},
+            "points": dict(self.points) if self.format.has_grid else {},
             "numbers": self.size,
             "files": [],
             "before": to_json(self.before_statistics),
@@ -286,7 +286,7 @@ class Compensation(BeforeAfter, Result):
 
 
 def format_points(kind: Format, points: Mapping[str, int]) -> str:
-    if kind.grid.startswith("none"):
+    if not kind.has_grid:
         return "no grid"
     return ", ".join(f"{axis} {count}" for axis, count in points.items()) + " points"
 
@@ -295,7 +295,7 @@ def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str,
     axes = [axis for axis in scene.machine.axes if axis in scene.workspace.volume_axes]
     if not axes:
         raise OptionError(
-            f"{scene.name}: no axis has a range in [workspace], so there is nothing to correct"
+            f"{scene.name}: no axis has a range in [workspace]; expected at least one"
         )
     if isinstance(points, tuple):
         by_axis = dict(points)
@@ -308,8 +308,7 @@ def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str,
     for axis, count in counts.items():
         if not 2 <= count <= kind.max_points:
             raise OptionError(
-                f"{{points}} {axis}={count}: {kind.name} takes 2 to {kind.max_points} points an"
-                " axis"
+                f"{{points}} {axis}={count}: expected 2 to {kind.max_points} points for {kind.name}"
             )
     return counts
 
@@ -324,8 +323,7 @@ def compensate(
     kind, loop, sign = find_format(options.formats[0]), options.loop or "", options.sign or ""
     if kind.write is None:
         raise OptionError(
-            f"{kind.name} cannot be written; expected a format that `warpspace import --formats`"
-            " lists as such"
+            f"{kind.name} cannot be written; `warpspace import --formats` lists those that can"
         )
     if options.orientation and not kind.orientation:
         raise OptionError(f"{{orientation}}: {kind.name} corrects the position only")
@@ -484,8 +482,9 @@ def sweep(scene: Scene, options: Compensate) -> Sweep:
     tables: list[tuple[str, int]] = []
     for name in names:
         kind, sizes = find_format(name), options.sweep or SIZES
-        gridless = kind.grid.startswith("none")
-        counts = [0] if gridless else [count for count in sizes if 2 <= count <= kind.max_points]
+        counts = [count for count in sizes if 2 <= count <= kind.max_points]
+        if not kind.has_grid:
+            counts = [0]
         tables += [(name, count) for count in counts]
     if len(tables) > MAX_TABLES:
         raise OptionError(f"{{sweep}} of {len(tables)} tables; expected at most {MAX_TABLES}")

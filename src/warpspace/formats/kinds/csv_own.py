@@ -11,7 +11,7 @@ import numpy as np
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, description_of
+from warpspace.formats.registry import Files, Format, ReadOptions, describe
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
@@ -84,12 +84,8 @@ def _to_fill_in(
 ) -> str:
     keys = [f"E{letter}{axis}" for letter in "XYZABC"]
     values = [*map(_value, keys), *(_value(key, "u({})") for key in keys if uncertain)]
-    lines = [
-        comments[0],
-        UNITS,
-        *comments[1:],
-        *(f"# {key}: {parameter(key).name}" for key in keys),
-    ]
+    lines = [comments[0], UNITS, *comments[1:]]
+    lines += [f"# {key}: {parameter(key).name}" for key in keys]
     lines += [",".join([*columns, *values]), *(row + "," * len(values) for row in cells)]
     return "\n".join(lines) + "\n"
 
@@ -372,10 +368,6 @@ def _surfaces(table: _CsvTable) -> measured.ImportedErrors:
 
 
 FORMAT = Format(
-    **description_of(NAME),
-    limits=f"{MAX_POINTS:,} rows",
-    recognise=recognise,
-    read=read,
-    write=write,
+    **describe(NAME), limits=f"{MAX_POINTS:,} rows", recognise=recognise, read=read, write=write
 )
 FORMATS = (FORMAT,)

@@ -12,14 +12,7 @@ import numpy as np
 
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import (
-    CORRECTION,
-    Files,
-    Format,
-    ReadOptions,
-    description_of,
-    has_pattern,
-)
+from warpspace.formats.registry import CORRECTION, Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import MM_PER, Source, format_comment
 from warpspace.formats.terms import Grid3, Tables
 
@@ -56,9 +49,8 @@ def _grid(source: Source, options: ReadOptions) -> Grid3:
     if not csv_rows.header:
         source.refuse("has no table", f"the columns {', '.join(HEADINGS)}")
     if tuple(csv_rows.header) != HEADINGS:
-        source.at(csv_rows.line).refuse(
-            f"columns {', '.join(csv_rows.header)}", ", ".join(HEADINGS)
-        )
+        head = source.at(csv_rows.line)
+        head.refuse(f"columns {', '.join(csv_rows.header)}", ", ".join(HEADINGS))
     rows: list[list[float]] = []
     for count, (number, parts) in enumerate(csv_rows, start=1):
         at = source.at(number)
@@ -137,7 +129,7 @@ def write(required: RequiredCorrections) -> Files:
 LARGEST = f"{MAX_AXIS_POINTS} points per axis, ±{MAX_COUNT} detection units times the magnification"
 FORMATS = (
     Format(
-        **description_of("fanuc-3d"), limits=LARGEST, recognise=has_pattern(rf"\A\s*{MARK}"),
+        **describe("fanuc-3d"), limits=LARGEST, recognise=has_pattern(rf"\A\s*{MARK}"),
         tables=read_tables, write=write, max_points=MAX_AXIS_POINTS,
     ),
 )  # fmt: skip

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, description_of
+from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe
 from warpspace.formats.source import Source, SourceLine
 from warpspace.formats.terms import HOLD_ENDS, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection
@@ -229,7 +229,7 @@ def _format_table(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) 
 
 
 FORMAT = Format(
-    **description_of("heidenhain"),
+    **describe("heidenhain"),
     recognise=recognise,
     tables=read_tables,
     write=write,

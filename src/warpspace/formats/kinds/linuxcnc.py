@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, description_of, has_pattern
+from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
 from warpspace.formats.terms import HOLD_ENDS, Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
@@ -223,7 +223,7 @@ def _write_matrix(corrections: RequiredCorrections) -> Files:
 
 
 COMP = Format(
-    **description_of("linuxcnc-comp"),
+    **describe("linuxcnc-comp"),
     recognise=_is_comp,
     tables=_read_comp,
     write=_write_comp,
@@ -231,7 +231,7 @@ COMP = Format(
     variants=(POSITIONS, OFFSETS),
 )
 MATRIX = Format(
-    **description_of("linuxcnc-matrix"),
+    **describe("linuxcnc-matrix"),
     recognise=has_pattern(r"matrixkins\.C_"),
     tables=_read_matrix,
     write=_write_matrix,

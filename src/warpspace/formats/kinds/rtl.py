@@ -18,7 +18,7 @@ from warpspace.formats.measured import (
     MeasuredRun,
     merge,
 )
-from warpspace.formats.registry import Format, ReadOptions, description_of, has_pattern
+from warpspace.formats.registry import Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
@@ -175,7 +175,7 @@ def read(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
 
 FORMATS = (
     Format(
-        **description_of(NAME),
+        **describe(NAME),
         recognise=has_pattern(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
         read=read,
     ),

@@ -22,14 +22,7 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.field.grid import shares
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import (
-    ERROR,
-    Files,
-    Format,
-    ReadOptions,
-    description_of,
-    has_pattern,
-)
+from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
 from warpspace.formats.terms import HOLD_ENDS, MODULO, AxisTable, Product, Tables, Term
 from warpspace.machine.axes import TravelDirection
@@ -401,15 +394,9 @@ def _interaction(matrix: Array) -> Array:
 
 FORMATS = (
     Format(
-        **description_of("sinumerik-enc"),
-        recognise=_assigns(ENC),
-        tables=_read_enc,
-        write=_write_enc,
+        **describe("sinumerik-enc"), recognise=_assigns(ENC), tables=_read_enc, write=_write_enc
     ),
     Format(
-        **description_of("sinumerik-cec"),
-        recognise=_assigns(CEC),
-        tables=_read_cec,
-        write=_write_cec,
+        **describe("sinumerik-cec"), recognise=_assigns(CEC), tables=_read_cec, write=_write_cec
     ),
 )

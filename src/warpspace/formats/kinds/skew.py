@@ -20,7 +20,7 @@ import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
 from warpspace.formats.measured import ErrorSeries, ImportedErrors, merge
-from warpspace.formats.registry import Files, Format, ReadOptions, description_of, has_pattern
+from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.formats.terms import Affine, Tables, errors_from_tables
 from warpspace.units import URAD_PER_RAD
@@ -289,8 +289,7 @@ def _check_switches(switches: set[str], defined: dict[str, Settings], notes: lis
     """Check that Marlin uses the lengths, and drop those of planes that it ignores."""
     if defined and "SKEW_CORRECTION" not in switches:
         at, _ = next(iter(next(iter(defined.values())).values()))
-        expected = "#define SKEW_CORRECTION, not commented out"
-        at.refuse("Marlin does not use these lengths", expected)
+        at.refuse("Marlin does not use these lengths", "#define SKEW_CORRECTION, not commented out")
     if "SKEW_CORRECTION_FOR_Z" in switches:
         return
     for plane in [plane for plane in defined if plane != "XY"]:
@@ -308,8 +307,7 @@ def _defined_factor(
         side = defined.get("XY", {}).get("SIDE_AD")
     if side is None or not {"DIAG_AC", "DIAG_BD"} <= settings.keys():
         at, _ = next(iter(settings.values()))
-        expected = f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side"
-        at.refuse(f"{plane}: {', '.join(settings)}", expected)
+        at.refuse(f"{plane}: {', '.join(settings)}", f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side")
     at, ac = settings["DIAG_AC"]
     lengths = (ac, settings["DIAG_BD"][1], side[1])
     factor = factor_of(lengths, at, plane)
@@ -332,7 +330,7 @@ def _write_marlin(corrections: RequiredCorrections) -> Files:
 
 
 KLIPPER = Format(
-    **description_of("klipper"),
+    **describe("klipper"),
     limits=f"three factors: {', '.join(PLANES)}",
     recognise=has_pattern(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
     read=_read_klipper,
@@ -340,6 +338,6 @@ KLIPPER = Format(
     write=_write_klipper,
 )
 MARLIN = Format(
-    **description_of("marlin"), recognise=_is_marlin, tables=_marlin_tables, write=_write_marlin
+    **describe("marlin"), recognise=_is_marlin, tables=_marlin_tables, write=_write_marlin
 )
 FORMATS = (KLIPPER, MARLIN)

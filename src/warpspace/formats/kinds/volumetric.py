@@ -22,7 +22,7 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, description_of
+from warpspace.formats.registry import Files, Format, ReadOptions, describe
 from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
@@ -226,8 +226,7 @@ def _check_header(
 ) -> None:
     for name in names:
         if name not in (*arguments, *ignored) and not error_name(name):
-            expected = "arguments X Y Z A B C and parameters such as EXX or C0B"
-            at.refuse(f"column {name!r}", expected)
+            at.refuse(f"column {name!r}", "arguments X Y Z A B C and parameters such as EXX or C0B")
     repeated = next((name for name in names if names.count(name) > 1), "")
     if repeated:
         at.refuse(f"column {repeated} occurs twice", "it once")
@@ -255,8 +254,7 @@ def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None
         if not row.is_constant:
             at.refuse(f"{key} without an argument", f"the argument {row.axis} with it")
     elif row.is_constant:
-        expected = "it in a block without arguments"
-        at.refuse(f"{file_name(key)} is constant", expected)
+        at.refuse(f"{file_name(key)} is constant", "it in a block without arguments")
     elif row.axis not in arguments:
         at.refuse(f"{key} over {' and '.join(arguments)}", f"the argument {row.axis}")
 
@@ -421,14 +419,14 @@ def _write_iso(corrections: RequiredCorrections) -> Files:
 
 
 ISO_FORMAT = Format(
-    **description_of(ISO),
+    **describe(ISO),
     recognise=_is_iso,
     read=_read_with(lambda source: [_read_iso(source)]),
     write=_write_iso,
     variants=VARIANTS,
 )
 ISG_FORMAT = Format(
-    **description_of(ISG),
+    **describe(ISG),
     recognise=_is_isg,
     read=_read_with(_read_isg),
     write=_write_isg,
