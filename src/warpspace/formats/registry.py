@@ -86,7 +86,7 @@ class Format:
     write: Callable[[RequiredCorrections], Files] | None = None  # the compensation files
     independent_files: bool = False  # each of its files is a complete table
     points: int = 21  # per axis, by default
-    max_points: int = 10_000  # per axis, limit of the controller
+    most_points: int = 10_000  # per axis, limit of the controller
     # it contains error parameters, from which the controller computes its corrections
     parametric: bool = False
     variants: tuple[str, ...] = ()  # published ones, the usual one first

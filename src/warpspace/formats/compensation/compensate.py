@@ -229,7 +229,7 @@ class Compensation(BeforeAfter, Result):
     def bytes(self) -> int:
         return sum(len(text.encode()) for text in self.files.values())
 
-    def texts(self, _ending: str = "", /) -> Mapping[str, str]:
+    def output_files(self, _ending: str = "", /) -> Mapping[str, str]:
         return self.files
 
     def as_json(self) -> dict[str, Any]:
@@ -306,9 +306,9 @@ def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str,
     else:
         counts = dict.fromkeys(axes, points or kind.points)
     for axis, count in counts.items():
-        if not 2 <= count <= kind.max_points:
+        if not 2 <= count <= kind.most_points:
             raise OptionError(
-                f"{{points}} {axis}={count}: expected 2 to {kind.max_points} points for {kind.name}"
+                f"{{points}} {axis}={count}: expected 2 to {kind.most_points} points for {kind.name}"
             )
     return counts
 
@@ -482,7 +482,7 @@ def sweep(scene: Scene, options: Compensate) -> Sweep:
     tables: list[tuple[str, int]] = []
     for name in names:
         kind, sizes = find_format(name), options.sweep or SIZES
-        counts = [count for count in sizes if 2 <= count <= kind.max_points]
+        counts = [count for count in sizes if 2 <= count <= kind.most_points]
         if not kind.has_grid:
             counts = [0]
         tables += [(name, count) for count in counts]

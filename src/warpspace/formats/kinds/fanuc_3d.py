@@ -130,6 +130,6 @@ LARGEST = f"{MAX_AXIS_POINTS} points per axis, ±{MAX_COUNT} detection units tim
 FORMATS = (
     Format(
         **describe("fanuc-3d"), limits=LARGEST, recognise=has_pattern(rf"\A\s*{MARK}"),
-        tables=read_tables, write=write, max_points=MAX_AXIS_POINTS,
+        tables=read_tables, write=write, most_points=MAX_AXIS_POINTS,
     ),
 )  # fmt: skip

@@ -233,6 +233,6 @@ FORMAT = Format(
     recognise=recognise,
     tables=read_tables,
     write=write,
-    max_points=MAX_TABLE_POINTS,
+    most_points=MAX_TABLE_POINTS,
 )
 FORMATS = (FORMAT,)

@@ -227,7 +227,7 @@ COMP = Format(
     recognise=_is_comp,
     tables=_read_comp,
     write=_write_comp,
-    max_points=MAX_ROWS,
+    most_points=MAX_ROWS,
     variants=(POSITIONS, OFFSETS),
 )
 MATRIX = Format(
