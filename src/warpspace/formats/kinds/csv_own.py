@@ -55,7 +55,7 @@ def _lines(rows: Iterable[Iterable[str]]) -> str:
 def surface_template(axes: tuple[str, str], places: tuple[Sequence[float], Sequence[float]]) -> str:
     axis, other = axes
     lines = [
-        f"# Errors of the {axis} axis over {axis} and {other}: actual - nominal, one row a point.",
+        f"# Errors of the {axis} axis over {axis}, {other}: actual - nominal, one row per point.",
         "# Every point of the grid occurs once, in any order. Interpolation is bilinear; beyond",
         "# the grid, the values of its edge apply. Columns that are not needed may be deleted.",
     ]

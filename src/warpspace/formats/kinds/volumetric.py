@@ -39,7 +39,7 @@ ASSUMED = (
     "beyond the points, the end values apply",
 )
 ROTATION = (
-    "rotation about the nominal axis (alternative_model 0), or with --variant the distorted axis",
+    "rotation about the nominal axis (alternative_model 0); --variant selects the distorted axis",
     "rotation about the distorted axis (alternative_model 1)",
 )
 IGNORED = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
