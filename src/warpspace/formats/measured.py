@@ -307,7 +307,7 @@ class ErrorTable:
 
     @property
     def directed(self) -> bool:
-        return any(way != UNDIRECTED for _, way, _ in self.rows)
+        return any(direction != UNDIRECTED for _, direction, _ in self.rows)
 
 
 def zero_key(scene: Scene) -> str:

@@ -308,7 +308,7 @@ def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str,
     for axis, count in counts.items():
         if not 2 <= count <= kind.most_points:
             raise OptionError(
-                f"{{points}} {axis}={count}: expected 2 to {kind.most_points} points for {kind.name}"
+                f"{{points}} {axis}={count}: expected 2 to {kind.most_points} for {kind.name}"
             )
     return counts
 
@@ -354,8 +354,8 @@ def compensate(
     reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
         forward, backward = (
-            evaluate_before_after(controller, grid, way)
-            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+            evaluate_before_after(controller, grid, direction)
+            for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
         directions = {"forward": forward, "backward": backward}
         reversal = reversal_notes(forward, backward, scene.errors, scene.model.direction)
@@ -368,12 +368,10 @@ def compensate(
 
 def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
     """Return the scene with best-fit placement if one of the formats has no constant offsets."""
-    if (
-        all(kind.offsets for kind in kinds)
-        or build_corrector(scene, loop).loop is not Loop.RELATIVE
-    ):
+    if all(kind.offsets for kind in kinds):
         return scene
-    return replace(scene, placed=True)
+    is_relative = build_corrector(scene, loop).loop is Loop.RELATIVE
+    return replace(scene, placed=True) if is_relative else scene
 
 
 def _with_placement(

@@ -41,9 +41,8 @@ class CorrectedPoints:
             placement = fit_placement(self.points.model, grid, nodes.field(errors).error_um)
         position, orientation = self.points.without(placement, *self.points.residual(errors))
         if self.reference is not None:
-            position = (
-                position - self.reference.without(placement, *self.reference.residual(errors))[0]
-            )
+            still, _ = self.reference.without(placement, *self.reference.residual(errors))
+            position = position - still
         shape = np.broadcast_shapes(position.shape, self.nominal_mm.shape)
         error_field = ErrorField(
             np.broadcast_to(self.nominal_mm, shape),
