@@ -76,7 +76,7 @@ _BUNDLED: "tuple[tuple[str, Task, str, str], ...]" = (
     ("clamp", "improve", "parts.clamp:Clamp",
      "Find where to clamp a part on the machine of SCENE."),
     ("compensate", "improve", "formats.compensation.compensate:Compensate",
-     "Write a table of compensation, and say what it leaves."),
+     "Write a compensation table and report the residual error."),
     ("montecarlo", "design", "analysis.commands.montecarlo:MonteCarlo",
      "Show how large |E| gets on machines within tolerance."),
     ("allocate", "design", "analysis.commands.allocate:Allocate",
