@@ -9,7 +9,7 @@ from functools import cache
 
 from reliability.outcome import Outcome
 from warpspace.formats.compensation.compensate import table_points
-from warpspace.formats.compensation.corrections import Wanted, build_corrector
+from warpspace.formats.compensation.corrections import RequiredCorrections, build_corrector
 from warpspace.formats.registry import formats
 from warpspace.parts.program import Program
 from warpspace.scene.library import load_scene
@@ -37,7 +37,7 @@ def writers() -> Mapping[str, Callable[[str], Mapping[str, str]]]:
         if kind.write is None:
             continue
         points = table_points(kind, scene, COUNT_NODES)
-        wanted = Wanted(scene, corrector, points)
+        wanted = RequiredCorrections(scene, corrector, points)
         found[kind.name] = lambda title, kind=kind, wanted=wanted: kind.write(
             replace(wanted, scene=replace(wanted.scene, title=title))
         )
