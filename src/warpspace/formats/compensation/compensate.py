@@ -294,9 +294,7 @@ def format_points(kind: Format, points: Mapping[str, int]) -> str:
 def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str, int]:
     axes = [axis for axis in scene.machine.axes if axis in scene.workspace.volume_axes]
     if not axes:
-        raise OptionError(
-            f"{scene.name}: no axis has a range in [workspace]; expected at least one"
-        )
+        raise OptionError(f"{scene.name}: nothing to correct; expected a range in [workspace]")
     if isinstance(points, tuple):
         by_axis = dict(points)
         for axis in by_axis:
