@@ -308,7 +308,7 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert "It adds EYX." in html
     column.part.parse("x.csv", TABLE)()
     assert "It replaces EXX and adds EYX." in column.settle()
-    with pytest.raises(SceneError, match="does not say which axis"):
+    with pytest.raises(SceneError, match="does not state its axis"):
         column.part.parse("other.comp", COMP.encode())()
     assert [one.name for one in column.part._files] == ["y.csv", "x.csv"]
 
@@ -327,9 +327,9 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     assert len(column.part._problem[1]) <= 1500
     column.do("remove", "0")
     column.part.parse("data.dat", b"0\t0.001\t0.002\n")()
-    assert "no format that is known" in column.settle()
+    assert "matches no known format" in column.settle()
     for word, value, said in (
-        ("set.format", "linuxcnc-comp", "which axis"),
+        ("set.format", "linuxcnc-comp", "its axis"),
         ("set.axis", "X", "It adds EXX."),
         ("set.format", "heidenhain", "data.dat: "),
         ("set.format", HOSTILE, "expected one of"),

@@ -13,7 +13,7 @@ from warpspace.calibration import read_readings
 from warpspace.calibration.readings import bundled_data, find_data
 from warpspace.formats.compensation.compensate import Compensate, compensate
 from warpspace.formats.registry import ReadOptions, find_format, formats, open_upload, read_errors
-from warpspace.formats.to_scene import base_scene, into_scene
+from warpspace.formats.to_scene import base_scene, build_imported_scene
 from warpspace.parts.program import Program
 from warpspace.resources import scenes_dir
 from warpspace.scene.library import load_scene, parse_scene, scene_names
@@ -147,7 +147,9 @@ def _read_import(name: str | None, content: bytes, _: Path) -> object:
     ] or [open_upload("x", content)]
     if name and (kind := find_format(name)).tables is not None:
         kind.tables(sources, options)
-    return into_scene(read_errors(sources, options, *([name] if name else [])), base, "fuzz", "x")
+    return build_imported_scene(
+        read_errors(sources, options, *([name] if name else [])), base, "fuzz", "x"
+    )
 
 
 def _measured() -> list[bytes]:

@@ -50,7 +50,7 @@ def test_sinumerik_page_242_interpolates_linearly_and_holds_its_ends():
 
 
 def test_sinumerik_page_242_is_a_positioning_error_in_um():
-    found = read_errors(sources(sinumerik_242()), PLAIN).found
+    found = read_errors(sources(sinumerik_242()), PLAIN).imported
     (one,) = found.series
     assert one.key == "EXX"
     assert one.values[:3] == pytest.approx([3.0, 10.0, 12.0])
@@ -107,7 +107,7 @@ def test_sinumerik_cec_direction_acts_in_one_direction_of_travel():
     assert tables.corrections(at, 1)["X"] == pytest.approx(-0.012)
     assert tables.corrections(at, -1)["X"] == pytest.approx(0.0)
     # the sag of X over Y, and what Z adds
-    found = read_errors(sources(CEC.format(direction=1, other=0)), PLAIN).found
+    found = read_errors(sources(CEC.format(direction=1, other=0)), PLAIN).imported
     keys = {one.key: one for one in found.series}
     assert set(keys) == {"EXY", "EXZ"}
     assert keys["EXY"].mean(FORWARD)[-1] == pytest.approx(12.0)
@@ -190,7 +190,7 @@ def test_matrixkins_squareness_of_printed_diagonals():
 
 def test_matrixkins_shear_is_the_squareness_of_y():
     text = "setp matrixkins.C_xx 1\nsetp matrixkins.C_xy 0.01695\nsetp matrixkins.C_yy 1.0001\n"
-    found = read_errors(sources(text), PLAIN).found
+    found = read_errors(sources(text), PLAIN).imported
     assert found.constants == {"EC0Y": pytest.approx(16950.0)}
     # the joint moves 0.1 mm/m further than commanded: the axis would be that much short
     assert found.curves == {"EYY": {"poly": [0.0, pytest.approx(-0.1)]}}
@@ -204,7 +204,7 @@ def test_klipper_printed_lengths():
     assert skew_factor(ac, bd, ad) == pytest.approx(cosine / math.sqrt(1 - cosine**2), rel=1e-12)
     assert skew_factor(ac, bd, ad) == pytest.approx(-0.0169507, abs=5e-8)
     text = "SET_SKEW XY=140.4,142.8,99.8 XZ=141.6,141.4,99.8 YZ=142.4,140.5,99.5\n"
-    found = read_errors(sources(text), PLAIN).found
+    found = read_errors(sources(text), PLAIN).imported
     assert set(found.constants) == {"EC0Y", "EA0Z", "EB0Z"}
     # the diagonal in X+/Y+ is the shorter one: Y leans towards −x, which is +γ about z
     assert found.constants["EC0Y"] == pytest.approx(16950.7, abs=0.1)
@@ -250,7 +250,7 @@ def test_heidenhain_y_over_z_of_the_manual_interpolates_lines_without_entry():
     assert table.corrections({"Z": at})["Y"] == pytest.approx(
         [0.0, 0.03, 0.10, 0.11, 0.12, 0.12], abs=1e-12
     )
-    found = read_errors(files, PLAIN).found
+    found = read_errors(files, PLAIN).imported
     assert [one.key for one in found.series] == ["EYZ"]
 
 
@@ -280,7 +280,7 @@ Z      X      EXX    EYX    EZX    EAX    EBX    ECX
 
 
 def test_etalon_example_in_um_and_urad():
-    found = read_errors(sources(ETALON), PLAIN).found
+    found = read_errors(sources(ETALON), PLAIN).imported
     assert found.constants == {"EC0B": pytest.approx(22.355737), "EA0B": pytest.approx(47.622950)}
     (one,) = found.series
     assert one.key == "EXY"
@@ -289,12 +289,12 @@ def test_etalon_example_in_um_and_urad():
 
 
 def test_isg_example_of_two_arguments():
-    found = read_errors(sources(ISG_TWO), PLAIN).found
-    assert [plane.key for plane in found.planes] == ["EXX", "EYX", "EZX", "EAX", "EBX", "ECX"]
-    first = found.planes[0]
+    found = read_errors(sources(ISG_TWO), PLAIN).imported
+    assert [plane.key for plane in found.surfaces] == ["EXX", "EYX", "EZX", "EAX", "EBX", "ECX"]
+    first = found.surfaces[0]
     assert (first.axes, first.first, first.second) == (("X", "Z"), (0.0, 10.0), (0.0, 100.0))
     assert first.values == ((20.0, 10.0), (0.0, 30.0))
-    pitch = found.planes[4]
+    pitch = found.surfaces[4]
     assert np.array(pitch.values) == pytest.approx(np.array([[4200.0, 4000.0], [1100.0, 1500.0]]))
 
 
@@ -307,7 +307,7 @@ def test_mean_reversal_and_repeatability_of_five_targets_and_five_runs(tmp_path)
     for run in range(5):
         lines += [f"{q},{run + 1},+,{there[run, i]}" for i, q in enumerate(targets)]
         lines += [f"{q},{run + 1},-,{back[run, 4 - i]}" for i, q in enumerate(reversed(targets))]
-    (one,) = read_errors(sources("\n".join(lines)), PLAIN).found.series
+    (one,) = read_errors(sources("\n".join(lines)), PLAIN).imported.series
     mean_up, mean_down = there.sum(axis=0) / 5, back.sum(axis=0) / 5
     assert one.mean(FORWARD) == pytest.approx(mean_up)
     assert one.mean(BACKWARD) == pytest.approx(mean_down)

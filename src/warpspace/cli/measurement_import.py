@@ -14,7 +14,7 @@ from warpspace.cli.shared_options import SCENES, print_json, write_text
 from warpspace.cli.tables import echo, print_table, print_text, progress
 from warpspace.exceptions import OptionError
 from warpspace.formats.kinds import csv_own
-from warpspace.formats.measured import summaries, summary_table
+from warpspace.formats.measured import summarise_errors, summary_table
 from warpspace.formats.registry import (
     ReadOptions,
     open_files,
@@ -22,7 +22,7 @@ from warpspace.formats.registry import (
     read_errors,
 )
 from warpspace.formats.registry import formats as all_formats
-from warpspace.formats.to_scene import base_scene, into_scene
+from warpspace.formats.to_scene import base_scene, build_imported_scene
 from warpspace.machine.axes import is_axis_name
 from warpspace.outputs.file_output import check_target, mesh_files, write_with_meshes
 from warpspace.scene.library import parse_scene
@@ -93,12 +93,12 @@ def import_files(
         source = files[0].name if len(files) == 1 else f"{files[0].name} and {len(files) - 1} more"
         if base is not None and (title or not scenes):
             base = replace(base, title=one_line(title or files[0].stem), name=Path(output).stem)
-        made = into_scene(reading, base, title or files[0].stem, source)
+        made = build_imported_scene(reading, base, title or files[0].stem, source)
     kind = reading.format
     recognition = "recognised" if reading.recognised else "by --format"
     echo(f"warpspace: {kind.name}, {kind.title} ({recognition})", err=True)
     write_text(output, made.text, force=force)
-    notes = [*reading.found.notes, *made.notes]
+    notes = [*reading.imported.notes, *made.notes]
     if as_json:
         print_json(
             {
@@ -106,18 +106,18 @@ def import_files(
                 "recognised": reading.recognised,
                 "machine": made.scene.machine.name,
                 "chain": str(made.scene.machine.chain),
-                "units": list(reading.found.units),
-                "errors": to_json(summaries(reading.found)),
-                "assumed": list(reading.found.assumed),
+                "units": list(reading.imported.units),
+                "errors": to_json(summarise_errors(reading.imported)),
+                "assumed": list(reading.imported.assumed),
                 "notes": notes,
                 "output": str(output),
             }
         )
         return
     print_text(f"{output}: {kind.title}, {made.scene.machine.chain}")
-    print_text(f"  units: {', '.join(reading.found.units)}")
-    print_blocks([summary_table(reading.found)])
-    for text in reading.found.assumed:
+    print_text(f"  units: {', '.join(reading.imported.units)}")
+    print_blocks([summary_table(reading.imported)])
+    for text in reading.imported.assumed:
         print_text(f"  assumed: {text}")
     for text in notes:
         print_text(f"  {text}")
@@ -132,7 +132,7 @@ def _import_robot(
     *,
     force: bool,
 ) -> None:
-    from warpspace.bodies.own_meshes import frame_meshes
+    from warpspace.bodies.mesh_files import frame_meshes
     from warpspace.scene.urdf import imported_text, omitted_notes, place_robot, read_robot
 
     target, robot = Path(output), files[0]
@@ -183,7 +183,7 @@ def _write_template(
                 f"--over {second_axis!r}; expected another axis than {name}, such as Z=0,100"
             )
         second_positions = _positions(values_text if equals else None, "--over")
-        at = (places or csv_own.usual_places(name), second_positions or csv_own.usual_places(other))
+        at = (places or csv_own.default_positions(name), second_positions or csv_own.default_positions(other))
         if len(at[0]) * len(at[1]) > MAX_ROWS:
             raise OptionError(
                 f"{len(at[0])} × {len(at[1])} points; expected at most {MAX_ROWS:,} rows"

@@ -1,8 +1,9 @@
-"""What a file of errors holds, whatever its format: the neutral form of imports and of scenes."""
+"""Imported errors independent of the file format, and their exchange with scenes."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import chain, product
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,19 +19,19 @@ from warpspace.machine.curves.table import TableCurve, TwoArguments
 from warpspace.scene.model import Scene
 from warpspace.units import Array
 
-FORWARD, BACKWARD, BOTH = 1, -1, 0
-"""Direction of travel in which a value was taken; both where a file does not tell."""
+FORWARD, BACKWARD, UNDIRECTED = 1, -1, 0
+"""Direction of travel of a reading; undirected where a file does not state it."""
 REPEATABILITY = 4.0  # ISO 230-2, 3.17: unidirectional repeatability in standard deviations
 Matrix = tuple[tuple[float, ...], ...]
 
 
 @dataclass(frozen=True)
 class MeasuredRun:
-    """One run over the positions of a series."""
+    """One measuring run over the positions of a series."""
 
     number: int
-    direction: int  # 1 forward, −1 backward, 0 where not told
-    values: tuple[float, ...]  # (n,), µm or µrad; not a number where a position was left out
+    direction: int  # 1 forward, −1 backward, 0 where not stated
+    values: tuple[float, ...]  # (n,), µm or µrad; not a number at positions without a reading
 
 
 @dataclass(frozen=True)
@@ -40,32 +41,36 @@ class ErrorSeries:
     key: str  # parameter
     positions: tuple[float, ...]  # (n,), mm or degrees; ascending
     runs: tuple[MeasuredRun, ...]  # at least one
-    # (n,), µm or µrad; standard uncertainties (k = 1); empty where none are given
+    # (n,), µm or µrad; standard uncertainties (k = 1); empty where none are stated
     uncertainty: tuple[float, ...] = ()
+
+    @classmethod
+    def undirected(cls, key: str, positions: ArrayLike, values: ArrayLike) -> "ErrorSeries":
+        """Build a series of one run without direction of travel."""
+        run = MeasuredRun(1, UNDIRECTED, tuple(np.asarray(values, dtype=float).tolist()))
+        return cls(key, tuple(np.asarray(positions, dtype=float).tolist()), (run,))
 
     def _runs(self, direction: int) -> Array:
         return np.array([run.values for run in self.runs if run.direction == direction])
 
     def mean(self, direction: int) -> Array | None:
-        """Give the mean of the runs in one direction, [n]; None where there are none.
+        """Return the mean of the runs in one direction, [n]; None without such runs.
 
         Forward it is x̄ᵢ↑ of ISO 230-2, backward x̄ᵢ↓.
         """
-        found = self._runs(direction)
-        return np.nanmean(found, axis=0) if len(found) else None
+        runs = self._runs(direction)
+        return np.nanmean(runs, axis=0) if len(runs) else None
 
-    def toward(self, direction: int) -> Array:
-        """Give the mean in a direction of travel, [n]; of both where there are no such runs."""
+    def in_direction(self, direction: int) -> Array:
+        """Return the mean in a direction of travel, [n]; without such runs that of all."""
         mean = self.mean(direction)
         return self.values if mean is None else mean
 
     @property
     def values(self) -> Array:
-        """Mean bidirectional error, [n], µm or µrad (x̄ᵢ); the mean of what there is otherwise."""
-        means = [
-            found for way in (FORWARD, BACKWARD, BOTH) if (found := self.mean(way)) is not None
-        ]
-        return np.mean(means, axis=0)
+        """Mean bidirectional error, [n], µm or µrad (x̄ᵢ); else the mean of the existing runs."""
+        means = [self.mean(direction) for direction in (FORWARD, BACKWARD, UNDIRECTED)]
+        return np.mean([mean for mean in means if mean is not None], axis=0)
 
     @property
     def reversal(self) -> Array | None:
@@ -75,8 +80,8 @@ class ErrorSeries:
 
     def deviation(self, direction: int) -> Array | None:
         """Estimate the standard deviation in a direction, [n] (sᵢ); None below two runs."""
-        found = self._runs(direction)
-        return np.nanstd(found, axis=0, ddof=1) if len(found) > 1 else None
+        runs = self._runs(direction)
+        return np.nanstd(runs, axis=0, ddof=1) if len(runs) > 1 else None
 
     @property
     def repeatability(self) -> Array | None:
@@ -88,8 +93,8 @@ class ErrorSeries:
         if up is None or down is None or reversal is None:
             return None
         half = REPEATABILITY / 2.0
-        both = half * (up + down) + np.abs(reversal)
-        return np.max([both, REPEATABILITY * up, REPEATABILITY * down], axis=0)
+        bidirectional = half * (up + down) + np.abs(reversal)
+        return np.max([bidirectional, REPEATABILITY * up, REPEATABILITY * down], axis=0)
 
 
 @dataclass(frozen=True)
@@ -106,80 +111,86 @@ class ErrorSurface:
     backward: Matrix = ()
 
     def table(self, direction: int) -> Array:
-        """Give the values of a direction of travel, the mean of both for 0, (first, second)."""
+        """Return the values of a direction of travel, the mean of both for 0, (first, second)."""
         forward = np.array(self.values)
         backward = np.array(self.backward) if self.backward else forward
-        return {FORWARD: forward, BACKWARD: backward, BOTH: (forward + backward) / 2.0}[direction]
+        return {FORWARD: forward, BACKWARD: backward, UNDIRECTED: (forward + backward) / 2.0}[
+            direction
+        ]
 
 
-def plane_by_direction(
+def surface_from_directions(
     key: str,
     axes: tuple[str, str],
     positions: tuple[ArrayLike, ArrayLike],
     tables: Mapping[int, Array],
 ) -> ErrorSurface:
-    """Build an error over two axes of its values in both directions of travel."""
-    forward, backward = (
-        tuple(tuple(row) for row in tables[way].tolist()) for way in (FORWARD, BACKWARD)
-    )
+    """Build an error over two axes from its values in both directions of travel."""
+    forward = tuple(map(tuple, tables[FORWARD].tolist()))
+    backward = tuple(map(tuple, tables[BACKWARD].tolist()))
     first, second = (tuple(np.asarray(at, dtype=float).tolist()) for at in positions)
     return ErrorSurface(key, axes, first, second, forward, () if backward == forward else backward)
 
 
 @dataclass(frozen=True)
-class Imported:
-    """What a file holds."""
+class ImportedErrors:
+    """Contents of a file of errors."""
 
     format: str  # name of its format
     series: tuple[ErrorSeries, ...] = ()
-    planes: tuple[ErrorSurface, ...] = ()
+    surfaces: tuple[ErrorSurface, ...] = ()
     constants: Mapping[str, float] = field(default_factory=dict[str, float])  # µm or µrad
     # µm or µrad; standard uncertainty of constants
     uncertainty: Mapping[str, float] = field(default_factory=dict[str, float])
-    units: tuple[str, ...] = ()  # units that the file has its numbers in
-    # what the file does not say and was taken for granted, a sentence each
+    units: tuple[str, ...] = ()  # of the numbers in the file
+    # about facts that the file does not state, a sentence each
     assumed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()  # what else a user should know
-    # where its component errors act, by kind of axis; empty where the file does not tell
+    notes: tuple[str, ...] = ()  # for the user
+    # convention of its component errors, by kind of axis; empty where the file does not state it
     convention: Mapping[str, str] = field(default_factory=dict[str, str])
-    # errors that no table but another spelling of a scene file holds: {"poly": […]}
+    # errors in another form of a scene file than a table: {"poly": […]}
     curves: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def keys(self) -> tuple[str, ...]:
-        own = [one.key for one in (*self.series, *self.planes)]
-        return tuple(dict.fromkeys((*own, *self.constants, *self.curves)))
+        tabulated = [error.key for error in (*self.series, *self.surfaces)]
+        return tuple(dict.fromkeys((*tabulated, *self.constants, *self.curves)))
 
     @property
     def axes(self) -> tuple[str, ...]:
-        own = [parameter(key).axis for key in self.keys]
-        return tuple(dict.fromkeys((*own, *(axis for one in self.planes for axis in one.axes))))
+        axes = dict.fromkeys(parameter(key).axis for key in self.keys)
+        for surface in self.surfaces:
+            axes |= dict.fromkeys(surface.axes)
+        return tuple(axes)
 
     @property
     def size(self) -> int:
-        series = sum(len(run.values) for one in self.series for run in one.runs)
-        planes = sum(
-            len(one.first) * len(one.second) * (2 if one.backward else 1) for one in self.planes
+        series = sum(len(run.values) for series in self.series for run in series.runs)
+        surfaces = sum(
+            len(surface.first) * len(surface.second) * (2 if surface.backward else 1)
+            for surface in self.surfaces
         )
-        return series + planes + len(self.constants)
+        return series + surfaces + len(self.constants)
 
 
-def merge(parts: Sequence[Imported]) -> Imported:
-    found: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
-    for name in (entry.name for entry in fields(Imported)[1:]):
+def merge(parts: Sequence[ImportedErrors]) -> ImportedErrors:
+    merged: dict[str, Any] = {"format": " + ".join(dict.fromkeys(part.format for part in parts))}
+    for name in (column.name for column in fields(ImportedErrors)[1:]):
         values = [getattr(part, name) for part in parts]
         if isinstance(values[0], Mapping):
-            found[name] = {key: value for table in values for key, value in table.items()}
+            merged[name] = {key: value for table in values for key, value in table.items()}
         else:
-            every = [one for value in values for one in value]
-            # an error that is given twice is refused later
-            found[name] = tuple(every if name in ("series", "planes") else dict.fromkeys(every))
-    return Imported(**found)
+            members = [member for group in values for member in group]
+            # a repeated error is refused later
+            merged[name] = tuple(
+                members if name in ("series", "surfaces") else dict.fromkeys(members)
+            )
+    return ImportedErrors(**merged)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorSummary:
-    """One error."""
+    """Summary of one error for lists."""
 
     json_keys: ClassVar[tuple[str, ...]] = (
         "key", "unit", "kind", "points", "runs", "directions", "range", "smallest", "largest",
@@ -190,7 +201,7 @@ class ErrorSummary:
     kind: str
     points: int = 1
     runs: int = 0
-    directions: str = ""  # "+", "-", "+ -", or empty where not told
+    directions: str = ""  # "+", "-", "+ -", or empty where not stated
     range: tuple[float, float] | None = None  # first and last position, mm or degrees
     smallest: float  # of the mean
     largest: float
@@ -204,26 +215,27 @@ class ErrorSummary:
         return parameter(self.key).unit
 
 
-def summaries(found: Imported) -> list[ErrorSummary]:
-    rows = [_of_series(one) for one in found.series]
-    for plane in found.planes:
-        values = plane.table(BOTH)
+def summarise_errors(imported: ImportedErrors) -> list[ErrorSummary]:
+    rows = [_series_summary(series) for series in imported.series]
+    for surface in imported.surfaces:
+        values = surface.table(UNDIRECTED)
         rows.append(
             ErrorSummary(
-                key=plane.key,
-                kind=f"over {plane.axes[1]}{', by direction' if plane.backward else ''}",
+                key=surface.key,
+                kind=f"over {surface.axes[1]}{', by direction' if surface.backward else ''}",
                 points=values.size,
-                directions="+ -" if plane.backward else "",
-                range=(plane.first[0], plane.first[-1]),
+                directions="+ -" if surface.backward else "",
+                range=(surface.first[0], surface.first[-1]),
                 smallest=float(values.min()),
                 largest=float(values.max()),
             )
         )
-    for key, value in found.constants.items():
-        own = found.uncertainty.get(key)
-        row = ErrorSummary(key=key, kind="constant", smallest=value, largest=value, uncertainty=own)
-        rows.append(row)
-    for key, curve in found.curves.items():
+    for key, error in imported.constants.items():
+        u = imported.uncertainty.get(key)
+        rows.append(
+            ErrorSummary(key=key, kind="constant", smallest=error, largest=error, uncertainty=u)
+        )
+    for key, curve in imported.curves.items():
         ((kind, numbers),) = curve.items()
         last = numbers[-1][1] if kind == "harmonics" else numbers[-1]
         rows.append(
@@ -232,15 +244,15 @@ def summaries(found: Imported) -> list[ErrorSummary]:
     return rows
 
 
-def summary_table(found: Imported) -> blocks.Table:
-    """List all errors of an import."""
+def summary_table(imported: ImportedErrors) -> blocks.Table:
+    """Return the table of all errors of an import."""
     rows = [
         (
-            one.key, one.kind, one.points, one.runs or None, one.directions,
-            f"{one.range[0]:g} … {one.range[1]:g}" if one.range else "",
-            one.smallest, one.largest, one.unit, one.mean_reversal, one.uncertainty,
+            error.key, error.kind, error.points, error.runs or None, error.directions,
+            f"{error.range[0]:g} … {error.range[1]:g}" if error.range else "",
+            error.smallest, error.largest, error.unit, error.mean_reversal, error.uncertainty,
         )
-        for one in summaries(found)
+        for error in summarise_errors(imported)
     ]  # fmt: skip
     columns = (
         blocks.Column("error", leads=True),
@@ -257,57 +269,59 @@ def summary_table(found: Imported) -> blocks.Table:
     return blocks.Table(columns, rows)
 
 
-def _of_series(one: ErrorSeries) -> ErrorSummary:
-    values, reversal, repeatability = one.values, one.reversal, one.repeatability
+def _series_summary(series: ErrorSeries) -> ErrorSummary:
+    values, reversal, repeatability = series.values, series.reversal, series.repeatability
     if repeatability is not None and np.isnan(repeatability).all():
         repeatability = None
-    ways = {run.direction for run in one.runs}
+    directions = {run.direction for run in series.runs}
     return ErrorSummary(
-        key=one.key,
+        key=series.key,
         kind="table" if reversal is None else "by direction",
-        points=len(one.positions),
-        runs=len(one.runs),
-        directions=" ".join(sign for sign, way in (("+", FORWARD), ("-", BACKWARD)) if way in ways),
-        range=(one.positions[0], one.positions[-1]),
+        points=len(series.positions),
+        runs=len(series.runs),
+        directions=" ".join(
+            sign for sign, code in (("+", FORWARD), ("-", BACKWARD)) if code in directions
+        ),
+        range=(series.positions[0], series.positions[-1]),
         smallest=float(values.min()),
         largest=float(values.max()),
         mean_reversal=None if reversal is None else float(reversal.mean()),
         repeatability=None if repeatability is None else float(np.nanmax(repeatability)),
-        uncertainty=max(one.uncertainty) if one.uncertainty else None,
+        uncertainty=max(series.uncertainty) if series.uncertainty else None,
     )
 
 
-WAYS = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
-SAME = 1e-9  # mm or degrees: positions nearer than this are one
+RUN_DIRECTION = {TravelDirection.FORWARD: FORWARD, TravelDirection.BACKWARD: BACKWARD}
+POSITION_TOLERANCE = 1e-9  # mm or degrees; nearer positions are equal
 Point = tuple[SourceLine, float, float, float]  # line, position of both axes, value
 
 
 @dataclass(frozen=True)
 class ErrorTable:
-    """Errors side by side: constants, those of one axis, or one over two axes."""
+    """Errors in the columns of a table: constants, those of one axis, or one over two axes."""
 
-    axes: tuple[str, ...]  # that they are over; none for constants
+    axes: tuple[str, ...]  # arguments; none for constants
     keys: tuple[str, ...]
     # positions, direction, and a value for each key
     rows: list[tuple[tuple[float, ...], int, Sequence[float]]]
 
     @property
     def directed(self) -> bool:
-        return any(way != BOTH for _, way, _ in self.rows)
+        return any(direction != UNDIRECTED for _, direction, _ in self.rows)
 
 
 def zero_key(scene: Scene) -> str:
-    """Give an error of the machine for a file of a scene without any: its value is zero."""
+    """Return an error parameter of the machine, written as zero for a scene without errors."""
     axis = next(iter(scene.machine.axes))
     return f"E{'XYZABC'[direction_index(axis) + (0 if is_linear(axis) else 3)]}{axis}"
 
 
-def sampled(wanted: RequiredCorrections) -> Imported:
-    """Sample the errors of a scene at the points of a table."""
-    scene = wanted.scene
+def sample_errors(corrections: RequiredCorrections) -> ImportedErrors:
+    """Compute the errors of a scene at the points of a table."""
+    scene = corrections.scene
     constants: dict[str, float] = {}
     series: list[ErrorSeries] = []
-    planes: list[ErrorSurface] = []
+    surfaces: list[ErrorSurface] = []
     for key, curve in scene.errors.functions.items():
         row = parameter(key)
         if row.axis not in scene.machine.axes:
@@ -315,136 +329,140 @@ def sampled(wanted: RequiredCorrections) -> Imported:
         if row.is_constant:
             constants[key] = float(curve.amplitude)
             continue
-        count = wanted.points.get(row.axis) or max(wanted.points.values())
+        count = corrections.points.get(row.axis) or max(corrections.points.values())
         at = np.linspace(*scene.axis_span(row.axis), count)
-        ways = _ways(curve)
+        curves = _curves_by_direction(curve)
         other = _second_axis(curve)
-        tabled = all(isinstance(one, TableCurve | TwoArguments) for one in ways.values() or [curve])
+        tabled = all(
+            isinstance(part, TableCurve | TwoArguments) for part in curves.values() or [curve]
+        )
         if tabled and (other is not None or len(curve.kinks) <= count):
             at = np.array(curve.kinks)
         elif other is not None:
             at = np.union1d(at, curve.kinks)
         if other is not None:
+            axis, places = other
+            arguments = {row.axis: at[:, None], axis: places}
+            shape = (len(at), len(places))
             tables = {
-                way: np.asarray(
-                    part.evaluate_at(row.axis, {row.axis: at[:, None], other[0]: other[1]})
-                )
-                + np.zeros((len(at), len(other[1])))
-                for way, part in {FORWARD: curve, BACKWARD: curve, **ways}.items()
+                direction: np.broadcast_to(part.evaluate_at(row.axis, arguments), shape)
+                for direction, part in {FORWARD: curve, BACKWARD: curve, **curves}.items()
             }
-            planes.append(plane_by_direction(key, (row.axis, other[0]), (at, other[1]), tables))
+            surfaces.append(surface_from_directions(key, (row.axis, axis), (at, places), tables))
         else:
             runs = tuple(
-                MeasuredRun(1, way, tuple(np.asarray(part.evaluate(at)).tolist()))
-                for way, part in (ways or {BOTH: curve}).items()
+                MeasuredRun(1, direction, tuple(np.asarray(part.evaluate(at)).tolist()))
+                for direction, part in (curves or {UNDIRECTED: curve}).items()
             )
             series.append(ErrorSeries(key, tuple(at.tolist()), runs))
-    return Imported("scene", tuple(series), tuple(planes), constants)
+    return ImportedErrors("scene", tuple(series), tuple(surfaces), constants)
 
 
-def in_one_direction(held: Imported, wanted: RequiredCorrections) -> Imported:
-    """Give errors by direction of travel as the scene has them in the direction it looks at."""
-    way = WAYS.get(TravelDirection(wanted.scene.model.direction), BOTH)
-
-    return replace(
-        held,
-        series=tuple(
-            ErrorSeries(
-                one.key, one.positions, (MeasuredRun(1, BOTH, tuple(one.toward(way).tolist())),)
-            )
-            for one in held.series
-        ),
-        planes=tuple(
-            replace(one, values=tuple(map(tuple, one.table(way).tolist())), backward=())
-            for one in held.planes
-        ),
-    )
+def to_single_direction(
+    imported: ImportedErrors, corrections: RequiredCorrections
+) -> ImportedErrors:
+    """Return errors by direction of travel as values for the direction of the scene."""
+    direction = RUN_DIRECTION.get(TravelDirection(corrections.scene.model.direction), UNDIRECTED)
+    series = [
+        ErrorSeries.undirected(error.key, error.positions, error.in_direction(direction))
+        for error in imported.series
+    ]
+    surfaces = [
+        replace(error, values=tuple(map(tuple, error.table(direction).tolist())), backward=())
+        for error in imported.surfaces
+    ]
+    return replace(imported, series=tuple(series), surfaces=tuple(surfaces))
 
 
-def _ways(curve: ErrorFunction) -> dict[int, ErrorFunction]:
+def _curves_by_direction(curve: ErrorFunction) -> dict[int, ErrorFunction]:
     if not isinstance(curve, Directional):
         return {}
     return {FORWARD: curve.forward, BACKWARD: curve.backward}
 
 
 def _second_axis(curve: ErrorFunction) -> tuple[str, Array] | None:
-    surfaces = [one for one in (curve, *_ways(curve).values()) if isinstance(one, TwoArguments)]
-    others = {one.axes[1] for one in surfaces}
-    if len(others) != 1:
+    curves = (curve, *_curves_by_direction(curve).values())
+    surfaces = [part for part in curves if isinstance(part, TwoArguments)]
+    axes = {surface.axes[1] for surface in surfaces}
+    if len(axes) != 1:
         return None
-    at = np.unique(np.concatenate([one.positions[1] for one in surfaces]))
-    return others.pop(), at
+    return axes.pop(), np.unique(np.concatenate([surface.positions[1] for surface in surfaces]))
 
 
-def tables_of(held: Imported) -> list[ErrorTable]:
-    """Put errors over the same axes side by side, those of one axis at all their positions."""
+def build_error_tables(imported: ImportedErrors) -> list[ErrorTable]:
+    """Build tables of errors with the same arguments, those of one axis at all their positions."""
     tables: list[ErrorTable] = []
-    if held.constants:
-        row = ((), BOTH, tuple(held.constants.values()))
-        tables.append(ErrorTable((), tuple(held.constants), [row]))
-    for axis in dict.fromkeys(parameter(one.key).axis for one in held.series):
-        series = [one for one in held.series if parameter(one.key).axis == axis]
-        at = np.unique(np.concatenate([one.positions for one in series]))
-        directed = any(one.reversal is not None for one in series)
-        table = ErrorTable((axis,), tuple(one.key for one in series), [])
-        for way in (FORWARD, BACKWARD) if directed else (BOTH,):
-            columns = [np.interp(at, one.positions, one.toward(way)).tolist() for one in series]
-            found = zip(at.tolist(), *columns, strict=True)
-            table.rows.extend(((q,), way, values) for q, *values in found)
+    if imported.constants:
+        row = ((), UNDIRECTED, tuple(imported.constants.values()))
+        tables.append(ErrorTable((), tuple(imported.constants), [row]))
+    for axis in dict.fromkeys(parameter(error.key).axis for error in imported.series):
+        errors = [error for error in imported.series if parameter(error.key).axis == axis]
+        at = np.unique(np.concatenate([error.positions for error in errors]))
+        directed = any(error.reversal is not None for error in errors)
+        table = ErrorTable((axis,), tuple(error.key for error in errors), [])
+        for direction in (FORWARD, BACKWARD) if directed else (UNDIRECTED,):
+            columns = [
+                np.interp(at, error.positions, error.in_direction(direction)) for error in errors
+            ]
+            numbers = np.stack(columns, axis=-1).tolist()
+            rows = zip(at.tolist(), numbers, strict=True)
+            table.rows.extend(((q,), direction, row) for q, row in rows)
         tables.append(table)
-    for plane in held.planes:
-        table = ErrorTable(plane.axes, (plane.key,), [])
-        for way in (FORWARD, BACKWARD) if plane.backward else (BOTH,):
-            values = plane.backward if way == BACKWARD else plane.values
-            for first, row in zip(plane.first, values, strict=True):
-                points = zip(plane.second, row, strict=True)
-                table.rows.extend(((first, second), way, (value,)) for second, value in points)
+    for surface in imported.surfaces:
+        table = ErrorTable(surface.axes, (surface.key,), [])
+        points = list(product(surface.first, surface.second))
+        for direction in (FORWARD, BACKWARD) if surface.backward else (UNDIRECTED,):
+            matrix = surface.backward if direction == BACKWARD else surface.values
+            cells = chain.from_iterable(matrix)
+            rows = zip(points, cells, strict=True)
+            table.rows.extend((point, direction, (error,)) for point, error in rows)
         tables.append(table)
     return tables
 
 
-def distinct(at: np.ndarray) -> np.ndarray:
+def distinct_positions(at: np.ndarray) -> np.ndarray:
     ordered = np.sort(at)
-    return ordered[np.concatenate([[True], np.diff(ordered) > SAME])]
+    return ordered[np.concatenate([[True], np.diff(ordered) > POSITION_TOLERANCE])]
 
 
-def plane_of(
+def build_surface(
     key: str, axes: tuple[str, str], points: Sequence[Point], source: Source, where: str = ""
 ) -> ErrorSurface:
-    first = distinct(np.array([point[1] for point in points]))
-    second = distinct(np.array([point[2] for point in points]))
+    first = distinct_positions(np.array([point[1] for point in points]))
+    second = distinct_positions(np.array([point[2] for point in points]))
     values = np.full((len(first), len(second)), math.nan)
     lines: dict[tuple[int, int], SourceLine] = {}
-    for at, one, other, value in points:
-        i = int(np.abs(first - one).argmin())
-        j = int(np.abs(second - other).argmin())
+    for at, q1, q2, error in points:
+        i, j = int(np.abs(first - q1).argmin()), int(np.abs(second - q2).argmin())
         if (i, j) in lines:
-            found = f"{axes[0]} {one:g}, {axes[1]} {other:g}{where} stands also in line"
-            at.refuse(f"{found} {lines[i, j].line}", "every point once")
+            problem = f"{axes[0]} {q1:g}, {axes[1]} {q2:g}{where} repeats line {lines[i, j].line}"
+            at.refuse(problem, "every point once")
         lines[i, j] = at
-        values[i, j] = value
+        values[i, j] = error
     if np.isnan(values).any():
         i, j = (int(index) for index in np.argwhere(np.isnan(values))[0])
-        found = f"{key} has no value at {axes[0]} {first[i]:g}, {axes[1]} {second[j]:g}{where}"
-        (lines.get((i, j)) or source).refuse(found, "a value at every point of the grid")
+        problem = f"{key} has no value at {axes[0]} {first[i]:g}, {axes[1]} {second[j]:g}{where}"
+        (lines.get((i, j)) or source).refuse(problem, "a value at every point of the grid")
     rows = tuple(tuple(row) for row in values.tolist())
     return ErrorSurface(key, axes, tuple(first.tolist()), tuple(second.tolist()), rows)
 
 
-def plane_by_ways(
+def build_surface_by_direction(
     key: str, axes: tuple[str, str], points: Mapping[int, Sequence[Point]], source: Source
 ) -> ErrorSurface:
-    """Build an error of two axes from its points by direction of travel, see `plane_of`."""
-    words = {FORWARD: " forward", BACKWARD: " backward", BOTH: ""}
-    planes = {way: plane_of(key, axes, own, source, words[way]) for way, own in points.items()}
-    if len(planes) == 1:
-        return next(iter(planes.values()))
-    if set(planes) != {FORWARD, BACKWARD}:
-        expected = "+ or - in every row, or in none"
-        points[BOTH][0][0].refuse("has no direction", expected)
-    there, back = planes[FORWARD], planes[BACKWARD]
-    if (there.first, there.second) != (back.first, back.second):
-        found = f"{key} has other points backward than forward"
-        points[BACKWARD][0][0].refuse(found, "the same")
-    tables = {way: plane.table(BOTH) for way, plane in planes.items()}
-    return plane_by_direction(key, axes, (there.first, there.second), tables)
+    """Build an error over two axes from its points by direction of travel; see `build_surface`."""
+    suffixes = {FORWARD: " forward", BACKWARD: " backward", UNDIRECTED: ""}
+    surfaces = {
+        direction: build_surface(key, axes, in_direction, source, suffixes[direction])
+        for direction, in_direction in points.items()
+    }
+    if len(surfaces) == 1:
+        return next(iter(surfaces.values()))
+    if set(surfaces) != {FORWARD, BACKWARD}:
+        points[UNDIRECTED][0][0].refuse("has no direction", "+ or - in every row, or in none")
+    forward, backward = surfaces[FORWARD], surfaces[BACKWARD]
+    if (forward.first, forward.second) != (backward.first, backward.second):
+        problem = f"{key} has different points backward and forward"
+        points[BACKWARD][0][0].refuse(problem, "the same points")
+    tables = {direction: surface.table(UNDIRECTED) for direction, surface in surfaces.items()}
+    return surface_from_directions(key, axes, (forward.first, forward.second), tables)

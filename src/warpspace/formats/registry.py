@@ -1,4 +1,4 @@
-"""What a format is and can, the formats there are, and from files to the errors in them."""
+"""The file formats: their description, their registry, and reading errors from files."""
 
 import re
 import tomllib
@@ -12,147 +12,151 @@ from typing import Any
 
 from warpspace.exceptions import OptionError, SceneError
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.measured import Imported, merge
+from warpspace.formats.measured import ImportedErrors, merge
 from warpspace.formats.source import MAX_BYTES, Source, SourceLine, source_of_bytes
-from warpspace.formats.terms import Tables, errors_of
+from warpspace.formats.terms import Tables, errors_from_tables
 from warpspace.machine.axes import is_axis_name
 from warpspace.machine.definition import Machine
 from warpspace.plugins import Registry
 from warpspace.scene.text_files import read_bytes
 
 ERROR, CORRECTION = "error", "correction"
-"""What the numbers of a controller's table are: the error, which it subtracts, or what it adds."""
+"""Sign of a controller's table: the error, which it subtracts, or the correction, which it adds."""
 SIGNS = (ERROR, CORRECTION)
 Files = Mapping[str, str]
-"""Text of each file by what is added to the name that the user gives: "" is that file itself."""
-MOST_FILES = 64
+"""Text of each file by its suffix to the name from the user; "" is the main file."""
+MAX_FILES = 64
 
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What a user says about a file that the file itself does not."""
+    """Facts about a file that it does not state itself."""
 
-    machine: Machine | None = None  # that its errors are for; None where none is named
-    axis: str = ""  # axis of a file that names none
+    machine: Machine | None = None  # that has the errors; None where it is not named
+    axis: str = ""  # axis of a file that does not name one
     # axis of the machine by its name in the file
     names: Mapping[str, str] = field(default_factory=dict[str, str])
-    sign: str = ""  # "error" or "correction"; empty for what the documentation of the format says
-    # which of the published variants of a format it is; empty for the usual one
+    sign: str = ""  # "error" or "correction"; empty for the sign in the documentation of the format
+    # published variant of the format; empty for the usual one
     variant: str = ""
 
     def factor(self, usual: str) -> float:
-        """Give the factor from a number of a table to a correction: −1 where it is an error."""
+        """Return the factor from a number of a table to a correction: −1 where it is an error."""
         return -1.0 if (self.sign or usual) == ERROR else 1.0
 
-    def said_sign(self, usual: str) -> str:
-        """Say what the numbers are: what the user says, else the documentation of the format."""
+    def sign_statement(self, usual: str) -> str:
+        """Return the assumption about the sign: from the user, else from the documentation."""
         return f"sign: {self.sign}" if self.sign else usual
 
     def axis_named(self, name: str, at: Source | SourceLine) -> str:
         """Find the axis of the machine behind a name in a file: X1, MX1 and X mean X."""
         bare = name.strip().strip('"').upper()
-        given = self.names.get(bare, "")
-        candidates = [given] if given else _candidates(bare)
-        known = [axis for axis in candidates if len(axis) == 1 or given]
+        assigned = self.names.get(bare, "")
+        candidates = [assigned] if assigned else _candidates(bare)
+        matches = [axis for axis in candidates if len(axis) == 1 or assigned]
         if self.machine is not None:
-            known = [axis for axis in candidates if axis in self.machine.axes]
-        if not known:
-            says = f"--axis {bare or 'NAME'}=AXIS says which one it is"
+            matches = [axis for axis in candidates if axis in self.machine.axes]
+        if not matches:
+            advice = f"--axis {bare or 'NAME'}=AXIS assigns it"
             if self.machine is None:
-                at.refuse(f"axis {bare!r} is not known", f"X Y Z U V W A B C; {says}")
+                at.refuse(f"axis {bare!r} is unknown", f"X Y Z U V W A B C; {advice}")
             chain, axes = self.machine.chain, ", ".join(self.machine.axes)
-            found = f"axis {bare!r} is none of the machine {chain}, which has {axes}"
-            at.refuse(found if given else f"{found} ({says})")
-        return known[0]
+            problem = f"the machine {chain} has no axis {bare!r}, it has {axes}"
+            at.refuse(problem if assigned else f"{problem} ({advice})")
+        return matches[0]
 
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of file: what it holds, how it is recognised, read, written and evaluated."""
+    """A file format: its contents, and how it is recognised, read, written and evaluated."""
 
     name: str
     title: str
     source: str  # where its structure is published
     endings: tuple[str, ...]  # usual endings of its files
-    holds: str  # for the list of formats, as the next three
+    holds: str  # contents, for the list of formats, like the next three
     units: str
     grid: str
     limits: str
     recognise: Callable[[str, str], bool]  # by the first lines of a file and its name
-    # the errors that files hold; None for those that `tables` correct
-    read: Callable[[Sequence[Source], ReadOptions], Imported] | None = None
-    # what the controller evaluates after reading them; None where it is no controller's
+    # the errors in files; None where they follow from `tables`
+    read: Callable[[Sequence[Source], ReadOptions], ImportedErrors] | None = None
+    # the tables that the controller evaluates; None for formats without a controller
     tables: Callable[[Sequence[Source], ReadOptions], Tables] | None = None
-    write: Callable[[RequiredCorrections], Files] | None = None  # the files that compensate
-    apart: bool = False  # whether each of its files is a table by itself
-    points: int = 21  # per axis where none are asked for
-    most_points: int = 10_000  # per axis that the controller takes
-    # whether it holds error parameters, from which the controller works out its corrections
+    write: Callable[[RequiredCorrections], Files] | None = None  # the compensation files
+    independent_files: bool = False  # each of its files is a complete table
+    points: int = 21  # per axis, by default
+    most_points: int = 10_000  # per axis, limit of the controller
+    # it contains error parameters, from which the controller computes its corrections
     parametric: bool = False
     variants: tuple[str, ...] = ()  # published ones, the usual one first
-    names_variants: bool = False  # whether its files name variants of their own, such as profiles
-    orientation: bool = False  # whether corrections of rotary axes have a place in it
-    # whether it can move all positions by the same; where not, a part that lies elsewhere cannot be
-    # corrected, and its placement is fitted out of relative errors
+    names_variants: bool = False  # its files name variants, such as profiles
+    orientation: bool = False  # it can contain corrections of rotary axes
+    # it can contain constant corrections; otherwise the placement of the workpiece cannot be
+    # corrected, and is fitted out of relative errors
     offsets: bool = True
-    measured: bool = False  # whether its runs are readings, which are kept with the scene
+    measured: bool = False  # its runs are readings, which the scene stores
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Go to another process by name: what reads and writes stays where it is."""
+        """Pickle by name: another process looks up the functions in its registry."""
         return find_format, (self.name,)
 
     @property
     def can_write(self) -> bool:
         return self.write is not None
 
-    def errors(self, sources: Sequence[Source], options: ReadOptions) -> Imported:
+    @property
+    def has_grid(self) -> bool:
+        return not self.grid.startswith("none")
+
+    def errors(self, sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
         if self.read is not None:
             return self.read(sources, options)
         if self.tables is None:
-            raise OptionError(f"{self.name} is written only; expected another format")
-        parts = [[source] for source in sources] if self.apart else [sources]
-        found = [
-            errors_of(self.tables(part, options), self.name, part[0], options.machine)
+            raise OptionError(f"{self.name} cannot be read; expected another format")
+        parts = [[source] for source in sources] if self.independent_files else [sources]
+        imports = [
+            errors_from_tables(self.tables(part, options), self.name, part[0], options.machine)
             for part in parts
         ]
-        return merge(found) if len(found) > 1 else found[0]
+        return merge(imports) if len(imports) > 1 else imports[0]
 
 
 @cache
-def _words() -> dict[str, Any]:
+def _catalogue() -> dict[str, Any]:
     return tomllib.loads((files("warpspace.formats") / "formats.toml").read_text("utf-8"))
 
 
-def described(name: str) -> dict[str, Any]:
-    words = _words()["formats"][name]
-    return {**words, "name": name, "endings": tuple(words["endings"])}
+def describe(name: str) -> dict[str, Any]:
+    description = _catalogue()["formats"][name]
+    return {**description, "name": name, "endings": tuple(description["endings"])}
 
 
-def has(pattern: str) -> Callable[[str, str], bool]:
-    """Tell files by a pattern in their first lines, whatever their name."""
-    found = re.compile(pattern, re.MULTILINE)
-    return lambda head, _: found.search(head) is not None
+def has_pattern(pattern: str) -> Callable[[str, str], bool]:
+    """Return a predicate that matches the first lines of a file, ignoring its name."""
+    expression = re.compile(pattern, re.MULTILINE)
+    return lambda head, _: expression.search(head) is not None
 
 
 def _candidates(bare: str) -> list[str]:
-    found = [bare] if is_axis_name(bare) else []
+    candidates = [bare] if is_axis_name(bare) else []
     stem = bare.removeprefix("M").rstrip("0123456789")
-    if len(stem) == 1 and is_axis_name(stem) and stem not in found:
-        found.append(stem)
-    return found
+    if len(stem) == 1 and is_axis_name(stem) and stem not in candidates:
+        candidates.append(stem)
+    return candidates
 
 
 def parse_axis_options(texts: Sequence[str]) -> tuple[str, dict[str, str]]:
     axis, names = "", {}
     for text in texts:
         name, equals, target = text.partition("=")
-        found = (target if equals else name).strip().upper()
-        if not is_axis_name(found):
+        axis_name = (target if equals else name).strip().upper()
+        if not is_axis_name(axis_name):
             raise OptionError(f"--axis {text!r}; expected an axis (X) or NAME=AXIS (AX1=X)")
         if equals:
-            names[name.strip().upper()] = found
+            names[name.strip().upper()] = axis_name
         else:
-            axis = found
+            axis = axis_name
     return axis, names
 
 
@@ -160,81 +164,82 @@ _KINDS = ["csv_own", "volumetric", "rtl", "sinumerik", "heidenhain", "fanuc_3d",
 
 
 @cache
-def _known() -> Registry[Format]:
-    kinds = (resolve_name(f"{__package__}.kinds.{kind}:FORMATS") for kind in _KINDS)
-    return Registry("format", {one.name: one for kind in kinds for one in kind})
+def _registry() -> Registry[Format]:
+    groups = (resolve_name(f"{__package__}.kinds.{module}:FORMATS") for module in _KINDS)
+    return Registry("format", {kind.name: kind for group in groups for kind in group})
 
 
 def formats() -> tuple[Format, ...]:
-    return _known().members()
+    return _registry().members()
 
 
 def find_format(name: str) -> Format:
-    return _known().find(name)
+    return _registry().find(name)
 
 
-def register_format(found: Format) -> None:
-    """Add a format; it is then recognised, listed, read and written."""
-    _known().register(found)
+def register_format(new_format: Format) -> None:
+    """Register a format to be recognised, listed, read and written."""
+    _registry().register(new_format)
 
 
 def unregister_format(name: str) -> None:
-    _known().unregister(name)
+    _registry().unregister(name)
 
 
 def recognise(sources: Sequence[Source]) -> Format:
-    found: dict[str, Format] = {}
+    recognised: dict[str, Format] = {}
     for source in sources:
-        kind = next((one for one in formats() if one.recognise(source.head, source.name)), None)
+        head, name = source.head, source.name
+        kind = next((kind for kind in formats() if kind.recognise(head, name)), None)
         if kind is None:
-            names = ", ".join(one.name for one in formats())
+            names = ", ".join(kind.name for kind in formats())
             first = next((line for line in source.lines if line.strip()), "")
             number = source.lines.index(first) + 1 if first else None
-            said = (
-                f"{source.at(number).shown if number else 'nothing'} is of no format that is known"
-            )
+            problem = f"{source.at(number).quoted if number else 'nothing'} matches no known format"
             expected = (
-                f"one of {names} (--format NAME says which; `warpspace import --formats` lists"
+                f"one of {names} (--format NAME selects it; `warpspace import --formats` lists"
             )
-            (source.at(number) if number else source).refuse(said, f"{expected} what each holds)")
-        found[kind.name] = kind
-        if len(found) > 1:
-            names = " and ".join(found)
-            source.refuse(f"files of {names} at once", "one format an import")
-    return next(iter(found.values()))
+            (source.at(number) if number else source).refuse(problem, f"{expected} their contents)")
+        recognised[kind.name] = kind
+        if len(recognised) > 1:
+            names = " and ".join(recognised)
+            source.refuse(f"files of {names} at once", "one format per import")
+    return next(iter(recognised.values()))
 
 
 @dataclass(frozen=True)
 class Reading:
-    """What was read, and as what."""
+    """Imported errors and their format."""
 
-    found: Imported
+    imported: ImportedErrors
     format: Format
-    recognised: bool  # whether the format was found in the files; if not, the user said it
+    recognised: bool  # from the files; otherwise the user stated the format
 
 
 def open_upload(name: str, content: bytes) -> Source:
-    """Take in a file; one whose structure nobody has published is refused."""
+    """Read an uploaded file; formats whose structure is not published are refused."""
     lower = name.lower()
-    for kind in _words()["unpublished"]:
+    for kind in _catalogue()["unpublished"]:
         starts = tuple(start.encode("latin-1") for start in kind.get("starts", ()))
         if content.startswith(starts) or lower.endswith(tuple(kind["endings"])):
-            found = f"is {kind['what']}; expected another file: {kind['instead']}"
-            raise SceneError(name, [found])
+            problem = f"is {kind['what']}; expected another file: {kind['instead']}"
+            raise SceneError(name, [problem])
     return source_of_bytes(content, name)
 
 
 def open_files(paths: Sequence[Path]) -> list[Source]:
-    if len(paths) > MOST_FILES:
-        raise OptionError(f"{len(paths)} files; expected at most {MOST_FILES} an import")
+    if len(paths) > MAX_FILES:
+        raise OptionError(f"{len(paths)} files; expected at most {MAX_FILES} per import")
     return [open_upload(str(path), read_bytes(path, MAX_BYTES)) for path in paths]
 
 
 def read_errors(sources: Sequence[Source], options: ReadOptions, format_name: str = "") -> Reading:
     kind = find_format(format_name) if format_name else recognise(sources)
     if options.variant not in ("", *kind.variants) and not kind.names_variants:
-        known = ", ".join(kind.variants) or "none"
-        raise OptionError(f"--variant {options.variant!r} of {kind.name}; expected one of: {known}")
+        variants = ", ".join(kind.variants) or "none"
+        raise OptionError(
+            f"--variant {options.variant!r} of {kind.name}; expected one of: {variants}"
+        )
     if options.sign and kind.tables is None:
-        raise OptionError(f"--sign: {kind.name} holds errors, no table of a controller")
+        raise OptionError(f"--sign: {kind.name} contains errors, not a table of a controller")
     return Reading(kind.errors(sources, options), kind, not format_name)

@@ -1,4 +1,4 @@
-"""The text of a file that somebody measured or a controller saved: its lines, places and units."""
+"""Text files of measured data and of controllers: lines, numbers, units and messages."""
 
 import io
 import math
@@ -21,7 +21,7 @@ UM_PER: Mapping[str, float] = {
     "in": 25_400.0,
     "inch": 25_400.0,
 }
-"""Micrometres in a unit of length."""
+"""Micrometres per unit of length."""
 URAD_PER: Mapping[str, float] = {
     "urad": 1.0,
     "µrad": 1.0,
@@ -35,7 +35,7 @@ URAD_PER: Mapping[str, float] = {
     "µm/m": 1.0,
     "mm/m": 1e3,
 }
-"""Microradians in a unit of angle."""
+"""Microradians per unit of angle."""
 MM_PER: Mapping[str, float] = {unit: size * 1e-3 for unit, size in UM_PER.items()}
 DEG_PER: Mapping[str, float] = {
     "deg": 1.0,
@@ -46,23 +46,23 @@ DEG_PER: Mapping[str, float] = {
 DEG_TO_URAD = URAD_PER["deg"]
 
 
-def spell(value: float, digits: int) -> str:
-    """Spell a number with at most so many digits behind the point, without needless zeros."""
+def format_number(value: float, digits: int) -> str:
+    """Format a number with at most so many decimals, without trailing zeros."""
     text = f"{value:.{digits}f}"
     if "." in text:
-        whole, _, part = text.partition(".")
-        text = f"{whole}.{part.rstrip('0') or '0'}"
+        integer_part, _, part = text.partition(".")
+        text = f"{integer_part}.{part.rstrip('0') or '0'}"
     return "0.0" if text in {"-0.0", "-0"} else text
 
 
-_DELIMITERS = str.maketrans(dict.fromkeys("();#%*\\", " "))  # and what joins lines
+_DELIMITERS = str.maketrans(dict.fromkeys("();#%*\\", " "))  # also of line continuation
 MAX_COMMENT = 200  # characters; LinuxCNC reads lines of 255
 
 
-def spell_comment(opens: str, text: str, closes: str = "") -> str:
-    """Spell a comment of a file that a control reads: one line of printable ASCII.
+def format_comment(opens: str, text: str, closes: str = "") -> str:
+    """Format a comment of a controller's file: one line of printable ASCII.
 
-    Some controls read other letters byte by byte, and take some bytes for the end of a line.
+    Some controls read other letters byte by byte and interpret some bytes as the end of a line.
     """
     clean = one_line(text).translate(_DELIMITERS).encode("ascii", "replace").decode()
     return f"{opens}{clean[:MAX_COMMENT]}{closes}"
@@ -71,10 +71,10 @@ def spell_comment(opens: str, text: str, closes: str = "") -> str:
 MAX_BYTES = 64 * 1024 * 1024
 MAX_LINES = 2_000_000
 MAX_LINE = 16_384  # characters of one line
-HEAD_LINES = 60  # lines by which a format is recognised
-SHOWN = 60  # characters of a line that a message shows
+HEAD_LINES = 60  # by which a format is recognised
+MAX_QUOTED = 60  # characters of a line in a message
 _UTF16_SHARE = 0.3
-"""Share of zero bytes at every other place from which bytes without a mark count as UTF-16."""
+"""Smallest share of zero bytes at every other position of UTF-16 without a byte order mark."""
 _LINE_ENDS = re.compile(r"\r\n|\n|\r")
 
 
@@ -82,9 +82,9 @@ _LINE_ENDS = re.compile(r"\r\n|\n|\r")
 class Source:
     """A text file in lines."""
 
-    name: str  # as messages call it
-    lines: tuple[str, ...]  # without their ends
-    notes: tuple[str, ...] = ()  # what was assumed about its bytes
+    name: str  # in messages
+    lines: tuple[str, ...]  # without line ends
+    notes: tuple[str, ...] = ()  # assumptions about its encoding
 
     @property
     def head(self) -> str:
@@ -103,105 +103,105 @@ class Source:
     def stem(self) -> str:
         return self.base.rsplit(".", 1)[0]
 
-    def refuse(self, found: str, expected: str = "") -> NoReturn:
-        raise SceneError(self.name, [_joined(found, expected)])
+    def refuse(self, problem: str, expected: str = "") -> NoReturn:
+        raise SceneError(self.name, [_joined(problem, expected)])
 
-    def rows(self, most: int) -> CsvRows:
-        """Read it as a table with a header and at most so many rows."""
-        return CsvRows(io.StringIO(self.text), self.name, most, unique=True)
+    def rows(self, max_rows: int) -> CsvRows:
+        """Read a table with a header and at most so many rows."""
+        return CsvRows(io.StringIO(self.text), self.name, max_rows, unique=True)
 
     def at(self, line: int) -> "SourceLine":
-        """Give one of its lines, counted from 1."""
+        """Return a line, counted from 1."""
         return SourceLine(self, line)
 
     def scan(self, *comments: str) -> Iterator[tuple["SourceLine", str]]:
-        """Give the lines that hold something, without what follows the mark of a comment."""
+        """Yield the lines that are not empty, without comments."""
         for number, text in enumerate(self.lines, start=1):
             bare = text
             for mark in comments:
                 bare = bare.split(mark)[0]
-            if bare := bare.strip():
-                yield SourceLine(self, number), bare
+            if bare.strip():
+                yield SourceLine(self, number), bare.strip()
 
 
 @dataclass(frozen=True)
 class SourceLine:
-    """A line of a file: what is read from it, and how it is refused."""
+    """A line of a file, with checked conversions that refer to it in messages."""
 
     source: Source
     line: int
 
     @property
-    def shown(self) -> str:
-        return shown(self.source.lines[self.line - 1])
+    def quoted(self) -> str:
+        return quote(self.source.lines[self.line - 1])
 
-    def refuse(self, found: str, expected: str = "") -> NoReturn:
-        self.source.refuse(f"line {self.line}: {found}", expected)
+    def refuse(self, problem: str, expected: str = "") -> NoReturn:
+        self.source.refuse(f"line {self.line}: {problem}", expected)
 
-    def number(self, text: str, what: str) -> float:
+    def number(self, text: str, quantity: str) -> float:
         try:
             return parse_number(text)
         except ValueError:
             if "," in text:
-                self.refuse(f"{what} {shown(text)} has a decimal comma", "a point")
-            self.refuse(f"{what} {shown(text)}", "a finite number")
+                self.refuse(f"{quantity} {quote(text)} has a decimal comma", "a point")
+            self.refuse(f"{quantity} {quote(text)}", "a finite number")
 
-    def whole(self, text: str, what: str, low: int, high: int) -> int:
-        value = self.number(text, what)
+    def integer(self, text: str, quantity: str, low: int, high: int) -> int:
+        value = self.number(text, quantity)
         if value != int(value) or not low <= value <= high:
-            self.refuse(f"{what} {shown(text)}", f"a whole number {low} … {high}")
+            self.refuse(f"{quantity} {quote(text)}", f"a whole number {low} … {high}")
         return int(value)
 
-    def position(self, text: str, what: str) -> float:
-        """Read a position that a machine reaches, mm or degrees."""
-        return self.checked_position(self.number(text, what), what)
+    def position(self, text: str, quantity: str) -> float:
+        """Parse a position within the limits of a machine, mm or degrees."""
+        return self.checked_position(self.number(text, quantity), quantity)
 
-    def checked_position(self, value: float, what: str) -> float:
-        """Refuse a position that no machine reaches, mm or degrees."""
+    def checked_position(self, value: float, quantity: str) -> float:
+        """Check a position against the limits of a machine, mm or degrees."""
         if abs(value) > MAX_LENGTH_MM:
-            self.refuse(f"{what} {value:g}", f"at most ±{MAX_LENGTH_MM:g} mm or degrees")
+            self.refuse(f"{quantity} {value:g}", f"at most ±{MAX_LENGTH_MM:g} mm or degrees")
         return value
 
-    def error(self, text: str, what: str, scale: float = 1.0) -> float:
-        """Read an error in its own unit, as µm or µrad."""
-        return self.checked_error(self.number(text, what) * scale, what)
+    def error(self, text: str, quantity: str, scale: float = 1.0) -> float:
+        """Parse an error in the unit of the file; return it in µm or µrad."""
+        return self.checked_error(self.number(text, quantity) * scale, quantity)
 
-    def checked_error(self, value: float, what: str) -> float:
-        """Refuse an error that no rigid-body model holds, µm or µrad."""
+    def checked_error(self, value: float, quantity: str) -> float:
+        """Check an error against the limits of the rigid-body model, µm or µrad."""
         if abs(value) > MAX_ERROR:
             expected = f"at most ±{MAX_ERROR:g} (is the unit right?)"
-            self.refuse(f"{what} {value:g} µm or µrad", expected)
+            self.refuse(f"{quantity} {value:g} µm or µrad", expected)
         return value
 
-    def unit(self, unit: str, known: Mapping[str, float], what: str) -> float:
-        if unit not in known:
-            units = ", ".join(name for name in known if name.isascii())
-            self.refuse(f"{what} in {shown(unit)}", f"one of the units {units}")
-        return known[unit]
+    def unit(self, unit: str, factors: Mapping[str, float], quantity: str) -> float:
+        if unit not in factors:
+            units = ", ".join(name for name in factors if name.isascii())
+            self.refuse(f"{quantity} in {quote(unit)}", f"one of the units {units}")
+        return factors[unit]
 
-    def ascending(self, value: float, before: Sequence[float], what: str, of: str = "") -> None:
+    def ascending(self, value: float, before: Sequence[float], quantity: str, of: str = "") -> None:
         if before and value <= before[-1]:
-            self.refuse(f"{what} {value:g}{of} after {before[-1]:g}", "ascending positions")
+            self.refuse(f"{quantity} {value:g}{of} after {before[-1]:g}", "ascending positions")
 
 
-def _joined(found: str, expected: str) -> str:
-    return f"{found}; expected {expected}" if expected else found
+def _joined(problem: str, expected: str) -> str:
+    return f"{problem}; expected {expected}" if expected else problem
 
 
-def shown(text: str) -> str:
-    """Spell what a file says in at most a line, without control characters."""
+def quote(text: str) -> str:
+    """Quote text of a file for a message, shortened and without control characters."""
     clean = one_line(text.strip())
-    return repr(clean if len(clean) <= SHOWN else clean[: SHOWN - 1] + "…")
+    return repr(clean if len(clean) <= MAX_QUOTED else clean[: MAX_QUOTED - 1] + "…")
 
 
 def source_of_bytes(content: bytes, name: str) -> Source:
     if len(content) > MAX_BYTES:
-        found = f"is {len(content):,} bytes long; expected at most {MAX_BYTES:,} bytes"
-        raise SceneError(name, [found])
+        problem = f"is {len(content):,} bytes long; expected at most {MAX_BYTES:,} bytes"
+        raise SceneError(name, [problem])
     text, notes = _decoded(content, name)
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
-        raise SceneError(name, [f"line {line}: holds bytes that are no text; expected a text file"])
+        raise SceneError(name, [f"line {line}: contains null bytes; expected a text file"])
     source = source_of_text(text, name, notes)
     if not any(line.strip() for line in source.lines):
         source.refuse("is empty", "measured data or a table of a controller")
@@ -209,39 +209,41 @@ def source_of_bytes(content: bytes, name: str) -> Source:
 
 
 def source_of_text(text: str, name: str, notes: tuple[str, ...] = ()) -> Source:
-    """Split a text into lines, whatever ends them."""
+    """Split a text into lines at any kind of line end."""
     count = text.count("\n") + text.count("\r") - text.count("\r\n") + (text[-1:] not in "\r\n")
-    if count > MAX_LINES:  # counted first: splitting four million lines holds up everybody
+    if count > MAX_LINES:  # counted first: splitting four million lines blocks the server
         raise SceneError(name, [f"has {count:,} lines; expected at most {MAX_LINES:,}"])
     lines = _LINE_ENDS.split(text)
     if lines and not lines[-1]:
         lines.pop()
     for number, line in enumerate(lines, start=1):
         if len(line) > MAX_LINE:
-            found = f"is longer than {MAX_LINE:,} characters; expected at most so many"
-            raise SceneError(name, [f"line {number} {found}"])
+            problem = f"is longer than {MAX_LINE:,} characters; expected shorter lines"
+            raise SceneError(name, [f"line {number} {problem}"])
     return Source(name, tuple(lines), notes)
 
 
 def _decoded(content: bytes, name: str) -> tuple[str, tuple[str, ...]]:
-    wide = _wide(content)
-    if wide:
+    encoding = _utf16(content)
+    if encoding:
         try:
-            return content.decode(wide), ("read as UTF-16",)
+            return content.decode(encoding), ("read as UTF-16",)
         except UnicodeDecodeError:
-            raise SceneError(name, ["is no UTF-16 text though it begins so"]) from None
+            raise SceneError(
+                name, ["begins as UTF-16 text, but is not valid; expected a text file"]
+            ) from None
     try:
         return content.decode("utf-8-sig"), ()
     except UnicodeDecodeError as error:
         try:
             text = content.decode("cp1252")
         except UnicodeDecodeError:
-            found = f"is no text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
-            raise SceneError(name, [f"{found}; expected a text file"]) from None
-        return text, ("read as Windows-1252: it is no UTF-8",)
+            problem = f"is not text in UTF-8, UTF-16 or Windows-1252 (byte {error.start})"
+            raise SceneError(name, [f"{problem}; expected a text file"]) from None
+        return text, ("read as Windows-1252, because it is not UTF-8",)
 
 
-def _wide(content: bytes) -> str:
+def _utf16(content: bytes) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     sample = content[:4096]

@@ -1,6 +1,6 @@
-"""How controllers evaluate their compensation tables, and which errors those tables correct.
+"""Terms of controller compensation: their evaluation, and the errors that they correct.
 
-A term gives, for commanded positions of the axes, the correction of each axis it acts on: the
+A term maps commanded positions of the axes to the correction of each axis that it acts on: the
 interpolation, the behaviour at the ends and the direction of travel are those of the controller.
 """
 
@@ -18,28 +18,27 @@ from warpspace.machine.axes import direction_index, is_linear
 from warpspace.machine.definition import Machine
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
-HELD, MODULO, EXTENDED = "held", "modulo", "extended"
-"""What a table does beyond its ends: its end values, its period, or its last straight line."""
+HOLD_ENDS, MODULO, EXTRAPOLATE = "held", "modulo", "extended"
+"""Extrapolation of a table: its end values, its period, or its last segment."""
 
 
 @dataclass(frozen=True)
 class AxisTable:
-    """A table of one axis that corrects one axis."""
+    """A table over one axis that corrects one axis."""
 
-    source: str  # the axis whose position is looked up, and the one that is corrected
+    source: str  # axis of the position; the target is the corrected axis
     target: str
     positions: tuple[float, ...]  # (n,), mm or degrees; ascending
-    # (n,), mm or degrees; what is added to the commanded position of the target. Forward values
-    # where `backward` is given.
+    # (n,), mm or degrees; corrections of the target, those for forward travel if `backward` is set
     values: tuple[float, ...]
-    ends: str = HELD  # "held", "modulo" (the period is that of the table) or "extended"
-    # (n,); values for travel in the negative direction; empty where they are the same
+    ends: str = HOLD_ENDS  # "held", "modulo" (the period is that of the table) or "extended"
+    # (n,); values for travel in the negative direction; empty if they are the same
     backward: tuple[float, ...] = ()
-    direction: int = 0  # 1 or −1 where it acts in one direction of travel only, else 0
+    direction: int = 0  # 1 or −1 if it acts in one direction of travel only, else 0
 
     @property
     def size(self) -> int:
-        """How many numbers it takes in the controller."""
+        """Count of numbers in the controller."""
         return len(self.values) + len(self.backward)
 
     @property
@@ -47,31 +46,31 @@ class AxisTable:
         return bool(self.direction or self.backward)
 
     def at(self, position: Array, direction: int = 0) -> Array:
-        """Interpolate linearly, [...]; without a direction of travel the mean of both."""
+        """Interpolate linearly, [...]; for direction 0 the mean of both directions."""
         if self.backward and direction == 0:
             return (self.at(position, 1) + self.at(position, -1)) / 2.0
         if self.direction and self.direction != direction:
-            own = self.at(position, self.direction)
-            return own / 2.0 if direction == 0 else np.zeros_like(own)
+            correction = self.at(position, self.direction)
+            return correction / 2.0 if direction == 0 else np.zeros_like(correction)
         values = self.backward if self.backward and direction < 0 else self.values
         return interpolate(np.asarray(position, dtype=float), self.positions, values, self.ends)
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
-        """Give what is added to the commanded positions, mm or degrees, by axis."""
+        """Return the corrections of commanded positions, mm or degrees, by axis."""
         return {self.target: self.at(coordinates[self.source], direction)}
 
 
 @dataclass(frozen=True)
 class Product:
-    """Two tables whose values are multiplied; the product is added to the target of the first."""
+    """The product of two tables, a correction of the target of the first."""
 
-    first: AxisTable  # their own corrections are no part of it
+    first: AxisTable  # the corrections by the tables themselves are not included
     second: AxisTable
-    sign: float = 1.0  # of the product: −1 where the controller subtracts what its tables say
+    sign: float = 1.0  # −1 if the controller subtracts the product
 
     @property
     def size(self) -> int:
-        """None of its own: both tables count already."""
+        """Zero: both tables are counted already."""
         return 0
 
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
@@ -79,7 +78,7 @@ class Product:
         return {self.first.target: self.at(first, second, direction)}
 
     def at(self, first: Array, second: Array, direction: int = 0) -> Array:
-        """Multiply both tables at positions of their axes; without a direction the mean of both."""
+        """Multiply both tables at positions of their axes; for direction 0 the mean of both."""
         if direction == 0 and (self.first.is_directed or self.second.is_directed):
             return (self.at(first, second, 1) + self.at(first, second, -1)) / 2.0
         return self.sign * self.first.at(first, direction) * self.second.at(second, direction)
@@ -92,7 +91,7 @@ class Grid3:
     axes: tuple[str, str, str]
     # (3, n); ascending, of each axis
     positions: tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
-    # [n1, n2, n3, 3], mm; added to the commanded positions. Beyond the grid its border is held.
+    # [n1, n2, n3, 3], mm; corrections; beyond the grid those of its boundary
     values: Array
 
     @property
@@ -102,8 +101,8 @@ class Grid3:
     def corrections(self, coordinates: Coordinates, direction: int = 0) -> dict[str, Array]:
         del direction
         points = np.broadcast_arrays(*(coordinates[axis] for axis in self.axes))
-        found = trilinear(points, self.positions, self.values)
-        return {axis: found[..., index] for index, axis in enumerate(self.axes)}
+        interpolated = trilinear(points, self.positions, self.values)
+        return {axis: interpolated[..., index] for index, axis in enumerate(self.axes)}
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ class Affine:
     """Corrections that are linear in the commanded positions."""
 
     axes: tuple[str, ...]  # (n,)
-    # (n, n); correction of the axis of the row per position of the axis of the column
+    # (n, n); correction of the row's axis per position of the column's axis
     matrix: tuple[tuple[float, ...], ...]
 
     @property
@@ -128,19 +127,19 @@ class Affine:
 
 
 Term: TypeAlias = AxisTable | Product | Grid3 | Affine
-"""A part of a controller's compensation."""
+"""One additive term of a controller's compensation."""
 
 
 def interpolate(position: Array, at: Sequence[float], values: Sequence[float], ends: str) -> Array:
-    places, found = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
+    places, heights = np.asarray(at, dtype=float), np.asarray(values, dtype=float)
     if ends == MODULO and len(places) > 1:
         period = places[-1] - places[0]
         position = places[0] + np.mod(position - places[0], period)
-    inside = np.interp(position, places, found)
-    if ends != EXTENDED or len(places) < 2:
+    inside = np.interp(position, places, heights)
+    if ends != EXTRAPOLATE or len(places) < 2:
         return inside
-    low = (found[1] - found[0]) / (places[1] - places[0])
-    high = (found[-1] - found[-2]) / (places[-1] - places[-2])
+    low = (heights[1] - heights[0]) / (places[1] - places[0])
+    high = (heights[-1] - heights[-2]) / (places[-1] - places[-2])
     below = np.minimum(position - places[0], 0.0) * low
     return inside + below + np.maximum(position - places[-1], 0.0) * high
 
@@ -148,19 +147,19 @@ def interpolate(position: Array, at: Sequence[float], values: Sequence[float], e
 def trilinear(
     points: Sequence[Array], positions: Sequence[Sequence[float]], values: Array
 ) -> Array:
-    """Interpolate in a grid of three axes; beyond it its border is held."""
+    """Interpolate in a grid of three axes; beyond it with the values of its boundary."""
     from scipy.interpolate import RegularGridInterpolator
 
-    both = zip(points, positions, strict=True)
-    held = np.stack([np.clip(point, along[0], along[-1]) for point, along in both], axis=-1)
-    return RegularGridInterpolator(tuple(map(np.array, positions)), values)(held)
+    pairs = zip(points, positions, strict=True)
+    clipped = np.stack([np.clip(point, along[0], along[-1]) for point, along in pairs], axis=-1)
+    return RegularGridInterpolator(tuple(map(np.array, positions)), values)(clipped)
 
 
 @dataclass(frozen=True)
 class Tables:
-    """What a controller holds after it has read its file."""
+    """The compensation of a controller, as read from its files."""
 
-    terms: tuple[Term, ...]  # all corrections add up
+    terms: tuple[Term, ...]  # their corrections are added
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     units: tuple[str, ...] = field(default=("mm",))
@@ -178,43 +177,44 @@ class Tables:
 
 
 SQUARENESS = {("X", "Y"): ("EC0Y", -1.0), ("X", "Z"): ("EB0Z", 1.0), ("Y", "Z"): ("EA0Z", -1.0)}
-"""Squareness that an error of the first axis in proportion to the second one is, and its sign."""
-WAYS: tuple[int, ...] = (measured.FORWARD, measured.BACKWARD)
+"""Squareness, and its sign, of a displacement of the first axis proportional to the second."""
+DIRECTIONS: tuple[int, ...] = (measured.FORWARD, measured.BACKWARD)
 NEGLIGIBLE = 1e-9  # µm or µrad
 
 
-def errors_of(
+def errors_from_tables(
     tables: Tables, name: str, source: Source, machine: Machine | None = None
-) -> measured.Imported:
+) -> measured.ImportedErrors:
     lines = [term for term in tables.terms if isinstance(term, AxisTable)]
     series = [_series(key, parts, machine) for key, parts in _by_key(lines, source).items()]
-    planes = [_plane(term, machine, source) for term in tables.terms if isinstance(term, Product)]
-    notes = list(tables.notes)
-    for term in tables.terms:
-        if isinstance(term, Grid3):
-            found, left = _grid_planes(term, machine)
-            planes += found
-            if left > NEGLIGIBLE:
-                notes.append(
-                    f"up to {left:.3g} µm depend on all three axes together, which no error of two"
-                    " axes holds: left out"
-                )
-    series, planes = _joined(series, planes, source)
+    surfaces: list[measured.ErrorSurface] = []
     constants: dict[str, float] = {}
     curves: dict[str, object] = {}
+    notes = list(tables.notes)
     for term in tables.terms:
-        if isinstance(term, Affine):
+        if isinstance(term, Product):
+            surfaces.append(_product_surface(term, machine, source))
+        elif isinstance(term, Grid3):
+            grid_surfaces, ignored_um = _grid_surfaces(term, machine)
+            surfaces += grid_surfaces
+            if ignored_um > NEGLIGIBLE:
+                notes.append(
+                    f"ignored up to {ignored_um:.3g} µm that depend on all three axes together: no"
+                    " error parameter does"
+                )
+        elif isinstance(term, Affine):
             _affine(term, machine, constants, curves)
-    side = "" if machine is not None else " (all axes taken to carry the tool)"
-    assumed = (*tables.assumed, f"what the table corrects is taken for the whole error{side}")
-    return measured.Imported(
+    series, surfaces = _merged(series, surfaces, source)
+    carried = "" if machine is not None else ", and all axes carry the tool"
+    assumed = (*tables.assumed, f"the table corrects the entire error{carried}")
+    return measured.ImportedErrors(
         name,
         tuple(
-            one
-            for one in series
-            if any(abs(value) > NEGLIGIBLE for run in one.runs for value in run.values)
+            error
+            for error in series
+            if np.any(np.abs([run.values for run in error.runs]) > NEGLIGIBLE)
         ),
-        tuple(planes),
+        tuple(surfaces),
         constants,
         units=tables.units,
         assumed=assumed,
@@ -224,20 +224,20 @@ def errors_of(
 
 
 def error_key(source_axis: str, target: str) -> str:
-    """Name the error of one axis that shows as a displacement of another: EXY for X over Y."""
+    """Return the error of one axis that displaces along another: EXY for X over Y."""
     letters = "XYZ" if is_linear(target) else "ABC"
     return f"E{letters[direction_index(target)]}{source_axis}"
 
 
 def sense(machine: Machine | None, axis: str) -> float:
-    """Give +1 where an axis moves the tool in its direction against the workpiece, else −1."""
+    """Return +1 if an axis moves the tool in its positive direction over the workpiece, else −1."""
     if machine is None or axis not in machine.axes:
         return 1.0
     return float(machine.sense(axis))
 
 
 def side(machine: Machine | None, axis: str) -> float:
-    """Give +1 for an axis that carries the tool, −1 for one that carries the workpiece."""
+    """Return +1 for an axis that carries the tool, −1 for one that carries the workpiece."""
     return -1.0 if machine is not None and axis in machine.chain.workpiece else 1.0
 
 
@@ -247,108 +247,120 @@ def _factor(machine: Machine | None, source_axis: str, target: str) -> float:
 
 
 def _by_key(lines: Sequence[AxisTable], source: Source) -> dict[str, list[AxisTable]]:
-    found: defaultdict[str, list[AxisTable]] = defaultdict(list)
+    lines_by_key: defaultdict[str, list[AxisTable]] = defaultdict(list)
     for line in lines:
         if not is_linear(line.target) and line.source != line.target:
             source.refuse(
-                f"corrects the rotary axis {line.target} over {line.source}: no error parameter"
-                " is such a correction",
-                "tables of linear axes, or of a rotary axis itself",
+                f"corrects the rotary axis {line.target} over {line.source}, which no error"
+                " parameter represents",
+                "tables of linear axes, or of a rotary axis over itself",
             )
-        found[error_key(line.source, line.target)].append(line)
-    return found
+        lines_by_key[error_key(line.source, line.target)].append(line)
+    return lines_by_key
 
 
 def _series(key: str, parts: Sequence[AxisTable], machine: Machine | None) -> measured.ErrorSeries:
     at = np.unique(np.concatenate([part.positions for part in parts]))
     factor = _factor(machine, parts[0].source, parts[0].target)
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite the scene refuses
-        ways = {way: factor * np.sum([part.at(at, way) for part in parts], axis=0) for way in WAYS}
-    if np.array_equal(ways[measured.FORWARD], ways[measured.BACKWARD]):
-        runs = (measured.MeasuredRun(1, measured.BOTH, tuple(ways[measured.FORWARD].tolist())),)
-    else:
-        runs = tuple(
-            measured.MeasuredRun(1, way, tuple(values.tolist())) for way, values in ways.items()
+    with np.errstate(over="ignore", invalid="ignore"):  # the scene refuses what is not finite
+        forward, backward = (
+            factor * np.sum([part.at(at, direction) for part in parts], axis=0)
+            for direction in DIRECTIONS
         )
+    if np.array_equal(forward, backward):
+        return measured.ErrorSeries.undirected(key, at, forward)
+    runs = (
+        measured.MeasuredRun(1, measured.FORWARD, tuple(forward.tolist())),
+        measured.MeasuredRun(1, measured.BACKWARD, tuple(backward.tolist())),
+    )
     return measured.ErrorSeries(key, tuple(at.tolist()), runs)
 
 
-def _plane(term: Product, machine: Machine | None, source: Source) -> measured.ErrorSurface:
-    one, other = term.first, term.second
-    if one.source == other.source or not is_linear(one.target):
+def _product_surface(
+    term: Product, machine: Machine | None, source: Source
+) -> measured.ErrorSurface:
+    axes, target = (term.first.source, term.second.source), term.first.target
+    if axes[0] == axes[1] or not is_linear(target):
         source.refuse(
-            f"multiplies tables over {one.source} and {other.source} for {one.target}",
+            f"multiplies tables over {axes[0]} and {axes[1]} for {target}",
             "tables over two axes that correct a linear axis",
         )
-    factor = _factor(machine, one.source, one.target)
-    first, second = np.meshgrid(one.positions, other.positions, indexing="ij")
-    tables = {way: factor * term.at(first, second, way) for way in WAYS}
-    key = error_key(one.source, one.target)
-    return measured.plane_by_direction(
-        key, (one.source, other.source), (one.positions, other.positions), tables
-    )
+    factor = _factor(machine, axes[0], target)
+    places = (term.first.positions, term.second.positions)
+    first, second = np.meshgrid(*places, indexing="ij")
+    tables = {direction: factor * term.at(first, second, direction) for direction in DIRECTIONS}
+    return measured.surface_from_directions(error_key(axes[0], target), axes, places, tables)
 
 
-def _grid_planes(term: Grid3, machine: Machine | None) -> tuple[list[measured.ErrorSurface], float]:
-    planes: list[measured.ErrorSurface] = []
-    left = 0.0
+def _grid_surfaces(
+    term: Grid3, machine: Machine | None
+) -> tuple[list[measured.ErrorSurface], float]:
+    surfaces: list[measured.ErrorSurface] = []
+    ignored_um = 0.0
     for index, target in enumerate(term.axes):
         values = term.values[..., index]
-        over = {
+        means = {
             axes: values.mean(axis=axes, keepdims=True)
             for axes in ((0,), (1,), (2,), (0, 1), (0, 2), (1, 2), (0, 1, 2))
         }
         parts = {
-            (0, 1): over[2,],
-            (1, 2): over[0,] - over[0, 2],
-            (2, 0): over[1,] - over[1, 2] - over[0, 1] + over[0, 1, 2],
+            (0, 1): means[2,],
+            (1, 2): means[0,] - means[0, 2],
+            (2, 0): means[1,] - means[1, 2] - means[0, 1] + means[0, 1, 2],
         }
-        rest = np.abs(values - sum(parts.values())).max()
-        left = max(left, float(rest) * UM_PER_MM)
+        remainder = np.abs(values - sum(parts.values())).max()
+        ignored_um = max(ignored_um, float(remainder) * UM_PER_MM)
         for (first, second), part in parts.items():
             flat = part.squeeze(axis=3 - first - second)
             table = flat if first < second else flat.T
             axes = (term.axes[first], term.axes[second])
             scaled: Array = _factor(machine, axes[0], target) * table
             places = (term.positions[first], term.positions[second])
-            tables = dict.fromkeys(WAYS, scaled)
-            planes.append(
-                measured.plane_by_direction(error_key(axes[0], target), axes, places, tables)
-            )
-    return [plane for plane in planes if np.abs(plane.values).max() > NEGLIGIBLE], left
+            tables = dict.fromkeys(DIRECTIONS, scaled)
+            key = error_key(axes[0], target)
+            surfaces.append(measured.surface_from_directions(key, axes, places, tables))
+    large = [surface for surface in surfaces if np.abs(surface.values).max() > NEGLIGIBLE]
+    return large, ignored_um
 
 
-def _joined(
-    series: list[measured.ErrorSeries], planes: list[measured.ErrorSurface], source: Source
+def _merged(
+    series: list[measured.ErrorSeries], surfaces: list[measured.ErrorSurface], source: Source
 ) -> tuple[list[measured.ErrorSeries], list[measured.ErrorSurface]]:
-    joined: dict[tuple[str, tuple[str, str]], measured.ErrorSurface] = {}
-    for plane in planes:
-        place = (plane.key, plane.axes)
-        joined[place] = _added(joined[place], plane) if place in joined else plane
-    keys = [key for key, _ in joined]
-    if twice := next((key for key in keys if keys.count(key) > 1), ""):
-        source.refuse(f"has products of {twice} with two other axes", "one for each error")
-    left: list[measured.ErrorSeries] = []
-    for one in series:
-        place = next((place for place in joined if place[0] == one.key), None)
+    """Add surfaces with the same arguments, and each series to the surface of its error."""
+    merged: dict[tuple[str, tuple[str, str]], measured.ErrorSurface] = {}
+    for surface in surfaces:
+        place = (surface.key, surface.axes)
+        merged[place] = _added(merged[place], surface) if place in merged else surface
+    keys = [key for key, _ in merged]
+    repeated = next((key for key in keys if keys.count(key) > 1), "")
+    if repeated:
+        source.refuse(f"has products of {repeated} with two other axes", "one per error")
+    single_axis: list[measured.ErrorSeries] = []
+    for error in series:
+        place = next((place for place in merged if place[0] == error.key), None)
         if place is None:
-            left.append(one)
+            single_axis.append(error)
             continue
-        ends = (joined[place].second[0], joined[place].second[-1])
-        columns = {way: np.repeat(one.toward(way)[:, None], 2, axis=1) for way in WAYS}
-        own = measured.plane_by_direction(one.key, place[1], (one.positions, ends), columns)
-        joined[place] = _added(joined[place], own)
-    return left, list(joined.values())
+        ends = (merged[place].second[0], merged[place].second[-1])
+        columns = {
+            direction: np.repeat(error.in_direction(direction)[:, None], 2, axis=1)
+            for direction in DIRECTIONS
+        }
+        positions = (error.positions, ends)
+        surface = measured.surface_from_directions(error.key, place[1], positions, columns)
+        merged[place] = _added(merged[place], surface)
+    return single_axis, list(merged.values())
 
 
-def _added(one: measured.ErrorSurface, other: measured.ErrorSurface) -> measured.ErrorSurface:
-    first = np.union1d(one.first, other.first)
-    second = np.union1d(one.second, other.second)
+def _added(surface: measured.ErrorSurface, other: measured.ErrorSurface) -> measured.ErrorSurface:
+    first = np.union1d(surface.first, other.first)
+    second = np.union1d(surface.second, other.second)
     totals = {
-        way: _resampled(one, way, first, second) + _resampled(other, way, first, second)
-        for way in WAYS
+        direction: _resampled(surface, direction, first, second)
+        + _resampled(other, direction, first, second)
+        for direction in DIRECTIONS
     }
-    return measured.plane_by_direction(one.key, one.axes, (first.tolist(), second.tolist()), totals)
+    return measured.surface_from_directions(surface.key, surface.axes, (first, second), totals)
 
 
 def _resampled(plane: measured.ErrorSurface, direction: int, first: Array, second: Array) -> Array:

@@ -1,5 +1,6 @@
-"""From imported errors to a scene: each error a curve, its runs and uncertainties beside it."""
+"""Conversion of imported errors to a scene: curves, measuring runs and uncertainties."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -7,7 +8,14 @@ from typing import TypeVar
 import numpy as np
 
 from warpspace.exceptions import OptionError, SceneError
-from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, ErrorSurface, Imported
+from warpspace.formats.measured import (
+    BACKWARD,
+    FORWARD,
+    ErrorSeries,
+    ErrorSurface,
+    ImportedErrors,
+    MeasuredRun,
+)
 from warpspace.formats.registry import Reading
 from warpspace.kinematics.model import Model
 from warpspace.machine.axes import is_linear, parameter
@@ -24,9 +32,9 @@ from warpspace.scene.scene_writer import scene_to_toml
 from warpspace.scene.schema import Problems
 from warpspace.scene.text_files import one_line, radian_notes
 
-LEEWAY = 1e-6  # mm or degrees by which a position may lie beyond the travel
-LARGE = {False: 1000.0, True: 5000.0}
-"""µm of a translation and µrad of a rotation above which the unit of a file is asked about."""
+TRAVEL_TOLERANCE = 1e-6  # mm or degrees; tolerance of positions beyond the travel
+IMPLAUSIBLE = {False: 1000.0, True: 5000.0}
+"""µm of a translation and µrad of a rotation above which a note questions the unit of the file."""
 T = TypeVar("T")
 SIGNS = {FORWARD: "+", BACKWARD: "-"}
 
@@ -36,54 +44,57 @@ class ImportedScene:
     """A scene with imported errors."""
 
     scene: Scene
-    text: str  # its file
-    notes: tuple[str, ...]  # what was left out, replaced or assumed for it
+    text: str  # of its file
+    notes: tuple[str, ...]  # about replaced errors and assumptions
 
 
 def base_scene(machine: str) -> Scene:
-    """Give the scene that errors are imported into: of a machine of the library, or a scene."""
+    """Load the scene for an import: a machine of the library, or a scene."""
     if machine in machine_names():
         return parse_scene(f'title = "{machine}"\nmachine = "{machine}"\n', machine)
     return load_scene(machine)
 
 
-def plain_scene(found: Imported) -> Scene:
-    other = [axis for axis in found.axes if axis not in ("X", "Y", "Z")]
+def default_scene(imported: ImportedErrors) -> Scene:
+    other = [axis for axis in imported.axes if axis not in ("X", "Y", "Z")]
     if other:
         raise OptionError(
-            f"the errors are of {', '.join(found.axes)}; expected --machine: how {other[0]} stands"
-            " in a machine is not in the files"
+            f"the errors are of {', '.join(imported.axes)}; expected --machine: the files do not"
+            f" state the position of {other[0]} in the machine"
         )
-    spans = {axis: ends for axis, ends in _ranges(found).items() if ends[1] - ends[0] > MIN_SPAN}
+    spans = {axis: ends for axis, ends in _ranges(imported).items() if ends[1] - ends[0] > MIN_SPAN}
     travel = "".join(f"{axis} = [{low!r}, {high!r}]\n" for axis, (low, high) in spans.items())
     text = f'title = "imported"\n[machine]\nchain = "wFXYZt"\n[machine.travel]\n{travel}'
     return parse_scene(text, "imported")
 
 
-def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> ImportedScene:
-    found = reading.found
+def build_imported_scene(
+    reading: Reading, base: Scene | None, title: str, name: str
+) -> ImportedScene:
+    imported = reading.imported
     notes: list[str] = []
     if base is None:
-        base = plain_scene(found)
+        base = default_scene(imported)
         base = replace(base, title=one_line(title)[:MAX_TEXT])
-        notes.append("no machine named: X, Y and Z carry the tool, travels are those of the data")
-    _check_keys(found, base, name)
-    _check_travel(found, base, name)
-    notes += _doubts(found, base)
-    curves = _curves(found, base, name)
+        notes.append("assumes that X, Y and Z carry the tool, with the travels of the data")
+    _check_keys(imported, base, name)
+    _check_travel(imported, base, name)
+    notes += _plausibility_notes(imported, base)
+    curves = _curves(imported, base, name)
     replaced = [key for key in curves if key in base.errors]
     if replaced:
         notes.append(f"replaced: {', '.join(replaced)}")
-    kept = [key for key in base.errors if key not in curves]
-    if kept:
-        notes.append(f"kept from {base.name}: {', '.join(kept)}")
-    uncertainty, measured = _measured(found, base, keep_runs=reading.format.measured)
-    model, said = _convention(found, base)
-    said_by = [*reading.found.assumed, *notes, *said, *found.notes]
-    description = "\n".join([f"Imported from {name} ({reading.format.name}).", *said_by])[:MAX_TEXT]
+    retained = [key for key in base.errors if key not in curves]
+    if retained:
+        notes.append(f"unchanged from {base.name}: {', '.join(retained)}")
+    uncertainty, measured = _measured(imported, base, keep_runs=reading.format.measured)
+    model, convention_notes = _convention(imported, base)
+    remarks = [*imported.assumed, *notes, *convention_notes, *imported.notes]
+    heading = f"Imported from {name} ({reading.format.name})."
+    description = "\n".join([heading, *remarks])[:MAX_TEXT]
     covariance = base.covariance and base.covariance.without(curves)
     if uncertainty:
-        covariance = (covariance or Covariance((), ())).extended(_ranges(found))
+        covariance = (covariance or Covariance((), ())).extended(_ranges(imported))
     scene = replace(
         base,
         model=model,
@@ -96,87 +107,87 @@ def into_scene(reading: Reading, base: Scene | None, title: str, name: str) -> I
     text = scene_to_toml(scene)
     if len(text.encode()) > MAX_SCENE_BYTES:
         size = len(text.encode()) / 1e6
-        found_text = f"gives a scene of {size:.1f} MB"
-        raise SceneError(name, [f"{found_text}; expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"])
+        problem = f"results in a scene of {size:.1f} MB"
+        raise SceneError(name, [f"{problem}; expected at most {MAX_SCENE_BYTES / 1e6:.1f} MB"])
     parsed = parse_scene(text, base.name, name)
-    return ImportedScene(parsed, text, (*notes, *said))
+    return ImportedScene(parsed, text, (*notes, *convention_notes))
 
 
 def _without(table: Mapping[str, T], curves: Mapping[str, ErrorFunction]) -> dict[str, T]:
     return {key: value for key, value in table.items() if key not in curves}
 
 
-def _check_keys(found: Imported, base: Scene, name: str) -> None:
+def _check_keys(imported: ImportedErrors, base: Scene, name: str) -> None:
     machine = base.machine
     expected = f"expected errors of {', '.join(machine.axes)}"
-    needed = [(key, parameter(key).axis) for key in found.keys]
-    needed += [(plane.key, axis) for plane in found.planes for axis in plane.axes]
+    pairs = [(key, parameter(key).axis) for key in imported.keys]
+    pairs += [(surface.key, axis) for surface in imported.surfaces for axis in surface.axes]
     problems = [
         f"{key}: the machine {machine.chain} has no axis {axis}; {expected}"
-        for key, axis in needed
+        for key, axis in pairs
         if axis not in machine.axes
     ]
     if problems:
         raise SceneError(name, list(dict.fromkeys(problems)))
 
 
-def _ranges(found: Imported) -> dict[str, tuple[float, float]]:
+def _ranges(imported: ImportedErrors) -> dict[str, tuple[float, float]]:
     at: dict[str, list[float]] = {}
-    for one in found.series:
-        at.setdefault(parameter(one.key).axis, []).extend(one.positions)
-    for plane in found.planes:
-        for axis, places in zip(plane.axes, (plane.first, plane.second), strict=True):
+    for series in imported.series:
+        at.setdefault(parameter(series.key).axis, []).extend(series.positions)
+    for surface in imported.surfaces:
+        for axis, places in zip(surface.axes, (surface.first, surface.second), strict=True):
             at.setdefault(axis, []).extend(places)
     return {axis: (min(places), max(places)) for axis, places in at.items()}
 
 
-def _check_travel(found: Imported, base: Scene, name: str) -> None:
+def _check_travel(imported: ImportedErrors, base: Scene, name: str) -> None:
     problems: list[str] = []
-    for axis, (low, high) in _ranges(found).items():
-        one = base.machine.axes[axis]
-        if not is_linear(axis) and one.travel[1] - one.travel[0] >= 360.0 - LEEWAY:
+    for axis, (low, high) in _ranges(imported).items():
+        start, end = base.machine.axes[axis].travel
+        if not is_linear(axis) and end - start >= 360.0 - TRAVEL_TOLERANCE:
             continue
-        if low < one.travel[0] - LEEWAY or high > one.travel[1] + LEEWAY:
-            unit = f" {one.unit}" if is_linear(axis) else one.unit
+        if low < start - TRAVEL_TOLERANCE or high > end + TRAVEL_TOLERANCE:
+            unit = f"{' ' if is_linear(axis) else ''}{base.machine.axes[axis].unit}"
             problems.append(
-                f"positions of {axis} {low:g} … {high:g}{unit} reach beyond its travel"
-                f" {one.travel[0]:g} … {one.travel[1]:g}{unit}; expected positions within it (is it"
-                " the right machine, are the units right?)"
+                f"positions of {axis} {low:g} … {high:g}{unit} are beyond its travel"
+                f" {start:g} … {end:g}{unit}; expected positions within it (check the machine and"
+                " the units)"
             )
     if problems:
         raise SceneError(name, problems)
 
 
-def _doubts(found: Imported, base: Scene) -> list[str]:
-    notes = list(coverage_notes(base, _ranges(found)))
-    for one in found.series:
-        if not is_linear(axis := parameter(one.key).axis):
-            notes += radian_notes({f"{one.key} over {axis}_deg": one.positions})
-    largest = {one.key: float(np.abs(one.values).max()) for one in (*found.series, *found.planes)}
-    largest |= {key: abs(value) for key, value in found.constants.items()}
-    for key, value in largest.items():
-        if value > LARGE[parameter(key).is_rotation]:
-            units = f", read in {', '.join(found.units)}" if found.units else ""
-            notes.append(
-                f"{key} reaches {value:g} {parameter(key).unit}{units}: is the file in this unit?"
-            )
+def _plausibility_notes(imported: ImportedErrors, base: Scene) -> list[str]:
+    notes = list(coverage_notes(base, _ranges(imported)))
+    for series in imported.series:
+        axis = parameter(series.key).axis
+        if not is_linear(axis):
+            notes += radian_notes({f"{series.key} over {axis}_deg": series.positions})
+    errors = (*imported.series, *imported.surfaces)
+    maxima = {error.key: float(np.abs(error.values).max()) for error in errors}
+    maxima |= {key: abs(constant) for key, constant in imported.constants.items()}
+    for key, maximum in maxima.items():
+        if maximum > IMPLAUSIBLE[parameter(key).is_rotation]:
+            units = f", read in {', '.join(imported.units)}" if imported.units else ""
+            notes.append(f"{key} reaches {maximum:g} {parameter(key).unit}{units}: check the unit")
     return notes
 
 
-def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]:
+def _curves(imported: ImportedErrors, base: Scene, name: str) -> dict[str, ErrorFunction]:
     curves: dict[str, ErrorFunction] = {}
-    for key, value in found.constants.items():
-        curves[key] = Constant(base.axis_span(parameter(key).axis), value)
-    for one in (*found.series, *found.planes):
-        if one.key in curves:
-            raise SceneError(name, [f"{one.key} is given twice; expected each error once"])
-        curves[one.key] = (
-            _curve(one, base) if isinstance(one, ErrorSeries) else _surface(one, base, name)
+    for key, constant in imported.constants.items():
+        curves[key] = Constant(base.axis_span(parameter(key).axis), constant)
+    for error in (*imported.series, *imported.surfaces):
+        if error.key in curves:
+            raise SceneError(name, [f"{error.key} is repeated; expected each error once"])
+        curves[error.key] = (
+            _curve(error, base) if isinstance(error, ErrorSeries) else _surface(error, base, name)
         )
     problems = Problems()
-    for key, value in found.curves.items():
+    for key, description in imported.curves.items():
         axis = parameter(key).axis
-        curve = CurveReader(problems, base.axis_span(axis), axis).read(value, key)
+        curve = CurveReader(problems, base.axis_span(axis), axis).read(description, key)
         if curve is not None:
             curves[key] = curve
     if problems.lines:
@@ -184,69 +195,67 @@ def _curves(found: Imported, base: Scene, name: str) -> dict[str, ErrorFunction]
     return curves
 
 
-def _curve(one: ErrorSeries, base: Scene) -> ErrorFunction:
-    span = base.axis_span(parameter(one.key).axis)
-    forward, backward = one.mean(FORWARD), one.mean(BACKWARD)
+def _curve(series: ErrorSeries, base: Scene) -> ErrorFunction:
+    span = base.axis_span(parameter(series.key).axis)
+    forward, backward = series.mean(FORWARD), series.mean(BACKWARD)
     if forward is not None and backward is not None and np.any(forward != backward):
-        there, back = (
-            _table(span, one.positions, values.tolist()) for values in (forward, backward)
+        forward_curve, backward_curve = (
+            _table(span, series.positions, values.tolist()) for values in (forward, backward)
         )
-        return Directional(span, there, back)
-    return _table(span, one.positions, one.values.tolist())
+        return Directional(span, forward_curve, backward_curve)
+    return _table(span, series.positions, series.values.tolist())
 
 
 def _table(span: tuple[float, float], at: Sequence[float], values: Sequence[float]) -> TableCurve:
     return TableCurve(span, tuple(zip(at, values, strict=True)))
 
 
-def _surface(plane: ErrorSurface, base: Scene, name: str) -> ErrorFunction:
-    if len(plane.first) * len(plane.second) > MAX_POINTS:
-        found = f"{plane.key} has {len(plane.first)} × {len(plane.second)} values"
-        raise SceneError(name, [f"{found}; expected at most {MAX_POINTS:,}"])
-    span = base.axis_span(parameter(plane.key).axis)
-    at = (plane.first, plane.second)
-    forward = TwoArguments(span, plane.axes, at, plane.values)
-    if not plane.backward:
+def _surface(surface: ErrorSurface, base: Scene, name: str) -> ErrorFunction:
+    if len(surface.first) * len(surface.second) > MAX_POINTS:
+        problem = f"{surface.key} has {len(surface.first)} × {len(surface.second)} values"
+        raise SceneError(name, [f"{problem}; expected at most {MAX_POINTS:,}"])
+    span = base.axis_span(parameter(surface.key).axis)
+    at = (surface.first, surface.second)
+    forward = TwoArguments(span, surface.axes, at, surface.values)
+    if not surface.backward:
         return forward
-    return Directional(span, forward, replace(forward, values=plane.backward))
+    return Directional(span, forward, replace(forward, values=surface.backward))
 
 
 def _measured(
-    found: Imported, base: Scene, *, keep_runs: bool
+    imported: ImportedErrors, base: Scene, *, keep_runs: bool
 ) -> tuple[dict[str, ErrorFunction], dict[str, Measurement]]:
     uncertainty: dict[str, ErrorFunction] = {
         key: Constant(base.axis_span(parameter(key).axis), value)
-        for key, value in found.uncertainty.items()
+        for key, value in imported.uncertainty.items()
     }
     measured: dict[str, Measurement] = {}
-    for one in found.series:
-        if one.uncertainty:
-            span = base.axis_span(parameter(one.key).axis)
-            uncertainty[one.key] = _table(span, one.positions, one.uncertainty)
-        if keep_runs and len(one.runs) > 1:
-            runs = [
-                (SIGNS.get(run.direction, ""), zip(one.positions, run.values, strict=True))
-                for run in one.runs
-            ]
-            measured[one.key] = Measurement(
-                tuple(
-                    TravelRun(sign, tuple((q, value) for q, value in pairs if not np.isnan(value)))
-                    for sign, pairs in runs
-                )
-            )
+    for series in imported.series:
+        if series.uncertainty:
+            span = base.axis_span(parameter(series.key).axis)
+            uncertainty[series.key] = _table(span, series.positions, series.uncertainty)
+        if keep_runs and len(series.runs) > 1:
+            runs = tuple(_travel_run(series.positions, run) for run in series.runs)
+            measured[series.key] = Measurement(runs)
     return uncertainty, measured
 
 
-def _convention(found: Imported, base: Scene) -> tuple[Model, list[str]]:
+def _travel_run(positions: Sequence[float], run: MeasuredRun) -> TravelRun:
+    pairs = zip(positions, run.values, strict=True)
+    points = tuple((q, error) for q, error in pairs if not math.isnan(error))
+    return TravelRun(SIGNS.get(run.direction, ""), points)
+
+
+def _convention(imported: ImportedErrors, base: Scene) -> tuple[Model, list[str]]:
     model = base.model
-    own = dict(model.own_component_errors)
-    said: list[str] = []
+    conventions = dict(model.own_component_errors)
+    notes: list[str] = []
     axes = dict.fromkeys(
-        parameter(key).axis for key in found.keys if not parameter(key).is_constant
+        parameter(key).axis for key in imported.keys if not parameter(key).is_constant
     )
     for axis in axes:
-        wanted = found.convention.get("linear" if is_linear(axis) else "rotary", "")
-        if wanted and model.convention(axis).name != wanted:
-            own[axis] = wanted
-            said.append(f"component errors of {axis}: {wanted}, as the file has them")
-    return replace(model, own_component_errors=tuple(own.items())), said
+        convention = imported.convention.get("linear" if is_linear(axis) else "rotary", "")
+        if convention and model.convention(axis).name != convention:
+            conventions[axis] = convention
+            notes.append(f"component errors of {axis}: {convention}, as in the file")
+    return replace(model, own_component_errors=tuple(conventions.items())), notes

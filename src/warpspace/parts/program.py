@@ -41,7 +41,7 @@ from warpspace.analysis.uncertainty.propagation import (
 from warpspace.bench.placing import ball_point, follow, following_axes, within_travel
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import evaluate_first_order
-from warpspace.formats.source import MAX_LINES, spell, spell_comment
+from warpspace.formats.source import MAX_LINES, format_comment, format_number
 from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import FULL_TURN_DEG, MAX_LINE_POINTS, MAX_PATH_POINTS
@@ -461,7 +461,7 @@ def correct_program(analysis: Program, program: ParsedProgram) -> Iterator[str]:
 def _header(scene: Scene, analysis: Program) -> Iterator[str]:
     digest = sha256(scene_to_toml(scene).encode()).hexdigest()[:12]
     title = f"{scene.title[:80]}, chain {scene.machine.chain}, errors {digest}"
-    yield spell_comment("(", f"corrected for {title}", ")")
+    yield format_comment("(", f"corrected for {title}", ")")
     setup = "".join(f", {name}={value:g}" for name, value in analysis.offset)
     yield f"(TCP {analysis.tcp}, length {analysis.length_mm:g} mm{setup})"
     yield f"(within {analysis.within_um:g} um between points; geometry only)"
@@ -485,13 +485,13 @@ def _blocks(
             position = float(place[state.index[letter]]) - state.place(letter, 0.0)
             digits = DECIMALS + (2 if letter in "ABC" else state.unit_mm != 1.0)
             unit = 1.0 if letter in "ABC" else state.unit_mm
-            block.append(letter + spell(position / unit, digits))
+            block.append(letter + format_number(position / unit, digits))
         if state.inverse_time and not is_rapid and "F" in state.words:
-            block.append("F" + spell(state.words["F"] * len(kinds), DECIMALS))
+            block.append("F" + format_number(state.words["F"] * len(kinds), DECIMALS))
         if index == len(kinds):
             block += last
         yield state.skip + " ".join([*number, *block, *other_words])
         number, other_words = [], []
         if state.motion == "G82" and not is_rapid:
-            dwell = spell(state.cycle.get("P", 0.0), DECIMALS).removesuffix(".0")
+            dwell = format_number(state.cycle.get("P", 0.0), DECIMALS).removesuffix(".0")
             yield f"{state.skip}G4 P{dwell}"

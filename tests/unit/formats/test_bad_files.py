@@ -14,7 +14,7 @@ from warpspace.exceptions import SceneError
 from warpspace.formats import source
 from warpspace.formats.registry import ReadOptions, find_format, open_upload, read_errors
 from warpspace.formats.source import MAX_BYTES, source_of_bytes, source_of_text
-from warpspace.formats.to_scene import into_scene
+from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics.model import Loop
 from warpspace.scene.library import load_scene, parse_scene
 
@@ -23,7 +23,7 @@ MACHINE = load_scene("dvf5000_nominal").machine
 
 
 def read(text, name="file.csv", **options):
-    return read_errors([source_of_text(text, name)], ReadOptions(**options)).found
+    return read_errors([source_of_text(text, name)], ReadOptions(**options)).imported
 
 
 @pytest.mark.parametrize(
@@ -46,7 +46,7 @@ def read(text, name="file.csv", **options):
     ],
 )
 def test_the_same_table_in_any_spelling(content):
-    found = read_errors([source_of_bytes(content, "t.csv")], ReadOptions()).found
+    found = read_errors([source_of_bytes(content, "t.csv")], ReadOptions()).imported
     exx, eax = found.series
     assert (exx.key, eax.key) == ("EXX", "EAX")
     assert exx.positions == (-100.0, 0.0, 100.0)
@@ -69,9 +69,9 @@ JOINT = "[JOINT_9]\nCOMP_FILE = j.comp\nCOMP_FILE_TYPE = 1\n"
         ("x.csv", "X [mm],EXX [um]\n" + "0,1\n" * 100_002, "line 100002: more than 100,000 rows"),
         ("T_X.COM", com(range(257)), "257.*at most 256"),
         ("T_X.COM", com([0] * 100_000), "line 259.* 100000 rows.* at most 256"),
-        ("j_X.comp", COMP, "line 257: has more than 256 rows"),
+        ("j_X.comp", COMP, "line 257: more than 256 rows"),
         ("j_X.comp", "1 0 0\n0 0 0\n", "line 2: nominal 0 after 1"),
-        ("joint.comp", "0 0 0\n1 0 0\n", "which axis"),
+        ("joint.comp", "0 0 0\n1 0 0\n", "its axis"),
         ("machine.ini", JOINT, r"line 1: section \[JOINT_9\]; expected a joint from 0 to 8"),
     ],
     ids=lambda part: part[:20],
@@ -97,7 +97,7 @@ def test_sizes_of_hostile_files():
         source_of_text("a" * 20_000, "long")
     with pytest.raises(SceneError, match="lines"):
         source_of_text("\n" * 2_000_001, "many")
-    with pytest.raises(SceneError, match="no text"):
+    with pytest.raises(SceneError, match="null bytes"):
         source_of_bytes(b"X [mm]\n\x00\x01\x02\x03\n", "binary")
     with pytest.raises(SceneError, match="is empty"):
         source_of_bytes(b" \n\n", "empty")
@@ -175,16 +175,18 @@ def test_the_runs_of_a_format_of_any_name_are_kept_where_it_says_so(measured):
     plugin = replace(
         reading,
         format=replace(reading.format, name="mine", measured=measured),
-        found=replace(reading.found, format="mine"),
+        imported=replace(reading.imported, format="mine"),
     )
-    assert ("EXX" in into_scene(plugin, None, "runs", "runs.csv").scene.measured) == measured
+    assert (
+        "EXX" in build_imported_scene(plugin, None, "runs", "runs.csv").scene.measured
+    ) == measured
 
 
 def test_lengths_that_do_not_close_are_told():
     text = "SET_SKEW XY=141.4,124.1,100\n"
-    found = read_errors([source_of_text(text, "a.cfg")], ReadOptions()).found
+    found = read_errors([source_of_text(text, "a.cfg")], ReadOptions()).imported
     said = " | ".join((*found.assumed, *found.notes))
-    assert "close only with a side AB of 87.73 mm, -12.3 % from AD" in said
+    assert "imply a side AB of 87.73 mm, -12.3 % from AD" in said
 
 
 @pytest.mark.parametrize("u", ["", ",u(EXX) [um]"])
@@ -204,12 +206,12 @@ measured_range = { X = [-10, 20], Y = 7 }
     cells = ",0.5" if u else ""
     text = f"X [mm],EXX [um]{u}\n-100,1{cells}\n100,3{cells}\n"
     reading = read_errors([source_of_text(text, "x.csv")], ReadOptions())
-    scene = into_scene(reading, base, "", "x.csv").scene
+    scene = build_imported_scene(reading, base, "", "x.csv").scene
     assert (scene.covariance.keys, scene.covariance.rows) == (("EC0Y",), ((9.0,),))
     assert set(scene.uncertainty) == ({"EXX"} if u else set())
     assert scene_uncertainty(scene, Loop.RELATIVE).unknown == (() if u else ("EXX",))
     assert scene.covariance.measured_range["X"] == ((-100.0, 100.0) if u else (-10.0, 20.0))
-    alone = into_scene(reading, None, "", "x.csv").scene
+    alone = build_imported_scene(reading, None, "", "x.csv").scene
     assert (alone.covariance.measured_range if u else alone.covariance) == (
         {"X": (-100.0, 100.0)} if u else None
     )

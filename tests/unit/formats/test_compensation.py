@@ -12,7 +12,7 @@ from warpspace.formats.kinds import fanuc_3d
 from warpspace.formats.registry import ReadOptions, formats, read_errors, recognise
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import AxisTable, Product
-from warpspace.formats.to_scene import into_scene
+from warpspace.formats.to_scene import build_imported_scene
 from warpspace.kinematics import transforms
 from warpspace.kinematics.chain import branch_pose, error_transform, point_in_branch
 from warpspace.kinematics.model import complete_coordinates
@@ -45,7 +45,7 @@ def sources_of(found):
 def read_back(found, scene):
     reading = read_errors(sources_of(found), ReadOptions(scene.machine))
     assert reading.recognised
-    return into_scene(reading, replace(scene, errors=ErrorSet()), "", "written").scene
+    return build_imported_scene(reading, replace(scene, errors=ErrorSet()), "", "written").scene
 
 
 WRITTEN = {one.name: one for one in formats() if one.can_write}
@@ -107,7 +107,7 @@ def test_cross_tables_correct_an_angle_with_its_lever_by_a_product():
 
 
 def test_a_full_grid_leaves_the_square_of_its_pitch(monkeypatch):
-    monkeypatch.setattr(fanuc_3d, "MOST_COUNT", 10**6)  # no rounding beside the interpolation
+    monkeypatch.setattr(fanuc_3d, "MAX_COUNT", 10**6)  # no rounding beside the interpolation
     scene = scene_with(
         "EXX = { harmonics = [[1, 20, 0]] }\nEYY = { harmonics = [[1, 15, 40]] }"
         "\nEAZ = { ramp = 9 }"
@@ -181,8 +181,8 @@ def test_an_axis_against_iso_841_is_said():
     against = replace(scene, model=replace(scene.model, machine=replace(scene.machine, axes=axes)))
     said = corrected(against, "fanuc-3d", 3, 3).assumed[-2:]
     moves = "the tool moves over the workpiece in the {} direction, {} ISO 841"
-    assert said[0].startswith("positive Y, Z: " + moves.format("positive", "as"))
-    assert said[1] == "positive X: " + moves.format("negative", "against")
+    assert said[0].startswith("positive Y, Z: " + moves.format("positive", "according to"))
+    assert said[1] == "positive X: " + moves.format("negative", "contrary to")
 
 
 def test_tables_of_a_machine_that_moves_its_workpiece_come_back_as_its_errors():
@@ -215,7 +215,7 @@ def test_orientation_is_corrected_by_rotary_axes_under_the_workpiece_too():
 def test_what_a_format_cannot_hold_is_said_and_stays():
     found = corrected(scene_with(SURFACE), "iso-text", 5)
     assert found.after_statistics.max_um == pytest.approx(found.before_statistics.max_um)
-    assert any("no place for EXY" in note for note in found.notes)
+    assert any("cannot represent EXY" in note for note in found.notes)
 
 
 def test_a_sweep_compares_kinds_by_their_size():
@@ -237,7 +237,7 @@ def test_constants_of_the_alternative_model_turn_with_the_axis():
     base = load_scene("dvf5000_nominal")
     options = ReadOptions(base.machine, variant="alternative")
     reading = read_errors([source_of_text(text, "e.exc")], options)
-    scene = into_scene(reading, base, "", "e.exc").scene
+    scene = build_imported_scene(reading, base, "", "e.exc").scene
     assert isinstance(scene.errors.functions["EAC"], Harmonics)
     at = {"X": 0.0, "Y": 0.0, "Z": 0.0, "B": 0.0, "C": np.array([0.0, 30.0, 90.0, 200.0])}
     found = evaluate(scene, at=at, loop="workpiece").error_um
@@ -278,8 +278,8 @@ def test_a_part_on_a_moving_bed_is_corrected_where_it_has_its_shape(name, asked,
     found = corrected(scene, name, 3 if asked else None, stem="p")
     assert 43.0 < found.before_statistics.rms_um < 46.0
     assert found.after_statistics.rms_um < left_um
-    assert found.assumed[-1].startswith("a part is judged by its shape")
-    assert ("no place for it" in found.assumed[-1]) is not asked
+    assert found.assumed[-1].startswith("best-fit placement")
+    assert ("cannot correct them" in found.assumed[-1]) is not asked
 
 
 POSITIONING = "EXX = { forward = { poly = [4, 0.01] }, backward = { poly = [-4, 0.01] } }"
@@ -314,7 +314,7 @@ def test_every_format_holds_the_directions_or_says_that_it_does_not(name, errors
         for one, other in ((there.before, back.before), (there.after, back.after))
     ]
     assert reversal[0] > 5.0
-    said = [note for note in found.notes if note.startswith("direction of travel is not held")]
+    said = [note for note in found.notes if "direction of travel" in note]
     if name in (ONE_HELD if errors == POSITIONING else BOTH_HELD):
         assert reversal[1] < 0.3
         assert not said
@@ -397,7 +397,7 @@ def test_surfaces_by_direction_stand_in_the_own_table_to_the_printed_digits():
         assert here == pytest.approx(there, abs=1e-6), way
     assert found.after_statistics.max_um < 1e-3
     isg = corrected(scene, "isg-csv", 3)
-    assert any("direction of travel is not held" in note for note in isg.notes)
+    assert any("direction of travel" in note for note in isg.notes)
     assert isg.after_statistics.max_um < 1e-3
 
 

@@ -28,7 +28,7 @@ def _scene(text, folder):
 
 def _import(text, folder):
     del folder
-    found = read_errors([open_upload("t.csv", text.encode())], ReadOptions(), "csv").found
+    found = read_errors([open_upload("t.csv", text.encode())], ReadOptions(), "csv").imported
     return list(zip(found.series[0].positions, found.series[0].values.tolist(), strict=True))
 
 

@@ -28,9 +28,9 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.form_values import read_form
 from warpspace.exceptions import WarpspaceError
 from warpspace.formats import registry
-from warpspace.formats.measured import BACKWARD, BOTH, FORWARD, ErrorSeries, summary_table
+from warpspace.formats.measured import BACKWARD, FORWARD, UNDIRECTED, ErrorSeries, summary_table
 from warpspace.formats.source import Source
-from warpspace.formats.to_scene import ImportedScene, into_scene
+from warpspace.formats.to_scene import ImportedScene, build_imported_scene
 from warpspace.machine.axes import is_linear, parameter
 from warpspace.machine.limits import MAX_UPLOAD_BYTES
 from warpspace.scene.model import Scene
@@ -43,7 +43,7 @@ SIGNS = {
     "error": "errors, which the controller subtracts",
     "correction": "corrections, which the controller adds",
 }
-WAYS = {FORWARD: "forward", BACKWARD: "backward", BOTH: "mean"}
+WAYS = {FORWARD: "forward", BACKWARD: "backward", UNDIRECTED: "mean"}
 OPTIONS = {"--axis": "“Axis”", "--sign": "“Sign”", "--variant": "“Variant”", "--format": "“Format”"}
 OFFERED = (
     "Measured errors or a controller's table; what changes is shown before it is applied."
@@ -83,7 +83,7 @@ class Import(Analysis):
         )
         reading = registry.read_errors(self.sources, options, self.format or "")
         files = ", ".join(source.name for source in self.sources)
-        made = into_scene(reading, scene, scene.title, files)
+        made = build_imported_scene(reading, scene, scene.title, files)
         return ImportResult(files=files, before=scene, reading=reading, made=made)
 
 
@@ -100,7 +100,7 @@ class ImportResult(Result):
         return (Change(self.files, self.made.scene),)
 
     def blocks(self) -> Iterator[Block]:
-        found = self.reading.found
+        found = self.reading.imported
         units = ", ".join(found.units).replace("um", "µm").replace("urad", "µrad")
         yield f"{self.reading.format.title} from {self.files}, in {units}."
         old = [key for key in found.keys if self.before.errors.amplitude(key)]
@@ -115,7 +115,7 @@ class ImportResult(Result):
             yield Lines("lines", title, f"{row.axis} [{place}]", f"[{row.unit}]", curves)
 
     def caveats(self) -> Iterator[str]:
-        found, kept = self.reading.found, f"kept from {self.before.name}:"
+        found, kept = self.reading.imported, f"kept from {self.before.name}:"
         for one in (*found.assumed, *found.notes, *self.made.notes):
             if not one.startswith("replaced: "):
                 yield _without_options(one.replace(kept, "unchanged:"))

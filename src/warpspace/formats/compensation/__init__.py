@@ -1,1 +1,1 @@
-"""What a controller needs, and what is left after it."""
+"""Compensation tables for controllers, and the residual error after compensation."""

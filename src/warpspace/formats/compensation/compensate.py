@@ -1,4 +1,4 @@
-"""A compensation from a scene to the controller and back: written, read, evaluated, applied."""
+"""The command `compensate`: write a compensation table and evaluate the residual error."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,7 +17,7 @@ from warpspace.field.grid import build_grid
 from warpspace.formats.compensation.controller import (
     BeforeAfter,
     Controller,
-    evaluated,
+    evaluate_before_after,
     read_back,
     reversal_notes,
 )
@@ -33,24 +33,24 @@ from warpspace.scene.model import Scene, with_direction, with_placement
 from warpspace.scene.text_files import parse_whole
 from warpspace.units import Array
 
-NODES = 28  # nodes per axis that what is left is evaluated at: between the points of usual tables
-SMALL_NODES = 7  # nodes and points per axis that the placement of a workpiece is fitted with
-STEP = 100.0  # µm and µrad by which a placement is changed to see what a table makes of it
-MOVABLE = 0.05  # A table that leaves less than this share of a displaced part can move it
-PLACED = (
-    "a part is judged by its shape: where it lies (three shifts, three small rotations) is fitted"
-    " out of the errors before and after"
+NODES = 28  # per axis, for the residual error: they lie between the points of usual tables
+SMALL_NODES = 7  # nodes and points per axis with which the placement of a workpiece is fitted
+STEP = 100.0  # µm and µrad; change of a placement that measures the response of a table
+MIN_SINGULAR_VALUE = 0.05  # below it the table compensates any placement by itself
+PLACED_ASSUMPTION = (
+    "best-fit placement: three shifts and three small rotations of the workpiece are fitted out"
+    " of the errors before and after"
 )
-NO_OFFSETS = ", since the format has no place for it"
+NO_OFFSETS = ", because the format cannot correct them"
 RESOLUTION = (0.0, 0.1)  # mm or degrees
 SIZES = (3, 5, 9, 17)
-MOST = 32  # compensations of one sweep
-FEW = ("linuxcnc-matrix", "marlin")
-"""Formats without a grid that a sweep shows where none are named; Klipper's skew is Marlin's."""
+MAX_TABLES = 32  # compensations of one sweep
+GRIDLESS = ("linuxcnc-matrix", "marlin")
+"""Formats without a grid in the default sweep; the skew of Klipper equals that of Marlin."""
 TABLES = ("sinumerik-enc", "sinumerik-cec", "heidenhain", "fanuc-3d", "isg-csv")
-LEAST_UM = 1e-3  # lower end of the chart of a sweep, where nothing is left
+MIN_CHART_UM = 1e-3  # lower end of the chart of a sweep
 Points: TypeAlias = int | tuple[tuple[str, int], ...]
-"""Points of a table along every axis, or along each."""
+"""Points of a table: one number for all axes, or one per axis."""
 
 
 def read_points(text: str, _scene: Scene | None = None) -> Points:
@@ -71,70 +71,69 @@ def _read_format(text: str, _scene: Scene) -> str:
 
 def _read_sizes(text: str, _scene: Scene) -> tuple[int, ...]:
     try:
-        found = tuple(dict.fromkeys(parse_whole(part) for part in text.split(",")))
+        sizes = tuple(dict.fromkeys(parse_whole(part) for part in text.split(",")))
     except ValueError:
-        found = ()
-    if not found or not all(2 <= count <= 1000 for count in found):
+        sizes = ()
+    if not sizes or not all(2 <= count <= 1000 for count in sizes):
         raise ValueError("expected numbers of points with commas between, for instance 3,5,9,17")
-    return found
+    return sizes
 
 
 @dataclass(frozen=True, kw_only=True)
 class Compensate(Analysis):
     """Write a compensation table and report the residual error.
 
-    The program reads its own file back and does with it what the controller does: it interpolates,
-    rounds and clips, and adds the result to the commanded positions. What is left is evaluated with
-    the exact chain over the working volume, between the points of the table.
+    The program reads its own file back and evaluates it as the controller does: it interpolates,
+    rounds and clips, and adds the corrections to the commanded positions. The residual error is
+    evaluated with the exact chain over the working volume, between the points of the table.
 
-    A format that cannot move all positions by the same (Klipper, Marlin, the matrix of LinuxCNC)
-    corrects no part that lies elsewhere: in the relative loop it is always --placed.
+    Formats without constant offsets (Klipper, Marlin, the matrix of LinuxCNC) cannot correct the
+    placement of the workpiece: in the relative loop they always imply --placed.
 
-    --sweep 3,5,9,17 compares kinds of table by their size instead.
+    --sweep 3,5,9,17 compares formats and table sizes instead.
     """
 
     name = "compensate"
     task = "improve"
     doing = "compensating"
-    file_help = "File to write; tables of several files stand beside it."
+    file_help = "File to write; further files of the table are written next to it."
     has_chart = True
-    chart_help = "maps before and after, or what is left by the size of the table,"
+    chart_help = "maps before and after, or the residual error over the size of the table,"
     formats: Annotated[tuple[str, ...], Grammar("F", _read_format, each=True)] = option(
         (),
         "Format of the table, see `warpspace import --formats`; with --sweep repeatable",
         flag="--format",
     )
     points: Annotated[Points | None, Grammar("N|X=N,…", read_points, many=True)] = option(
-        None, "Points of the table along each axis", flag="--grid", unset="as the format needs"
+        None, "Points of the table along each axis", flag="--grid", unset="default of the format"
     )
     resolution: float = option(
         0.0,
-        "Smallest step of a value, mm or degrees; of fanuc-3d the detection unit",
+        "Resolution of the values, mm or degrees; for fanuc-3d the detection unit",
         low=RESOLUTION[0],
         high=RESOLUTION[1],
         unset="that of the format",
     )
     sign: Literal["error", "correction"] | None = option(
         None,
-        "What the numbers of the table are: the error, which the controller takes back, or what it"
+        "Sign of the table: the error, which the controller subtracts, or the correction, which it"
         " adds",
-        unset="what the manual says",
+        unset="as in the manual of the controller",
     )
     loop: Literal["tool", "relative"] | None = option(
         None,
-        "Structural loop that is corrected",
+        "Structural loop to correct",
         unset="relative where a linear axis, or with --orientation all rotary axes, carry the"
         " workpiece",
     )
     placed: bool = option(False, PLACED_HELP)
     orientation: bool = option(
-        False,
-        "Correct the tool axis too, with the rotary axes, where the format has a place for it",
+        False, "Correct the tool axis too, with the rotary axes, if the format supports it"
     )
     sweep: Annotated[tuple[int, ...], Grammar("N,N,…", _read_sizes, many=True)] = option(
-        (), "Instead of one table, compare tables with so many points per axis"
+        (), "Compare tables with these numbers of points per axis instead of writing one"
     )
-    stem: str = "compensation"  # name of the files
+    stem: str = "compensation"  # of the file names
 
     def for_output(self, stem: str | None) -> "Compensate":
         if not self.sweep and (len(self.formats) != 1 or stem is None):
@@ -143,33 +142,33 @@ class Compensate(Analysis):
             )
         if self.sweep and (stem or self.points or self.orientation):
             raise OptionError(
-                "{sweep} writes no table: expected it without {output}, {points}, {orientation}"
+                "{sweep} writes no table; expected no {output}, {points}, {orientation} with it"
             )
         if stem and not stem.isprintable():  # files name each other
             raise OptionError(f"{stem!r}: expected a name of printable characters")
         return self if stem is None else replace(self, stem=stem)
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> "Compensation | Sweep":
-        asked = replace(self, loop="relative") if self.placed and self.loop is None else self
-        scene = with_placement(scene, asked.loop or "", placed=self.placed)
+        options = replace(self, loop="relative") if self.placed and self.loop is None else self
+        scene = with_placement(scene, options.loop or "", placed=self.placed)
         if self.sweep:
-            return sweep(scene, asked)
-        return compensate(scene, asked, watch=lambda: watch(0.0))
+            return sweep(scene, options)
+        return compensate(scene, options, check_cancelled=lambda: watch(0.0))
 
 
 @dataclass(frozen=True)
 class Compensation(BeforeAfter, Result):
-    """A compensation and what it leaves."""
+    """A compensation table and the residual error."""
 
     drawn_by: ClassVar[str] = "warpspace.outputs.charts.result_charts:compensation_chart"
     format: Format
-    files: Mapping[str, str]  # texts by what is added to the name of the file
+    files: Mapping[str, str]  # texts by the suffix of the file name
     points: Mapping[str, int]  # points of the table per axis
-    controller: Controller  # it has read the files
+    controller: Controller  # that has read the files
     # "forward" and "backward", where errors depend on the direction of travel
     directions: Mapping[str, BeforeAfter] = field(default_factory=dict[str, BeforeAfter])
-    reversal: tuple[str, ...] = ()  # what of that the format has no place for, in words
-    resolution: float = 0.0  # mm or degrees; smallest step that was asked for
+    reversal: tuple[str, ...] = ()  # notes on reversal errors that the format cannot represent
+    resolution: float = 0.0  # mm or degrees; 0 where the format sets it
 
     @property
     def size(self) -> int:
@@ -185,23 +184,26 @@ class Compensation(BeforeAfter, Result):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """What the format leaves open, in which sense axes move, and what is left out by itself."""
+        """Assumptions about the format, the senses of the axes and the placement."""
         machine = self.controller.scene.machine
         senses = (
-            (1, "the positive direction, as ISO 841 has it"),
-            (-1, "the negative direction, against ISO 841"),
+            (1, "the positive direction, according to ISO 841"),
+            (-1, "the negative direction, contrary to ISO 841"),
         )
-        said = (
-            f"positive {', '.join(axes)}: the tool moves over the workpiece in {words}"
-            for sense, words in senses
-            if (axes := [axis for axis in self.axes if machine.sense(axis) == sense])
-        )
-        placed = [f"{PLACED}{'' if self.format.offsets else NO_OFFSETS}"] if self.placed else []
-        return (*self.controller.assumed, *said, *placed)
+        assumptions = list(self.controller.assumed)
+        for sense, direction in senses:
+            axes = ", ".join(axis for axis in self.axes if machine.sense(axis) == sense)
+            if axes:
+                assumptions.append(
+                    f"positive {axes}: the tool moves over the workpiece in {direction}"
+                )
+        if self.placed:
+            assumptions.append(PLACED_ASSUMPTION + ("" if self.format.offsets else NO_OFFSETS))
+        return tuple(assumptions)
 
     @property
     def placed(self) -> bool:
-        """Whether the errors before and after leave out where the workpiece lies."""
+        """True if the placement of the workpiece is fitted out of the errors."""
         return self.controller.scene.view(self.controller.loop).placed_over is not None
 
     @property
@@ -210,7 +212,7 @@ class Compensation(BeforeAfter, Result):
 
     @property
     def expected(self) -> dict[str, float | None]:
-        """RMS that the machine has to be expected to keep, as its errors are not known better."""
+        """Expected RMS residual error of the machine, with the uncertainty of its errors."""
         if self.field_uncertainty is None:
             return {}
         square = self.after.norm_um**2 + np.trace(
@@ -220,8 +222,8 @@ class Compensation(BeforeAfter, Result):
         return {"expected_rms_um": rms if self.field_uncertainty.errors.is_known else None}
 
     @property
-    def points_words(self) -> str:
-        return spell_points(self.format, self.points)
+    def points_text(self) -> str:
+        return format_points(self.format, self.points)
 
     @property
     def bytes(self) -> int:
@@ -231,28 +233,28 @@ class Compensation(BeforeAfter, Result):
         return self.files
 
     def as_json(self) -> dict[str, Any]:
-        """Spell it; who writes the files names them."""
+        """Return the JSON mapping; the caller that writes the files adds their names."""
         after = self.after_statistics
         return {
             "format": self.format.name,
             "loop": self.loop,
             "corrected": list(self.axes),
-            "points": dict(self.points) if not self.format.grid.startswith("none") else {},
+            "points": dict(self.points) if self.format.has_grid else {},
             "numbers": self.size,
             "files": [],
             "before": to_json(self.before_statistics),
             "after": to_json(after) | self.expected,
             "worst_after_um": after.max_um,
             "orientation": {
-                word: dict(zip(("mean_urad", "max_urad"), self.tilt_urad(field), strict=True))
-                for word, field in (("before", self.before), ("after", self.after))
+                name: dict(zip(("mean_urad", "max_urad"), self.tilt_urad(field), strict=True))
+                for name, field in (("before", self.before), ("after", self.after))
             },
             "directions": {
-                way: {
-                    "before": to_json(one.before_statistics),
-                    "after": to_json(one.after_statistics),
+                direction: {
+                    "before": to_json(errors.before_statistics),
+                    "after": to_json(errors.after_statistics),
                 }
-                for way, one in self.directions.items()
+                for direction, errors in self.directions.items()
             },
             "assumed": list(self.assumed),
             "notes": list(self.notes),
@@ -265,142 +267,145 @@ class Compensation(BeforeAfter, Result):
             *number_columns(("mean", "RMS", "P95", "max"), ".3f", "µm"),
             *number_columns(("mean tilt", "max tilt"), ".2f", "µrad"),
         )
-        rows = [
-            (f"{word} {way}".rstrip(), *numbers.four, *one.tilt_urad(field))
-            for way, one in {"": self, **self.directions}.items()
-            for word, numbers, field in (
-                ("before", one.before_statistics, one.before),
-                ("after", one.after_statistics, one.after),
-            )
-        ]
+        rows: list[tuple[str | float, ...]] = []
+        for direction, errors in {"": self, **self.directions}.items():
+            before, after = errors.before_statistics.four, errors.after_statistics.four
+            rows += [
+                (f"before {direction}".rstrip(), *before, *errors.tilt_urad(errors.before)),
+                (f"after {direction}".rstrip(), *after, *errors.tilt_urad(errors.after)),
+            ]
         yield Table(columns, rows)
         named = {"before": self.before_statistics, "after": self.after_statistics}
         yield from u95_lines(self.field_uncertainty and self.field_uncertainty.errors, named)
-        if (rms := self.expected.get("expected_rms_um")) is not None:
-            yield f"  expected on the machine: RMS {rms:.2f} µm, as its errors are not known better"
-        yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_words}"
+        rms = self.expected.get("expected_rms_um")
+        if rms is not None:
+            yield f"  expected RMS on the machine {rms:.2f} µm, with the uncertainty of its errors"
+        yield f"  {self.size} numbers; corrected: {', '.join(self.axes)}; {self.points_text}"
         yield from (f"  assumed: {text}" for text in self.assumed)
         yield from (f"  {text}" for text in self.notes)
 
 
-def spell_points(kind: Format, points: Mapping[str, int]) -> str:
-    if kind.grid.startswith("none"):
+def format_points(kind: Format, points: Mapping[str, int]) -> str:
+    if not kind.has_grid:
         return "no grid"
     return ", ".join(f"{axis} {count}" for axis, count in points.items()) + " points"
 
 
-def table_points(kind: Format, scene: Scene, asked: Points | None) -> dict[str, int]:
+def table_points(kind: Format, scene: Scene, points: Points | None) -> dict[str, int]:
     axes = [axis for axis in scene.machine.axes if axis in scene.workspace.volume_axes]
     if not axes:
-        raise OptionError(f"{scene.name}: no axis has a range in [workspace]; nothing to correct")
-    if isinstance(asked, tuple):
-        by_axis = dict(asked)
+        raise OptionError(f"{scene.name}: nothing to correct; expected a range in [workspace]")
+    if isinstance(points, tuple):
+        by_axis = dict(points)
         for axis in by_axis:
             if axis not in axes:
                 raise OptionError(f"{{points}} {axis}: expected one of {', '.join(axes)}")
-        given = {axis: by_axis.get(axis, kind.points) for axis in axes}
+        counts = {axis: by_axis.get(axis, kind.points) for axis in axes}
     else:
-        given = dict.fromkeys(axes, asked or kind.points)
-    for axis, count in given.items():
+        counts = dict.fromkeys(axes, points or kind.points)
+    for axis, count in counts.items():
         if not 2 <= count <= kind.most_points:
             raise OptionError(
-                f"{{points}} {axis}={count}: {kind.name} takes 2 to {kind.most_points} points an"
-                " axis"
+                f"{{points}} {axis}={count}: expected 2 to {kind.most_points} for {kind.name}"
             )
-    return given
+    return counts
 
 
 def compensate(
     scene: Scene,
-    asked: Compensate,
+    options: Compensate,
     nodes: int = NODES,
     *,
-    watch: Callable[[], None] = lambda: None,
+    check_cancelled: Callable[[], None] = lambda: None,
 ) -> Compensation:
-    kind, loop, sign = find_format(asked.formats[0]), asked.loop or "", asked.sign or ""
+    kind, loop, sign = find_format(options.formats[0]), options.loop or "", options.sign or ""
     if kind.write is None:
         raise OptionError(
-            f"{kind.name} is read only; `warpspace import --formats` lists what can be written"
+            f"{kind.name} cannot be written; `warpspace import --formats` lists those that can"
         )
-    if asked.orientation and not kind.orientation:
+    if options.orientation and not kind.orientation:
         raise OptionError(f"{{orientation}}: {kind.name} corrects the position only")
     if sign and (sign not in SIGNS or kind.tables is None):
         raise OptionError(f"{{sign}} {sign!r}: expected error or correction, of a table")
     if scene.model.direction == TravelDirection.DIFFERENCE:
         scene = with_direction(scene, TravelDirection.MEAN)
     scene = placed_for([kind], scene, loop)
-    corrector = build_corrector(scene, loop, orientation=asked.orientation)
-    points = table_points(kind, scene, asked.points)
-    wanted = RequiredCorrections(scene, corrector, points, asked.resolution, sign, asked.stem)
-    watch()
+    corrector = build_corrector(scene, loop, orientation=options.orientation)
+    points = table_points(kind, scene, options.points)
+    corrections = RequiredCorrections(
+        scene, corrector, points, options.resolution, sign, options.stem
+    )
+    check_cancelled()
     if kind.tables is not None:
-        wanted = replace(wanted, corrector=_placed(kind, kind.write, wanted, watch))
-    files = kind.write(wanted)
-    watch()
+        corrections = replace(
+            corrections, corrector=_with_placement(kind, kind.write, corrections, check_cancelled)
+        )
+    files = kind.write(corrections)
+    check_cancelled()
     grid = build_grid(scene.model, scene.workspace, nodes)
-    label = f"{kind.title.partition(',')[0]} ({spell_points(kind, points)})"
-    controller = read_back(kind, files, wanted, label)
-    watch()
-    own = evaluated(controller, grid, scene.model.direction)
-    watch()
+    label = f"{kind.title.partition(',')[0]} ({format_points(kind, points)})"
+    controller = read_back(kind, files, corrections, label)
+    check_cancelled()
+    comparison = evaluate_before_after(controller, grid, scene.model.direction)
+    check_cancelled()
     directions: dict[str, BeforeAfter] = {}
     reversal: tuple[str, ...] = ()
     if scene.errors.has_directions:
-        there, back = (
-            evaluated(controller, grid, way)
-            for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        forward, backward = (
+            evaluate_before_after(controller, grid, direction)
+            for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
         )
-        directions = {"forward": there, "backward": back}
-        reversal = reversal_notes(there, back, scene.errors, scene.model.direction)
-        watch()
+        directions = {"forward": forward, "backward": backward}
+        reversal = reversal_notes(forward, backward, scene.errors, scene.model.direction)
+        check_cancelled()
     return Compensation(
-        own.before, own.after, grid, own.field_uncertainty, kind, files, points, controller, directions,
-        reversal, asked.resolution,
+        comparison.before, comparison.after, grid, comparison.field_uncertainty, kind, files,
+        points, controller, directions, reversal, options.resolution,
     )  # fmt: skip
 
 
 def placed_for(kinds: Sequence[Format], scene: Scene, loop: str) -> Scene:
-    """Leave out where the workpiece lies, should one of some formats have no place for it."""
-    unplaced = all(kind.offsets for kind in kinds)
-    if unplaced or build_corrector(scene, loop).loop is not Loop.RELATIVE:
+    """Return the scene with best-fit placement if one of the formats has no constant offsets."""
+    if all(kind.offsets for kind in kinds):
         return scene
-    return replace(scene, placed=True)
+    is_relative = build_corrector(scene, loop).loop is Loop.RELATIVE
+    return replace(scene, placed=True) if is_relative else scene
 
 
-def _placed(
+def _with_placement(
     kind: Format,
     write: Callable[[RequiredCorrections], Files],
-    wanted: RequiredCorrections,
-    watch: Callable[[], None],
+    corrections: RequiredCorrections,
+    check_cancelled: Callable[[], None],
 ) -> Corrector:
-    """Let the corrector leave alone where the workpiece lies, if that is fitted out.
+    """Return the corrector with the placement of the workpiece that fits the residual error best.
 
-    What a table does to the errors changes which placement fits best what it leaves. Both are
-    linear: seven small tables tell it. What a table could make of any placement stays as it is.
+    The table changes the residual error, and so the placement that fits it best. Both are linear:
+    seven small tables determine the fit. Placements that the table compensates stay unchanged.
     """
-    scene, corrector = wanted.scene, wanted.corrector
+    scene, corrector = corrections.scene, corrections.corrector
     view = replace(scene.view(corrector.loop), reference=None)
     start = find_placement(corrector.model, corrector.errors, view, exact=True)
     if start is None:
         return corrector
     bare = replace(scene, placed=False, reference=None)
     grid = build_grid(scene.model, scene.workspace, SMALL_NODES)
-    coarse = {axis: min(count, SMALL_NODES) for axis, count in wanted.points.items()}
+    coarse = {axis: min(count, SMALL_NODES) for axis, count in corrections.points.items()}
 
     def fitted(placement: Array) -> Array:
-        watch()
-        own = replace(corrector, placement=placement)
-        asked = replace(wanted, corrector=own, points=coarse, resolution=0.0)
-        controller = read_back(kind, write(asked), asked, kind.name)
+        check_cancelled()
+        placed_corrector = replace(corrector, placement=placement)
+        trial = replace(corrections, corrector=placed_corrector, points=coarse, resolution=0.0)
+        controller = read_back(kind, write(trial), trial, kind.name)
         field = controller.field(grid.coordinates, grid.nominal_mm, bare)
         return fit_placement(scene.model, grid, field.error_um)
 
     base = fitted(start)
-    slopes = [(fitted(start + STEP * one) - base) / STEP for one in np.eye(6)]
-    left, sizes, right = np.linalg.svd(np.eye(6) - np.array(slopes).T)
-    back = np.divide(1.0, sizes, out=np.zeros(6), where=sizes > MOVABLE)
-    found = start + right.T @ (back * (left.T @ (base - start)))
-    return replace(corrector, placement=found)
+    slopes = [(fitted(start + STEP * direction) - base) / STEP for direction in np.eye(6)]
+    left_vectors, sizes, right_vectors = np.linalg.svd(np.eye(6) - np.array(slopes).T)
+    reciprocals = np.divide(1.0, sizes, out=np.zeros(6), where=sizes > MIN_SINGULAR_VALUE)
+    placement_fit = start + right_vectors.T @ (reciprocals * (left_vectors.T @ (base - start)))
+    return replace(corrector, placement=placement_fit)
 
 
 @dataclass(frozen=True)
@@ -416,7 +421,7 @@ class SweepStep:
     bytes: int
     pitch: float  # largest step of the table, mm or degrees; 0 where there is none
     after: Statistics
-    # whether it leaves out where the workpiece lies, as all of a sweep do then
+    # true if the placement of the workpiece is fitted out, as in all tables of the sweep then
     placed: bool = False
 
     @property
@@ -426,12 +431,12 @@ class SweepStep:
 
 @dataclass(frozen=True, kw_only=True)
 class Sweep(Result):
-    """Which table is worth it: what is left, by kind of table and number of points."""
+    """Residual errors by format and number of points."""
 
     title: str  # of the scene
     before: Statistics
     steps: tuple[SweepStep, ...]
-    left_out: tuple[str, ...]  # formats of which no table can be made, and why
+    left_out: tuple[str, ...]  # formats that cannot be used, with reasons
 
     def as_json(self) -> dict[str, Any]:
         steps = to_json(self.steps)
@@ -445,75 +450,76 @@ class Sweep(Result):
             Column("numbers", "d"), *number_columns(("mean", "RMS", "P95", "max"), ".3f", "µm"),
         )  # fmt: skip
         rows = [
-            (one.format, one.points or None, one.pitch or None, one.numbers, *one.after.four)
-            for one in self.steps
+            (step.format, step.points or None, step.pitch or None, step.numbers, *step.after.four)
+            for step in self.steps
         ]
         yield Table(columns, rows)
-        if any(one.placed for one in self.steps):
-            yield f"  assumed: {PLACED}"
-        yield from (f"  left out: {text}" for text in self.left_out)
-        for words, of in (("largest", "max_um"), ("mean over the volume", "mean_um")):
-            title = f"Left over the working volume: {words}"
-            yield Lines(
-                "lines", title, "numbers in the controller", "|E| [µm]", self._curves(of), log=True
-            )
+        if any(step.placed for step in self.steps):
+            yield f"  assumed: {PLACED_ASSUMPTION}"
+        yield from (f"  not possible: {text}" for text in self.left_out)
+        for label, statistic in (("maximum", "max_um"), ("mean over the volume", "mean_um")):
+            title, x_label = f"Residual error: {label}", "numbers in the controller"
+            yield Lines("lines", title, x_label, "|E| [µm]", self._curves(statistic), log=True)
 
-    def _curves(self, of: str) -> tuple[Curve, ...]:
-        sizes = [max(one.numbers, 1) for one in self.steps]
-        before = np.full(2, max(getattr(self.before, of), LEAST_UM))
+    def _curves(self, statistic: str) -> tuple[Curve, ...]:
+        sizes = [max(step.numbers, 1) for step in self.steps]
+        before = np.full(2, max(getattr(self.before, statistic), MIN_CHART_UM))
         curves = [Curve("before", np.array([min(sizes), max(sizes)], float), before, style="thin")]
-        for number, kind in enumerate(dict.fromkeys(one.format for one in self.steps)):
-            own = [one for one in self.steps if one.format == kind]
-            x = np.array([max(one.numbers, 1) for one in own], float)
-            y = np.array([max(getattr(one.after, of), LEAST_UM) for one in own])
+        for number, kind in enumerate(dict.fromkeys(step.format for step in self.steps)):
+            steps = [step for step in self.steps if step.format == kind]
+            x = np.array([max(step.numbers, 1) for step in steps], float)
+            y = np.array([max(getattr(step.after, statistic), MIN_CHART_UM) for step in steps])
             curves += [Curve(kind, x, y, number), Curve("", x, y, number, "dots")]
         return tuple(curves)
 
 
-def sweep(scene: Scene, asked: Compensate) -> Sweep:
-    names = list(dict.fromkeys(asked.formats)) or [*TABLES, *FEW]
-    wanted: list[tuple[str, int]] = []
+def sweep(scene: Scene, options: Compensate) -> Sweep:
+    names = list(dict.fromkeys(options.formats)) or [*TABLES, *GRIDLESS]
+    tables: list[tuple[str, int]] = []
     for name in names:
-        kind, sizes = find_format(name), asked.sweep or SIZES
-        gridless = kind.grid.startswith("none")
-        counts = [0] if gridless else [count for count in sizes if 2 <= count <= kind.most_points]
-        wanted += [(name, count) for count in counts]
-    if len(wanted) > MOST:
-        raise OptionError(f"{{sweep}} of {len(wanted)} tables; expected at most {MOST}")
+        kind, sizes = find_format(name), options.sweep or SIZES
+        counts = [count for count in sizes if 2 <= count <= kind.most_points]
+        if not kind.has_grid:
+            counts = [0]
+        tables += [(name, count) for count in counts]
+    if len(tables) > MAX_TABLES:
+        raise OptionError(f"{{sweep}} of {len(tables)} tables; expected at most {MAX_TABLES}")
     title = scene.title
-    scene = placed_for([find_format(name) for name in names], scene, asked.loop or "")
+    scene = placed_for([find_format(name) for name in names], scene, options.loop or "")
     before: Statistics | None = None
     steps: list[SweepStep] = []
     left_out: dict[str, str] = {}
-    for name, count in wanted:
+    for name, count in tables:
         kind = find_format(name)
-        own = replace(
-            asked,
+        single = replace(
+            options,
             formats=(name,),
             points=count or None,
-            resolution=0.0 if kind.parametric else asked.resolution,
-            sign=asked.sign if kind.tables else None,
+            resolution=0.0 if kind.parametric else options.resolution,
+            sign=options.sign if kind.tables else None,
         )
         try:
-            found = compensate(scene, own)
+            compensation = compensate(scene, single)
         except OptionError as error:
-            if asked.formats:
+            if options.formats:
                 raise
             left_out[name] = str(error)
             continue
-        before = found.before_statistics
-        steps.append(_step(scene, found, count))
+        before = compensation.before_statistics
+        steps.append(_step(scene, compensation, count))
     if before is None:
-        raise OptionError(f"{{sweep}}: no table can be made: {'; '.join(left_out.values())}")
-    words = tuple(f"{name}: {why}" for name, why in left_out.items())
-    return Sweep(title=title, before=before, steps=tuple(steps), left_out=words)
+        raise OptionError(
+            f"{{sweep}}: none of the tables is possible: {'; '.join(left_out.values())}"
+        )
+    reasons = tuple(f"{name}: {reason}" for name, reason in left_out.items())
+    return Sweep(title=title, before=before, steps=tuple(steps), left_out=reasons)
 
 
-def _step(scene: Scene, found: Compensation, count: int) -> SweepStep:
+def _step(scene: Scene, compensation: Compensation, count: int) -> SweepStep:
     spans = [
         (scene.workspace.ranges[axis][1] - scene.workspace.ranges[axis][0]) / (number - 1)
-        for axis, number in found.points.items()
+        for axis, number in compensation.points.items()
     ]
     pitch = max(spans) if count else 0.0
-    size, after = (found.size, found.bytes), found.after_statistics
-    return SweepStep(found.format.name, count, *size, pitch, after, found.placed)
+    size, after = (compensation.size, compensation.bytes), compensation.after_statistics
+    return SweepStep(compensation.format.name, count, *size, pitch, after, compensation.placed)

@@ -1,4 +1,4 @@
-"""A controller that has read a table: what it adds to positions, and the error that it leaves."""
+"""A controller with a compensation table: its corrections and the residual error."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from warpspace.analysis.uncertainty.propagation import FieldUncertainty, field_u
 from warpspace.exceptions import OptionError
 from warpspace.field.evaluate import ErrorField, fit_placement
 from warpspace.field.grid import Grid, build_grid
-from warpspace.formats.compensation.corrections import Corrector, Moved, RequiredCorrections
+from warpspace.formats.compensation.corrections import Corrector, MovedPoints, RequiredCorrections
 from warpspace.formats.registry import Files, Format, Reading, ReadOptions
 from warpspace.formats.source import source_of_text
 from warpspace.formats.terms import Tables
@@ -19,67 +19,75 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene, with_direction
 from warpspace.units import UM_PER_MM, URAD_PER_RAD, Array
 
-WAYS = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
+TRAVEL_SIGN = {TravelDirection.FORWARD: 1, TravelDirection.BACKWARD: -1}
 
 
 @dataclass(frozen=True)
-class Corrected:
-    """Points that a controller moves a machine to, before the errors of the machine count."""
+class CorrectedPoints:
+    """Points that a controller moves a machine to, without the errors of the machine."""
 
     nominal_mm: Array  # [..., 3]
-    moved: Moved
-    held: Moved | None = None  # the point that is held still; None for absolute errors
-    # what is subtracted: the way back, where the difference of both directions is looked at
-    less: "Corrected | None" = None
-    # or None; nodes over which the placement of the workpiece is fitted out; None leaves it in
-    volume: "tuple[Grid, Corrected] | None" = None
+    points: MovedPoints
+    reference: MovedPoints | None = None  # the reference point; None for absolute errors
+    # travel in the negative direction, for the difference of both directions
+    subtracted: "CorrectedPoints | None" = None
+    # nodes over which the placement of the workpiece is fitted out; None where it is not
+    placement_nodes: "tuple[Grid, CorrectedPoints] | None" = None
 
     def field(self, errors: ErrorSet) -> ErrorField:
         placement = None
-        if self.volume is not None:
-            grid, nodes = self.volume
-            placement = fit_placement(self.moved.model, grid, nodes.field(errors).error_um)
-        position, orientation = self.moved.without(placement, *self.moved.residual(errors))
-        if self.held is not None:
-            position = position - self.held.without(placement, *self.held.residual(errors))[0]
+        if self.placement_nodes is not None:
+            grid, nodes = self.placement_nodes
+            placement = fit_placement(self.points.model, grid, nodes.field(errors).error_um)
+        position, orientation = self.points.without(placement, *self.points.residual(errors))
+        if self.reference is not None:
+            still, _ = self.reference.without(placement, *self.reference.residual(errors))
+            position = position - still
         shape = np.broadcast_shapes(position.shape, self.nominal_mm.shape)
-        found = ErrorField(
+        error_field = ErrorField(
             np.broadcast_to(self.nominal_mm, shape),
             np.broadcast_to(position, shape) * UM_PER_MM,
             np.broadcast_to(orientation, shape) * URAD_PER_RAD,
         )
-        return found if self.less is None else found - self.less.field(errors)
+        if self.subtracted is None:
+            return error_field
+        return error_field - self.subtracted.field(errors)
 
     @property
     def nbytes(self) -> int:
-        moved = self.moved
+        moved = self.points
         arrays = (*moved.coordinates.values(), moved.point_mm, moved.shift_mm, moved.turn_rad)
-        own = sum(array.nbytes for array in arrays)
-        own += 0 if self.volume is None else self.volume[1].nbytes
-        return own + (0 if self.less is None else self.less.nbytes)
+        total = sum(array.nbytes for array in arrays)
+        if self.placement_nodes is not None:
+            total += self.placement_nodes[1].nbytes
+        if self.subtracted is not None:
+            total += self.subtracted.nbytes
+        return total
 
 
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """A controller that has read the files of a table. Two are equal only if they are one."""
+    """A controller that has read the files of a table; compared by identity."""
 
-    scene: Scene  # the machine that the table was made for, with its errors of then
-    loop: Loop  # the loop that is corrected
-    label: str  # name of the format and points of the table, for people
-    # axes that are corrected; where there is no table, with the errors that the files hold
+    scene: Scene  # the machine and the errors for which the table was computed
+    loop: Loop  # that is corrected
+    label: str  # title of the format and points of the table
+    # the corrected axes; without a table, with the errors that the files contain
     corrector: Corrector
-    tables: Tables | None  # what it adds to the positions; None where it works that out from errors
-    size: int  # numbers that it holds
+    tables: (
+        Tables | None
+    )  # None where the controller computes its corrections from error parameters
+    size: int  # count of stored numbers
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     def moves(self, coordinates: Coordinates, direction: str = "") -> dict[str, Array]:
-        """Give what it adds to commanded positions."""
-        way = TravelDirection(direction or self.scene.model.direction)
+        """Return the corrections at commanded positions, by axis."""
+        travel = TravelDirection(direction or self.scene.model.direction)
         if self.tables is not None:
-            return dict(self.tables.corrections(coordinates, WAYS.get(way, 0)))
-        own = self.corrector
-        return replace(own, model=replace(own.model, direction=way)).moves(coordinates)
+            return dict(self.tables.corrections(coordinates, TRAVEL_SIGN.get(travel, 0)))
+        model = replace(self.corrector.model, direction=travel)
+        return replace(self.corrector, model=model).moves(coordinates)
 
     def at(
         self,
@@ -88,28 +96,29 @@ class Controller:
         scene: Scene | None = None,
         loop: Loop | None = None,
         point_mm: Array | None = None,
-    ) -> Corrected:
-        """Work out all of a field that does not depend on the errors; see `field`."""
+    ) -> CorrectedPoints:
+        """Compute the part of the error field that does not depend on the errors; see `field`."""
         scene, loop = scene or self.scene, loop or self.loop
-        way = TravelDirection(scene.model.direction)
-        if way is TravelDirection.DIFFERENCE:
-            there, back = (
-                self.at(coordinates, nominal_mm, with_direction(scene, one), loop, point_mm)
-                for one in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+        travel = TravelDirection(scene.model.direction)
+        if travel is TravelDirection.DIFFERENCE:
+            forward, backward = (
+                self.at(coordinates, nominal_mm, with_direction(scene, direction), loop, point_mm)
+                for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
             )
-            return replace(there, less=back)
+            return replace(forward, subtracted=backward)
         machine = Corrector(scene.model, scene.errors, loop, ())
-        held = _reference(scene, coordinates)
-        over, volume = scene.view(loop).placed_over, None
-        if over is not None:
-            grid, absolute = build_grid(scene.model, over), replace(scene, reference=None)
-            at = (grid.coordinates, grid.nominal_mm, replace(absolute, placed=False), loop)
-            volume = grid, self.at(*at, grid.point_mm)
-        return Corrected(
+        reference = _reference(scene, coordinates)
+        placement_volume, placement_nodes = scene.view(loop).placed_over, None
+        if placement_volume is not None:
+            grid = build_grid(scene.model, placement_volume)
+            absolute = replace(scene, reference=None, placed=False)
+            nodes = self.at(grid.coordinates, grid.nominal_mm, absolute, loop, grid.point_mm)
+            placement_nodes = grid, nodes
+        return CorrectedPoints(
             nominal_mm,
-            machine.move(coordinates, self.moves(coordinates, way), point_mm),
-            None if held is None else machine.move(held, self.moves(held, way)),
-            volume=volume,
+            machine.move(coordinates, self.moves(coordinates, travel), point_mm),
+            None if reference is None else machine.move(reference, self.moves(reference, travel)),
+            placement_nodes=placement_nodes,
         )
 
     def field(
@@ -124,7 +133,7 @@ class Controller:
         return self.at(coordinates, nominal_mm, scene, loop, point_mm).field(errors)
 
     def without(self) -> "Controller":
-        """Give the same controller with an empty table: it leaves the machine as it is."""
+        """Return the controller with an empty table."""
         return replace(self, tables=Tables(()))
 
 
@@ -135,126 +144,114 @@ def _reference(scene: Scene, coordinates: Coordinates) -> dict[str, Array] | Non
     return {axis: np.asarray(still.get(axis, at)) for axis, at in coordinates.items()}
 
 
-def read_back(kind: Format, files: Files, wanted: RequiredCorrections, label: str) -> Controller:
-    from warpspace.formats.to_scene import into_scene
+def read_back(
+    kind: Format, files: Files, corrections: RequiredCorrections, label: str
+) -> Controller:
+    from warpspace.formats.to_scene import build_imported_scene
 
-    scene, corrector = wanted.scene, wanted.corrector
+    scene, corrector = corrections.scene, corrections.corrector
     sources = [
-        source_of_text(text, f"{wanted.stem}{add}{'' if add else kind.endings[0]}")
+        source_of_text(text, f"{corrections.stem}{add}{'' if add else kind.endings[0]}")
         for add, text in files.items()
     ]
-    options = ReadOptions(scene.machine, sign=wanted.sign)
+    options = ReadOptions(scene.machine, sign=corrections.sign)
     if kind.tables is not None:
         tables = kind.tables(sources, options)
-        return Controller(
-            scene,
-            corrector.loop,
-            label,
-            corrector,
-            tables,
-            tables.size,
-            tables.assumed,
-            tables.notes,
-        )
-    found = kind.errors(sources, options)
+        stated = (tables.size, tables.assumed, tables.notes)
+        return Controller(scene, corrector.loop, label, corrector, tables, *stated)
+    imported = kind.errors(sources, options)
     bare = replace(scene, errors=ErrorSet(), uncertainty={}, measured={})
-    held = into_scene(Reading(found, kind, recognised=True), bare, scene.title, scene.name).scene
-    errors = held.errors
-    if wanted.resolution:
+    reading = Reading(imported, kind, recognised=True)
+    imported_scene = build_imported_scene(reading, bare, scene.title, scene.name).scene
+    errors = imported_scene.errors
+    if corrections.resolution:
         raise OptionError(
-            f"{{resolution}} {wanted.resolution:g}: formats of error parameters have as many digits"
-            " as they print; expected a table of corrections"
+            f"{{resolution}} {corrections.resolution:g}: the resolution of formats with error"
+            " parameters is fixed; expected a table of corrections"
         )
-    model = replace(held.model, direction=scene.model.direction)
-    notes = list(found.notes)
+    model = replace(imported_scene.model, direction=scene.model.direction)
+    notes = list(imported.notes)
     lost = [key for key in scene.errors if key not in errors and scene.errors.amplitude(key)]
     if lost:
-        notes.append(f"has no place for {', '.join(lost)}")
+        notes.append(f"the format cannot represent {', '.join(lost)}")
     partly = [
         key
         for key in scene.errors
         if key in errors and set(scene.errors.arguments(key)) - set(errors.arguments(key))
     ]
     if partly:
-        notes.append(f"holds {', '.join(partly)} over fewer axes than the scene")
+        notes.append(f"the format represents {', '.join(partly)} over fewer axes than the scene")
     differing = [
         axis
         for axis in scene.machine.axes
         if model.convention(axis).name != scene.model.convention(axis).name
     ]
     if differing:
-        notes.append(
-            f"errors of {', '.join(differing)} stand in another convention here than in the scene"
-        )
-    knows = replace(corrector, model=model, errors=errors)
+        notes.append(f"the format uses a different convention for errors of {', '.join(differing)}")
+    corrector = replace(corrector, model=model, errors=errors)
     return Controller(
-        scene, corrector.loop, label, knows, None, found.size, found.assumed, tuple(notes)
+        scene, corrector.loop, label, corrector, None, imported.size, imported.assumed, tuple(notes)
     )
 
 
-HELD = 0.05
-"""Share of the reversal that may be left where a format holds it: the steps of its table."""
-LEAST_UM = 0.01  # A reversal below it is none
+MAX_REVERSAL_SHARE = 0.05
+"""Largest residual share of the reversal in a format that represents it (steps of its table)."""
+MIN_REVERSAL_UM = 0.01  # smaller reversal errors are ignored
 
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """The errors over the working volume before and after a compensation."""
+    """Errors over the working volume before and after compensation."""
 
     before: ErrorField
     after: ErrorField
     grid: Grid
-    field_uncertainty: (
-        FieldUncertainty | None
-    )  # how sure the errors before are; those after are no surer
+    field_uncertainty: FieldUncertainty | None  # of the errors before; those after have the same
 
     @property
     def before_statistics(self) -> Statistics:
-        return self._summed_up(self.before)
+        return self._statistics(self.before)
 
     @property
     def after_statistics(self) -> Statistics:
-        return self._summed_up(self.after)
+        return self._statistics(self.after)
 
-    def _summed_up(self, field: ErrorField) -> Statistics:
-        found = volume_statistics(field, self.grid)
-        return (
-            replace(self.field_uncertainty, error_um=field.error_um).with_expanded_uncertainty(
-                found
-            )
-            if self.field_uncertainty
-            else found
-        )
+    def _statistics(self, field: ErrorField) -> Statistics:
+        statistics = volume_statistics(field, self.grid)
+        if self.field_uncertainty is None:
+            return statistics
+        uncertainty = replace(self.field_uncertainty, error_um=field.error_um)
+        return uncertainty.with_expanded_uncertainty(statistics)
 
     def tilt_urad(self, field: ErrorField) -> tuple[float, float]:
-        """Give mean, by volume, and largest tilt of the tool axis in one of the fields, µrad."""
-        found = volume_statistics(field.tilts, self.grid)
-        return found.mean_um, found.max_um
+        """Return the volume mean and the maximum of the tilt of the tool axis, µrad."""
+        statistics = volume_statistics(field.tilts, self.grid)
+        return statistics.mean_um, statistics.max_um
 
 
-def evaluated(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
+def evaluate_before_after(controller: Controller, grid: Grid, direction: str) -> BeforeAfter:
     at, nominal, scene = grid.coordinates, grid.nominal_mm, controller.scene
     scene = with_direction(scene, direction)
     before = controller.without().field(at, nominal, scene)
     view = scene.view(controller.loop)
-    sure = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
-    return BeforeAfter(before, controller.field(at, nominal, scene), grid, sure)
+    uncertainty = field_uncertainty(scene, before.error_um, at, view, grid.point_mm, grid.weights)
+    return BeforeAfter(before, controller.field(at, nominal, scene), grid, uncertainty)
 
 
 def reversal_notes(
-    there: BeforeAfter, back: BeforeAfter, errors: ErrorSet, direction: str
+    forward: BeforeAfter, backward: BeforeAfter, errors: ErrorSet, direction: str
 ) -> tuple[str, ...]:
     before, after = (
-        float((one - other).norm_um.max())
-        for one, other in ((there.before, back.before), (there.after, back.after))
+        float((first - second).norm_um.max())
+        for first, second in ((forward.before, backward.before), (forward.after, backward.after))
     )
-    if after <= max(LEAST_UM, HELD * before):
+    if after <= max(MIN_REVERSAL_UM, MAX_REVERSAL_SHARE * before):
         return ()
     keys = ", ".join(key for key, curve in errors.functions.items() if curve.has_directions)
-    words = DIRECTION_WORDS[TravelDirection(direction)]
-    said = (
-        f"direction of travel is not held here, or not all of it: by {keys} forward and backward"
-        f" differ by up to {before:.3g} µm before and {after:.3g} µm after (where one value stands"
-        f" for both: {words})"
+    description = DIRECTION_WORDS[TravelDirection(direction)]
+    note = (
+        f"the format does not fully represent the direction of travel: due to {keys}, forward and"
+        f" backward differ by up to {before:.3g} µm before and {after:.3g} µm after compensation"
+        f" (a value for both directions is that of: {description})"
     )
-    return (said,)
+    return (note,)

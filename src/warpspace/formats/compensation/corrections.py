@@ -1,4 +1,4 @@
-"""What a table is to correct: the corrections at its points, averaged where it has fewer axes."""
+"""Corrections that a table requires at its points, averaged where it has fewer axes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,25 +18,25 @@ from warpspace.machine.errors import ErrorSet
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, RAD_PER_URAD, Array
 
-STEPS = 2  # newton steps: an error grows by a ten-thousandth of the correction at most
+NEWTON_STEPS = 2  # enough: an error changes by at most a ten-thousandth of the correction
 SMALL_MM, SMALL_DEG = 1e-2, 1e-3  # moves by which the response of the tool to an axis is measured
-CUT = 1e-3  # moves that act less than this share of the best one are not used
+RELATIVE_CUTOFF = 1e-3  # smallest singular value that is inverted, relative to the largest
 
 
 @dataclass(frozen=True)
-class Moved:
-    """Points of a machine whose axes were moved, before its errors count."""
+class MovedPoints:
+    """Points of a machine after moves of its axes, without errors."""
 
     model: Model
     loop: Loop
-    coordinates: Coordinates  # [...], mm or degrees; where the axes stand after the moves
-    point_mm: Array  # [..., 3]; where the points nominally are then
-    # [..., 3]; by how much they have moved from where they were commanded, as the loop sees it
+    coordinates: Coordinates  # [...], mm or degrees; after the moves
+    point_mm: Array  # [..., 3]; nominal positions after the moves
+    # [..., 3]; displacement from the commanded positions, in the structural loop
     shift_mm: Array
-    turn_rad: Array  # [..., 3]; by how much the tool axis has turned
+    turn_rad: Array  # [..., 3]; rotation of the tool axis
 
     def residual(self, errors: ErrorSet) -> tuple[Array, Array]:
-        """Give what is left with errors; see `Corrector.residual`."""
+        """Compute the residual error, mm and rad; see `Corrector.residual`."""
         view = View(self.loop)
         field = evaluate_exact(self.model, errors, self.coordinates, view, self.point_mm)
         return (
@@ -47,26 +47,27 @@ class Moved:
     def without(
         self, placement: Array | None, position_mm: Array, orientation_rad: Array
     ) -> tuple[Array, Array]:
-        """Leave out of a residual where the workpiece lies, if that is known."""
+        """Subtract the effect of a placement of the workpiece from a residual error."""
         if placement is None:
             return position_mm, orientation_rad
-        less = placement_effect(self.model, placement, self.coordinates, self.point_mm)
-        return position_mm - less[0] * MM_PER_UM, orientation_rad - less[1] * RAD_PER_URAD
+        shift_um, turn_urad = placement_effect(
+            self.model, placement, self.coordinates, self.point_mm
+        )
+        return position_mm - shift_um * MM_PER_UM, orientation_rad - turn_urad * RAD_PER_URAD
 
 
 @dataclass(frozen=True)
 class Corrector:
-    """A machine with its errors and the axes that may be moved against them."""
+    """A machine with its errors and the axes that correct them."""
 
     model: Model
     errors: ErrorSet
     loop: Loop  # tool, or tool relative to workpiece
     axes: tuple[str, ...]  # axes that correct the position
-    # rotary axes that correct the tilt of the tool axis, as far as they can; those of `axes` then
-    # take back what they move the tool point by
+    # rotary axes that correct the tilt of the tool axis as far as possible; those of `axes` then
+    # compensate the displacement of the tool point
     tilting: tuple[str, ...] = ()
-    # [6], or None; where the workpiece lies, as `fit_placement` gives it: that part of the error is
-    # left alone
+    # [6], or None; placement of the workpiece from `fit_placement`: its effect is not corrected
     placement: Array | None = None
 
     @property
@@ -74,26 +75,26 @@ class Corrector:
         return (*self.axes, *self.tilting)
 
     def residual(self, coordinates: Coordinates, moves: Mapping[str, Array]) -> tuple[Array, Array]:
-        """Give what is left at commanded positions after moves of the axes."""
+        """Compute the residual error at commanded positions after moves of the axes."""
         moved = self.move(coordinates, moves)
         return moved.without(self.placement, *moved.residual(self.errors))
 
     def move(
         self, coordinates: Coordinates, moves: Mapping[str, Array], point_mm: Array | None = None
-    ) -> "Moved":
-        """Work out all of a residual that does not depend on the errors; see `residual`."""
+    ) -> "MovedPoints":
+        """Compute the part of a residual that does not depend on the errors; see `residual`."""
         after = {axis: q + moves[axis] if axis in moves else q for axis, q in coordinates.items()}
-        return Moved(
+        return MovedPoints(
             self.model, self.loop, after, *self._nominal_motion(coordinates, after, point_mm)
         )
 
     def _nominal_motion(
         self, before: Coordinates, after: Coordinates, point_mm: Array | None = None
     ) -> tuple[Array, Array, Array]:
-        """Place of a point after a move, its displacement, and the turn of the tool axis.
+        """Compute a point after a move, its displacement, and the rotation of the tool axis.
 
-        The point is the tool point by default. In the workpiece loop it rides on the workpiece, in
-        the relative loop the displacement is that of the tool against the workpiece.
+        The default point is the tool point. In the workpiece loop it is fixed to the workpiece; in
+        the relative loop the displacement is that of the tool relative to the workpiece.
         """
         start = nominal_point(self.model, Loop.TOOL, before) if point_mm is None else point_mm
         aim, end = tool_axis(self.model, before), tool_axis(self.model, after)
@@ -124,16 +125,16 @@ class Corrector:
         shape = batch_shape(coordinates)
         total = {axis: np.zeros(shape) for axis in self.moved}
         shift, _ = self._response(coordinates, self.axes)
-        back = _inverse(shift)
+        inverse_shift = _inverse(shift)
         carried, turn = self._response(coordinates, self.tilting)
         upright = _inverse(turn)
-        for _ in range(STEPS):
+        for _ in range(NEWTON_STEPS):
             position, orientation = self.residual(coordinates, total)
             if self.tilting:
                 tilt = -_times(upright, orientation)
                 position = position + _times(carried, tilt)
                 total |= {a: total[a] + tilt[..., i] for i, a in enumerate(self.tilting)}
-            step = -_times(back, position)
+            step = -_times(inverse_shift, position)
             total |= {a: total[a] + step[..., i] for i, a in enumerate(self.axes)}
         return total
 
@@ -143,14 +144,12 @@ class Corrector:
         shape = (*batch_shape(coordinates), 3)
         for axis in axes:
             small = SMALL_MM if is_linear(axis) else SMALL_DEG
-            up, down = (
-                self._nominal_motion(
-                    coordinates, {**coordinates, axis: coordinates[axis] + way * small}
-                )
-                for way in (1.0, -1.0)
-            )
-            for found, one, other in ((shifts, up[1], down[1]), (turns, up[2], down[2])):
-                found.append(np.broadcast_to((one - other) / (2.0 * small), shape))
+            plus = {**coordinates, axis: coordinates[axis] + small}
+            minus = {**coordinates, axis: coordinates[axis] - small}
+            _, shift_plus, turn_plus = self._nominal_motion(coordinates, plus)
+            _, shift_minus, turn_minus = self._nominal_motion(coordinates, minus)
+            shifts.append(np.broadcast_to((shift_plus - shift_minus) / (2.0 * small), shape))
+            turns.append(np.broadcast_to((turn_plus - turn_minus) / (2.0 * small), shape))
         none = np.zeros((*shape, 0))
         return (
             np.stack(shifts, -1) if shifts else none,
@@ -161,7 +160,7 @@ class Corrector:
 def _inverse(matrix: Array) -> Array:
     if not matrix.shape[-1]:
         return np.swapaxes(matrix, -1, -2)
-    return np.asarray(np.linalg.pinv(matrix, rcond=CUT), dtype=np.float64)
+    return np.asarray(np.linalg.pinv(matrix, rcond=RELATIVE_CUTOFF), dtype=np.float64)
 
 
 def _times(matrix: Array, vector: Array) -> Array:
@@ -197,10 +196,10 @@ def build_corrector(scene: Scene, loop: str = "", *, orientation: bool = False) 
 
 def _independent(linear: Sequence[str], scene: Scene) -> tuple[str, ...]:
     spanning = scene.workspace.volume_axes
-    found: dict[int, str] = {}
+    axis_by_direction: dict[int, str] = {}
     for axis in sorted(linear, key=lambda name: name not in spanning):
-        found.setdefault(direction_index(axis), axis)
-    return tuple(axis for axis in linear if axis in found.values())
+        axis_by_direction.setdefault(direction_index(axis), axis)
+    return tuple(axis for axis in linear if axis in axis_by_direction.values())
 
 
 AXES = ("X", "Y", "Z")
@@ -209,16 +208,16 @@ OTHER_NODES = 9  # positions of the other axes that a table of one axis is avera
 
 @dataclass(frozen=True)
 class RequiredCorrections:
-    """What a table is to correct, and how fine it may be."""
+    """Corrections that a table requires, and its resolution."""
 
     scene: Scene
     corrector: Corrector
     points: Mapping[str, int]  # points of the table along each axis of the volume
-    # smallest step of a value, mm or degrees; 0 for as many digits as are printed
+    # of a value, mm or degrees; 0 for all printed digits
     resolution: float = 0.0
-    # what the values are: "error" or "correction"; empty for what the format's manual says
+    # "error" or "correction"; empty for the sign that the manual of the controller states
     sign: str = ""
-    stem: str = "compensation"  # name of the files to write, without an ending
+    stem: str = "compensation"  # name of the files, without suffix
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -226,91 +225,92 @@ class RequiredCorrections:
         spanning = self.scene.workspace.volume_axes
         return tuple(axis for axis in self.scene.machine.axes if axis in spanning)
 
-    def places(self, axis: str) -> Array:
+    def positions(self, axis: str) -> Array:
         return np.linspace(*self.scene.workspace.ranges[axis], self.points[axis])
 
     def factor(self, usual: str) -> float:
-        """Give the factor from a correction to a number of the table."""
+        """Return the factor from a correction to a number of the table."""
         return -1.0 if (self.sign or usual) == "error" else 1.0
 
     def round(self, values: ArrayLike) -> Array:
         step = self.resolution
-        given = np.asarray(values, dtype=float)
-        return np.round(given / step) * step if step else given
+        exact = np.asarray(values, dtype=float)
+        return np.round(exact / step) * step if step else exact
 
     @property
-    def directed(self) -> tuple[str, ...]:
-        """Those of `axes` that have errors by direction of travel."""
+    def directional_axes(self) -> tuple[str, ...]:
+        """Axes of the volume whose errors depend on the direction of travel."""
         functions = self.corrector.errors.functions
-        found = {parameter(key).axis for key, curve in functions.items() if curve.has_directions}
-        return tuple(axis for axis in self.axes if axis in found)
+        directional = {
+            parameter(key).axis for key, curve in functions.items() if curve.has_directions
+        }
+        return tuple(axis for axis in self.axes if axis in directional)
 
-    def toward(self, direction: str, axis: str = "") -> "RequiredCorrections":
-        """Give what is wanted for one direction of travel, of all axes or of one alone."""
+    def for_direction(self, direction: str, axis: str = "") -> "RequiredCorrections":
+        """Return the corrections for one direction of travel, of all axes or of a single one."""
         model, errors = self.corrector.model, self.corrector.errors
         if not axis:
             corrector = replace(self.corrector, model=replace(model, direction=direction))
             return replace(self, corrector=corrector)
-        own = {
+        curves = {
             key: curve.forward if direction == TravelDirection.FORWARD else curve.backward
             for key, curve in errors.functions.items()
             if isinstance(curve, Directional) and parameter(key).axis == axis
         }
-        changed = ErrorSet({**errors.functions, **own})
+        changed = ErrorSet({**errors.functions, **curves})
         return replace(self, corrector=replace(self.corrector, errors=changed))
 
     def corrections(self, places: Mapping[str, Array]) -> dict[str, Array]:
-        """Give the corrections of all axes on a grid of places along the axes of the volume."""
+        """Compute the corrections of all axes on a grid over the volume."""
         still = self.scene.workspace.positions
         meshed = np.meshgrid(*(places[axis] for axis in self.axes), indexing="ij")
         coordinates = {name: np.asarray(still[name]) for name in self.scene.machine.axes}
         coordinates |= dict(zip(self.axes, meshed, strict=True))
         return self.corrector.moves(coordinates)
 
-    def averaged(self, kept: Sequence[str]) -> dict[str, Array]:
-        places = {
-            axis: self.places(axis)
-            if axis in kept
-            else np.linspace(*self.scene.workspace.ranges[axis], OTHER_NODES)
-            for axis in self.axes
-        }
+    def _coarse_positions(self) -> dict[str, Array]:
+        ranges = self.scene.workspace.ranges
+        return {axis: np.linspace(*ranges[axis], OTHER_NODES) for axis in self.axes}
+
+    def averaged(self, axes: Sequence[str]) -> dict[str, Array]:
+        places = self._coarse_positions() | {axis: self.positions(axis) for axis in axes}
         weights = shares(OTHER_NODES)
-        found = self.corrections(places)
+        averages = self.corrections(places)
         for index in reversed(range(len(self.axes))):
-            if self.axes[index] not in kept:
-                found = {
-                    axis: np.moveaxis(value, index, -1) @ weights for axis, value in found.items()
+            if self.axes[index] not in axes:
+                averages = {
+                    axis: np.moveaxis(moves, index, -1) @ weights
+                    for axis, moves in averages.items()
                 }
-        return found
+        return averages
 
     def linear_fit(self, allowed: Sequence[tuple[str, str]]) -> dict[tuple[str, str], float]:
         """Fit corrections of one axis in proportion to the position of another."""
         scene, machine = self.scene, self.scene.machine
-        if missing := [axis for axis in AXES if axis not in machine.axes]:
-            found_axes = ", ".join(machine.axes)
+        missing = next((axis for axis in AXES if axis not in machine.axes), "")
+        if missing:
+            axes = ", ".join(machine.axes)
             raise OptionError(
-                f"the matrix is of X, Y and Z; the machine {machine.chain} has {found_axes}, no"
-                f" {missing[0]}"
+                f"the matrix is of X, Y and Z; the machine {machine.chain} has {axes}, no {missing}"
             )
-        places = {
-            axis: np.linspace(*scene.workspace.ranges[axis], OTHER_NODES) for axis in self.axes
-        }
-        needed, weights = self.corrections(places), np.ones(())
+        places = self._coarse_positions()
+        required, weights = self.corrections(places), np.ones(())
         for _ in self.axes:
             weights = weights[..., None] * shares(OTHER_NODES)
         root = np.sqrt(weights).ravel()
         at = dict(zip(self.axes, np.meshgrid(*places.values(), indexing="ij"), strict=True))
-        held = scene.reference or {}
-        if held:
-            still = {**scene.workspace.positions, **held}
-            there = self.corrector.moves({axis: np.asarray(still[axis]) for axis in machine.axes})
-            needed = {target: values - there[target] for target, values in needed.items()}
-        found: dict[tuple[str, str], float] = {}
+        reference = scene.reference or {}
+        if reference:
+            still = {**scene.workspace.positions, **reference}
+            offsets = self.corrector.moves({axis: np.asarray(still[axis]) for axis in machine.axes})
+            required = {target: values - offsets[target] for target, values in required.items()}
+        coefficients: dict[tuple[str, str], float] = {}
         for target in dict.fromkeys(target for target, _ in allowed):
-            sources = [axis for one, axis in allowed if one == target and axis in at]
-            if target in needed and sources:
-                columns = [at[axis] - held.get(axis, 0.0) for axis in sources]
+            sources = [axis for row, axis in allowed if row == target and axis in at]
+            if target in required and sources:
+                columns = [at[axis] - reference.get(axis, 0.0) for axis in sources]
                 matrix = np.stack([column.ravel() * root for column in columns], -1)
-                solved = np.linalg.lstsq(matrix, needed[target].ravel() * root, rcond=None)[0]
-                found |= {(target, axis): float(v) for axis, v in zip(sources, solved, strict=True)}
-        return found
+                solved = np.linalg.lstsq(matrix, required[target].ravel() * root, rcond=None)[0]
+                keys = [(target, axis) for axis in sources]
+                coefficients.update(zip(keys, solved.tolist(), strict=True))
+        return coefficients

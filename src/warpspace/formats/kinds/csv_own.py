@@ -1,7 +1,8 @@
-"""The measurement table of warpspace: a CSV file whose header names errors with their units."""
+"""The measurement table of warpspace: a CSV file with errors and their units in the header."""
 
 import math
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ import numpy as np
 from warpspace.exceptions import SceneError, near_miss
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, described
+from warpspace.formats.registry import Files, Format, ReadOptions, describe
 from warpspace.formats.source import (
     DEG_PER,
     MM_PER,
@@ -18,9 +19,9 @@ from warpspace.formats.source import (
     URAD_PER,
     Source,
     SourceLine,
-    shown,
+    format_number,
+    quote,
     source_of_text,
-    spell,
 )
 from warpspace.machine.axes import PARAMETERS, is_axis_name, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
@@ -28,13 +29,13 @@ from warpspace.scene.text_files import CsvRows, unguard_cell
 from warpspace.units import Array
 
 RUN, DIRECTION = "run", "direction"
-SIGNS = {measured.FORWARD: "+", measured.BACKWARD: "-", measured.BOTH: ""}
-DIGITS = 6  # behind the point of a value, µm or µrad
-UNITS = "# Units stand in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
+SIGNS = {measured.FORWARD: "+", measured.BACKWARD: "-", measured.UNDIRECTED: ""}
+DIGITS = 6  # decimals of a value, µm or µrad
+UNITS = "# Units are in brackets and may be changed: um mm nm in, urad mrad rad arcsec deg."
 
 
-def usual_places(axis: str) -> tuple[float, ...]:
-    """Give positions of a table to fill in, mm or degrees."""
+def default_positions(axis: str) -> tuple[float, ...]:
+    """Return the default positions of a template, mm or degrees."""
     return (-250, -125, 0, 125, 250) if is_linear(axis) else (0, 90, 180, 270, 360)
 
 
@@ -42,9 +43,9 @@ def _position(axis: str) -> str:
     return f"{axis} [{'mm' if is_linear(axis) else 'deg'}]"
 
 
-def _value(key: str, spelled: str = "{}") -> str:
+def _value(key: str, template: str = "{}") -> str:
     unit = "urad" if parameter(key).is_rotation else "um"
-    return f"{spelled.format(key)} [{unit}]"
+    return f"{template.format(key)} [{unit}]"
 
 
 def _lines(rows: Iterable[Iterable[str]]) -> str:
@@ -54,20 +55,20 @@ def _lines(rows: Iterable[Iterable[str]]) -> str:
 def surface_template(axes: tuple[str, str], places: tuple[Sequence[float], Sequence[float]]) -> str:
     axis, other = axes
     lines = [
-        f"# Errors of the {axis} axis over {axis} and {other}: actual - nominal, a row a point.",
-        "# Every point of the grid stands there once, in any order; between them the value is",
-        "# bilinear, beyond them that of the edge. Columns that are not needed may be left out.",
+        f"# Errors of the {axis} axis over {axis}, {other}: actual - nominal, one row per point.",
+        "# Every point of the grid occurs once, in any order. Interpolation is bilinear; beyond",
+        "# the grid, the values of its edge apply. Columns that are not needed may be deleted.",
     ]
     cells = [f"{first:g},{second:g}" for first in places[0] for second in places[1]]
     return _to_fill_in(axis, lines, map(_position, axes), cells)
 
 
 def template(axis: str, places: Sequence[float] = ()) -> str:
-    spans = places or usual_places(axis)
+    spans = places or default_positions(axis)
     lines = [
-        f"# Errors of the {axis} axis: actual - nominal, a row a position of a run.",
-        "# run: 1, 2, 3 …; direction: + towards growing positions, - towards falling ones.",
-        "# u(…): standard uncertainties (k = 1). Columns that are not needed may be left out.",
+        f"# Errors of the {axis} axis: actual - nominal, one row per position and run.",
+        "# run: 1, 2, 3 …; direction: + for increasing positions, - for decreasing positions.",
+        "# u(…): standard uncertainties (k = 1). Columns that are not needed may be deleted.",
     ]
     cells = [f"{q:g},1,+" for q in spans] + [f"{q:g},1,-" for q in reversed(spans)]
     return _to_fill_in(axis, lines, (_position(axis), RUN, DIRECTION), cells, uncertain=True)
@@ -75,7 +76,7 @@ def template(axis: str, places: Sequence[float] = ()) -> str:
 
 def _to_fill_in(
     axis: str,
-    words: list[str],
+    comments: list[str],
     columns: Iterable[str],
     cells: list[str],
     *,
@@ -83,24 +84,26 @@ def _to_fill_in(
 ) -> str:
     keys = [f"E{letter}{axis}" for letter in "XYZABC"]
     values = [*map(_value, keys), *(_value(key, "u({})") for key in keys if uncertain)]
-    lines = [words[0], UNITS, *words[1:], *(f"# {key}: {parameter(key).name}" for key in keys)]
+    lines = [comments[0], UNITS, *comments[1:]]
+    lines += [f"# {key}: {parameter(key).name}" for key in keys]
     lines += [",".join([*columns, *values]), *(row + "," * len(values) for row in cells)]
     return "\n".join(lines) + "\n"
 
 
-def write(wanted: RequiredCorrections) -> Files:
-    """Write the errors of a scene: constants in the main file, one file an axis beside it."""
+def write(corrections: RequiredCorrections) -> Files:
+    """Write the errors of a scene: constants in the main file, and one further file per axis."""
     files: dict[str, str] = {}
-    for table in measured.tables_of(measured.sampled(wanted)):
+    for table in measured.build_error_tables(measured.sample_errors(corrections)):
         directed = [DIRECTION] if table.directed else []
         rows = [[*map(_position, table.axes), *directed, *map(_value, table.keys)]]
-        for at, way, values in table.rows:
-            told = [SIGNS[way]] if directed else []
-            rows.append([*map(repr, at), *told, *(spell(value, DIGITS) for value in values)])
+        for at, direction, values in table.rows:
+            signs = [SIGNS[direction]] if directed else []
+            numbers = [format_number(number, DIGITS) for number in values]
+            rows.append([*map(repr, at), *signs, *numbers])
         name = ("constant", *table.axes[:1], table.keys[0])[len(table.axes)]
         files[f"_{name}.csv"] = _lines(rows)
     if not files:
-        return {"": _lines([[_value(measured.zero_key(wanted.scene))], ["0.0"]])}
+        return {"": _lines([[_value(measured.zero_key(corrections.scene))], ["0.0"]])}
     files[""] = files.pop(next(iter(files)))
     return files
 
@@ -108,8 +111,8 @@ def write(wanted: RequiredCorrections) -> Files:
 NAME = "csv"
 POSITION, ERROR, UNCERTAINTY = "position", "error", "uncertainty"
 DIRECTIONS: Mapping[str, int] = {
-    "": measured.BOTH,
-    "0": measured.BOTH,
+    "": measured.UNDIRECTED,
+    "0": measured.UNDIRECTED,
     "+": measured.FORWARD,
     "1": measured.FORWARD,
     "+1": measured.FORWARD,
@@ -127,7 +130,7 @@ _HEADING = re.compile(
 
 @dataclass(frozen=True)
 class _CsvColumn:
-    """One column of a table: what it holds, and the factor to µm, µrad, mm or degrees."""
+    """One column of a table: its role, and the factor to µm, µrad, mm or degrees."""
 
     role: str
     name: str
@@ -136,20 +139,20 @@ class _CsvColumn:
 
     def value(self, cell: str, at: SourceLine, table: CsvRows) -> float:
         if self.role == DIRECTION:
-            way = unguard_cell(cell).lower()
-            if way not in DIRECTIONS:
-                at.refuse(f"direction {shown(cell)}", "+, - or nothing")
-            return DIRECTIONS[way]
+            direction = unguard_cell(cell).lower()
+            if direction not in DIRECTIONS:
+                at.refuse(f"direction {quote(cell)}", "+, - or nothing")
+            return DIRECTIONS[direction]
         if self.role == RUN:
-            return at.whole(cell, RUN, 0, 10**9)
+            return at.integer(cell, RUN, 0, 10**9)
         if not cell and self.role != POSITION:
             return math.nan
-        value = self.factor * table.number(cell, at.line, self.name)
+        number = self.factor * table.number(cell, at.line, self.name)
         if self.role == POSITION:
-            return at.checked_position(value, self.name)
-        if self.role == UNCERTAINTY and value <= 0.0:
-            at.refuse(f"u({self.name}) {shown(cell)}", "a standard uncertainty above 0")
-        return at.checked_error(value, self.name)
+            return at.checked_position(number, self.name)
+        if self.role == UNCERTAINTY and number <= 0.0:
+            at.refuse(f"u({self.name}) {quote(cell)}", "a standard uncertainty above 0")
+        return at.checked_error(number, self.name)
 
 
 _Row = tuple[SourceLine, dict[tuple[str, str], float]]
@@ -157,18 +160,18 @@ _Row = tuple[SourceLine, dict[tuple[str, str], float]]
 
 @dataclass(frozen=True)
 class _CsvTable:
-    """A file that was read: its columns and its rows."""
+    """The columns and rows of a file."""
 
     source: Source
     head: SourceLine
     columns: tuple[_CsvColumn, ...]
     rows: tuple[_Row, ...]
 
-    def of(self, role: str) -> list[str]:
-        return [one.name for one in self.columns if one.role == role]
+    def names_with_role(self, role: str) -> list[str]:
+        return [column.name for column in self.columns if column.role == role]
 
-    def ways(self) -> list[int]:
-        return [int(row.get((DIRECTION, DIRECTION), measured.BOTH)) for _, row in self.rows]
+    def directions(self) -> list[int]:
+        return [int(row.get((DIRECTION, DIRECTION), measured.UNDIRECTED)) for _, row in self.rows]
 
 
 def recognise(head: str, name: str) -> bool:
@@ -176,196 +179,195 @@ def recognise(head: str, name: str) -> bool:
         header = source_of_text(head, name).rows(1).header
     except SceneError:
         return False
-    found = [matched for part in header if (matched := _heading(part))]
-    has_unit = any(one[3] or one[4] or one[5] for one in found)
-    return has_unit and any(one[2] in PARAMETERS for one in found)
+    matches = [match for match in map(_heading, header) if match]
+    has_unit = any(match[3] or match[4] or match[5] for match in matches)
+    return has_unit and any(match[2] in PARAMETERS for match in matches)
 
 
-def _heading(part: str) -> re.Match[str] | None:
-    return _HEADING.fullmatch(" ".join(part.split()))  # runs of blanks would be tried by all parts
+def _heading(text: str) -> re.Match[str] | None:
+    return _HEADING.fullmatch(" ".join(text.split()))  # long blanks would cause backtracking
 
 
-def _columns(at: SourceLine, parts: Sequence[str]) -> tuple[_CsvColumn, ...]:
-    found = [_column(at, part) for part in parts]
-    seen = [(one.role, one.name) for one in found]
-    if twice := next((one for one in seen if seen.count(one) > 1), None):
-        at.refuse(f"column {twice[1]} stands there twice", "it once")
-    return tuple(found)
+def _columns(at: SourceLine, headings: Sequence[str]) -> tuple[_CsvColumn, ...]:
+    columns = [_column(at, heading) for heading in headings]
+    keys = [(column.role, column.name) for column in columns]
+    repeated = next((name for role, name in keys if keys.count((role, name)) > 1), None)
+    if repeated:
+        at.refuse(f"column {repeated} occurs twice", "it once")
+    return tuple(columns)
 
 
-def _column(at: SourceLine, part: str) -> _CsvColumn:
-    lower = part.strip().lower()
+def _column(at: SourceLine, heading: str) -> _CsvColumn:
+    lower = heading.strip().lower()
     if lower in (RUN, DIRECTION):
         return _CsvColumn(lower, lower)
-    matched = _heading(part)
+    matched = _heading(heading)
     if matched is None:
         expected = "headings such as X [mm], EXX [um], u(EXX) [um], run, direction"
-        at.refuse(f"column {shown(part)}", expected)
+        at.refuse(f"column {quote(heading)}", expected)
     uncertain, name = bool(matched[1]), matched[2].upper()
     unit = (matched[3] or matched[4] or matched[5] or "").strip()
     if name in PARAMETERS:
-        known = URAD_PER if parameter(name).is_rotation else UM_PER
+        factors = URAD_PER if parameter(name).is_rotation else UM_PER
         role = UNCERTAINTY if uncertain else ERROR
     elif is_axis_name(name) and not uncertain:
-        known, role = MM_PER if is_linear(name) else DEG_PER, POSITION
+        factors, role = MM_PER if is_linear(name) else DEG_PER, POSITION
     else:
         errors = (f"E{a}{b}" for a in "XYZABC" for b in "XYZABC")
         hint = near_miss(name, [*"XYZABCUVW", *errors])
-        at.refuse(f"column {shown(part)}", f"an axis, an error, u(error), run or direction{hint}")
+        at.refuse(
+            f"column {quote(heading)}", f"an axis, an error, u(error), run or direction{hint}"
+        )
     if not unit:
-        units = ", ".join(one for one in known if one.isascii())
-        at.refuse(f"column {name} has no unit", f"{name} [unit], of {units}")
-    return _CsvColumn(role, name, at.unit(unit, known, name), unit)
+        units = ", ".join(name for name in factors if name.isascii())
+        at.refuse(f"column {name} has no unit", f"{name} [unit], with one of {units}")
+    return _CsvColumn(role, name, at.unit(unit, factors, name), unit)
 
 
-def read(sources: Sequence[Source], options: ReadOptions) -> measured.Imported:
+def read(sources: Sequence[Source], options: ReadOptions) -> measured.ImportedErrors:
     del options
     return measured.merge([_read_one(source) for source in sources])
 
 
-def _read_one(source: Source) -> measured.Imported:
-    given = source.rows(MAX_POINTS)
-    if not given.header:
+def _read_one(source: Source) -> measured.ImportedErrors:
+    csv_rows = source.rows(MAX_POINTS)
+    if not csv_rows.header:
         source.refuse("has no header", "one such as X [mm],EXX [um]")
-    head = source.at(given.line)
-    columns = _columns(head, given.header)
-    if not any(one.role == ERROR for one in columns):
-        head.refuse("has no column of an error", "for instance EXX [um]")
+    head = source.at(csv_rows.line)
+    columns = _columns(head, csv_rows.header)
+    if not any(column.role == ERROR for column in columns):
+        head.refuse("has no column of an error", "one such as EXX [um]")
     rows: list[_Row] = []
-    for number, cells in given:
+    for number, cells in csv_rows:
         at = source.at(number)
-        pairs = zip(columns, cells, strict=True)
-        rows.append((at, {(one.role, one.name): one.value(cell, at, given) for one, cell in pairs}))
-    given.check()
+        row: dict[tuple[str, str], float] = {}
+        for column, cell in zip(columns, cells, strict=True):
+            row[column.role, column.name] = column.value(cell, at, csv_rows)
+        rows.append((at, row))
+    csv_rows.check()
     if not rows:
         head.refuse("has no rows below its header", "at least one")
     table = _CsvTable(source, head, columns, tuple(rows))
-    units = tuple(dict.fromkeys(one.unit for one in columns if one.unit))
-    notes = (*source.notes, *given.notes)
-    found = _errors(table)
-    return replace(found, units=units, notes=(*notes, *found.notes))
+    units = tuple(dict.fromkeys(column.unit for column in columns if column.unit))
+    notes = (*source.notes, *csv_rows.notes)
+    imported = _errors(table)
+    return replace(imported, units=units, notes=(*notes, *imported.notes))
 
 
-def _errors(table: _CsvTable) -> measured.Imported:
-    errors, positions = table.of(ERROR), table.of(POSITION)
+def _errors(table: _CsvTable) -> measured.ImportedErrors:
+    errors, positions = table.names_with_role(ERROR), table.names_with_role(POSITION)
     if not positions:
         return _constants(table)
-    if constant := next((key for key in errors if parameter(key).is_constant), ""):
+    constant = next((key for key in errors if parameter(key).is_constant), "")
+    if constant:
         expected = "it in a file without positions"
         table.head.refuse(f"column {constant} is a constant error", expected)
     if len(positions) > 2:
         table.head.refuse(f"{len(positions)} columns of positions", "one or two")
     if len(positions) == 2:
-        return _planes(table)
+        return _surfaces(table)
     (axis,) = positions
-    if other := next((key for key in errors if parameter(key).axis != axis), ""):
+    other = next((key for key in errors if parameter(key).axis != axis), "")
+    if other:
         expected = f"errors of {axis} in a table over {axis}"
         table.head.refuse(f"column {other} is an error of {parameter(other).axis}", expected)
     return _series(table, axis)
 
 
-def _constants(table: _CsvTable) -> measured.Imported:
+def _constants(table: _CsvTable) -> measured.ImportedErrors:
     if len(table.rows) != 1:
         expected = "one, or a column of positions such as X [mm]"
         table.head.refuse(f"{len(table.rows)} rows of errors without positions", expected)
     ((at, row),) = table.rows
-    constants = {key: row[ERROR, key] for key in table.of(ERROR)}
-    if empty := next((key for key, value in constants.items() if math.isnan(value)), ""):
+    constants = {key: row[ERROR, key] for key in table.names_with_role(ERROR)}
+    empty = next((key for key, constant in constants.items() if math.isnan(constant)), "")
+    if empty:
         at.refuse(f"{empty} is empty", "a number")
-    uncertain = {key: row[UNCERTAINTY, key] for key in table.of(UNCERTAINTY)}
-    given = {key: value for key, value in uncertain.items() if not math.isnan(value)}
-    return measured.Imported(NAME, constants=constants, uncertainty=given)
+    cells = {key: row[UNCERTAINTY, key] for key in table.names_with_role(UNCERTAINTY)}
+    uncertainty = {key: u for key, u in cells.items() if not math.isnan(u)}
+    return measured.ImportedErrors(NAME, constants=constants, uncertainty=uncertainty)
 
 
-def _series(table: _CsvTable, axis: str) -> measured.Imported:
+def _series(table: _CsvTable, axis: str) -> measured.ImportedErrors:
     at = np.array([row[POSITION, axis] for _, row in table.rows])
-    places = measured.distinct(at)
+    places = measured.distinct_positions(at)
     runs = [int(row.get((RUN, RUN), 1)) for _, row in table.rows]
-    ways = list(zip(runs, table.ways(), strict=True))
-    known = list(dict.fromkeys(ways))
-    if len(known) > MAX_RUNS:
-        table.source.refuse(f"has {len(known)} runs", f"at most {MAX_RUNS}")
+    row_runs = list(zip(runs, table.directions(), strict=True))
+    distinct_runs = list(dict.fromkeys(row_runs))
+    if len(distinct_runs) > MAX_RUNS:
+        table.source.refuse(f"has {len(distinct_runs)} runs", f"at most {MAX_RUNS}")
     index = np.searchsorted((places[1:] + places[:-1]) / 2.0, at).tolist()
-    taken: dict[tuple[tuple[int, int], int], int] = {}
-    for place, way, (line, _) in zip(index, ways, table.rows, strict=True):
-        if (way, place) in taken:
-            found = f"position {places[place]:g} of {axis} stands also in line {taken[way, place]}"
-            line.refuse(found, "columns run and direction to tell them apart")
-        taken[way, place] = line.line
+    lines: dict[tuple[tuple[int, int], int], int] = {}
+    for place, run, (line, _) in zip(index, row_runs, table.rows, strict=True):
+        if (run, place) in lines:
+            problem = f"position {places[place]:g} of {axis} repeats line {lines[run, place]}"
+            line.refuse(problem, "columns run and direction that distinguish them")
+        lines[run, place] = line.line
     series: list[measured.ErrorSeries] = []
-    for key in table.of(ERROR):
-        values = {way: np.full(len(places), math.nan) for way in known}
-        uncertain = np.zeros(len(places))
-        for place, way, (_, row) in zip(index, ways, table.rows, strict=True):
-            values[way][place] = row[ERROR, key]
-            uncertain[place] = np.fmax(uncertain[place], row.get((UNCERTAINTY, key), 0.0))
-        given = {way: own for way, own in values.items() if not np.isnan(own).all()}
-        if not given:
+    for key in table.names_with_role(ERROR):
+        readings = {run: np.full(len(places), math.nan) for run in distinct_runs}
+        u = np.zeros(len(places))
+        for place, run, (_, row) in zip(index, row_runs, table.rows, strict=True):
+            readings[run][place] = row[ERROR, key]
+            u[place] = np.fmax(u[place], row.get((UNCERTAINTY, key), 0.0))
+        readings = {run: errors for run, errors in readings.items() if not np.isnan(errors).all()}
+        if not readings:
             table.source.refuse(f"column {key} is empty", "numbers, or no such column")
-        _check_holes(table.source, key, given, places, axis)
-        series.append(
-            measured.ErrorSeries(
-                key,
-                tuple(places.tolist()),
-                tuple(
-                    measured.MeasuredRun(*way, tuple(own.tolist())) for way, own in given.items()
-                ),
-                tuple(uncertain.tolist()) if uncertain.any() else (),
-            )
+        _check_complete(table.source, key, readings, places, axis)
+        measured_runs = tuple(
+            measured.MeasuredRun(*run, tuple(errors.tolist())) for run, errors in readings.items()
         )
-    sorted_rows = len(known) == 1 and np.any(np.diff(at) < 0.0)
+        uncertainty = tuple(u.tolist()) if u.any() else ()
+        positions = tuple(places.tolist())
+        series.append(measured.ErrorSeries(key, positions, measured_runs, uncertainty))
+    sorted_rows = len(distinct_runs) == 1 and np.any(np.diff(at) < 0.0)
     notes = (f"rows were sorted by the position of {axis}",) if sorted_rows else ()
-    return measured.Imported(NAME, tuple(series), notes=notes)
+    return measured.ImportedErrors(NAME, tuple(series), notes=notes)
 
 
-def _check_holes(
-    source: Source,
-    key: str,
-    given: Mapping[tuple[int, int], Array],
-    places: Array,
-    axis: str,
+def _check_complete(
+    source: Source, key: str, readings: Mapping[tuple[int, int], Array], places: Array, axis: str
 ) -> None:
-    holes = np.isnan(np.array(list(given.values()))).all(axis=0)
-    if holes.any():
-        found = f"{key} has no value at {axis} {places[holes][0]:g}"
-        source.refuse(found, "one at every position")
-    for direction in {way for _, way in given}:
-        own = np.array([values for (_, way), values in given.items() if way == direction])
-        holes = np.isnan(own).all(axis=0)
-        if holes.any():
-            said = {measured.FORWARD: "forward", measured.BACKWARD: "backward"}.get(
-                direction, "any"
-            )
-            found = f"{key} has no value at {axis} {places[holes][0]:g} in {said} direction"
-            source.refuse(found, "every direction at every position")
+    missing = np.isnan(list(readings.values())).all(axis=0)
+    if missing.any():
+        problem = f"{key} has no value at {axis} {places[missing][0]:g}"
+        source.refuse(problem, "one at every position")
+    by_direction: defaultdict[int, list[Array]] = defaultdict(list)
+    for (_, direction), errors in readings.items():
+        by_direction[direction].append(errors)
+    names = {measured.FORWARD: "forward", measured.BACKWARD: "backward"}
+    for direction, runs in by_direction.items():
+        missing = np.isnan(runs).all(axis=0)
+        if missing.any():
+            place = f"{axis} {places[missing][0]:g} in {names.get(direction, 'any')} direction"
+            source.refuse(f"{key} has no value at {place}", "every direction at every position")
 
 
-def _planes(table: _CsvTable) -> measured.Imported:
-    first, second = table.of(POSITION)
-    if unknown := next((one for one in table.columns if one.role in (RUN, UNCERTAINTY)), None):
-        what = RUN if unknown.role == RUN else f"u({unknown.name})"
-        expected = "positions, direction and errors over two axes: one value a point"
-        table.head.refuse(f"column {what}", expected)
-    planes: list[measured.ErrorSurface] = []
-    for key in table.of(ERROR):
-        own = parameter(key).axis
-        if own not in (first, second):
+def _surfaces(table: _CsvTable) -> measured.ImportedErrors:
+    first, second = table.names_with_role(POSITION)
+    for column in table.columns:
+        if column.role in (RUN, UNCERTAINTY):
+            heading = RUN if column.role == RUN else f"u({column.name})"
+            expected = "positions, direction and errors over two axes: one value per point"
+            table.head.refuse(f"column {heading}", expected)
+    surfaces: list[measured.ErrorSurface] = []
+    for key in table.names_with_role(ERROR):
+        axis = parameter(key).axis
+        if axis not in (first, second):
             expected = f"errors of {first} or {second}"
-            table.head.refuse(f"column {key} is an error of {own}", expected)
-        other = second if own == first else first
+            table.head.refuse(f"column {key} is an error of {axis}", expected)
+        other = second if axis == first else first
         points: dict[int, list[measured.Point]] = {}
-        for way, (at, row) in zip(table.ways(), table.rows, strict=True):
-            point = (at, row[POSITION, own], row[POSITION, other], row[ERROR, key])
-            points.setdefault(way, []).append(point)
-        planes.append(measured.plane_by_ways(key, (own, other), points, table.source))
-    return measured.Imported(NAME, planes=tuple(planes))
+        for direction, (at, row) in zip(table.directions(), table.rows, strict=True):
+            point = (at, row[POSITION, axis], row[POSITION, other], row[ERROR, key])
+            points.setdefault(direction, []).append(point)
+        surfaces.append(
+            measured.build_surface_by_direction(key, (axis, other), points, table.source)
+        )
+    return measured.ImportedErrors(NAME, surfaces=tuple(surfaces))
 
 
 FORMAT = Format(
-    **described(NAME),
-    limits=f"{MAX_POINTS:,} rows",
-    recognise=recognise,
-    read=read,
-    write=write,
+    **describe(NAME), limits=f"{MAX_POINTS:,} rows", recognise=recognise, read=read, write=write
 )
 FORMATS = (FORMAT,)

@@ -5,28 +5,28 @@ HEIDENHAIN Technical Manual MANUALplus 620, pages 713 to 718, and TNC 407/415/42
 linear between them; `axis of the column in the .COM = F(axis of the column in the .CMA)`.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, described
+from warpspace.formats.registry import ERROR, Files, Format, ReadOptions, describe
 from warpspace.formats.source import Source, SourceLine
-from warpspace.formats.terms import HELD, AxisTable, Tables
+from warpspace.formats.terms import HOLD_ENDS, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection
 from warpspace.units import Array
 
-MOST_POINTS = 256  # entries of one table (TNC 407 Technical Manual, module 9095, error 3)
+MAX_TABLE_POINTS = 256  # entries of one table (TNC 407 Technical Manual, module 9095, error 3)
 RESOLUTION = 1e-4  # mm or degrees, as the tables are printed
 STEP_SHARE = 1e-3
 SIGN = (
-    "values are errors, which the control takes back (TNC 360 Technical Manual, page 4-24: the"
-    " table follows the error curve); --sign correction says otherwise"
+    "values are errors, which the control subtracts (TNC 360 Technical Manual, page 4-24: the"
+    " table follows the error curve); --sign correction selects the opposite"
 )
 TRAVEL = (
-    "BACKLASH is the value for travel in the negative direction; positions beyond the table take"
-    " its end values"
+    "BACKLASH is the value for travel in the negative direction; the end values apply beyond the"
+    " table"
 )
 POSITION, BACKLASH, NUMBER, ACTIVE = "AXISPOS", "BACKLASH", "NR", "ACTIVE"
 WIDTH = 12
@@ -51,10 +51,10 @@ def _rows(source: Source) -> list[tuple[SourceLine, Cells]]:
     head = lines[0][1].upper()
     names = head.lstrip("#").split()
     if not lines[-1][1].strip().upper().startswith("[END]"):
-        lines[-1][0].refuse("is not the end", "[END] (is the file cut off?)")
-    if len(lines) - 2 > MOST_POINTS:
-        expected = f"at most {MOST_POINTS}, as the control takes"
-        lines[MOST_POINTS + 1][0].refuse(f"has {len(lines) - 2} rows", expected)
+        lines[-1][0].refuse("is not the end", "[END] (is the file truncated?)")
+    if len(lines) - 2 > MAX_TABLE_POINTS:
+        expected = f"at most {MAX_TABLE_POINTS}, the limit of the control"
+        lines[MAX_TABLE_POINTS + 1][0].refuse(f"has {len(lines) - 2} rows", expected)
     starts, end = [0], 0
     for before, name in pairwise(names):
         end = head.index(before, end) + len(before)
@@ -66,7 +66,7 @@ def _rows(source: Source) -> list[tuple[SourceLine, Cells]]:
             ends = [*starts[1:], len(text) + 1]
             parts = [text[low:high].strip() for low, high in zip(starts, ends, strict=True)]
             if any(" " in part for part in parts):
-                at.refuse(at.shown, f"{len(names)} columns: {' '.join(names)}")
+                at.refuse(at.quoted, f"{len(names)} columns: {' '.join(names)}")
         rows.append((at, dict(zip(names, parts, strict=True))))
     return rows
 
@@ -85,23 +85,22 @@ def _assignment(sources: Sequence[Source]) -> tuple[dict[str, list[str]], list[S
         if len(marked) != 1 and len(rows) > 1:
             source.refuse(f"has {len(marked)} active lines", f"one with * in {ACTIVE}")
         _, cells = (marked or rows)[0]
-        for column, value in cells.items():
-            if column not in (NUMBER, ACTIVE) and value not in ("", "-"):
-                axes.setdefault(Source(value, ()).stem.upper(), []).append(column)
+        for column, name in cells.items():
+            if column not in (NUMBER, ACTIVE) and name not in ("", "-"):
+                axes.setdefault(Source(name, ()).stem.upper(), []).append(column)
     return axes, tables
 
 
-def _looked_up(source: Source, axes: dict[str, list[str]], options: ReadOptions) -> str:
+def _lookup_axis(source: Source, axes: dict[str, list[str]], options: ReadOptions) -> str:
     stem = source.stem.upper()
     named, last = axes.get(stem, []), stem.rsplit("_", 1)[-1]
     if len(named) > 1:
-        source.refuse(f"is entered for {', '.join(named)}", "one axis a table")
+        source.refuse(f"is entered for {', '.join(named)}", "one axis per table")
     last = last if len(last) == 1 and last in "XYZUVWABC" else ""
-    found = (named or [options.axis or last])[0]
-    if not found:
-        expected = "its .CMA file beside it, or --axis X"
-        source.refuse("does not say over which axis", expected)
-    return options.axis_named(found, source)
+    axis = (named or [options.axis or last])[0]
+    if not axis:
+        source.refuse("does not state its axis", "its .CMA file with it, or --axis X")
+    return options.axis_named(axis, source)
 
 
 def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
@@ -119,23 +118,25 @@ def _lines(source: Source, along: str, options: ReadOptions) -> list[AxisTable]:
         if all(not cells[column] for _, cells in rows):
             continue
         target = options.axis_named(column, rows[0][0])
-        known = [
+        points = [
             (q, at.position(cells[column], column))
             for q, (at, cells) in zip(places, rows, strict=True)
             if cells[column]
         ]
-        values = factor * np.interp(places, *np.array(known).T)
+        values = factor * np.interp(places, *np.array(points).T)
         backward: tuple[float, ...] = ()
         if any(cells.get(BACKLASH) for _, cells in rows):
             if len(columns) > 1:
                 expected = "one corrected axis in a table with BACKLASH"
-                rows[0][0].refuse(f"gives {BACKLASH} and {len(columns)} axes", expected)
+                rows[0][0].refuse(f"has {BACKLASH} and {len(columns)} axes", expected)
             backward = tuple(
                 factor * at.position(cells[BACKLASH] or cells[column], BACKLASH)
                 for at, cells in rows
             )
         lines.append(
-            AxisTable(along, target, tuple(places.tolist()), tuple(values.tolist()), HELD, backward)
+            AxisTable(
+                along, target, tuple(places.tolist()), tuple(values.tolist()), HOLD_ENDS, backward
+            )
         )
     return lines
 
@@ -145,81 +146,81 @@ def _check_steps(places: np.ndarray, rows: Sequence[tuple[SourceLine, Cells]]) -
     for index, step in enumerate(steps):
         at, _ = rows[index + 1]
         if step <= 0.0:
-            found = f"{POSITION} {places[index + 1]:g} after {places[index]:g}"
-            at.refuse(found, "ascending positions")
+            problem = f"{POSITION} {places[index + 1]:g} after {places[index]:g}"
+            at.refuse(problem, "ascending positions")
         if abs(step - steps[0]) > max(STEP_SHARE * steps[0], 2.0 * RESOLUTION):
-            expected = "equal steps, as the control does"
+            expected = "equal steps, a requirement of the control"
             at.refuse(f"step of {step:g} after steps of {steps[0]:g}", expected)
 
 
 def read_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     axes, tables = _assignment(sources)
     if not tables:
-        sources[0].refuse("names tables", "the .COM files it names beside it")
+        sources[0].refuse("names tables", "these .COM files with it")
     terms: list[AxisTable] = []
     for source in tables:
-        along = _looked_up(source, axes, options)
+        along = _lookup_axis(source, axes, options)
         if any(term.source == along for term in terms):
-            source.refuse(f"is a second table over {along}", "one active table an axis")
+            source.refuse(f"is a second table over {along}", "one active table per axis")
         terms += _lines(source, along, options)
-    return Tables(tuple(terms), (options.said_sign(SIGN), TRAVEL))
+    return Tables(tuple(terms), (options.sign_statement(SIGN), TRAVEL))
 
 
-def write(wanted: RequiredCorrections) -> Files:
-    stem = wanted.stem.upper()
+def write(required: RequiredCorrections) -> Files:
+    stem = required.stem.upper()
     files: dict[str, str] = {}
-    mean = {axis: float(value) for axis, value in wanted.averaged([]).items()}
-    targets = wanted.corrector.moved
-    for axis in wanted.axes:
-        places = wanted.places(axis)
-        values = wanted.averaged([axis])
-        home = {target: target if target in wanted.axes else wanted.axes[0] for target in targets}
-        taken = {target: 0.0 if home[target] == axis else mean[target] for target in targets}
-
-        def spelled(found: Mapping[str, Array], taken: Mapping[str, float] = taken) -> Columns:
-            """Spell what is needed of each axis, without what stands in another table."""
-            factor = wanted.factor(ERROR)
-            return {
-                target: [
-                    f"{v:+.4f}" for v in wanted.round(factor * (found[target] - taken[target]))
-                ]
-                for target in targets
-            }
-
-        columns = _with_backlash(wanted, axis, spelled) or spelled(values)
+    mean = {axis: float(value) for axis, value in required.averaged([]).items()}
+    targets = required.corrector.moved
+    for axis in required.axes:
+        places = required.positions(axis)
+        # the mean of each target is part of one table only
+        home = {
+            target: target if target in required.axes else required.axes[0] for target in targets
+        }
+        offsets = {target: 0.0 if home[target] == axis else mean[target] for target in targets}
+        columns = _with_backlash(required, axis, offsets)
+        if not columns:
+            columns = _format_columns(required, required.averaged([axis]), offsets)
         rows = [(POSITION, *columns)]
-        rows += [(f"{q:+.4f}", *found) for q, *found in zip(places, *columns.values(), strict=True)]
-        files[f"_{axis}.COM"] = _spelled(f"{stem}_{axis}.COM", rows)
-    header = (ACTIVE, *wanted.axes)
-    files[""] = _spelled(
-        f"{stem}.CMA", [header, ("*", *(f"{stem}_{axis}" for axis in wanted.axes))], width=24
-    )
+        rows += zip([f"{q:+.4f}" for q in places], *columns.values(), strict=True)
+        files[f"_{axis}.COM"] = _format_table(f"{stem}_{axis}.COM", rows)
+    assignment = [(ACTIVE, *required.axes), ("*", *(f"{stem}_{axis}" for axis in required.axes))]
+    files[""] = _format_table(f"{stem}.CMA", assignment, width=24)
     return files
 
 
-def _with_backlash(
-    wanted: RequiredCorrections, axis: str, spelled: Callable[[Mapping[str, Array]], Columns]
+def _format_columns(
+    required: RequiredCorrections, moves: Mapping[str, Array], offsets: Mapping[str, float]
 ) -> Columns:
-    """Spell the one column of a table and its values for travel in the negative direction.
+    """Format the corrections of each axis, less the offsets that another table contains."""
+    factor = required.factor(ERROR)
+    return {
+        target: [f"{v:+.4f}" for v in required.round(factor * (moves[target] - offset))]
+        for target, offset in offsets.items()
+    }
+
+
+def _with_backlash(
+    required: RequiredCorrections, axis: str, offsets: Mapping[str, float]
+) -> Columns:
+    """Format the single column of a table and its values for travel in the negative direction.
 
     Empty where they do not depend on the direction, and where several axes are corrected over the
-    one: which of them BACKLASH belongs to is not published then.
+    axis: the meaning of BACKLASH is not published for this case.
     """
-    if axis not in wanted.directed:
+    if axis not in required.directional_axes:
         return {}
-    there, back = (
-        spelled(wanted.toward(way, axis).averaged([axis]))
-        for way in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
+    forward, backward = (
+        _format_columns(required, required.for_direction(direction, axis).averaged([axis]), offsets)
+        for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD)
     )
-    used = [
-        target for target in there if any(float(value) for value in (*there[target], *back[target]))
-    ]
-    if len(used) != 1 or there == back:
+    used = [target for target in forward if any(map(float, (*forward[target], *backward[target])))]
+    if len(used) != 1 or forward == backward:
         return {}
-    return {BACKLASH: back[used[0]], used[0]: there[used[0]]}
+    return {BACKLASH: backward[used[0]], used[0]: forward[used[0]]}
 
 
-def _spelled(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
+def _format_table(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> str:
     lines = [f"BEGIN {name} MM"]
     for number, row in enumerate(rows):
         first = NUMBER if number == 0 else str(number - 1)
@@ -228,10 +229,10 @@ def _spelled(name: str, rows: Sequence[Sequence[str]], width: int = WIDTH) -> st
 
 
 FORMAT = Format(
-    **described("heidenhain"),
+    **describe("heidenhain"),
     recognise=recognise,
     tables=read_tables,
     write=write,
-    most_points=MOST_POINTS,
+    most_points=MAX_TABLE_POINTS,
 )
 FORMATS = (FORMAT,)

@@ -1,10 +1,10 @@
 """LinuxCNC: screw compensation of a joint, `COMP_FILE`, and the matrix of `matrixkins`.
 
 LinuxCNC documentation, INI configuration, [JOINT_<num>], and src/emc/motion/command.c: rows of
-nominal, forward and reverse, ascending, at most 256; type 0 holds actual positions, type 1 what is
-added to the commanded one; linear between rows, end values held, by direction of travel. Its
-usrmotintf.cc takes the first three numbers of a line and ends at the first line without them, be
-it blank or a comment.
+nominal, forward and reverse, ascending, at most 256; type 0 contains actual positions, type 1
+corrections; linear between rows, end values held, by direction of travel. Its usrmotintf.cc reads
+the first three numbers of a line and stops at the first line without them, even if it is blank or
+a comment.
 
 src/hal/components/matrixkins.comp: X_joint = C_xx·X + C_xy·Y + C_xz·Z and so on; of the diagonals
 A (X+/Y+) and B (X+/Y−) of a square part C_xy = (B² − A²) / (2·A·B).
@@ -17,159 +17,168 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, shown, spell, spell_comment
-from warpspace.formats.terms import HELD, Affine, AxisTable, Tables
+from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number, quote
+from warpspace.formats.terms import HOLD_ENDS, Affine, AxisTable, Tables
 from warpspace.machine.axes import TravelDirection, is_linear
 
-MOST_POINTS = 256
+MAX_ROWS = 256
 DIGITS = 6
 JOINTS = "XYZABCUVW"
-"""Axes of the joints 0 to 8, where ``coordinates=`` of KINEMATICS does not name them (trivkins)."""
+"""Axes of the joints 0 to 8, if ``coordinates=`` of KINEMATICS does not name them (trivkins)."""
 INCH_MM = 25.4
 POSITIONS, OFFSETS = "type-0", "type-1"
 NEAR = 0.1
-"""Share of its range by which an actual position may be off, for a file that names no type."""
+"""Largest error, as a share of the range, of actual positions in a file without a type."""
 _NUMBER = r"([-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?)"
 _ROW = re.compile(rf"\s*{_NUMBER}\s+{_NUMBER}\s+{_NUMBER}(.*)", re.ASCII)
 _KINEMATICS = re.compile(r"(?mi)^[ \t]*+KINEMATICS\s*=.*\bcoordinates\s*=\s*([A-Z]+)")
 _INCH = re.compile(r"(?mi)^[ \t]*+LINEAR_UNITS\s*=\s*(?:in|inch|imperial)\b")
 _SECTION = re.compile(r"\[JOINT_([0-9])\]")
+Joint = tuple[str, str, float]  # axis, type of the table, mm or degrees per machine unit
 
 
 def _is_comp(head: str, name: str) -> bool:
     if re.search(r"^\s*COMP_FILE\s*=", head, re.MULTILINE):
         return True
     rows = [line for line in head.splitlines() if line.strip()]
-    return name.lower().endswith(".comp") or (
-        len(rows) > 1 and all(_ROW.match(line) for line in rows)
-    )
+    if name.lower().endswith(".comp"):
+        return True
+    return len(rows) > 1 and all(_ROW.match(line) for line in rows)
 
 
-def _assignment(
-    sources: Sequence[Source],
-) -> tuple[dict[str, tuple[str, str, float]], list[Source]]:
-    known: dict[str, tuple[str, str, float]] = {}
+def _assignment(sources: Sequence[Source]) -> tuple[dict[str, Joint], list[Source]]:
+    joints: dict[str, Joint] = {}
     tables: list[Source] = []
     for source in sources:
-        if not re.search(r"^[ \t]*+COMP_FILE", source.text, re.MULTILINE):
+        if re.search(r"^[ \t]*+COMP_FILE", source.text, re.MULTILINE):
+            joints |= _read_ini(source)
+        else:
             tables.append(source)
-            continue
-        named = _KINEMATICS.search(source.text)
-        joints = named[1].upper() if named else JOINTS
-        per_unit = INCH_MM if _INCH.search(source.text) else 1.0
-        joint, file, kind = "", "", POSITIONS
-        for at, bare in replace(source, lines=(*source.lines, "[END]")).scan("#", ";"):
-            if bare.startswith("["):
-                if joint and file:
-                    known[file] = (joint, kind, per_unit if is_linear(joint) else 1.0)
-                found = _SECTION.fullmatch(bare)
-                if found and int(found[1]) >= len(joints):
-                    expected = f"a joint from 0 to {len(joints) - 1}, {joints}"
-                    at.refuse(f"section {bare}", expected)
-                joint, file, kind = (joints[int(found[1])] if found else ""), "", POSITIONS
-                continue
-            key, _, value = (part.strip() for part in bare.partition("="))
-            if key == "COMP_FILE":
-                file = value.rsplit("/", 1)[-1]
-            elif key == "COMP_FILE_TYPE":
-                kind = f"type-{at.whole(value, key, 0, 1)}"
-    return known, tables
+    return joints, tables
+
+
+def _read_ini(source: Source) -> dict[str, Joint]:
+    """Read the joints of an INI file by the name of their table."""
+    joints: dict[str, Joint] = {}
+    coordinates = _KINEMATICS.search(source.text)
+    axes = coordinates[1].upper() if coordinates else JOINTS
+    per_unit = INCH_MM if _INCH.search(source.text) else 1.0
+    axis, file, kind = "", "", POSITIONS
+    for at, bare in replace(source, lines=(*source.lines, "[END]")).scan("#", ";"):
+        key, _, setting = (part.strip() for part in bare.partition("="))
+        if bare.startswith("["):
+            if axis and file:
+                joints[file] = (axis, kind, per_unit if is_linear(axis) else 1.0)
+            axis, file, kind = _joint_axis(at, bare, axes), "", POSITIONS
+        elif key == "COMP_FILE":
+            file = setting.rsplit("/", 1)[-1]
+        elif key == "COMP_FILE_TYPE":
+            kind = f"type-{at.integer(setting, key, 0, 1)}"
+    return joints
+
+
+def _joint_axis(at: SourceLine, heading: str, axes: str) -> str:
+    section = _SECTION.fullmatch(heading)
+    if section is None:
+        return ""
+    if int(section[1]) >= len(axes):
+        at.refuse(f"section {heading}", f"a joint from 0 to {len(axes) - 1}, {axes}")
+    return axes[int(section[1])]
 
 
 def _rows(source: Source, per_unit: float, notes: list[str]) -> np.ndarray:
     rows: list[list[float]] = []
     for number, line in enumerate(source.lines, start=1):
-        at, found = source.at(number), _ROW.match(line)
-        if found is None:
-            left = sum(_ROW.match(one) is not None for one in source.lines[number:])
+        at, match = source.at(number), _ROW.match(line)
+        if match is None:
             if not rows:
-                stops = f"LinuxCNC stops here, at {at.shown}, and has no table"
-                at.refuse(stops, "three numbers: nominal forward reverse")
-            if left:
+                problem = f"LinuxCNC stops here, at {at.quoted}, without a table"
+                at.refuse(problem, "three numbers: nominal forward reverse")
+            unread = sum(map(bool, map(_ROW.match, source.lines[number:])))
+            if unread:
                 notes.append(
-                    f"{source.name}: LinuxCNC stops at line {number}, {at.shown}: {left} rows"
-                    " behind it are not read"
+                    f"{source.name}: LinuxCNC stops at line {number}, {at.quoted}: ignored"
+                    f" {unread} rows after it"
                 )
             break
-        if found[4].strip():
+        if match[4].strip():
             notes.append(
-                f"{source.name}: line {number}: {shown(found[4])} behind three numbers is not read"
+                f"{source.name}: line {number}: ignored {quote(match[4])} after three numbers"
             )
-        row = [per_unit * at.number(found[n], "value") for n in (1, 2, 3)]
+        row = [per_unit * at.number(match[n], "value") for n in (1, 2, 3)]
         if rows and row[0] <= rows[-1][0]:
-            expected = "ascending positions, as LinuxCNC does"
+            expected = "ascending positions, a requirement of LinuxCNC"
             at.refuse(f"nominal {row[0]:g} after {rows[-1][0]:g}", expected)
-        rows.append([at.checked_position(value, "value") for value in row])
-        if len(rows) > MOST_POINTS:
-            at.refuse(f"has more than {MOST_POINTS} rows; LinuxCNC takes {MOST_POINTS}")
+        rows.append([at.checked_position(number, "value") for number in row])
+        if len(rows) > MAX_ROWS:
+            at.refuse(f"more than {MAX_ROWS} rows", f"at most {MAX_ROWS}, the limit of LinuxCNC")
     return np.array(rows)
 
 
-def _kind(rows: np.ndarray, given: str) -> tuple[str, tuple[str, ...]]:
-    if given:
-        return given, ()
+def _kind(rows: np.ndarray, stated: str) -> tuple[str, tuple[str, ...]]:
+    if stated:
+        return stated, ()
     span = max(np.ptp(rows[:, 0]), abs(rows[:, 0]).max(), 1e-9)
     positions = np.abs(rows[:, 1:] - rows[:, :1]).max() < NEAR * span
     kind = POSITIONS if positions and np.abs(rows[:, 1]).max() > NEAR * span else OFFSETS
-    said = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
-    return kind, (f"second and third column taken for {said}; --variant says otherwise",)
+    description = "actual positions (type 0)" if kind == POSITIONS else "offsets (type 1)"
+    return kind, (f"second and third column: {description}; --variant selects the other type",)
 
 
 def _read_comp(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    known, tables = _assignment(sources)
+    joints, tables = _assignment(sources)
     terms: list[AxisTable] = []
-    inches = any(size != 1.0 for _, _, size in known.values())
+    inches = any(size != 1.0 for _, _, size in joints.values())
     assumed: list[str] = [f"machine units {'inches' if inches else 'mm'} and degrees"]
     notes: list[str] = []
     for source in tables:
-        axis, kind, per_unit = known.get(source.base, ("", "", 1.0))
+        axis, kind, per_unit = joints.get(source.base, ("", "", 1.0))
         if not axis:
             letter = source.stem.upper().rsplit("_", 1)[-1]
             axis = options.axis or (letter if len(letter) == 1 and letter in JOINTS else "")
         if not axis:
-            source.refuse("does not say which axis it is for", "--axis X, or its INI file")
+            source.refuse("does not state its axis", "--axis X, or its INI file")
         axis = options.axis_named(axis, source)
         if any(term.source == axis for term in terms):
-            source.refuse(f"is a second table of {axis}", "one a joint, as LinuxCNC takes")
+            source.refuse(f"is a second table of {axis}", "one per joint, the limit of LinuxCNC")
         rows = _rows(source, per_unit, notes)
-        kind, said = _kind(rows, options.variant or kind)
-        assumed += said
+        kind, assumptions = _kind(rows, options.variant or kind)
+        assumed += assumptions
         trims = rows[:, :1] - rows[:, 1:] if kind == POSITIONS else rows[:, 1:]
         nominal, forward, reverse = (tuple(column.tolist()) for column in (rows[:, 0], *trims.T))
         backward = () if forward == reverse else reverse
-        terms.append(AxisTable(axis, axis, nominal, forward, HELD, backward))
+        terms.append(AxisTable(axis, axis, nominal, forward, HOLD_ENDS, backward))
     if not terms:
-        sources[0].refuse("names files", "the files of its COMP_FILE lines beside it")
+        sources[0].refuse("names files", "the files of its COMP_FILE lines with it")
     return Tables(tuple(terms), tuple(dict.fromkeys(assumed)), tuple(notes))
 
 
-def _write_comp(wanted: RequiredCorrections) -> Files:
+def _write_comp(corrections: RequiredCorrections) -> Files:
     files: dict[str, str] = {}
-    lines = [spell_comment("# ", wanted.scene.title)]
-    lines += [f"# joints counted as {JOINTS}: trivkins without coordinates="]
-    for axis in wanted.axes:
-        if axis not in wanted.corrector.moved or axis not in JOINTS:
+    lines = [format_comment("# ", corrections.scene.title)]
+    lines.append(f"# joints in the order {JOINTS}: trivkins without coordinates=")
+    for axis in corrections.axes:
+        if axis not in corrections.corrector.moved or axis not in JOINTS:
             continue
-        places = wanted.places(axis)
-        ways = (TravelDirection.FORWARD, TravelDirection.BACKWARD)
-        forward, backward = (
-            wanted.round(wanted.toward(way, axis).averaged([axis])[axis]).tolist() for way in ways
-        )
+        columns = [corrections.positions(axis)]
+        for direction in (TravelDirection.FORWARD, TravelDirection.BACKWARD):
+            moves = corrections.for_direction(direction, axis).averaged([axis])[axis]
+            columns.append(corrections.round(moves))
         files[f"_{axis}.comp"] = "".join(
-            f"{spell(q, DIGITS)} {spell(there, DIGITS)} {spell(back, DIGITS)}\n"
-            for q, there, back in zip(places.tolist(), forward, backward, strict=True)
+            " ".join(format_number(number, DIGITS) for number in row) + "\n"
+            for row in np.stack(columns, axis=-1).tolist()
         )
         lines += [
             f"[JOINT_{JOINTS.index(axis)}]",
-            f"COMP_FILE = {wanted.stem}_{axis}.comp",
+            f"COMP_FILE = {corrections.stem}_{axis}.comp",
             "COMP_FILE_TYPE = 1",
         ]
     return {"": "\n".join(lines) + "\n", **files}
 
 
 MATRIX_DIGITS = 9
-MOST = 0.1  # of a coefficient's distance from the identity: 0.1 rad or 10 %
+MAX_COEFFICIENT = 0.1  # deviation of a coefficient from the identity: 0.1 rad or 10 %
 _SETP = re.compile(r"setp\s+matrixkins\.C_([xyz])([xyz])\s+(\S+)", re.IGNORECASE)
 
 
@@ -179,51 +188,51 @@ def squareness(first_diagonal_mm: float, second_diagonal_mm: float) -> float:
 
 
 def _read_matrix(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    found: dict[tuple[str, str], float] = {}
+    coefficients: dict[tuple[str, str], float] = {}
     for source in sources:
         for at, bare in source.scan("#"):
             if "matrixkins.C_" not in bare:
                 continue
             matched = _SETP.fullmatch(bare)
             if matched is None:
-                at.refuse(at.shown, "setp matrixkins.C_xy NUMBER")
+                at.refuse(at.quoted, "setp matrixkins.C_xy NUMBER")
             row, column = matched[1].upper(), matched[2].upper()
             value = at.number(matched[3], f"C_{matched[1]}{matched[2]}") - float(row == column)
-            if abs(value) > MOST:
-                at.refuse(at.shown, f"a matrix within ±{MOST:g} of the identity")
-            if (row, column) in found:
+            if abs(value) > MAX_COEFFICIENT:
+                at.refuse(at.quoted, f"a matrix within ±{MAX_COEFFICIENT:g} of the identity")
+            if (row, column) in coefficients:
                 at.refuse(f"C_{row.lower()}{column.lower()} is set twice", "it once")
             for axis in (row, column):
                 options.axis_named(axis, at)
-            found[row, column] = value
-        if not found:
+            coefficients[row, column] = value
+        if not coefficients:
             source.refuse("sets no coefficient", "setp matrixkins.C_xx … C_zz")
-    matrix = tuple(tuple(found.get((row, axis), 0.0) for axis in AXES) for row in AXES)
+    matrix = tuple(tuple(coefficients.get((row, axis), 0.0) for axis in AXES) for row in AXES)
     return Tables((Affine(AXES, matrix),), (), (), ("mm/mm",))
 
 
-def _write_matrix(wanted: RequiredCorrections) -> Files:
+def _write_matrix(corrections: RequiredCorrections) -> Files:
     allowed = [(row, column) for row in AXES for column in AXES]
-    found = wanted.linear_fit(allowed)
-    lines = [spell_comment("# ", wanted.scene.title)]
+    coefficients = corrections.linear_fit(allowed)
+    lines = [format_comment("# ", corrections.scene.title)]
     for row, column in allowed:
-        value = float(row == column) + found.get((row, column), 0.0)
-        text = spell(float(wanted.round(value)), MATRIX_DIGITS)
+        value = float(row == column) + coefficients.get((row, column), 0.0)
+        text = format_number(float(corrections.round(value)), MATRIX_DIGITS)
         lines.append(f"setp matrixkins.C_{row.lower()}{column.lower()} {text}")
     return {"": "\n".join(lines) + "\n"}
 
 
 COMP = Format(
-    **described("linuxcnc-comp"),
+    **describe("linuxcnc-comp"),
     recognise=_is_comp,
     tables=_read_comp,
     write=_write_comp,
-    most_points=MOST_POINTS,
+    most_points=MAX_ROWS,
     variants=(POSITIONS, OFFSETS),
 )
 MATRIX = Format(
-    **described("linuxcnc-matrix"),
-    recognise=has(r"matrixkins\.C_"),
+    **describe("linuxcnc-matrix"),
+    recognise=has_pattern(r"matrixkins\.C_"),
     tables=_read_matrix,
     write=_write_matrix,
 )

@@ -1,7 +1,7 @@
 """Laser interferometer files `.rtl`: sections HEADER, TARGET DATA, RUNS, ENVIRONMENT, DEVIATIONS.
 
-The structure is not published by its maker. What is understood here is inferred from files that
-public programs write; an import says so, and a section or line beyond that is refused.
+The structure is not published by its maker, but inferred from files that public programs write; an
+import states this, and other sections or lines are refused.
 """
 
 import math
@@ -10,8 +10,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from warpspace.formats.measured import BACKWARD, FORWARD, ErrorSeries, Imported, MeasuredRun, merge
-from warpspace.formats.registry import Format, ReadOptions, described, has
+from warpspace.formats.measured import (
+    BACKWARD,
+    FORWARD,
+    ErrorSeries,
+    ImportedErrors,
+    MeasuredRun,
+    merge,
+)
+from warpspace.formats.registry import Format, ReadOptions, describe, has_pattern
 from warpspace.formats.source import Source, SourceLine
 from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
@@ -19,35 +26,36 @@ from warpspace.machine.limits import MAX_POINTS, MAX_RUNS
 NAME = "rtl"
 SECTIONS = ("HEADER", "TARGET DATA", "USER-TEXT", "RUNS", "DEVIATIONS", "ENVIRONMENT", "EOF")
 INFERRED = (
-    "the structure is not published, it was inferred: targets in mm, deviations in µm, actual −"
-    " nominal; runs with odd numbers forward, even ones backward"
+    "unpublished structure, inferred: targets in mm, deviations in µm, actual − nominal; runs with"
+    " odd numbers forward, with even numbers backward"
 )
-ONE_WAY = "the flags say one direction: runs with even numbers hold nothing, left out"
-KNOWN = "Filetype, Target-count, Targets and Flags"
+ONE_WAY = "unidirectional according to the flags: runs with even numbers are empty and ignored"
+TARGET_KEYS = "Filetype, Target-count, Targets and Flags"
 _SECTION = re.compile(r"([A-Z][A-Z -]*)::")
 _KEY = re.compile(r"[A-Za-z][A-Za-z0-9 _-]*")
 Lines = list[tuple[SourceLine, str]]
 
 
 def _sections(source: Source) -> dict[str, Lines]:
-    found: dict[str, Lines] = {}
+    sections: dict[str, Lines] = {}
     lines: Lines | None = None
     for at, bare in source.scan():
-        if matched := _SECTION.fullmatch(bare):
-            name = matched[1].strip()
+        heading = _SECTION.fullmatch(bare)
+        if heading:
+            name = heading[1].strip()
             if name not in SECTIONS:
-                at.refuse(f"section {name!r} is not understood", f"one of {', '.join(SECTIONS)}")
-            if name in found:
-                at.refuse(f"section {name} stands there twice", "it once")
-            lines = found.setdefault(name, [])
+                at.refuse(f"section {name!r} is unknown", f"one of {', '.join(SECTIONS)}")
+            if name in sections:
+                at.refuse(f"section {name} occurs twice", "it once")
+            lines = sections.setdefault(name, [])
         elif lines is None:
-            at.refuse(f"{at.shown} before any section", "HEADER::")
+            at.refuse(f"{at.quoted} before any section", "HEADER::")
         else:
             lines.append((at, bare))
     for name in ("TARGET DATA", "RUNS", "DEVIATIONS"):
-        if name not in found:
-            source.refuse(f"has no section {name}", "it (is the file cut off?)")
-    return found
+        if name not in sections:
+            source.refuse(f"has no section {name}", "it (is the file truncated?)")
+    return sections
 
 
 def _pair(text: str) -> tuple[str, str] | None:
@@ -59,29 +67,29 @@ def _pair(text: str) -> tuple[str, str] | None:
 def _targets(source: Source, lines: Lines) -> tuple[list[float], list[int]]:
     count, flags = 0, []
     values: list[float] = []
-    within = False
+    within_targets = False
     for at, text in lines:
         pair = _pair(text)
         if pair is None:
-            if not within:
-                at.refuse(f"{at.shown} is not understood", KNOWN)
+            if not within_targets:
+                at.refuse(f"{at.quoted} is unknown", TARGET_KEYS)
             values += [at.position(part, "target") for part in text.split()]
             continue
         key, value = pair
-        within = key == "targets"
+        within_targets = key == "targets"
         if key == "target-count":
-            count = at.whole(value, key, 2, MAX_POINTS)
+            count = at.integer(value, key, 2, MAX_POINTS)
         elif key == "flags":
-            flags = [at.whole(part, key, -9, 99) for part in value.split()]
+            flags = [at.integer(part, key, -9, 99) for part in value.split()]
         elif key == "targets":
             values += [at.number(part, "target") for part in value.split()]
         elif key != "filetype":
-            at.refuse(f"{at.shown} is not understood", KNOWN)
+            at.refuse(f"{at.quoted} is unknown", TARGET_KEYS)
     end = lines[-1][0] if lines else source
     if len(values) != count:
-        end.refuse(f"{len(values)} targets", f"{count} as Target-count says")
+        end.refuse(f"{len(values)} targets", f"{count}, the Target-count")
     if len(set(values)) != len(values):
-        end.refuse("a target stands there twice", "each once")
+        end.refuse("a target occurs twice", "each once")
     return values, flags
 
 
@@ -91,7 +99,7 @@ def _axis(source: Source, sections: dict[str, Lines], options: ReadOptions) -> s
     pairs = [(at, _pair(text)) for at, text in sections.get("USER-TEXT", [])]
     named = [(at, pair[1]) for at, pair in pairs if pair and pair[0] == "axis" and pair[1]]
     if not named:
-        source.refuse("does not name its axis", "--axis X")
+        source.refuse("does not state its axis", "--axis X")
     at, value = named[0]
     return options.axis_named(value.split()[0], at)
 
@@ -101,7 +109,7 @@ def _run_count(source: Source, lines: Lines) -> int:
     for at, text in lines:
         key, value = _pair(text) or ("", "")
         if key == "run-count":
-            stated = at.whole(value, "Run-count", 1, MAX_RUNS)
+            stated = at.integer(value, "Run-count", 1, MAX_RUNS)
     if not stated:
         source.refuse("section RUNS has no Run-count", "Run-count: number")
     return stated
@@ -114,59 +122,61 @@ def _deviations(lines: Lines, targets: int, stated: int) -> dict[int, np.ndarray
             continue
         parts = text.split()
         if len(parts) != 3:
-            at.refuse(at.shown, "run, target, deviation")
-        run = at.whole(parts[0], "run", 1, MAX_RUNS)
-        target = at.whole(parts[1], "target", 1, MAX_POINTS)
+            at.refuse(at.quoted, "run, target, deviation")
+        run = at.integer(parts[0], "run", 1, MAX_RUNS)
+        target = at.integer(parts[1], "target", 1, MAX_POINTS)
         rows.append((at, run, target, at.error(parts[2], "deviation")))
     table: dict[int, np.ndarray] = {}
-    for at, run, target, value in rows:
+    for at, run, target, error in rows:
         if target > targets:
             at.refuse(f"target {target}", f"at most {targets}")
         if run > stated:
-            at.refuse(f"run {run}", f"at most {stated} as Run-count says")
+            at.refuse(f"run {run}", f"at most {stated}, the Run-count")
         row = table.setdefault(run, np.full(targets, math.nan))
         if not math.isnan(row[target - 1]):
-            at.refuse(f"run {run}, target {target} stands there twice", "it once")
-        row[target - 1] = value
+            at.refuse(f"run {run}, target {target} occurs twice", "it once")
+        row[target - 1] = error
     return table
 
 
-def _read_one(source: Source, options: ReadOptions) -> Imported:
+def _read_one(source: Source, options: ReadOptions) -> ImportedErrors:
     sections = _sections(source)
     targets, flags = _targets(source, sections["TARGET DATA"])
     stated = _run_count(source, sections["RUNS"])
-    one_way = len(flags) > 1 and flags[1] == 1
+    unidirectional = len(flags) > 1 and flags[1] == 1
     axis = _axis(source, sections, options)
     table = _deviations(sections["DEVIATIONS"], len(targets), stated)
-    kept = {run: row for run, row in sorted(table.items()) if run % 2 or not one_way}
-    expected = [run for run in range(1, stated + 1) if run % 2 or not one_way]
-    if list(kept) != expected or any(np.isnan(row).any() for row in kept.values()):
-        counted = sum(int((~np.isnan(row)).sum()) for row in kept.values())
-        wanted = f"{len(expected) * len(targets)}: {len(expected)} runs of {len(targets)} targets"
-        source.refuse(f"{counted} readings", f"{wanted} (is the file cut off?)")
+    rows_by_run = {run: row for run, row in sorted(table.items()) if run % 2 or not unidirectional}
+    expected = [run for run in range(1, stated + 1) if run % 2 or not unidirectional]
+    if list(rows_by_run) != expected or any(np.isnan(row).any() for row in rows_by_run.values()):
+        counted = sum(int((~np.isnan(row)).sum()) for row in rows_by_run.values())
+        required = f"{len(expected) * len(targets)}: {len(expected)} runs of {len(targets)} targets"
+        source.refuse(f"{counted} readings", f"{required} (is the file truncated?)")
     order = np.argsort(targets)
     runs = tuple(
         MeasuredRun((run + 1) // 2, FORWARD if run % 2 else BACKWARD, tuple(row[order].tolist()))
-        for run, row in kept.items()
+        for run, row in rows_by_run.items()
     )
     if not is_linear(axis):
-        source.refuse(f"is for the rotary axis {axis}; its units are not known: expected a CSV")
+        source.refuse(f"is for the rotary axis {axis}, whose units are unknown; expected a CSV")
     key = f"E{'XYZ'['XYZUVW'.index(axis[0]) % 3]}{axis}"
     series = ErrorSeries(key, tuple(float(targets[index]) for index in order), runs)
     air = [text for _, text in sections.get("ENVIRONMENT", [])]
-    notes = (*source.notes, *([f"environment: {'; '.join(air)}"] if air else []))
-    assumed = (INFERRED, *((ONE_WAY,) if one_way else ()))
-    return Imported(NAME, (series,), units=("mm", "µm"), assumed=assumed, notes=notes)
+    notes = source.notes
+    if air:
+        notes += (f"environment: {'; '.join(air)}",)
+    assumed = (INFERRED, ONE_WAY) if unidirectional else (INFERRED,)
+    return ImportedErrors(NAME, (series,), units=("mm", "µm"), assumed=assumed, notes=notes)
 
 
-def read(sources: Sequence[Source], options: ReadOptions) -> Imported:
+def read(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
     return merge([_read_one(source, options) for source in sources])
 
 
 FORMATS = (
     Format(
-        **described(NAME),
-        recognise=has(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
+        **describe(NAME),
+        recognise=has_pattern(r"(?s)\A(?=.*HEADER::)(?=.*(TARGET DATA|DEVIATIONS)::)"),
         read=read,
     ),
 )

@@ -6,8 +6,8 @@ tan(π/2 − acos((AC² − side² − AD²) / (2·side·AD))); x is moved by �
 −z·YZ.
 
 Klipper documentation, Skew_Correction: a profile [skew_correction NAME] acts once SKEW_PROFILE
-LOAD=NAME is given; axis_twist_compensation.py: the twist is a height that a probe is off by, along
-X, its mean taken out; it corrects the probe, not the nozzle. Marlin documentation, M852 (I, J, K
+LOAD=NAME is executed; axis_twist_compensation.py: the twist is the height error of a probe along X
+without its mean; it corrects the probe, not the nozzle. Marlin documentation, M852 (I, J, K
 are the factors of XY, XZ, YZ; S that of XY), and Marlin/src/inc/Conditionals_post.h.
 """
 
@@ -19,21 +19,21 @@ from dataclasses import replace
 import numpy as np
 
 from warpspace.formats.compensation.corrections import AXES, RequiredCorrections
-from warpspace.formats.measured import BOTH, ErrorSeries, Imported, MeasuredRun, merge
-from warpspace.formats.registry import Files, Format, ReadOptions, described, has
-from warpspace.formats.source import Source, SourceLine, spell, spell_comment
-from warpspace.formats.terms import Affine, Tables, errors_of
+from warpspace.formats.measured import ErrorSeries, ImportedErrors, merge
+from warpspace.formats.registry import Files, Format, ReadOptions, describe, has_pattern
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number
+from warpspace.formats.terms import Affine, Tables, errors_from_tables
 from warpspace.units import URAD_PER_RAD
 
 PLANES = ("XY", "XZ", "YZ")
-MOST = 1.0  # of a factor (Marlin, SKEW_FACTOR_MAX)
-OPEN = 0.02
-"""Share by which the side that two diagonals and a side give may differ from that side, unsaid."""
-SIDE_MM = 100.0  # side of the part that a factor is spelled by
+MAX_FACTOR = 1.0  # of a factor (Marlin, SKEW_FACTOR_MAX)
+CLOSURE_TOLERANCE = 0.02
+"""Largest relative difference without a note between a side and the one that closes the part."""
+SIDE_MM = 100.0  # side of the part whose lengths express a factor
 
 
 def skew_factor(ac: float, bd: float, ad: float) -> float:
-    """Give the skew factor of a part from its lengths, mm."""
+    """Compute the skew factor of a part from its lengths, mm."""
     side = other_side(ac, bd, ad)
     return math.tan(
         math.pi / 2.0 - math.acos((ac * ac - side * side - ad * ad) / (2.0 * side * ad))
@@ -41,35 +41,36 @@ def skew_factor(ac: float, bd: float, ad: float) -> float:
 
 
 def other_side(ac: float, bd: float, ad: float) -> float:
-    """Give the side AB that closes a part, mm."""
+    """Compute the side AB that closes a part, mm."""
     return math.sqrt(2.0 * ac * ac + 2.0 * bd * bd - 4.0 * ad * ad) / 2.0
 
 
-def open_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str, ...]:
-    """Say where the lengths of a part do not close for a square one."""
+def closure_notes(lengths: tuple[float, float, float], plane: str) -> tuple[str, ...]:
+    """Return a note if the lengths of a part contradict a square part."""
     ac, bd, ad = lengths
     side = other_side(ac, bd, ad)
-    if abs(side / ad - 1.0) < OPEN:
+    if abs(side / ad - 1.0) < CLOSURE_TOLERANCE:
         return ()
-    shown = f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm close only with a side AB of"
     share = 100.0 * (side / ad - 1.0)
-    return (
-        f"{shown} {side:.4g} mm, {share:+.1f} % from AD: is the part square, is none mistyped?",
+    note = (
+        f"{plane}: AC {ac:g}, BD {bd:g} and AD {ad:g} mm imply a side AB of {side:.4g} mm,"
+        f" {share:+.1f} % from AD; check the lengths (the part must be square)"
     )
+    return (note,)
 
 
 def skew_lengths(factor: float) -> tuple[float, float, float]:
-    """Give diagonals and side of a rhombus that has a skew factor, mm: AC, BD, AD."""
+    """Compute diagonals and side of a rhombus with a skew factor, mm: AC, BD, AD."""
     angle = math.pi / 2.0 - math.atan(factor)
     return 2.0 * SIDE_MM * math.cos(angle / 2.0), 2.0 * SIDE_MM * math.sin(angle / 2.0), SIDE_MM
 
 
 def factor_of(lengths: tuple[float, float, float], at: SourceLine, what: str) -> float:
     ac, bd, ad = lengths
-    # the diagonals of a parallelogram are together longer than twice a side, and differ by less
+    # twice a side is shorter than the sum of the diagonals, and longer than their difference
     if not (min(lengths) > 0.0 and ac + bd > 2.0 * ad > abs(ac - bd)):
-        found = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm are no parallelogram"
-        at.refuse(found, "two diagonals and a side")
+        problem = f"{what}: AC {ac:g}, BD {bd:g}, AD {ad:g} mm do not form a parallelogram"
+        at.refuse(problem, "two diagonals and a side")
     return skew_factor(ac, bd, ad)
 
 
@@ -78,15 +79,15 @@ def skew_term(factors: Mapping[str, float]) -> Affine:
     return Affine(AXES, ((0.0, -xy, -(xz - xy * yz)), (0.0, 0.0, -yz), (0.0, 0.0, 0.0)))
 
 
-def fitted_factors(wanted: RequiredCorrections) -> dict[str, float]:
-    """Give the factors that leave the smallest RMS over the volume."""
-    found = wanted.linear_fit((("X", "Y"), ("X", "Z"), ("Y", "Z")))
-    xy, yz = -found.get(("X", "Y"), 0.0), -found.get(("Y", "Z"), 0.0)
-    xz = -found.get(("X", "Z"), 0.0) + xy * yz
+def fitted_factors(corrections: RequiredCorrections) -> dict[str, float]:
+    """Fit the factors that minimise the RMS residual error over the volume."""
+    coefficients = corrections.linear_fit((("X", "Y"), ("X", "Z"), ("Y", "Z")))
+    xy, yz = -coefficients.get(("X", "Y"), 0.0), -coefficients.get(("Y", "Z"), 0.0)
+    xz = -coefficients.get(("X", "Z"), 0.0) + xy * yz
     return {"XY": xy, "XZ": xz, "YZ": yz}
 
 
-LEAST_OFFSET_MM = 1.0  # between probe and nozzle: below it a twist cannot be told from the height
+MIN_OFFSET_MM = 1.0  # between probe and nozzle: with less, a twist is not estimable
 PROBES = ("probe", "bltouch", "beacon", "cartographer", "smart_effector")
 _SET = re.compile(r"\b(XY|XZ|YZ)=([^\s]+)")
 _PROFILE = re.compile(r"\[skew_correction\s++([^\]]+)\]")
@@ -94,60 +95,73 @@ _LOAD = re.compile(r"\bSKEW_PROFILE\s+LOAD=\"?([^\s\"]+)")
 _SAVED = re.compile(r"(xy|xz|yz)_skew\s*[=:]\s*(\S+)")
 _SECTION = re.compile(r"\[([a-z_]+)(?:\s[^\]]*)?\]")
 Section = dict[str, tuple[SourceLine, str]]
+Settings = dict[str, tuple[SourceLine, float]]
 
 
 def _sections(source: Source) -> dict[str, Section]:
-    found: dict[str, Section] = {}
+    sections: dict[str, Section] = {}
     section: Section = {}
     for number, text in enumerate(source.lines, start=1):
         bare = text.removeprefix("#*#").split(" ;")[0].strip()
-        if matched := _SECTION.fullmatch(bare):
-            section = found.setdefault(matched[1], {})
-        elif not bare.startswith(("#", ";")) and (pair := re.match(r"(\w+)\s*[:=]\s*(.*)", bare)):
-            section[pair[1]] = (source.at(number), pair[2].strip())
-    return found
+        heading, setting = _SECTION.fullmatch(bare), re.match(r"(\w+)\s*[:=]\s*(.*)", bare)
+        if heading:
+            section = sections.setdefault(heading[1], {})
+        elif setting:
+            section[setting[1]] = (source.at(number), setting[2].strip())
+    return sections
 
 
 def _factors(source: Source, options: ReadOptions, notes: list[str]) -> dict[str, float]:
-    found: dict[str, float] = {}
+    factors: dict[str, float] = {}
     profiles: dict[str, dict[str, float]] = {}
-    loaded, name = options.variant, ""
+    loaded, profile = options.variant, ""
     for number, text in enumerate(source.lines, start=1):
         at, bare = source.at(number), text.removeprefix("#*#").strip()
-        commented = bare.startswith((";", "#"))
-        if matched := _PROFILE.fullmatch(bare):
-            name = matched[1].rstrip()
-        elif not commented and (matched := _LOAD.search(bare)):
-            loaded = options.variant or matched[1]
-        elif "SET_SKEW" in bare and not commented:
-            if re.search(r"CLEAR\s*=\s*1", bare):
-                found.clear()
-                continue
-            for plane, value in _SET.findall(bare):
-                parts = value.split(",")
-                if len(parts) != 3:
-                    at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
-                ac, bd, ad = (at.number(part, plane) for part in parts)
-                found[plane] = factor_of((ac, bd, ad), at, plane)
-                notes += open_notes((ac, bd, ad), plane)
-        elif matched := _SAVED.fullmatch(bare):
-            value = at.number(matched[2], matched[1])
-            profiles.setdefault(name, {})[matched[1].upper()] = value
-    if profiles and (loaded or not found):
-        names = ", ".join(profiles)
-        if len(profiles) == 1 and not loaded:
-            (loaded,) = profiles
-        elif not loaded or loaded not in profiles:
-            which = f"no profile {loaded!r} among" if loaded else "several skew profiles:"
-            source.refuse(f"{which} {names}", "one of them (--variant NAME)")
-        found |= profiles[loaded]
-        notes.append(
-            f"profile {loaded!r} is taken as loaded: Klipper loads none by itself, only"
-            f" SKEW_PROFILE LOAD={loaded} does"
-        )
-    for axis in "".join(found):
+        is_command = not bare.startswith((";", "#"))
+        section, load, saved = _PROFILE.fullmatch(bare), _LOAD.search(bare), _SAVED.fullmatch(bare)
+        if section:
+            profile = section[1].rstrip()
+        elif load and is_command:
+            loaded = options.variant or load[1]
+        elif "SET_SKEW" in bare and is_command:
+            _set_skew(at, bare, factors, notes)
+        elif saved:
+            factor = at.number(saved[2], saved[1])
+            profiles.setdefault(profile, {})[saved[1].upper()] = factor
+    if profiles and (loaded or not factors):
+        factors |= _loaded_profile(source, profiles, loaded, notes)
+    for axis in "".join(factors):
         options.axis_named(axis, source)
-    return found
+    return factors
+
+
+def _set_skew(at: SourceLine, command: str, factors: dict[str, float], notes: list[str]) -> None:
+    if re.search(r"CLEAR\s*=\s*1", command):
+        factors.clear()
+        return
+    for plane, value in _SET.findall(command):
+        parts = value.split(",")
+        if len(parts) != 3:
+            at.refuse(f"{plane}={value}", "three lengths AC,BD,AD in mm")
+        ac, bd, ad = (at.number(part, plane) for part in parts)
+        factors[plane] = factor_of((ac, bd, ad), at, plane)
+        notes += closure_notes((ac, bd, ad), plane)
+
+
+def _loaded_profile(
+    source: Source, profiles: Mapping[str, dict[str, float]], loaded: str, notes: list[str]
+) -> dict[str, float]:
+    names = ", ".join(profiles)
+    if len(profiles) == 1 and not loaded:
+        loaded = names
+    if loaded not in profiles:
+        problem = f"no profile {loaded!r} among" if loaded else "several skew profiles:"
+        source.refuse(f"{problem} {names}", "one of them (--variant NAME)")
+    notes.append(
+        f"profile {loaded!r} is assumed to be loaded: Klipper loads no profile without"
+        f" SKEW_PROFILE LOAD={loaded}"
+    )
+    return profiles[loaded]
 
 
 def _klipper_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
@@ -160,7 +174,7 @@ def _klipper_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
     return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
 
 
-def _twist(source: Source, options: ReadOptions) -> Imported | None:
+def _twist(source: Source, options: ReadOptions) -> ImportedErrors | None:
     sections = _sections(source)
     twist = sections.get("axis_twist_compensation", {})
     if "z_compensations" not in twist:
@@ -170,57 +184,56 @@ def _twist(source: Source, options: ReadOptions) -> Imported | None:
     ends: list[float] = []
     for key in ("start_x", "end_x"):
         names = (f"compensation_{key}", f"calibrate_{key}", key)
-        named = next((name for name in names if name in twist), None)
-        if named is None:
-            at.refuse(f"[axis_twist_compensation] has no calibrate_{key}", "it")
-        place, given = twist[named]
-        ends.append(place.number(given, named))
+        name = next((name for name in names if name in twist), None)
+        if name is None:
+            at.refuse("[axis_twist_compensation] is incomplete", f"calibrate_{key}")
+        place, text = twist[name]
+        ends.append(place.number(text, name))
     if len(heights) < 2 or ends[1] <= ends[0]:
-        found = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
-        at.refuse(found, "two or more along a range")
+        problem = f"{len(heights)} z_compensations from {ends[0]:g} to {ends[1]:g}"
+        at.refuse(problem, "two or more along a range")
     probe = next((name for name in PROBES if "y_offset" in sections.get(name, {})), None)
     if probe is None:
-        expected = "y_offset in [probe]: without it a height tells no twist"
+        expected = "y_offset in [probe], needed to compute the twist"
         at.refuse("[axis_twist_compensation] without a probe", expected)
-    place, given = sections[probe]["y_offset"]
-    offset = place.number(given, "y_offset")
-    if abs(offset) < LEAST_OFFSET_MM:
-        place.refuse(f"y_offset {offset:g} mm", f"{LEAST_OFFSET_MM:g} mm or more to tell a twist")
+    place, text = sections[probe]["y_offset"]
+    offset = place.number(text, "y_offset")
+    if abs(offset) < MIN_OFFSET_MM:
+        place.refuse(
+            f"y_offset {offset:g} mm", f"{MIN_OFFSET_MM:g} mm or more to compute the twist"
+        )
     options.axis_named("X", at)
     places = np.linspace(ends[0], ends[1], len(heights))
-    values = np.array(heights) / offset * URAD_PER_RAD
-    said = (
-        f"the heights that the probe is off by, {offset:g} mm behind the nozzle, are taken for"
-        " roll of X; their mean is not in the file"
+    series = ErrorSeries.undirected("EAX", places, np.array(heights) / offset * URAD_PER_RAD)
+    assumption = (
+        f"the height errors of the probe, {offset:g} mm behind the nozzle, are due to roll of X;"
+        " their mean is not in the file"
     )
-    series = ErrorSeries(
-        "EAX", tuple(places.tolist()), (MeasuredRun(1, BOTH, tuple(values.tolist())),)
-    )
-    return Imported("klipper", (series,), units=("mm",), assumed=(said,))
+    return ImportedErrors("klipper", (series,), units=("mm",), assumed=(assumption,))
 
 
-def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> Imported:
-    parts: list[Imported] = []
+def _read_klipper(sources: Sequence[Source], options: ReadOptions) -> ImportedErrors:
+    parts: list[ImportedErrors] = []
     for source in sources:
         twist = _twist(source, options)
         parts += [twist] if twist else []
         if not twist or _factors(source, options, []):
             tables = _klipper_tables([source], options)
-            parts.append(errors_of(tables, "klipper", source, options.machine))
+            parts.append(errors_from_tables(tables, "klipper", source, options.machine))
     return merge(parts)
 
 
-def _write_klipper(wanted: RequiredCorrections) -> Files:
+def _write_klipper(corrections: RequiredCorrections) -> Files:
     parts = [
         f"{plane}=" + ",".join(f"{length:.6f}" for length in skew_lengths(factor))
-        for plane, factor in fitted_factors(wanted).items()
+        for plane, factor in fitted_factors(corrections).items()
     ]
-    head = spell_comment("# ", wanted.scene.title)
-    head += "\n# [skew_correction] must stand in printer.cfg\n"
+    head = format_comment("# ", corrections.scene.title)
+    head += "\n# [skew_correction] is required in printer.cfg\n"
     return {"": f"{head}SET_SKEW {' '.join(parts)}\n"}
 
 
-DIGITS = 6  # behind the point of a factor, as the firmware reports it
+DIGITS = 6  # decimals of a factor, as in the report of the firmware
 LETTERS = {"I": "XY", "S": "XY", "J": "XZ", "K": "YZ"}
 _WORD = re.compile(r"([A-Z])\s*([^A-Z\s]*)")
 _DEFINE = re.compile(r"#\s*define\s+(XY|XZ|YZ)_(DIAG_AC|DIAG_BD|SIDE_AD|SKEW_FACTOR)\s+(\S+)")
@@ -229,87 +242,102 @@ _COMMENT = re.compile(r"/\*.*?(?:\*/|$)|//[^\n]*", re.DOTALL)
 
 
 def _is_marlin(head: str, name: str) -> bool:
-    known = re.search(r"^\s*M852\b|SKEW_CORRECTION", head, re.MULTILINE)
-    return known is not None or name.endswith("Configuration.h")
+    match = re.search(r"^\s*M852\b|SKEW_CORRECTION", head, re.MULTILINE)
+    return match is not None or name.endswith("Configuration.h")
 
 
 def _marlin_tables(sources: Sequence[Source], options: ReadOptions) -> Tables:
-    found: dict[str, tuple[SourceLine, float]] = {}
-    defined: dict[str, dict[str, tuple[SourceLine, float]]] = {}
+    factors: Settings = {}
+    defined: dict[str, Settings] = {}
     notes: list[str] = []
     for source in sources:
-        switches: set[str] = set()
-        text = _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), source.text)
-        for at, bare in replace(source, lines=tuple(text.split("\n"))).scan(";"):
-            if matched := _SWITCH.match(bare):
-                switches.add(matched[1])
-            elif re.match(r"M852\b", bare):
-                for letter, value in _WORD.findall(bare[4:]):
-                    if letter not in LETTERS:
-                        at.refuse(f"M852 {letter}", "I, J, K or S")
-                    found[LETTERS[letter]] = (at, at.number(value, f"M852 {letter}"))
-            elif matched := _DEFINE.match(bare):
-                value = at.number(matched[3].rstrip("f"), matched[2])
-                defined.setdefault(matched[1], {})[matched[2]] = (at, value)
-        if defined and "SKEW_CORRECTION" not in switches:
-            at, _ = next(iter(next(iter(defined.values())).values()))
-            expected = "#define SKEW_CORRECTION, not commented out"
-            at.refuse("Marlin does not use these lengths", expected)
-        for plane in [plane for plane in defined if plane != "XY"]:
-            if "SKEW_CORRECTION_FOR_Z" not in switches:
-                del defined[plane]
-                notes.append(f"{plane}: not read, SKEW_CORRECTION_FOR_Z is not defined")
+        switches = _read_marlin(source, factors, defined)
+        _check_switches(switches, defined, notes)
         for plane, settings in defined.items():
-            side = defined.get("XY", {}).get("SIDE_AD") if plane == "XZ" else None
-            side = settings.get("SIDE_AD", side)
-            at, _ = next(iter(settings.values()))
-            if "SKEW_FACTOR" in settings:
-                found[plane] = settings["SKEW_FACTOR"]
-            elif {"DIAG_AC", "DIAG_BD"} <= settings.keys() and side:
-                at, ac = settings["DIAG_AC"]
-                lengths = (ac, settings["DIAG_BD"][1], side[1])
-                found[plane] = (at, factor_of(lengths, at, plane))
-                notes += open_notes(lengths, plane)
-            else:
-                expected = f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side"
-                at.refuse(f"{plane}: {', '.join(settings)}", expected)
-        for plane, (at, factor) in found.items():
-            if abs(factor) > MOST:
-                at.refuse(f"factor {factor:g} of {plane}", f"at most ±{MOST:g}")
+            factors[plane] = _defined_factor(plane, settings, defined, notes)
+        for plane, (at, factor) in factors.items():
+            if abs(factor) > MAX_FACTOR:
+                at.refuse(f"factor {factor:g} of {plane}", f"at most ±{MAX_FACTOR:g}")
             for axis in plane:
                 options.axis_named(axis, at)
-    if not found:
+    if not factors:
         sources[0].refuse("has no skew factors", "M852 I… J… K… or XY_SKEW_FACTOR")
-    factors = {plane: factor for plane, (_, factor) in found.items()}
-    return Tables((skew_term(factors),), (), tuple(notes), ("mm", "rad"))
+    skew = skew_term({plane: factor for plane, (_, factor) in factors.items()})
+    return Tables((skew,), (), tuple(notes), ("mm", "rad"))
 
 
-def _write_marlin(wanted: RequiredCorrections) -> Files:
-    factors = fitted_factors(wanted)
-    words = [
-        f"{letter}{spell(float(wanted.round(factors[plane])), DIGITS)}"
+def _read_marlin(source: Source, factors: Settings, defined: dict[str, Settings]) -> set[str]:
+    """Read the factors of M852 and the lengths by plane; return the switches that are defined."""
+    switches: set[str] = set()
+    text = _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), source.text)
+    for at, bare in replace(source, lines=tuple(text.split("\n"))).scan(";"):
+        switch, define = _SWITCH.match(bare), _DEFINE.match(bare)
+        if switch:
+            switches.add(switch[1])
+        elif define:
+            number = at.number(define[3].rstrip("f"), define[2])
+            defined.setdefault(define[1], {})[define[2]] = (at, number)
+        elif re.match(r"M852\b", bare):
+            for letter, number in _WORD.findall(bare[4:]):
+                if letter not in LETTERS:
+                    at.refuse(f"M852 {letter}", "I, J, K or S")
+                factors[LETTERS[letter]] = (at, at.number(number, f"M852 {letter}"))
+    return switches
+
+
+def _check_switches(switches: set[str], defined: dict[str, Settings], notes: list[str]) -> None:
+    """Check that Marlin uses the lengths, and drop those of planes that it ignores."""
+    if defined and "SKEW_CORRECTION" not in switches:
+        at, _ = next(iter(next(iter(defined.values())).values()))
+        at.refuse("Marlin does not use these lengths", "#define SKEW_CORRECTION, not commented out")
+    if "SKEW_CORRECTION_FOR_Z" in switches:
+        return
+    for plane in [plane for plane in defined if plane != "XY"]:
+        del defined[plane]
+        notes.append(f"{plane}: ignored, SKEW_CORRECTION_FOR_Z is not defined")
+
+
+def _defined_factor(
+    plane: str, settings: Settings, defined: Mapping[str, Settings], notes: list[str]
+) -> tuple[SourceLine, float]:
+    if "SKEW_FACTOR" in settings:
+        return settings["SKEW_FACTOR"]
+    side = settings.get("SIDE_AD")
+    if side is None and plane == "XZ":
+        side = defined.get("XY", {}).get("SIDE_AD")
+    if side is None or not {"DIAG_AC", "DIAG_BD"} <= settings.keys():
+        at, _ = next(iter(settings.values()))
+        at.refuse(f"{plane}: {', '.join(settings)}", f"{plane}_DIAG_AC, {plane}_DIAG_BD and a side")
+    at, ac = settings["DIAG_AC"]
+    lengths = (ac, settings["DIAG_BD"][1], side[1])
+    factor = factor_of(lengths, at, plane)
+    notes += closure_notes(lengths, plane)
+    return at, factor
+
+
+def _write_marlin(corrections: RequiredCorrections) -> Files:
+    factors = fitted_factors(corrections)
+    parameters = [
+        f"{letter}{format_number(float(corrections.round(factors[plane])), DIGITS)}"
         for letter, plane in zip("IJK", PLANES, strict=True)
     ]
     lines = [
-        spell_comment("; ", wanted.scene.title),
+        format_comment("; ", corrections.scene.title),
         "; SKEW_CORRECTION_FOR_Z and SKEW_CORRECTION_GCODE must be enabled",
-        f"M852 {' '.join(words)}\n",
+        f"M852 {' '.join(parameters)}\n",
     ]
     return {"": "\n".join(lines)}
 
 
 KLIPPER = Format(
-    **described("klipper"),
+    **describe("klipper"),
     limits=f"three factors: {', '.join(PLANES)}",
-    recognise=has(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
+    recognise=has_pattern(r"SET_SKEW|\[skew_correction|\[axis_twist_compensation"),
     read=_read_klipper,
     tables=_klipper_tables,
     write=_write_klipper,
 )
 MARLIN = Format(
-    **described("marlin"),
-    recognise=_is_marlin,
-    tables=_marlin_tables,
-    write=_write_marlin,
+    **describe("marlin"), recognise=_is_marlin, tables=_marlin_tables, write=_write_marlin
 )
 FORMATS = (KLIPPER, MARLIN)

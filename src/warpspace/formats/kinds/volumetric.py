@@ -14,7 +14,7 @@ by #; columns part by blanks; two arguments make an error of two axes. Etalon ex
 import math
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,8 +22,8 @@ import numpy as np
 from warpspace.exceptions import OptionError
 from warpspace.formats import measured
 from warpspace.formats.compensation.corrections import RequiredCorrections
-from warpspace.formats.registry import Files, Format, ReadOptions, described
-from warpspace.formats.source import Source, SourceLine, spell, spell_comment
+from warpspace.formats.registry import Files, Format, ReadOptions, describe
+from warpspace.formats.source import Source, SourceLine, format_comment, format_number
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.limits import MAX_POINTS
 from warpspace.units import UM_PER_MM, URAD_PER_RAD
@@ -35,15 +35,19 @@ CONVENTION = {"linear": "after_motion", "rotary": "before_motion"}
 DIGITS = 12
 ASSUMED = (
     "a positive angle follows the right-hand rule, also of a squareness",
-    "errors of a linear axis ride on it, those of a rotary axis act in fixed directions",
-    "values beyond the points are held",
+    "errors of a linear axis move with it, those of a rotary axis act in fixed directions",
+    "beyond the points, the end values apply",
 )
-OTHER = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
-FINE_DEG = 1.0  # steps of a table that a wave is added to
+ROTATION = (
+    "rotation about the nominal axis (alternative_model 0); --variant selects the distorted axis",
+    "rotation about the distorted axis (alternative_model 1)",
+)
+IGNORED = re.compile(r"P0[XYZ]|N0[XYZ]|P[XYZ][ABC]|V[XYZ][XYZABC]|ID[XYZ]|LN[XYZABC]")
+FINE_DEG = 1.0  # step of a table to which a harmonic is added
 
 
 def error_name(name: str) -> str:
-    """Give the key of a parameter of a file; empty where it is no error."""
+    """Return the key of a parameter of a file; empty if it is not an error."""
     upper = name.strip().upper()
     for key in (upper, f"E{upper}"):
         if key in PARAMETERS:
@@ -52,91 +56,93 @@ def error_name(name: str) -> str:
 
 
 def file_name(key: str) -> str:
-    """Give the name that a file has for a key: C0B for EC0B."""
+    """Return the name of an error parameter in files: C0B for EC0B."""
     return key[1:] if parameter(key).is_constant else key
 
 
 def factor_of(key: str) -> float:
-    """Give the factor from mm or rad to µm or µrad."""
+    """Return the factor from mm or rad to µm or µrad."""
     return URAD_PER_RAD if parameter(key).is_rotation else UM_PER_MM
 
 
-def left_out(names: Sequence[str]) -> tuple[str, ...]:
-    return (f"{', '.join(names)}: no errors, left out",) if names else ()
+def ignored_notes(names: Sequence[str]) -> tuple[str, ...]:
+    return (f"ignored {', '.join(names)}: not errors",) if names else ()
 
 
-def check_axes(held: measured.Imported, name: str) -> None:
-    if other := next((axis for axis in held.axes if axis not in ARGUMENTS), ""):
-        raise OptionError(f"{name} knows the axes {', '.join(ARGUMENTS)}; the scene has {other}")
+def check_axes(imported: measured.ImportedErrors, name: str) -> None:
+    other = next((axis for axis in imported.axes if axis not in ARGUMENTS), "")
+    if other:
+        raise OptionError(f"{name} cannot represent axis {other}; expected {', '.join(ARGUMENTS)}")
 
 
-def _finished(found: measured.Imported, options: ReadOptions) -> measured.Imported:
-    found = replace(
-        found,
+def _finished(imported: measured.ImportedErrors, options: ReadOptions) -> measured.ImportedErrors:
+    is_alternative = options.variant == ALTERNATIVE
+    imported = replace(
+        imported,
         units=("mm", "rad", "degrees for rotary positions"),
-        assumed=(*found.assumed, *ASSUMED),
+        assumed=(*imported.assumed, *ASSUMED, ROTATION[is_alternative]),
         convention=CONVENTION,
     )
-    if options.variant != ALTERNATIVE:
-        said = "rotation about the nominal axis (alternative_model 0); --variant says otherwise"
-        return replace(found, assumed=(*found.assumed, said))
-    said = "rotation about the distorted axis (alternative_model 1)"
-    found = replace(found, assumed=(*found.assumed, said))
-    for axis in dict.fromkeys(parameter(key).axis for key in found.constants):
+    if not is_alternative:
+        return imported
+    for axis in dict.fromkeys(parameter(key).axis for key in imported.constants):
         if not is_linear(axis):
-            found = _about_distorted_axis(found, axis, options)
-    return found
+            imported = _about_distorted_axis(imported, axis, options)
+    return imported
 
 
 def _about_distorted_axis(
-    found: measured.Imported, axis: str, options: ReadOptions
-) -> measured.Imported:
-    """Take back, turned with the axis, what the constant errors of a rotary axis move at zero.
+    imported: measured.ImportedErrors, axis: str, options: ReadOptions
+) -> measured.ImportedErrors:
+    """Subtract the constant errors of a rotary axis, rotated with the axis.
 
     A rotation R about an axis that is displaced by E₀ is E₀·R·E₀⁻¹: to first order the constant
-    error minus the same error turned by R, which is one wave a turn of its component errors.
+    error minus the same error rotated by R, which is a first harmonic of its component errors.
     """
     machine = options.machine
-    way = machine.axes[axis].direction if machine is not None and axis in machine.axes else 1
-    own = direction_index(axis)
-    first, second = (own + 1) % 3, (own + 2) % 3
+    sense = machine.axes[axis].direction if machine is not None and axis in machine.axes else 1
+    axis_index = direction_index(axis)
+    first, second = (axis_index + 1) % 3, (axis_index + 2) % 3
     for letters in ("XYZ", "ABC"):
-        one, other = (
-            found.constants.get(f"E{letters[index]}0{axis}", 0.0) for index in (first, second)
+        u, v, along = (
+            imported.constants.get(f"E{letters[index]}0{axis}", 0.0)
+            for index in (first, second, axis_index)
         )
-        along = found.constants.get(f"E{letters[own]}0{axis}", 0.0)
-        found = _plus(found, f"E{letters[first]}{axis}", 0.0, -one, way * other)
-        found = _plus(found, f"E{letters[second]}{axis}", 0.0, -other, -way * one)
-        found = _plus(found, f"E{letters[own]}{axis}", -along)
-    return found
+        imported = _plus(imported, f"E{letters[first]}{axis}", 0.0, -u, sense * v)
+        imported = _plus(imported, f"E{letters[second]}{axis}", 0.0, -v, -sense * u)
+        imported = _plus(imported, f"E{letters[axis_index]}{axis}", -along)
+    return imported
 
 
 def _plus(
-    found: measured.Imported, key: str, offset: float = 0.0, cosine: float = 0.0, sine: float = 0.0
-) -> measured.Imported:
+    imported: measured.ImportedErrors,
+    key: str,
+    offset: float = 0.0,
+    cosine: float = 0.0,
+    sine: float = 0.0,
+) -> measured.ImportedErrors:
+    """Add an offset and a first harmonic to an error."""
     size = math.hypot(cosine, sine)
     if not size and not offset:
-        return found
-    present = next((one for one in found.series if one.key == key), None)
+        return imported
+    present = next((error for error in imported.series if error.key == key), None)
     if present is None:
         phase = math.degrees(math.atan2(sine, cosine))
         curve = {"harmonics": [[1, size, phase]]} if size else {"poly": [offset]}
-        return replace(found, curves={**found.curves, key: curve})
+        return replace(imported, curves={**imported.curves, key: curve})
     at = np.array(present.positions)
     if size:
         at = np.union1d(at, np.arange(at[0], at[-1], FINE_DEG))
     values = np.interp(at, present.positions, present.values) + offset
     values = values + cosine * np.cos(np.deg2rad(at)) + sine * np.sin(np.deg2rad(at))
-    changed = measured.ErrorSeries(
-        key, tuple(at.tolist()), (measured.MeasuredRun(1, measured.BOTH, tuple(values.tolist())),)
-    )
-    series = tuple(changed if one.key == key else one for one in found.series)
-    return replace(found, series=series)
+    changed = measured.ErrorSeries.undirected(key, at, values)
+    series = tuple(changed if error is present else error for error in imported.series)
+    return replace(imported, series=series)
 
 
 def _read_with(
-    read_one: Callable[[Source], Sequence[measured.Imported]],
-) -> Callable[[Sequence[Source], ReadOptions], measured.Imported]:
+    read_one: Callable[[Source], Sequence[measured.ImportedErrors]],
+) -> Callable[[Sequence[Source], ReadOptions], measured.ImportedErrors]:
     return lambda sources, options: _finished(
         measured.merge([part for source in sources for part in read_one(source)]), options
     )
@@ -155,8 +161,10 @@ def _is_isg(head: str, name: str) -> bool:
         if not bare or bare == "#":
             continue
         names = [part for part in _SPLIT.split(bare) if part]
-        known = [part for part in names if error_name(part)]
-        return bool(known) and len(known) + sum(part in ARGUMENTS for part in names) == len(names)
+        parameters = [part for part in names if error_name(part)]
+        return bool(parameters) and len(parameters) + sum(
+            part in ARGUMENTS for part in names
+        ) == len(names)
     return False
 
 
@@ -170,77 +178,83 @@ def _blocks(source: Source) -> list[Block]:
         if bare:
             blocks[-1].append((at, [part for part in _SPLIT.split(bare) if part]))
             if len(blocks[-1]) > MAX_POINTS:
-                at.refuse(f"a block has more than {MAX_POINTS:,} rows", "at most so many")
+                at.refuse(f"a block has more than {MAX_POINTS:,} rows", "shorter blocks")
     return [block for block in blocks if block]
 
 
-def _read_isg(source: Source) -> list[measured.Imported]:
-    found: list[measured.Imported] = []
-    known: set[str] = set()
+def _read_isg(source: Source) -> list[measured.ImportedErrors]:
+    imports: list[measured.ImportedErrors] = []
+    keys: set[str] = set()
     for block in _blocks(source):
         part = _read_block(source, block)
-        for key in part.keys:
-            if key in known:
-                name = file_name(key)
-                block[0][0].refuse(f"{name} stands in two blocks", "it in one")
-            known.add(key)
-        found.append(part)
-    if not known:
+        repeated = next((key for key in part.keys if key in keys), "")
+        if repeated:
+            block[0][0].refuse(f"{file_name(repeated)} occurs in two blocks", "it in one")
+        keys.update(part.keys)
+        imports.append(part)
+    if not keys:
         source.refuse("has no errors", "a header such as X EXX EYX")
-    return found
+    return imports
 
 
-def _read_block(source: Source, block: Block) -> measured.Imported:
+def _read_block(source: Source, block: Block) -> measured.ImportedErrors:
     at, names = block[0]
     arguments = [name for name in names if name in ARGUMENTS]
-    left = [name for name in names if OTHER.fullmatch(name)]
-    key_of = {name: error_name(name) for name in names}
-    for name in names:
-        if name not in (*arguments, *left) and not key_of[name]:
-            expected = "arguments X Y Z A B C and parameters such as EXX or C0B"
-            at.refuse(f"column {name!r}", expected)
-    if twice := next((name for name in names if names.count(name) > 1), ""):
-        at.refuse(f"column {twice} stands there twice", "it once")
-    if len(arguments) > 2:
-        expected = "one or two: no error here depends on more"
-        at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
+    ignored = [name for name in names if IGNORED.fullmatch(name)]
+    _check_header(at, names, arguments, ignored)
     if len(block) < 2:
         at.refuse("a header without records", "at least one")
-    rows: list[Row] = []
-    for place, parts in block[1:]:
-        if len(parts) != len(names):
-            place.refuse(f"{len(parts)} fields", f"{len(names)} as in the header")
-        row: dict[str, float] = {}
-        for name, part in zip(names, parts, strict=True):
-            value = place.number(part, name)
-            if name in arguments:
-                row[name] = place.checked_position(value, name)
-            elif key := key_of[name]:
-                row[key] = place.checked_error(value * factor_of(key), name)
-        rows.append((place, row))
-    notes = (*source.notes, *left_out(left))
-    keys = [key for name in names if (key := key_of[name])]
+    rows = [_read_record(place, names, parts) for place, parts in block[1:]]
+    notes = (*source.notes, *ignored_notes(ignored))
+    keys = [key for key in map(error_name, names) if key]
     if not arguments and len(rows) > 1:
         rows[1][0].refuse(f"{len(rows)} records without arguments", "one")
     for key in keys:
         _check_arguments(at, key, arguments)
     if not arguments:
-        return measured.Imported(ISG, constants={key: rows[0][1][key] for key in keys}, notes=notes)
+        constants = {key: rows[0][1][key] for key in keys}
+        return measured.ImportedErrors(ISG, constants=constants, notes=notes)
     if len(arguments) == 2:
-        planes = tuple(_isg_plane(source, key, arguments, rows) for key in keys)
-        return measured.Imported(ISG, planes=planes, notes=notes)
+        surfaces = tuple(_isg_surface(source, key, arguments, rows) for key in keys)
+        return measured.ImportedErrors(ISG, surfaces=surfaces, notes=notes)
     series = tuple(_isg_series(key, arguments[0], rows) for key in keys)
-    return measured.Imported(ISG, series, notes=notes)
+    return measured.ImportedErrors(ISG, series, notes=notes)
+
+
+def _check_header(
+    at: SourceLine, names: Sequence[str], arguments: Sequence[str], ignored: Sequence[str]
+) -> None:
+    for name in names:
+        if name not in (*arguments, *ignored) and not error_name(name):
+            at.refuse(f"column {name!r}", "arguments X Y Z A B C and parameters such as EXX or C0B")
+    repeated = next((name for name in names if names.count(name) > 1), "")
+    if repeated:
+        at.refuse(f"column {repeated} occurs twice", "it once")
+    if len(arguments) > 2:
+        expected = "one or two: no error parameter depends on more"
+        at.refuse(f"{len(arguments)} arguments {' '.join(arguments)}", expected)
+
+
+def _read_record(at: SourceLine, names: Sequence[str], parts: Sequence[str]) -> Row:
+    if len(parts) != len(names):
+        at.refuse(f"{len(parts)} fields", f"{len(names)} as in the header")
+    row: dict[str, float] = {}
+    for name, part in zip(names, parts, strict=True):
+        number, key = at.number(part, name), error_name(name)
+        if name in ARGUMENTS:
+            row[name] = at.checked_position(number, name)
+        elif key:
+            row[key] = at.checked_error(number * factor_of(key), name)
+    return at, row
 
 
 def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None:
     row = parameter(key)
     if not arguments:
         if not row.is_constant:
-            at.refuse(f"{key} without an argument", f"the argument {row.axis} beside it")
+            at.refuse(f"{key} without an argument", f"the argument {row.axis} with it")
     elif row.is_constant:
-        expected = "it in a block without arguments"
-        at.refuse(f"{file_name(key)} is constant", expected)
+        at.refuse(f"{file_name(key)} is constant", "it in a block without arguments")
     elif row.axis not in arguments:
         at.refuse(f"{key} over {' and '.join(arguments)}", f"the argument {row.axis}")
 
@@ -248,43 +262,43 @@ def _check_arguments(at: SourceLine, key: str, arguments: Sequence[str]) -> None
 def _isg_series(key: str, argument: str, rows: Sequence[Row]) -> measured.ErrorSeries:
     for (_, before), (at, row) in pairwise(rows):
         if row[argument] <= before[argument]:
-            found = f"{argument} {row[argument]:g} after {before[argument]:g}"
-            at.refuse(found, "ascending positions")
-    run = measured.MeasuredRun(1, measured.BOTH, tuple(row[key] for _, row in rows))
-    return measured.ErrorSeries(key, tuple(row[argument] for _, row in rows), (run,))
+            problem = f"{argument} {row[argument]:g} after {before[argument]:g}"
+            at.refuse(problem, "ascending positions")
+    positions, errors = [row[argument] for _, row in rows], [row[key] for _, row in rows]
+    return measured.ErrorSeries.undirected(key, positions, errors)
 
 
-def _isg_plane(
+def _isg_surface(
     source: Source, key: str, arguments: Sequence[str], rows: Sequence[Row]
 ) -> measured.ErrorSurface:
-    own = parameter(key).axis
-    other = next(axis for axis in arguments if axis != own)
-    points = [(at, row[own], row[other], row[key]) for at, row in rows]
-    return measured.plane_of(key, (own, other), points, source)
+    first = parameter(key).axis
+    second = next(axis for axis in arguments if axis != first)
+    points = [(at, row[first], row[second], row[key]) for at, row in rows]
+    return measured.build_surface(key, (first, second), points, source)
 
 
-def _write_isg(wanted: RequiredCorrections) -> Files:
-    held = measured.in_one_direction(measured.sampled(wanted), wanted)
-    check_axes(held, ISG)
+def _write_isg(corrections: RequiredCorrections) -> Files:
+    imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
+    check_axes(imported, ISG)
 
-    def spelled(value: float, key: str) -> str:
-        return spell(value / factor_of(key), DIGITS)
+    def format_error(error: float, key: str) -> str:
+        return format_number(error / factor_of(key), DIGITS)
 
     blocks: list[list[list[str]]] = []
-    for table in measured.tables_of(held):
+    for table in measured.build_error_tables(imported):
         names = [*reversed(table.axes), *map(file_name, table.keys)]
-        ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis runs fastest
+        ordered = sorted(table.rows, key=lambda row: row[0][::-1])  # the first axis fastest
         rows = [
-            [*map(repr, reversed(at)), *map(spelled, values, table.keys)]
+            [*map(repr, reversed(at)), *map(format_error, values, table.keys)]
             for at, _, values in ordered
         ]
         blocks.append([names, *rows])
     if not blocks:
-        key = measured.zero_key(wanted.scene)
+        key = measured.zero_key(corrections.scene)
         blocks = [[[parameter(key).axis, key], ["0.0", "0.0"]]]
     texts = ["\n".join("\t".join(row) for row in block) for block in blocks]
     return {
-        "": f"{spell_comment('// ', wanted.scene.title)}\n// mm, rad, degrees\n"
+        "": f"{format_comment('// ', corrections.scene.title)}\n// mm, rad, degrees\n"
         + "\n#\n".join(texts)
         + "\n"
     }
@@ -302,103 +316,117 @@ def _is_iso(head: str, name: str) -> bool:
     return bool(blocks) and bool(re.search(r"Gridpoints|VALUE\s*=", head, re.IGNORECASE))
 
 
-def _read_iso(source: Source) -> measured.Imported:
-    constants: dict[str, float] = {}
-    series: list[measured.ErrorSeries] = []
-    left: list[str] = []
-    key, name = "", ""
-    opened: SourceLine | None = None
-    rows: list[tuple[float, float]] = []
-    for at, bare in source.scan("//"):
-        if opened:
-            body, closed, _ = bare.partition("}")
-            _iso_row(at, body.replace("{", " ").split(), rows, name, key)
-            if closed:
-                if not rows:
-                    at.refuse(f"[{name}] has no points", "position and value")
-                if key:
-                    places, values = zip(*rows, strict=True)
-                    series.append(
-                        measured.ErrorSeries(
-                            key, places, (measured.MeasuredRun(1, measured.BOTH, values),)
-                        )
-                    )
-                opened, rows = None, []
-        elif matched := _SECTION.fullmatch(bare):
-            name = matched[1].upper()
-            key = error_name(name)
-            if not key and not OTHER.fullmatch(name):
-                at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
-            if not key:
-                left.append(name)
-            elif key in constants or any(one.key == key for one in series):
-                at.refuse(f"[{name}] is given twice", "it once")
-        elif not name:
-            at.refuse(at.shown, "a block such as [EXY]")
-        elif matched := _VALUE.fullmatch(bare):
-            value = at.number(matched[1], f"VALUE of {name}")
-            if key and not parameter(key).is_constant:
-                at.refuse(f"[{name}] has one VALUE", "Gridpoints = { position value … }")
-            if key:
-                constants[key] = at.checked_error(value * factor_of(key), name)
+@dataclass
+class _IsoReader:
+    """State while a text with ISO names is read: its errors and the current block."""
+
+    constants: dict[str, float] = field(default_factory=dict[str, float])
+    series: dict[str, measured.ErrorSeries] = field(default_factory=dict[str, measured.ErrorSeries])
+    ignored: list[str] = field(default_factory=list[str])
+    name: str = ""  # of the current block
+    key: str = ""  # its error parameter; empty where the block is ignored
+    opened: SourceLine | None = None  # where its grid points begin, until they end
+    points: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])
+
+    def read_line(self, at: SourceLine, bare: str) -> None:
+        section, constant = _SECTION.fullmatch(bare), _VALUE.fullmatch(bare)
+        if self.opened:
+            self._read_point(at, bare)
+        elif section:
+            self._begin_block(at, section[1].upper())
+        elif not self.name:
+            at.refuse(at.quoted, "a block such as [EXY]")
+        elif constant:
+            self._read_constant(at, constant[1])
         elif _OPEN.fullmatch(bare):
-            if key and parameter(key).is_constant:
-                at.refuse(f"[{name}] has Gridpoints", "VALUE = number")
-            opened = at
+            if self.key and parameter(self.key).is_constant:
+                at.refuse(f"[{self.name}] has Gridpoints", "VALUE = number")
+            self.opened = at
         elif bare != "{":
-            at.refuse(at.shown, "VALUE = number or Gridpoints = {")
-    if opened:
-        opened.refuse(f"Gridpoints of [{name}] do not end", "} (is the file cut off?)")
-    notes = (*source.notes, *left_out(left))
-    return measured.Imported(ISO, tuple(series), constants=constants, notes=notes)
+            at.refuse(at.quoted, "VALUE = number or Gridpoints = {")
+
+    def _begin_block(self, at: SourceLine, name: str) -> None:
+        self.name, self.key = name, error_name(name)
+        if self.key in self.constants or self.key in self.series:
+            at.refuse(f"[{name}] occurs twice", "it once")
+        if not self.key and not IGNORED.fullmatch(name):
+            at.refuse(f"[{name}]", "a parameter such as EXY or C0B")
+        if not self.key:
+            self.ignored.append(name)
+
+    def _read_constant(self, at: SourceLine, text: str) -> None:
+        number = at.number(text, f"VALUE of {self.name}")
+        if self.key and not parameter(self.key).is_constant:
+            at.refuse(f"[{self.name}] has one VALUE", "Gridpoints = { position value … }")
+        if self.key:
+            self.constants[self.key] = at.checked_error(number * factor_of(self.key), self.name)
+
+    def _read_point(self, at: SourceLine, bare: str) -> None:
+        body, closed, _ = bare.partition("}")
+        parts = body.replace("{", " ").split()
+        if parts:
+            self.points.append(self._point(at, parts))
+        if len(self.points) > MAX_POINTS:
+            at.refuse(f"{self.name} has more than {MAX_POINTS:,} points", "fewer points")
+        if not closed:
+            return
+        if not self.points:
+            at.refuse(f"[{self.name}] has no points", "position and value")
+        if self.key:
+            positions, values = zip(*self.points, strict=True)
+            self.series[self.key] = measured.ErrorSeries.undirected(self.key, positions, values)
+        self.opened, self.points = None, []
+
+    def _point(self, at: SourceLine, parts: Sequence[str]) -> tuple[float, float]:
+        if len(parts) != 2:
+            at.refuse(f"{len(parts)} numbers in {at.quoted}", "position and value")
+        position = at.position(parts[0], "position")
+        if self.points and position <= self.points[-1][0]:
+            problem = f"position {position:g} of {self.name} after {self.points[-1][0]:g}"
+            at.refuse(problem, "ascending positions")
+        return position, at.error(parts[1], self.name, factor_of(self.key) if self.key else 1.0)
 
 
-def _iso_row(
-    at: SourceLine, parts: list[str], rows: list[tuple[float, float]], name: str, key: str
-) -> None:
-    if not parts:
-        return
-    if len(parts) != 2:
-        at.refuse(f"{len(parts)} numbers in {at.shown}", "position and value")
-    position = at.position(parts[0], "position")
-    if rows and position <= rows[-1][0]:
-        found = f"position {position:g} of {name} after {rows[-1][0]:g}"
-        at.refuse(found, "ascending positions")
-    rows.append((position, at.error(parts[1], name, factor_of(key) if key else 1.0)))
-    if len(rows) > MAX_POINTS:
-        at.refuse(f"{name} has more points than {MAX_POINTS:,}", "at most so many")
+def _read_iso(source: Source) -> measured.ImportedErrors:
+    reader = _IsoReader()
+    for at, bare in source.scan("//"):
+        reader.read_line(at, bare)
+    if reader.opened:
+        problem = f"Gridpoints of [{reader.name}] do not end"
+        reader.opened.refuse(problem, "} (is the file truncated?)")
+    notes = (*source.notes, *ignored_notes(reader.ignored))
+    series = tuple(reader.series.values())
+    return measured.ImportedErrors(ISO, series, constants=reader.constants, notes=notes)
 
 
-def _write_iso(wanted: RequiredCorrections) -> Files:
-    held = measured.in_one_direction(measured.sampled(wanted), wanted)
-    check_axes(held, ISO)
-    lines = [spell_comment("// ", wanted.scene.title), "// mm, rad, degrees; variant Vendor"]
-    for plane in held.planes:
-        axes = " and ".join(plane.axes)
-        lines.append(f"// {plane.key} over {axes}: has no place here, left out")
-    for key, value in held.constants.items():
-        scaled = value / factor_of(key)
+def _write_iso(corrections: RequiredCorrections) -> Files:
+    imported = measured.to_single_direction(measured.sample_errors(corrections), corrections)
+    check_axes(imported, ISO)
+    lines = [format_comment("// ", corrections.scene.title), "// mm, rad, degrees; variant Vendor"]
+    for surface in imported.surfaces:
+        axes = " and ".join(surface.axes)
+        lines.append(f"// {surface.key} over {axes}: omitted, not supported by the format")
+    for key, constant in imported.constants.items():
+        scaled = constant / factor_of(key)
         lines += [f"[{file_name(key)}]", f"VALUE = {scaled:.{DIGITS}f}"]
-    for one in held.series:
-        lines += [f"[{one.key}]", "Gridpoints = {"]
-        scale = factor_of(one.key)
-        lines += [
-            f"  {position!r} {value / scale:.{DIGITS}f}"
-            for position, value in zip(one.positions, one.values.tolist(), strict=True)
-        ]
-        lines.append(f"}}  // end of {one.key}")
+    for series in imported.series:
+        lines += [f"[{series.key}]", "Gridpoints = {"]
+        scaled_errors = series.values / factor_of(series.key)
+        for position, error in zip(series.positions, scaled_errors.tolist(), strict=True):
+            lines.append(f"  {position!r} {error:.{DIGITS}f}")
+        lines.append(f"}}  // end of {series.key}")
     return {"": "\n".join(lines) + "\n"}
 
 
 ISO_FORMAT = Format(
-    **described(ISO),
+    **describe(ISO),
     recognise=_is_iso,
     read=_read_with(lambda source: [_read_iso(source)]),
     write=_write_iso,
     variants=VARIANTS,
 )
 ISG_FORMAT = Format(
-    **described(ISG),
+    **describe(ISG),
     recognise=_is_isg,
     read=_read_with(_read_isg),
     write=_write_isg,

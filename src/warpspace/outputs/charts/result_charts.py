@@ -127,7 +127,7 @@ def compensation_chart(compensation: "Compensation") -> Figure:
     """Draw slices of |E| before and after in one colour scale, and of the residual in its own."""
     title = f"Compensation · {compensation.controller.scene.title}"
     table = f"{compensation.format.title} · loop {compensation.loop}"
-    subtitle = f"{table} · {compensation.points_words}"
+    subtitle = f"{table} · {compensation.points_text}"
     planes, fields = _planes(compensation), _fields(compensation)
     with style():
         height = 1.3 + PLANE_IN * max(len(planes), 1)
