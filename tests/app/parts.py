@@ -65,16 +65,16 @@ class Alone:
 
     def do(self, word: str, value: str = "") -> Any:
         """Do what an event says; give what is shown then."""
-        self.store.apply(lambda state: self.part.take(state, word, value))
+        self.store.apply(lambda state: self.part.handle(state, word, value))
         while word in ("file", "bundled", "set.unit") and self.context.jobs:
             time.sleep(0.01)  # files are parsed beside the session
-        self.context.shown = LIVE.evaluate(self.store.state)
+        self.context.picture = LIVE.evaluate(self.store.state)
         return self.store.state
 
     @property
     def html(self) -> str:
         """What it shows."""
-        (found,) = self.part.pieces(LIVE.evaluate(self.store.state)).values()
+        (found,) = self.part.render(LIVE.evaluate(self.store.state)).values()
         return str(found)
 
 

@@ -214,7 +214,7 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
     html = shown(part, state, found)
     assert "SINUMERIK $AN_CEC" in html
     assert 'data-do="compensate:table"' in html
-    after = part.take(state, "table", "")
+    after = part.handle(state, "table", "")
     assert after.controller is found.controller
     assert after.comparison.b is not None
     ((name, content),) = part.context.told
@@ -223,9 +223,9 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
         f"compensation{add or found.format.endings[0]}" for add in found.files
     ]
     assert packed(found) == (name, content)  # the same table gives the same bytes
-    assert part.take(after, "box", "machine").controller is None
-    assert part.take(state, "box", "<b>") == state
-    assert part.take(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
+    assert part.handle(after, "box", "machine").controller is None
+    assert part.handle(state, "box", "<b>") == state
+    assert part.handle(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
 
 
 def test_what_is_left_of_rounding_is_said_and_not_drawn(found):

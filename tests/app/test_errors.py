@@ -23,8 +23,8 @@ class Column:
         self.part, self.state = lone_part(ErrorsPanel), state
 
     def do(self, word, value=""):
-        self.state = self.part.take(self.state, word, value)
-        return self.part.pieces(LIVE.evaluate(self.state))
+        self.state = self.part.handle(self.state, word, value)
+        return self.part.render(LIVE.evaluate(self.state))
 
 
 def places(pieces):
@@ -72,7 +72,7 @@ def test_a_row_opens_into_curve_origin_and_numbers_and_goes_back():
     assert "assumed" in opened
     assert "Undo the edit" not in opened
     column.do("kind.EAY", "table")
-    column.part.context.renew = (renewed := []).append
+    column.part.context.rerender = (renewed := []).append
     edited = column.do("rows.EAY", "position;value\n-225;0\n225;<b>")["error.EAY"]
     assert renewed == [column.part]  # the state is as it was, the row says why
     assert 'aria-invalid="true"' in edited

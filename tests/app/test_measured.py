@@ -89,9 +89,9 @@ def positioned(targets):
 @pytest.mark.parametrize("name", bench_names())
 def test_figure_and_path_follow_the_errors(name):
     column = Column(TestsPanel, STATE)
-    depends = column.part.depends(LIVE.evaluate(column.state))
+    depends = column.part.dependencies(LIVE.evaluate(column.state))
     column.do("choose", name)
-    assert column.part.depends(LIVE.evaluate(column.state)) != depends
+    assert column.part.dependencies(LIVE.evaluate(column.state)) != depends
     html = column.settle()
     result = column.part._answer.found
     assert "<svg" in html
@@ -149,7 +149,7 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     assert "RMS of measured − model" in html
     assert "<img" not in html
     column.do("report")
-    ((_, result),) = column.context.reported
+    ((_, result),) = column.context.report_results
     assert result.rms_difference > 0.1
     column.do("remove", "0")
     assert "RMS of measured" not in column.settle()
@@ -201,7 +201,7 @@ def test_an_applied_fit_gives_errors_that_had_no_row_and_one_undo_takes_it_back(
     state = column.state
     (found,) = [one for one in column.part._answer.found.parameters if one.key == "EB0B"]
     store = StateStore(state)
-    store.apply(lambda now: column.part.take(now, "apply", "0"))
+    store.apply(lambda now: column.part.handle(now, "apply", "0"))
     assert store.state.amplitudes["EB0B"] == round(found.value, 3) != 0.0
     compared = LIVE.evaluate(store.state).compared
     assert compared.a.max_um == 0.0

@@ -48,14 +48,14 @@ def test_a_note_is_shown_again_as_it_was_and_back_leads_to_where_one_was():
     second = pin(part)
     present = part.store.apply(lambda state: state.with_amplitude("EA0Z", 5.0)) or part.store.state
     assert part.do("show." + first.id).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
-    assert "Note 1 as it was" in part.part.pieces(part.context.shown)["reopened"]
+    assert "Note 1 as it was" in part.part.render(part.context.picture)["reopened"]
     assert part.do("show." + second.id).amplitudes["EA0Z"] == 0.0
     part.do("reply." + second.id, "seen")  # is not lost
     back = part.do("back")
     assert replace(back, review=present.review) == present
     assert back.review[1].replies[0].text == "seen"
     assert cameras == [CAMERA] * 3
-    assert part.part.pieces(part.context.shown)["reopened"] == ""
+    assert part.part.render(part.context.picture)["reopened"] == ""
 
 
 def test_numbers_of_a_note_are_those_of_check_and_grow_stale():
@@ -70,7 +70,7 @@ def test_numbers_of_a_note_are_those_of_check_and_grow_stale():
 
 def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_holds():
     part, _ = alone()
-    part.context.decided = START, "Repair: EA0Z to 20"
+    part.context.last_decision = START, "Repair: EA0Z to 20"
     part.store.apply(lambda state: state.with_amplitude("EA0Z", 20.0).with_amplitude("EB0Z", 1.5))
     part.do("decide")
     note = part.do("keep").review[0]
@@ -175,7 +175,7 @@ def test_hostile_events_change_nothing(word):
         review = part.store.state.review
         assert part.do(word, value).review == review
     part.do("open")
-    assert "<img" not in str(part.part.pieces(part.context.shown))
+    assert "<img" not in str(part.part.render(part.context.picture))
 
 
 def stands(tab):

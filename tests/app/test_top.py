@@ -115,7 +115,7 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
     asked, done = [], (b"%PDF", ())
     write = Services(write_report=lambda _, *about: asked.append(about) or done)
     window = Alone(ReportDialog, STATE, services=write)
-    window.context.reported[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
+    window.context.report_results[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
     page = replace(STATE.page, author=HOSTILE, questions="one\n\n two ")
     window.store.apply(lambda state: replace(state, page=page))
     assert "<img" not in window.html

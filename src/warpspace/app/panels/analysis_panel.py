@@ -85,7 +85,7 @@ class AnalysisPanel(Section):
         self._answer: AnalysisOutcome | None = None
         self._applied: Question = ()  # what is asked once a change has been applied
         self._problem: tuple[Question, str] | None = None
-        self._jobs = Jobs(self, self.renew, self._fail)
+        self._jobs = Jobs(self, self.rerender, self._fail)
         self._asked: Question = ()
         self._subject = ""
 
@@ -163,7 +163,7 @@ class AnalysisPanel(Section):
         found, told = self.defaults(state), option_values(state, self.name)
         return {**found, **told, **{name: found[name] for name in OF_STATE & found.keys()}}
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.question(picture.state),)
 
     def body(self, picture: LivePicture) -> Markup:
@@ -233,26 +233,28 @@ class AnalysisPanel(Section):
 
     # --- events --------------------------------------------------------------------------------
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        name = word.removeprefix("set.")
-        if word.startswith("set.") and name in {one.name for one in self.options()}:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        name = action.removeprefix("set.")
+        if action.startswith("set.") and name in {one.name for one in self.options()}:
             return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:LONGEST]})
-        if word == "run" and self.is_ready(state):
+        if action == "run" and self.is_ready(state):
             self._run(state)
-        elif word == "cancel":
+        elif action == "cancel":
             self._jobs.cancel()
-        elif word in ("save", "report"):
-            self.context.act(partial(self._save, value) if word == "save" else self._into_report)
-        elif word in ("preview", "apply") and (change := self._change(state, value)) is not None:
+        elif action in ("save", "report"):
+            self.context.call_soon(
+                partial(self._save, value) if action == "save" else self._into_report
+            )
+        elif action in ("preview", "apply") and (change := self._change(state, value)) is not None:
             what = self.title.lower()
-            if word == "preview":
+            if action == "preview":
                 words = change.words if change.words.startswith("after ") else ""
                 words = words or f"after {what}: {change.words}"
                 return with_proposal(state, change.scene, words)
             found = with_applied(state, change.scene, f"before {what}")
             self._applied = self.question(found)
             done = change.words.removeprefix(f"after {what}: ")
-            self.context.decided = state, f"{self.title}: {done}"
+            self.context.last_decision = state, f"{self.title}: {done}"
             return found
         return state
 
@@ -273,9 +275,9 @@ class AnalysisPanel(Section):
             return
 
         def answer(job: Job) -> AnalysisOutcome:
-            with taken_turn(lambda: job.tell(job.share)):
+            with taken_turn(lambda: job.report_progress(job.share)):
                 started = time.monotonic()
-                found = asked.run_all(scenes, job.tell)
+                found = asked.run_all(scenes, job.report_progress)
                 took_s = time.monotonic() - started
             cards = tuple((one, _change_html(state, one)) for one in found.changes())
             return AnalysisOutcome(question, found, cards, took_s)
@@ -286,8 +288,8 @@ class AnalysisPanel(Section):
         """Run it for what has changed; while something is dragged, once that rests."""
         if self.question(state) == self._asked or self._jobs.busy:
             return
-        if self._asked and not self.context.is_still:
-            self.context.rest_again(self)
+        if self._asked and not self.context.is_paused:
+            self.context.restart_idle(self)
         else:
             self._run(state)
 
@@ -295,13 +297,13 @@ class AnalysisPanel(Section):
         def work(job: Job) -> None:
             made = make(job)
             if not job.is_set():
-                self.context.act(partial(take, made))
+                self.context.call_soon(partial(take, made))
 
         self._jobs.start(words, work)
 
     def _take_answer(self, answer: AnalysisOutcome) -> None:
         self._answer, self._problem = answer, None
-        self.renew()
+        self.rerender()
 
     def _fail(self, error: Exception) -> None:
         words = error_words(error)
@@ -309,7 +311,7 @@ class AnalysisPanel(Section):
             labels = {one.name: one.label for one in self.kind.options()}
             words = error.said(lambda name: labels.get(name, name))
         self._problem = (self._asked, words)
-        self.renew()
+        self.rerender()
 
     def _save(self, ending: str) -> None:
         found = self._answer.found if self._answer else None
@@ -325,7 +327,7 @@ class AnalysisPanel(Section):
     def _into_report(self) -> None:
         if self._answer is not None:
             title = self.kind.title or self.title
-            self.context.reported.append((title, self._answer.found))
+            self.context.report_results.append((title, self._answer.found))
             self.context.notify("Added to the report", f"{title}; see Report at the top")
 
 

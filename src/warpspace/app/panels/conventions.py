@@ -258,7 +258,7 @@ class ConventionsSection(Section):
     name, task, title = "conventions", "machine", "Conventions"
     sentence = "Choose what the errors mean, and see what another convention would change"
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         state = picture.state
         return (
             Identity(state.origin), Identity(state.scene), tuple(state.active.items()),
@@ -285,14 +285,14 @@ class ConventionsSection(Section):
             _reference(state), tag("div", back, class_="ws-actions"), _wrong(state),
         ))  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "choose":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "choose":
             return with_choice(state, value)
-        if word == "own":
+        if action == "own":
             return with_own_conventions(state)
-        if word == "pick" and state.picked is not None:
+        if action == "pick" and state.picked is not None:
             return with_reference(state, state.picked.at)
-        if word == "set.reference":
+        if action == "set.reference":
             at = read_positions(value)
             if at is not None:
                 return with_reference(state, at)

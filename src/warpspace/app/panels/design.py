@@ -115,7 +115,7 @@ class TolerancesPanel(AnalysisPanel):
             if self.question(state) != answer.question:
                 note = "tolerances or limit were changed meanwhile: allocate again"
                 return state.noted(note)
-            self.context.decided = state, f"{self.title}: allocated for the limit"
+            self.context.last_decision = state, f"{self.title}: allocated for the limit"
             state = edits.with_half_widths(state, found.tolerances)
             self._applied = self.question(state)
             return state
@@ -174,12 +174,12 @@ class TolerancesPanel(AnalysisPanel):
             "div", scales, class_="ws-actions", role="group", aria_label="Scale all tolerances"
         )  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "scale" and value in SCALES:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "scale" and value in SCALES:
             return edits.with_scaled_tolerances(state, self._order[1], SCALES[value])
-        if word == "reset":
+        if action == "reset":
             return edits.with_scene_tolerances(state)
-        return super().take(state, word, value)
+        return super().handle(state, action, value)
 
 
 def _controls(state: AppState, *names: str) -> Markup:
@@ -335,21 +335,21 @@ class ConceptsPanel(AnalysisPanel):
                  if draws else EMPTY)  # fmt: skip
         return sheet + super().actions(found, stale=stale)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         chosen, offers = self.chosen(state), self.offers(state)
-        if word == "set.add" and value in offers and value not in chosen:
+        if action == "set.add" and value in offers and value not in chosen:
             chosen = [*chosen, value][:MOST_CONCEPTS]
-        elif word == "remove" and value in chosen:
+        elif action == "remove" and value in chosen:
             chosen.remove(value)
-        elif word == "open" and value in offers and value != PRESENT:
+        elif action == "open" and value in offers and value != PRESENT:
             opened = start_state(offers[value])
-            self.context.act(partial(self.context.show_opened, opened, None, whole=False))
+            self.context.call_soon(partial(self.context.show_opened, opened, None, whole=False))
             return state
-        elif word == "sheet":
+        elif action == "sheet":
             self._draw(state)
             return state
         else:
-            return super().take(state, word, value)
+            return super().handle(state, action, value)
         self._answer = None  # other machines are compared
         return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
 

@@ -27,7 +27,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
-from warpspace.app.panels.panel import Context, Panel
+from warpspace.app.panels.panel import Context, Panel, Refresh
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import amplitude_span
@@ -261,7 +261,7 @@ class ErrorsPanel(Panel):
     """
 
     name = "errors"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -279,7 +279,7 @@ class ErrorsPanel(Panel):
         self._made: Mapping[str, float] = {}  # amplitudes that the rows were written with
         self._made_for: tuple[object, ...] = ()
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
         made_for = (Identity(state.scene), state.seen, tuple(state.positions.items()))
         if made_for != self._gains_for:
@@ -364,20 +364,20 @@ class ErrorsPanel(Panel):
             pieces[f"error.{key}"] = html + curve
         return pieces
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        what, _, key = word.partition(".")
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        what, _, key = action.partition(".")
         if what in ("set", "kind", "rows", "own") and key in state.amplitudes:
             self._own.add(key)
             if what == "set":
                 return put(state, f"amplitudes.{key}", value)
             state, said = edit_curve(state, what, key, value)
             self._said = {**self._said, key: said}
-            self.context.act(self.renew)  # also where it is refused
+            self.context.call_soon(self.rerender)  # also where it is refused
             return state
         if what in ("sort", "find"):
             self._sorted_for = ()
         if what == "sort":
-            self.context.act(self.renew)
+            self.context.call_soon(self.rerender)
         if what == "find":
             return replace(state, page=replace(state.page, query=value[:LONGEST_QUERY]))
         if what == "row":

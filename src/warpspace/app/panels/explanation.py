@@ -92,22 +92,22 @@ class WorstPanel(Section):
             self._found = picture, answer(picture.drawn_state, picked, picture.exaggeration)
         return self._found[1]
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "set.at":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "set.at":
             return put(state, "picked", value)
-        if word == "forget":
+        if action == "forget":
             return with_picked(state, None)
-        if word == "lever" and value in state.amplitudes:
-            shown = self.context.shown
+        if action == "lever" and value in state.amplitudes:
+            shown = self.context.picture
             if state.picked is None and shown is not None:
                 state = with_picked(state, pick_worst(shown))
             return replace(state, lever="" if value == state.lever else value)
-        if word == "back":
-            self.context.act(self._stand_back)
+        if action == "back":
+            self.context.call_soon(self._stand_back)
         return state
 
     def _stand_back(self) -> None:
-        picture, camera = self.context.shown, self.context.camera.remember()
+        picture, camera = self.context.picture, self.context.camera.remember()
         if picture is None or picture.state.picked is None or picture.is_difference:
             return
         found = self._answer(picture)
@@ -117,7 +117,7 @@ class WorstPanel(Section):
             points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
             room, fov_deg = self.context.camera.room, float(np.rad2deg(camera.fov_rad))
             pose = fit_camera(points, room.aspect, fov_deg=fov_deg, margins=room.margins)
-            self.context.look_from(pose)
+            self.context.move_camera(pose)
 
 
 def _axes(found: PointExplanation) -> str:
@@ -204,11 +204,11 @@ def _lever(part: PointContribution) -> Markup:
 class DistancePanel(AnalysisPanel):
     """Distance and angle between points that are picked on the map."""
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().concerns(picture), id(picture))
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), id(picture))
 
     def before_result(self, state: AppState) -> Markup:
-        point, drawn = awaited(state), self.context.shown and measured(self.context.shown)
+        point, drawn = awaited(state), self.context.picture and measured(self.context.picture)
         hint = "Click two points of the map, and a third for an angle"
         buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
         if point:
@@ -222,11 +222,11 @@ class DistancePanel(AnalysisPanel):
         said = tag("p", POINTS[point], role="status") if point else EMPTY
         return actions(*buttons) + said + tag("p", without_words(state), class_="ws-tiny")
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word not in ("pick", "stop", "clear"):
-            return super().take(state, word, value)
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action not in ("pick", "stop", "clear"):
+            return super().handle(state, action, value)
         picked = {one: text for one in POINTS if (text := state.forms.get(one))}
-        points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[word]
+        points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[action]
         others = {one: text for one, text in state.forms.items() if one not in POINTS}
         return replace(state, forms={**others, **points})
 

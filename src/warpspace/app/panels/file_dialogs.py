@@ -17,7 +17,7 @@ from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Job, Jobs, Window, actions
+from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
@@ -40,16 +40,16 @@ def accepted_endings() -> str:
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
 
-class JobDialog(Window):
+class JobDialog(Dialog):
     """A window that makes files, one at a time, with its progress and a way to cancel."""
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._jobs = Jobs(self, self.renew, context.page.report)
+        self._jobs = Jobs(self, self.rerender, context.page.report)
 
     def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
         """Make a file of what is drawn beside the session, and have the browser save it."""
-        drawn = self.context.shown
+        drawn = self.context.picture
         if drawn is None:
             return
 
@@ -64,8 +64,8 @@ class JobDialog(Window):
                 "One file at a time", "Wait for the other one, or cancel it", "warning"
             )
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "cancel":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "cancel":
             self._jobs.cancel()
         return state
 
@@ -77,7 +77,7 @@ class FilesDialog(JobDialog):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._uploads = Jobs(self, self.renew, context.page.report)
+        self._uploads = Jobs(self, self.rerender, context.page.report)
 
     def body(self, picture: LivePicture) -> Markup:
         services = self.context.services
@@ -112,9 +112,9 @@ class FilesDialog(JobDialog):
             self._jobs.html(),
         ))  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         services = self.context.services
-        if word == "share" and services.token and not value:
+        if action == "share" and services.token and not value:
             return replace(state, page=replace(state.page, window=self.name))
         doing: dict[str, Callable[[], None]] = {
             "file": partial(self._open, value),
@@ -127,9 +127,9 @@ class FilesDialog(JobDialog):
             "story": self._story,
             "export": partial(self._export, value),
         }
-        if word in doing:
-            self.context.act(doing[word])
-        return super().take(state, word, value)
+        if action in doing:
+            self.context.call_soon(doing[action])
+        return super().handle(state, action, value)
 
     # --- what is opened --------------------------------------------------------------------------
 
@@ -151,12 +151,12 @@ class FilesDialog(JobDialog):
         elif name.lower().endswith(".toml"):
             text = transfers.upload_text(content, name)
         else:
-            self.context.act(partial(self.context.offer_import, name, content))
+            self.context.call_soon(partial(self.context.offer_import, name, content))
             return
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
         whole = is_robot or scene_file.settings_of(text) != ""
         if not job.is_set():
-            self.context.act(partial(self.context.show_opened, opened, camera, whole=whole))
+            self.context.call_soon(partial(self.context.show_opened, opened, camera, whole=whole))
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, word: str) -> None:
@@ -277,7 +277,7 @@ class ReportDialog(JobDialog):
         limit = f"{picture.state.specification.limit_um:g} µm"
         put = [
             tag("li", join((f"{title} ", button("remove", "report:remove", index, kind="link"))))
-            for index, (title, _) in enumerate(self.context.reported)
+            for index, (title, _) in enumerate(self.context.report_results)
         ]
         # the notes beside it may ask for the same name
         author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
@@ -295,19 +295,19 @@ class ReportDialog(JobDialog):
             tag("p", hint, class_="ws-quiet"),
         ))  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "remove":
-            index = index_of(value, len(self.context.reported))
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "remove":
+            index = index_of(value, len(self.context.report_results))
             if index is not None:
-                del self.context.reported[index]
-                self.context.act(self.renew)
-        elif word == "write" and value in (".html", ".pdf"):
-            self.context.act(partial(self._write, value))
-        return super().take(state, word, value)
+                del self.context.report_results[index]
+                self.context.call_soon(self.rerender)
+        elif action == "write" and value in (".html", ".pdf"):
+            self.context.call_soon(partial(self._write, value))
+        return super().handle(state, action, value)
 
     def _write(self, ending: str) -> None:
         results: dict[str, Result] = {}
-        for index, (title, found) in enumerate(self.context.reported):
+        for index, (title, found) in enumerate(self.context.report_results):
             results[f"{title} ({index + 1})" if title in results else title] = found
         page = self.context.state.page
         questions = tuple(filter(None, map(str.strip, page.questions.splitlines())))

@@ -20,7 +20,7 @@ from warpspace.app.evaluation.compare import pinned_side, with_before, without_t
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, Question
 from warpspace.app.panels.block_html import details_html, result_html
-from warpspace.app.panels.panel import Context
+from warpspace.app.panels.panel import Context, Refresh
 from warpspace.app.state.app_state import AppState
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
@@ -93,13 +93,13 @@ class RepairPanel(AnalysisPanel):
 class BestPanel(RepairPanel):
     """The best adjustment of one error for the largest one, below the worst point."""
 
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context, next(one for one in entries() if one.name == Adjust.name))
         self.name, self.title = "best", "One adjustment"
 
-    def is_seen(self, state: AppState) -> bool:
+    def is_visible(self, state: AppState) -> bool:
         return state.page.task == "understand" and "worst" in state.page.open
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
@@ -107,10 +107,10 @@ class BestPanel(RepairPanel):
         nodes = str(min(max(state.nodes, low), high))
         return {**super().defaults(state), "count": "1", "grid": nodes}
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*self.concerns(picture), _is_of_errors(picture))
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*self.body_dependencies(picture), _is_of_errors(picture))
 
-    def pieces(self, picture: LivePicture) -> dict[str, str]:
+    def render(self, picture: LivePicture) -> dict[str, str]:
         state, answer = picture.state, self._answer
         if not _is_of_errors(picture):
             return {self.name: EMPTY}
@@ -216,25 +216,28 @@ class CompensatePanel(AnalysisPanel):
                     class_="ws-actions", role="group", aria_label="The box shows")  # fmt: skip
         return tag("div", join(row), class_="ws-actions") + shown
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         found = self._answer.found if self._answer is not None else None
-        if word == "set.formats":
+        if action == "set.formats":
             self._answer = None  # a table of another control says nothing of this one
-        if not isinstance(found, Compensation) or word not in ("table", "box", "maps"):
-            return super().take(state, word, value)
-        if word == "maps":
+        if not isinstance(found, Compensation) or action not in ("table", "box", "maps"):
+            return super().handle(state, action, value)
+        if action == "maps":
             self._draw(found, dark=state.shown.dark, saves=value == "save")
             return state
-        if word == "table":
-            self.context.act(partial(self.context.save_file, *packed(found)))
+        if action == "table":
+            self.context.call_soon(partial(self.context.save_file, *packed(found)))
         if not holds_for(state, found.controller):
             return state
         left = f"{found.after_statistics.max_um:.1f} µm"
-        self.context.decided = without_table(state), f"{self.title}: a table leaves at most {left}"
-        return with_box(state, BOTH if word == "table" else value, found.controller)
+        self.context.last_decision = (
+            without_table(state),
+            f"{self.title}: a table leaves at most {left}",
+        )
+        return with_box(state, BOTH if action == "table" else value, found.controller)
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().concerns(picture), box_of(picture.state))
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), box_of(picture.state))
 
     def _draw(self, found: Compensation, *, dark: bool, saves: bool) -> None:
         draw = self.context.services.draw_compensation
@@ -248,7 +251,7 @@ class CompensatePanel(AnalysisPanel):
 
     def _take_picture(self, found: Compensation, png: bytes) -> None:
         self._picture = found, f"data:image/png;base64,{base64.b64encode(png).decode()}"
-        self.renew()
+        self.rerender()
 
 
 def _writable() -> dict[str, str]:

@@ -28,7 +28,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import HERE, chosen_trace, played_axis, standing
 from warpspace.app.panels.block_html import block_html
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Section, Window
+from warpspace.app.panels.panel import Context, Dialog, Section
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.look import linear_spans
 from warpspace.app.state.tree import leaves
@@ -120,16 +120,16 @@ class RotarySection(Section):
 
     def _follow(self) -> None:
         state, stage = self.context.state, self.context.stage
-        if stage is not None and self.is_seen(state) and self.is_open(state):
+        if stage is not None and self.is_visible(state) and self.is_open(state):
             text = ", ".join(f"{axis} = {at:.0f}°" for axis, at in stage.position.items())
             self.context.page.put({"rotary.angle": str(tag("span", text.replace("-", MINUS)))})
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         stage = self.context.stage
-        if word in ("play", "stop") and stage is not None:
-            on = None if word == "stop" else not stage.playing
-            self.context.act(lambda: stage.play(on))
-            self.context.act(self.renew)
+        if action in ("play", "stop") and stage is not None:
+            on = None if action == "stop" else not stage.playing
+            self.context.call_soon(lambda: stage.play(on))
+            self.context.call_soon(self.rerender)
         return state
 
 
@@ -270,11 +270,11 @@ class EditorSection(Section):
             tag("div", join(whole), class_="ws-actions"),
         ))  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         self._refused = ("", "")
-        if word == "do":
+        if action == "do":
             return machine_edits.with_word(state, value)
-        what = word.removeprefix("set.")
+        what = action.removeprefix("set.")
         changed = machine_edits.with_word(state, f"{what} {value}")
         notes = changed.notes[len(state.notes) :]
         if what == "chain" and notes and changed.scene is state.scene:
@@ -282,7 +282,7 @@ class EditorSection(Section):
                 value[:200],
                 "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}"),
             )
-            self.context.act(self.renew)
+            self.context.call_soon(self.rerender)
             return state
         return changed
 
@@ -384,7 +384,7 @@ def _source(source: BodySource) -> str:
 WIDTH_PX = 240  # of a small picture: it is shown smaller, sharp on fine screens too
 
 
-class MachinesDialog(Window):
+class MachinesDialog(Dialog):
     name, title = "machines", "Start from a machine"
 
     def body(self, picture: LivePicture) -> Markup:
@@ -399,12 +399,12 @@ class MachinesDialog(Window):
             for name, scene in machine_edits.library().items()
         ), class_="ws-gallery", data_list=True)  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         scene = machine_edits.library().get(value)
-        if word != "choose" or scene is None:
+        if action != "choose" or scene is None:
             return state
         found = machine_edits.with_library_scene(state, scene)
-        self.context.act(lambda: self.context.scenes.add(found.origin) and None)
+        self.context.call_soon(lambda: self.context.scenes.add(found.origin) and None)
         return self.closed(replace(found, page=state.page))
 
 

@@ -72,7 +72,7 @@ class FilesPanel(AnalysisPanel):
         super().__init__(context, entry)
         self._files: tuple[UploadedFile, ...] = ()
         self._trouble = ""
-        self._uploads = Jobs(self, self.renew, self._refuse)
+        self._uploads = Jobs(self, self.rerender, self._refuse)
 
     def question(self, state: AppState) -> Question:
         return (*super().question(state), self._files)
@@ -109,29 +109,29 @@ class FilesPanel(AnalysisPanel):
         def work(job: Job) -> None:
             take_in = self.parse(*read())
             if not job.is_set():
-                self.context.act(partial(self._take_in, take_in))
+                self.context.call_soon(partial(self._take_in, take_in))
 
         self._uploads.queue("Reading", work)
 
     def _take_in(self, take_in: Callable[[], None]) -> None:
         self._trouble = ""
         take_in()
-        self.renew()
+        self.rerender()
 
     def _refuse(self, error: Exception) -> None:
         self._trouble = error_words(error)
-        self.renew()
+        self.rerender()
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "file":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "file":
             self.receive(partial(read_upload, value, self.most_bytes, self.what))
-        elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
+        elif action == "remove" and (at := index_of(value, len(self._files))) is not None:
             self._files = (*self._files[:at], *self._files[at + 1 :])
-            self.context.act(self.renew)
+            self.context.call_soon(self.rerender)
         else:
-            if word == "cancel":
+            if action == "cancel":
                 self._uploads.cancel()
-            return super().take(state, word, value)
+            return super().handle(state, action, value)
         return state
 
 
@@ -159,7 +159,7 @@ class TestsPanel(FilesPanel):
     def is_ready(self, state: AppState) -> bool:
         return chosen_test(state) is not None
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.question(picture.drawn_state), picture.is_difference)
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
@@ -201,15 +201,15 @@ class TestsPanel(FilesPanel):
     def result_html(self, found: Result) -> Markup:
         return join(map(block_html, (*found.blocks_of(Lines), *found.blocks_of(Table))))
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "choose" and value in ("", *bench_names()):
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "choose" and value in ("", *bench_names()):
             self._answer, self._files, self._trouble = None, (), ""
             kept = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
             state = replace(state, forms=kept | ({TEST: value} if value else {}))
             return edits.with_sight(state, inside=bool(value))
-        if word == "path":
+        if action == "path":
             return with_form(state, "test.path", value)
-        return super().take(state, word, value)
+        return super().handle(state, action, value)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         return partial(self._hold, (UploadedFile(name, upload_text(content, name, WHAT)),))
@@ -320,20 +320,20 @@ class CalibratePanel(FilesPanel):
         rest = details_html(one for one in blocks if one not in shown)
         return join((arrows, words, *map(block_html, shown), rest))
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "kind":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "kind":
             self._kind_of_next = value if value in (*KINDS, *test_kinds()) else ""
-        elif word == "test-options":
+        elif action == "test-options":
             name = self._kind_of_next.partition(":")[0]
             self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
-        elif word == "bundled" and value in bundled_data():
+        elif action == "bundled" and value in bundled_data():
             self.receive(lambda: (value, find_data(value).read_bytes()))
-        elif word == "arrows":
+        elif action == "arrows":
             self._arrows = value if value in ARROWS else ""
             state = edits.with_sight(state, inside=bool(self._arrows))
         else:
-            return super().take(state, word, value)
-        self.context.act(self.renew)
+            return super().handle(state, action, value)
+        self.context.call_soon(self.rerender)
         return state
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
@@ -344,7 +344,7 @@ class CalibratePanel(FilesPanel):
     # --- arrows ----------------------------------------------------------------------------------
 
     def _arrow_words(self) -> str:
-        picture, found, words = self.context.shown, None, ""
+        picture, found, words = self.context.picture, None, ""
         shapes: Shapes = {}
         if self._answer and self.question(self.context.state) in (self._answer[0], self._applied):
             found = self._answer[1]

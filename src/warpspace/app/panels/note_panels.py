@@ -21,7 +21,7 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import answer, pick_worst, with_picked
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Panel, actions
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -55,7 +55,7 @@ class NotesPanel(Panel):
         # the words of the bar over what is shown again, the note, and where one was before
         self._again: tuple[str, str, AppState, CameraMemory] | None = None
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         state, bar = picture.state, EMPTY
         if again := self._shown_again(state):
             words, own, *_ = again
@@ -72,8 +72,8 @@ class NotesPanel(Panel):
 
     # --- events ----------------------------------------------------------------------------------
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        do, _, own = word.partition(".")
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        do, _, own = action.partition(".")
         match do, next((one for one in state.review if one.id == own), None):
             case "open" | "close", None:
                 return _opened(state, LIST if do == "open" else "")
@@ -83,7 +83,7 @@ class NotesPanel(Panel):
                 return self._kept(state, edited)
             case "back", None if self._again:
                 (*_, before, camera), self._again = self._again, None
-                self.context.look_from(camera)
+                self.context.move_camera(camera)
                 return replace(before, review=state.review, page=state.page, forms=state.forms)
             case "at", None if index := index_of(value, len(state.review) + 1):
                 self.context.page.call("reveal", f"note-{state.review[index - 1].id}")
@@ -97,7 +97,7 @@ class NotesPanel(Panel):
 
     def _begun(self, state: AppState, text: str, *, decided: bool) -> AppState:
         """Open the form; for a decision filled in with what has just been applied."""
-        self._decided, words = (self.context.decided if decided else None) or (None, "")
+        self._decided, words = (self.context.last_decision if decided else None) or (None, "")
         if words:
             return _opened(state, NEW, "decision", "whole", f"{words}\nReason: ")
         # what somebody has measured, say, is about the whole
@@ -120,7 +120,7 @@ class NotesPanel(Panel):
         return _opened(replace(state, review=with_note(state.review, note)), LIST)
 
     def _place(self, state: AppState) -> tuple[Mapping[str, float], NoteAnchor | None]:
-        picture, place = self.context.shown, state.page.note_place
+        picture, place = self.context.picture, state.page.note_place
         if place in state.scene.machine.axes:
             return {}, NoteAnchor(body=place)
         if place != "point" or picture is None or picture.is_difference:
@@ -140,7 +140,7 @@ class NotesPanel(Panel):
         words = f"{note.kind.capitalize()} {number} as it was on {note.date:%d %b %Y} "
         self._again = words, note.id, before, at
         if camera is not None:
-            self.context.look_from(camera)
+            self.context.move_camera(camera)
         return found
 
 
@@ -309,17 +309,17 @@ class NoteNumbersPanel(Panel):
     """What the numbers of notes have become."""
 
     name = "note-numbers"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
-    def is_seen(self, state: AppState) -> bool:
+    def is_visible(self, state: AppState) -> bool:
         return bool(state.review)
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         state = picture.state
         return (Identity(state.review), Identity(state.scene), tuple(state.amplitudes.items()),
                 tuple(state.positions.items()), state.placed)  # fmt: skip
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         review, scene = picture.state.review, picture.state.resulting_scene()
         said = [*map(said_stale, review, note_numbers(scene, review))]
         stale = [str(number) for number, words in enumerate(said, 1) if words]
@@ -340,27 +340,27 @@ class StoryPanel(Panel):
     """Tells the story of a scene's notes; the state is not changed by it, only what is shown."""
 
     name = "story"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._number, self._words = 0, EMPTY  # of the step that is told; empty while none is
         self._camera = context.camera.remember()  # before it
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         return {"story": self._words}
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         context, notes = self.context, story(state.review)
-        to = self._number + {"on": 1, "back": -1}.get(word, len(notes))
-        if word == "start" and not notes:
+        to = self._number + {"on": 1, "back": -1}.get(action, len(notes))
+        if action == "start" and not notes:
             context.notify("No story yet", "Give notes a place in the story first")
-        elif word == "start" and not self._words:
+        elif action == "start" and not self._words:
             self._camera = context.camera.remember()
             context.page.call("story", True)
             self._tell(state, notes, 0)
-        elif self._words and word == "end":
-            self._words, context.telling = EMPTY, None
+        elif self._words and action == "end":
+            self._words, context.story_state = EMPTY, None
             context.page.call("story", False)
             context.fly(self._camera, 0)
         elif self._words and 0 <= to < len(notes):
@@ -370,14 +370,14 @@ class StoryPanel(Panel):
     def _tell(self, now: AppState, notes: Sequence[Note], number: int) -> None:
         context, note, camera, problem = self.context, notes[number], None, ""
         # the page stays the same thing, so that little is written anew
-        found, before = now, context.telling or replace(now, page=replace(now.page, window=""))
+        found, before = now, context.story_state or replace(now, page=replace(now.page, window=""))
         try:
             if note.view:
                 found, camera = reopened(now, note, context.scenes.fixed)
         except WarpspaceError as error:
             found, problem = before, str(error)
         context.notes += found.notes
-        context.telling = replace(found.without_notes(), page=before.page)
+        context.story_state = replace(found.without_notes(), page=before.page)
         self._number = number
         self._words = step_words(now.resulting_scene(), notes, number, problem) + actions(
             button("←", "story:back", hint="Back (←)", aria_label="Back", disabled=number == 0),

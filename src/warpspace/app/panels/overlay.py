@@ -25,7 +25,7 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Panel
+from warpspace.app.panels.panel import Context, Panel, Refresh
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.geometry.surfaces import corners
@@ -39,9 +39,9 @@ class HeadPanel(Panel):
     """Mean and max with the place of the latter."""
 
     name = "head"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         words, place = subject_words(picture), place_words(picture)
         head = fill(
             '<div data-piece="reopened"></div><h1>{numbers}</h1>'
@@ -59,12 +59,12 @@ class LegendPanel(Panel):
     """The colour bar, and how much of the volume keeps the limit."""
 
     name = "legend"
-    follows = "often"
+    refresh = Refresh.THROTTLED
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (picture.scale, id(picture))
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         kept = EMPTY
         if not picture.is_difference:
             (words, is_kept), limit = kept_words(picture), picture.state.specification.limit_um
@@ -84,9 +84,9 @@ class OrderPanel(Panel):
     """
 
     name = "order"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         words, left = [*order_conditions(picture)], picture.state.left_behind
         words += [f"with its own errors; those of “{left}” are left behind"] if left else []
         allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
@@ -98,13 +98,13 @@ class RoomPanel(Panel):
     """What the page places by itself as the camera moves, and how large the drawing is."""
 
     name = "room"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._sent: dict[str, Any] = {}
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         facts = _facts(picture)
         changes = {name: value for name, value in facts.items() if self._sent.get(name) != value}
         if changes:
@@ -112,10 +112,10 @@ class RoomPanel(Panel):
         self._sent = facts
         return {}
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        room, context = read_room(value) if word == "size" else None, self.context
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        room, context = read_room(value) if action == "size" else None, self.context
         if room is not None:
-            context.act(lambda: context.camera.take_room(room, context.shown))
+            context.call_soon(lambda: context.camera.take_room(room, context.picture))
         return state
 
 
@@ -185,11 +185,11 @@ class PointerPanel(Panel):
         self._tabs, self._last = tabs, 0.0
         context.page.call("together")
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        now, picture, at = time.monotonic(), self.context.shown, None
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        now, picture, at = time.monotonic(), self.context.picture, None
         spelt, _, name = value.partition("\n")
-        if word == "at":
-            if len(spelt) > LONGEST_RAY or now - self._last < OFTEN_S or self.context.telling:
+        if action == "at":
+            if len(spelt) > LONGEST_RAY or now - self._last < OFTEN_S or self.context.story_state:
                 return state
             try:
                 ray = np.array([float(one) for one in spelt.split(",")]).reshape(2, 3)
@@ -199,7 +199,7 @@ class PointerPanel(Panel):
             found = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
             at = found and (found[1] * SCENE_PER_MM).round(4).tolist()
         for one in self._tabs():
-            if one is not self.context and not one.telling and queued(one.client) <= MOST_QUEUED:
+            if one is not self.context and one.story_state is None and queued(one.client) <= MOST_QUEUED:
                 said = " ".join(name[:LONGEST_NAME].split())
                 one.page.call("pointer", self.context.client.client_id, said, at)
         return state

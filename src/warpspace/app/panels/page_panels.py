@@ -65,7 +65,7 @@ class TasksPanel(Panel):
         names = {name: names[name] for name in (*FIRST, *names)}
         self.sections = {task: [name for name, of in names.items() if of == task] for task in TASKS}
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         """Write the tabs, and an empty place for each section."""
         task = picture.state.page.task
         tabs = join(

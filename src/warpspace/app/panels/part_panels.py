@@ -48,8 +48,8 @@ class InBoxPanel(FilesPanel):
         made = replace(state.part, shown=True, normal=False, moved=False)
         return (*super().question(state), made)
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().concerns(picture), picture.state.part)
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), picture.state.part)
 
     def is_ready(self, state: AppState) -> bool:
         return getattr(state.part, self.holds[0]) is not None
@@ -84,9 +84,9 @@ class InBoxPanel(FilesPanel):
         part = replace(state.part, **dict(zip(self.holds, (held, name), strict=True)), **more)
         return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        is_removed = word == "remove" and not value
-        return self.hold(state, None, "") if is_removed else super().take(state, word, value)
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        is_removed = action == "remove" and not value
+        return self.hold(state, None, "") if is_removed else super().handle(state, action, value)
 
 
 class PartPanel(InBoxPanel):
@@ -121,12 +121,12 @@ class PartPanel(InBoxPanel):
         judged = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
         return html.rows(judged) + super().result_html(found)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
             turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
             return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
-        found = super().take(state, word, value)
-        if word == "set.unit" and state.part.mesh and self._sent:
+        found = super().handle(state, action, value)
+        if action == "set.unit" and state.part.mesh and self._sent:
             sent = self._sent
             self.receive(lambda: sent)
         return found

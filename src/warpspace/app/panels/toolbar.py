@@ -25,7 +25,7 @@ from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Panel
+from warpspace.app.panels.panel import Panel, Refresh
 from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, SHOWN, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
@@ -64,7 +64,7 @@ def chosen_map(state: AppState) -> str:
 class ControlsPanel(Panel):
     name = "controls"
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         camera = self.context.camera
         lens = switch("controls:set.lens", "Orthographic", on=camera.orthographic,
                       hint="Parallel edges stay parallel")  # fmt: skip
@@ -80,25 +80,25 @@ class ControlsPanel(Panel):
                           hint="The machine's axes; click to look from another side"),
         }  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         context = self.context
-        if word == "map":
+        if action == "map":
             quantity, _, component = value.partition(".")
             if value == "limit":
                 quantity, component = "position", "norm"
             state = put(state, "look.pass_fail", str(int(value == "limit")))
             state = put(state, "look.quantity", quantity)
             return put(state, "component", component)
-        if word == "machine" and value in MACHINES:
+        if action == "machine" and value in MACHINES:
             machine = replace(state.machine, shown=value == "solid", ghost=value != "off")
             return replace(state, machine=machine)
-        if word == "set.travel":
+        if action == "set.travel":
             return with_travel(state, value)
-        view = value if word == "view" and value in VIEWS else None
-        lens = value == "1" if word == "set.lens" else None
+        view = value if action == "view" and value in VIEWS else None
+        lens = value == "1" if action == "set.lens" else None
         if view is not None or lens is not None:
-            context.act(lambda: context.fit_view(view, lens))
-            context.act(self.renew)
+            context.call_soon(lambda: context.fit_view(view, lens))
+            context.call_soon(self.rerender)
         return state
 
 
@@ -175,13 +175,13 @@ class ComparePanel(Panel):
     """Which two are compared and which of them is drawn, and the numbers of both."""
 
     name = "compare"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (Identity(picture.state.comparison), Identity(picture.compared),
                 *self.context.scenes)  # fmt: skip
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         state, found = picture.state, picture.compared
         chosen = state.comparison
         known = {title: title for title in (*_own_sides(state), *self.context.scenes)}
@@ -202,19 +202,19 @@ class ComparePanel(Panel):
                 "compare": menu(words, join(body), key="compare", kind="up wide",
                                 hint="Two scenes, or the errors before and after")}  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         """Take what a browser has chosen; a title that nobody has changes nothing."""
         chosen, scene = state.comparison, self.context.scenes.get(value)
-        if word == "pin":
+        if action == "pin":
             return with_pin(state)
-        if word == "leave" or (word == "set.b" and value == NOBODY):
+        if action == "leave" or (action == "set.b" and value == NOBODY):
             return with_sides(state, chosen.a, None)
         side = _own_sides(state).get(value)
         if side is None and scene is not None:
             side = replace(scene_side(scene), title=value)
-        if side is None or word not in ("set.a", "set.b"):
+        if side is None or action not in ("set.a", "set.b"):
             return state
-        a, b = (side, chosen.b or Side()) if word == "set.a" else (chosen.a, side)
+        a, b = (side, chosen.b or Side()) if action == "set.a" else (chosen.a, side)
         return with_sides(state, a, b)
 
 

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.file_dialogs import accepted_endings
-from warpspace.app.panels.panel import Context, Panel, Window
+from warpspace.app.panels.panel import Context, Dialog, Panel, Refresh
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
 from warpspace.exceptions import OptionError
@@ -25,8 +25,8 @@ class StatePanel(Panel):
 
     name = "state"
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        return put(state, word.removeprefix("set."), value)
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        return put(state, action.removeprefix("set."), value)
 
 
 class TopPanel(Panel):
@@ -34,7 +34,7 @@ class TopPanel(Panel):
 
     name = "top"
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         store = self.context.store
         travel = (
             button(sign, f"page:{word.lower()}", kind="quiet", aria_label=word, data_key=word,
@@ -69,7 +69,7 @@ class TopPanel(Panel):
         }  # fmt: skip
 
 
-class ScenesDialog(Window):
+class ScenesDialog(Dialog):
     """The scenes there are: title, machine, what each shows."""
 
     name, title = "scenes", "Choose a scene"
@@ -91,8 +91,8 @@ class ScenesDialog(Window):
             "p", words, class_="ws-quiet"
         )
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word != "choose" or value not in self.context.scenes:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action != "choose" or value not in self.context.scenes:
             return state
         # what is chosen again is reset
         return self.closed(replace(state.with_scene(self.context.scenes[value]), page=state.page))
@@ -179,7 +179,7 @@ def _found(query: str) -> list[Command]:
     return [one for one in COMMANDS if all(word in one.label.lower() for word in words)]
 
 
-class HelpDialog(Window):
+class HelpDialog(Dialog):
     """All commands, found by their words; what the mouse does, and what is drawn."""
 
     name, title = "help", "Help"
@@ -205,11 +205,11 @@ class HelpDialog(Window):
             *((tag("h3", scene.title), tag("p", about)) if about else ()),
         ))  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         query = state.page.command
         found = [one for one in _found(query) if ":" in one.event]
-        runs = found[: bool(query)] if word == "first" else [o for o in found if o.label == value]
-        if word not in ("first", "run") or not runs:
+        runs = found[: bool(query)] if action == "first" else [o for o in found if o.label == value]
+        if action not in ("first", "run") or not runs:
             return state
         self.context.send(runs[0].event, runs[0].value)
         return self.closed(state)
@@ -219,27 +219,27 @@ class PagePanel(Panel):
     """What acts on the page as a whole: tasks, sections, windows, undo, redo, and all errors."""
 
     name = "page"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         context.page.call("keys", key_events())
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         # the part of a window that is open fills it
         return {} if picture.state.page.window else {"window": ""}
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         context = self.context
         actions: dict[str, Callable[[], None]] = {
             "undo": partial(self._travel, "Undone", context.store.undo),
             "redo": partial(self._travel, "Done again", context.store.redo),
             "fit": context.fit_view,
             "tour": partial(context.page.call, "tour", True),
-            "close": context.closed,
+            "close": context.dialog_closed,
         }
-        if word in actions:
-            context.act(actions[word])
+        if action in actions:
+            context.call_soon(actions[action])
         updates: dict[str, Callable[[], AppState]] = {
             "task": partial(put, state, "page.task", value),
             "fold": partial(toggled, state, "page.open", value),
@@ -249,9 +249,9 @@ class PagePanel(Panel):
             "zero": state.zeroed,
             "reset": state.reset,
         }
-        if word == "toggle" and isinstance(on := getattr(state.shown, value, None), bool):
+        if action == "toggle" and isinstance(on := getattr(state.shown, value, None), bool):
             return replace(state, shown=replace(state.shown, **{value: not on}))
-        return updates[word]() if word in updates else state
+        return updates[action]() if action in updates else state
 
     def _travel(self, done: str, travel: Callable[[], str]) -> None:
         try:
