@@ -19,14 +19,14 @@ LIVE = LiveModel()
 class Nobody(SimpleNamespace):
     """The context of a page that is not there; what it posts and tells a user goes into lists."""
 
-    is_still, shown, stage = True, None, None
+    is_paused, picture, stage = True, None, None
 
     def __init__(self, **given: Any) -> None:
         posted, told = [], []
         super().__init__(
             jobs=set(), scenes=SceneList({}), services=Services(), posted=posted, told=told,
             offers={},
-            act=lambda do: do(), renew=lambda _: None, post=posted.append,
+            call_soon=lambda do: do(), rerender=lambda _: None, post=posted.append,
             notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
         )  # fmt: skip
         vars(self).update(given)
@@ -44,9 +44,9 @@ class Alone:
         self.said, self.sent, self.saved, self.called = [], [], [], []
         self.store = StateStore(state)
         self.context = Nobody(
-            act=self._act, store=self.store, shown=LIVE.evaluate(state),
-            notify=lambda *words: self.said.append(words), post=self.store.apply, reported=[],
-            send=lambda *event: self.sent.append(event), closed=lambda: None,
+            call_soon=self._call, store=self.store, picture=LIVE.evaluate(state),
+            notify=lambda *words: self.said.append(words), post=self.store.apply, report_results=[],
+            send=lambda *event: self.sent.append(event), dialog_closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
             offers={}, page=SimpleNamespace(
                 report=lambda error: self.said.append(("", str(error))),
@@ -57,7 +57,7 @@ class Alone:
         )  # fmt: skip
         self.part = kind(self.context, *more)
 
-    def _act(self, action: Callable[[], None]) -> None:
+    def _call(self, action: Callable[[], None]) -> None:
         try:
             action()
         except WarpspaceError as error:  # as the session says it
@@ -85,7 +85,7 @@ def lone_part(kind: Any, name: str = "") -> Any:
 
 def wait(part: Any) -> None:
     """Wait until nothing is computed for a part."""
-    while part._jobs.busy:
+    while part.context.jobs:
         time.sleep(0.01)
 
 

@@ -30,7 +30,7 @@ CAMERA = CameraMemory((9.0, -12.0, 8.0), (0.5, 0.0, -2.5), (0.0, 0.0, 1.0), 0.4)
 def alone(state=START):
     """A notes part on a page that is not there, and the cameras it was put to."""
     cameras: list[CameraMemory] = []
-    found = Alone(NotesPanel, state, look_from=cameras.append, decided=None)
+    found = Alone(NotesPanel, state, move_camera=cameras.append, last_decision=None)
     found.context.camera.remember = lambda: CAMERA
     return found, cameras
 

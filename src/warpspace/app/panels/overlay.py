@@ -199,7 +199,11 @@ class PointerPanel(Panel):
             found = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
             at = found and (found[1] * SCENE_PER_MM).round(4).tolist()
         for one in self._tabs():
-            if one is not self.context and one.story_state is None and queued(one.client) <= MOST_QUEUED:
+            if (
+                one is not self.context
+                and one.story_state is None
+                and queued(one.client) <= MOST_QUEUED
+            ):
                 said = " ".join(name[:LONGEST_NAME].split())
                 one.page.call("pointer", self.context.client.client_id, said, at)
         return state
