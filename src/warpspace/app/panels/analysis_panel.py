@@ -79,8 +79,8 @@ class AnalysisPanel(Section):
         super().__init__(context)
         self.entry, self.name, self.task = entry, entry.name, entry.task
         self.title = TITLES.get(entry.name) or entry.name.replace("-", " ").capitalize()
-        words = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
-        self.sentence = self.sentence or words.rstrip(".")
+        sentence = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
+        self.sentence = self.sentence or sentence.rstrip(".")
         self.at_once = self.at_once or entry.task == "understand"
         self._answer: AnalysisOutcome | None = None
         self._applied: Question = ()  # what is asked once a change has been applied
@@ -98,7 +98,11 @@ class AnalysisPanel(Section):
 
     def options(self) -> Sequence[Option]:
         """List the options that a page asks for."""
-        return [one for one in self.kind.options() if not (one.grammar and one.grammar.is_file)]
+        return [
+            option
+            for option in self.kind.options()
+            if not (option.grammar and option.grammar.is_file)
+        ]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         """List those that are shown under "Options" and count."""
@@ -106,11 +110,15 @@ class AnalysisPanel(Section):
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         """Give what the state says of options that nobody has set."""
-        found = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
-        found["placed"] = str(int(state.seen[1]))
+        state_values = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
+        state_values["placed"] = str(int(state.seen[1]))
         if state.picked is not None:
-            found["at"] = spell_at(state.picked.at)
-        return {one.name: found[one.name] for one in self.options() if one.name in found}
+            state_values["at"] = spell_at(state.picked.at)
+        return {
+            option.name: state_values[option.name]
+            for option in self.options()
+            if option.name in state_values
+        }
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
         """Give what it is asked of: the machine as it is drawn."""
@@ -137,31 +145,39 @@ class AnalysisPanel(Section):
     def before_result(self, state: AppState) -> Markup:
         return EMPTY
 
-    def headline(self, found: Result) -> Markup:
+    def headline(self, result: Result) -> Markup:
         """Say what matters most of the result: its sentences."""
         # which scene it is stands at the top of the page
-        words = (one.removeprefix(self._subject) for one in found.blocks() if isinstance(one, str))
-        return join(map(block_html, words))
+        sentences = (
+            block.removeprefix(self._subject) for block in result.blocks() if isinstance(block, str)
+        )
+        return join(map(block_html, sentences))
 
-    def offered(self, found: Result) -> Sequence[int]:
+    def offered(self, result: Result) -> Sequence[int]:
         """List the places of the changes that are offered, in order: the best first."""
         return range(len(self._answer.cards) if self._answer else 0)[::-1]
 
-    def result_html(self, found: Result) -> Markup:
+    def result_html(self, result: Result) -> Markup:
         """Draw its tables and charts."""
-        return result_html(one for one in found.blocks() if not isinstance(one, str))
+        return result_html(block for block in result.blocks() if not isinstance(block, str))
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
+    def actions(self, result: Result, *, stale: bool) -> Markup:
         """Give what can be done with a result beside its cards."""
-        saves = [button(f"Save {one}", f"{self.name}:save", one) for one in _endings(found)]
+        saves = [
+            button(f"Save {ending}", f"{self.name}:save", ending) for ending in _endings(result)
+        ]
         saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         return tag("div", join(saves), class_="ws-actions")
 
     # --- the page --------------------------------------------------------------------------------
 
     def values(self, state: AppState) -> dict[str, str]:
-        found, told = self.defaults(state), option_values(state, self.name)
-        return {**found, **told, **{name: found[name] for name in OF_STATE & found.keys()}}
+        defaults, chosen = self.defaults(state), option_values(state, self.name)
+        return {
+            **defaults,
+            **chosen,
+            **{name: defaults[name] for name in OF_STATE & defaults.keys()},
+        }
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.question(picture.state),)
@@ -185,14 +201,16 @@ class AnalysisPanel(Section):
             elif stale and not is_quick:
                 words = "Something has changed since: run it again."
                 parts.append(tag("p", words, class_="ws-stale"))
-            found, faded = answer.found, stale and question != self._applied
-            said = join((self.headline(found), self.cards_html(question), self.result_html(found)))
-            parts.append(tag("div", said, class_="ws-result" + (" stale" if faded else "")))
-            parts += [tag("p", words, class_="ws-doubt") for words in found.caveats()]
-            parts.append(self.actions(found, stale=stale))
+            result, faded = answer.found, stale and question != self._applied
+            content = join(
+                (self.headline(result), self.cards_html(question), self.result_html(result))
+            )
+            parts.append(tag("div", content, class_="ws-result" + (" stale" if faded else "")))
+            parts += [tag("p", words, class_="ws-doubt") for words in result.caveats()]
+            parts.append(self.actions(result, stale=stale))
         bar = EMPTY if stale and is_quick else self._jobs.html()
-        wanted = answer is None or problem or (stale and not is_quick)
-        if wanted and is_ready and not bar:
+        needs_run = answer is None or problem or (stale and not is_quick)
+        if needs_run and is_ready and not bar:
             words = f"{self.run_words} again" if answer else self.run_words
             run = button(words, f"{self.name}:run", kind="" if answer else "main",
                          hint=self.run_hint)  # fmt: skip
@@ -213,20 +231,20 @@ class AnalysisPanel(Section):
                  "Apply": "Change the errors; the state before it is kept as A"}  # fmt: skip
         for index in self.offered(answer.found):
             buttons = join(
-                button(words, f"{self.name}:{words.lower()}", index, hint=hint,
-                       kind="main" if words == "Apply" else "",
+                button(label, f"{self.name}:{label.lower()}", index, hint=hint,
+                       kind="main" if label == "Apply" else "",
                        disabled=answer.question != question)
-                for words, hint in hints.items()
+                for label, hint in hints.items()
             )  # fmt: skip
             row = tag("div", buttons, class_="ws-actions")
             cards.append(tag("div", answer.cards[index][1] + row, class_="ws-card"))
         return join(cards)
 
-    def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
-        options = [one for one in self.shown_options(state) if one.name not in OF_STATE]
+    def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
+        options = [option for option in self.shown_options(state) if option.name not in OF_STATE]
         if not options:
             return EMPTY
-        form = above + form_html(self.name, options, self.values(state), state.scene)
+        form = controls + form_html(self.name, options, self.values(state), state.scene)
         return tag("details", tag("summary", "Options") + form, class_="ws-options",
                    open=bool(self.problem_html(state)),
                    data_key=f"{self.name}.options")  # fmt: skip
@@ -235,7 +253,7 @@ class AnalysisPanel(Section):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         name = action.removeprefix("set.")
-        if action.startswith("set.") and name in {one.name for one in self.options()}:
+        if action.startswith("set.") and name in {option.name for option in self.options()}:
             return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:LONGEST]})
         if action == "run" and self.is_ready(state):
             self._run(state)
@@ -246,16 +264,16 @@ class AnalysisPanel(Section):
                 partial(self._save, value) if action == "save" else self._into_report
             )
         elif action in ("preview", "apply") and (change := self._change(state, value)) is not None:
-            what = self.title.lower()
+            title = self.title.lower()
             if action == "preview":
                 words = change.words if change.words.startswith("after ") else ""
-                words = words or f"after {what}: {change.words}"
+                words = words or f"after {title}: {change.words}"
                 return with_proposal(state, change.scene, words)
-            found = with_applied(state, change.scene, f"before {what}")
-            self._applied = self.question(found)
-            done = change.words.removeprefix(f"after {what}: ")
-            self.context.last_decision = state, f"{self.title}: {done}"
-            return found
+            applied_state = with_applied(state, change.scene, f"before {title}")
+            self._applied = self.question(applied_state)
+            description = change.words.removeprefix(f"after {title}: ")
+            self.context.last_decision = state, f"{self.title}: {description}"
+            return applied_state
         return state
 
     def _change(self, state: AppState, value: str) -> Change | None:
@@ -269,18 +287,18 @@ class AnalysisPanel(Section):
         question, scenes = self.question(state), self.scenes(state)
         self._asked, self._subject = question, f"{state.scene.title} · "
         try:
-            asked = self.ask(state, self.values(state), scenes)
+            analysis = self.ask(state, self.values(state), scenes)
         except WarpspaceError as error:
             self._fail(error)
             return
 
         def answer(job: Job) -> AnalysisOutcome:
             with taken_turn(lambda: job.report_progress(job.share)):
-                started = time.monotonic()
-                found = asked.run_all(scenes, job.report_progress)
-                took_s = time.monotonic() - started
-            cards = tuple((one, _change_html(state, one)) for one in found.changes())
-            return AnalysisOutcome(question, found, cards, took_s)
+                start_s = time.monotonic()
+                result = analysis.run_all(scenes, job.report_progress)
+                took_s = time.monotonic() - start_s
+            cards = tuple((change, _change_html(state, change)) for change in result.changes())
+            return AnalysisOutcome(question, result, cards, took_s)
 
         self._make(self.kind.doing, answer, self._take_answer)
 
@@ -293,33 +311,33 @@ class AnalysisPanel(Section):
         else:
             self._run(state)
 
-    def _make(self, words: str, make: Callable[[Job], T], take: Callable[[T], None]) -> None:
+    def _make(self, name: str, compute: Callable[[Job], T], deliver: Callable[[T], None]) -> None:
         def work(job: Job) -> None:
-            made = make(job)
+            product = compute(job)
             if not job.is_set():
-                self.context.call_soon(partial(take, made))
+                self.context.call_soon(partial(deliver, product))
 
-        self._jobs.start(words, work)
+        self._jobs.start(name, work)
 
     def _take_answer(self, answer: AnalysisOutcome) -> None:
         self._answer, self._problem = answer, None
         self.rerender()
 
     def _fail(self, error: Exception) -> None:
-        words = error_words(error)
+        text = error_words(error)
         if isinstance(error, OptionError):
-            labels = {one.name: one.label for one in self.kind.options()}
-            words = error.said(lambda name: labels.get(name, name))
-        self._problem = (self._asked, words)
+            labels = {option.name: option.label for option in self.kind.options()}
+            text = error.said(lambda name: labels.get(name, name))
+        self._problem = (self._asked, text)
         self.rerender()
 
     def _save(self, ending: str) -> None:
-        found = self._answer.found if self._answer else None
-        if found is None or ending not in _endings(found):
+        result = self._answer.found if self._answer else None
+        if result is None or ending not in _endings(result):
             return
-        text, table = io.StringIO(), found.file_table()
+        text, table = io.StringIO(), result.file_table()
         if ending == "JSON":
-            json.dump(found.as_json(), text, indent=2, ensure_ascii=False)
+            json.dump(result.as_json(), text, indent=2, ensure_ascii=False)
         elif table is not None:
             csv.writer(text, lineterminator="\n").writerows(table.csv_rows())
         self.context.save_file(f"{self.name}.{ending.lower()}", text.getvalue())
@@ -331,25 +349,25 @@ class AnalysisPanel(Section):
             self.context.notify("Added to the report", f"{title}; see Report at the top")
 
 
-def _endings(found: Result) -> tuple[str, ...]:
-    return ("JSON",) if found.file_table() is None else ("CSV", "JSON")
+def _endings(result: Result) -> tuple[str, ...]:
+    return ("JSON",) if result.file_table() is None else ("CSV", "JSON")
 
 
 def _change_html(state: AppState, change: Change) -> Markup:
-    now = without_table(plain_state(state))
-    then = applied(now, change.scene)
+    before_state = without_table(plain_state(state))
+    after_state = applied(before_state, change.scene)
     moved: list[tuple[float, str]] = []
-    for key in {**now.amplitudes, **then.amplitudes}:
-        a, b = (one.amplitudes.get(key, 0.0) for one in (now, then))
+    for key in {**before_state.amplitudes, **after_state.amplitudes}:
+        a, b = (state.amplitudes.get(key, 0.0) for state in (before_state, after_state))
         if abs(b - a) > SAME:
-            said = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
-            moved.append((-abs(b - a), said))
-    steps = [said for _, said in sorted(moved)] or [change.words]
-    lines = [tag("div", tag("b", said)) for said in steps[:MOST_STEPS]]
-    if (more := len(steps) - MOST_STEPS) > 0:
-        lines.append(tag("div", f"and {more} more", class_="ws-quiet"))
+            line = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
+            moved.append((-abs(b - a), line))
+    steps = [line for _, line in sorted(moved)] or [change.words]
+    lines = [tag("div", tag("b", line)) for line in steps[:MOST_STEPS]]
+    if (n_hidden := len(steps) - MOST_STEPS) > 0:
+        lines.append(tag("div", f"and {n_hidden} more", class_="ws-quiet"))
     try:
-        before, after = (PLAIN.evaluate(one).statistics for one in (now, then))
+        before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))
     except WarpspaceError:
         return join(lines)
     pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))

@@ -38,21 +38,21 @@ ANGLES = Markup(
 
 def result_html(blocks: Iterable[Block]) -> Markup:
     """Draw tables and charts; what is too wide for the column of the page is folded."""
-    found = [_turned(one) if isinstance(one, Table) else one for one in blocks]
-    wide = [one for one in found if isinstance(one, Bars) or _is_wide(one)]
-    shown = (_first_bars(one) if isinstance(one, Bars) else block_html(one)
-             for one in found if isinstance(one, Bars) or one not in wide)  # fmt: skip
-    return join(shown) + details_html(wide)
+    tables_and_charts = [_turned(block) if isinstance(block, Table) else block for block in blocks]
+    folded = [block for block in tables_and_charts if isinstance(block, Bars) or _is_wide(block)]
+    visible = (_first_bars(block) if isinstance(block, Bars) else block_html(block)
+             for block in tables_and_charts if isinstance(block, Bars) or block not in folded)  # fmt: skip
+    return join(visible) + details_html(folded)
 
 
-def details_html(blocks: Iterable[Block], words: str = "Details") -> Markup:
+def details_html(blocks: Iterable[Block], title: str = "Details") -> Markup:
     """Fold what is too wide for the column, or rarely read."""
     inner = join(map(block_html, blocks))
     if not inner:
         return EMPTY
-    wide = tag("div", inner, tabindex=0, role="group", aria_label=words)  # scrolled by keys
-    return tag("details", tag("summary", words) + wide, class_="ws-details",
-               data_key=f"details.{words}")  # fmt: skip
+    wide = tag("div", inner, tabindex=0, role="group", aria_label=title)  # scrolled by keys
+    return tag("details", tag("summary", title) + wide, class_="ws-details",
+               data_key=f"details.{title}")  # fmt: skip
 
 
 def block_html(block: Block) -> Markup:
@@ -91,9 +91,9 @@ def _first_bars(bars: Bars) -> Markup:
     longest = max((abs(value) for value in values if value is not None), default=0.0) or 1.0
     lines = [
         fill('<div class="ws-pair"><span>{words}</span><span>{value}</span></div>'
-             '<div class="ws-effect"><i style="width:{share}%"></i></div>', words=words,
+             '<div class="ws-effect"><i style="width:{share}%"></i></div>', words=label,
              value=number(value, 2), share=number(100.0 * abs(value) / longest))
-        for words, value in zip(bars.rows, values, strict=True) if value is not None
+        for label, value in zip(bars.rows, values, strict=True) if value is not None
     ]  # fmt: skip
     head = tag("p", " · ".join(filter(None, (panel.title, panel.unit))), class_="ws-tiny")
     return head + join(lines[:MOST_BARS])
@@ -132,8 +132,8 @@ class PlotFrame:
             parts += [_line(f"M{at:.1f} {TOP}V{floor}"), _text(spell_short(value), at, floor + 11)]
         for value in tick_values(*self.y, 5.0):
             at = self.place(self.x[0], value)[1]
-            words = _text(spell_short(value), LEFT - 4, at + 3, text_anchor="end")
-            parts += [_line(f"M{LEFT} {at:.1f}H{WIDE - RIGHT}"), words]
+            label = _text(spell_short(value), LEFT - 4, at + 3, text_anchor="end")
+            parts += [_line(f"M{LEFT} {at:.1f}H{WIDE - RIGHT}"), label]
         return join(parts)
 
 
@@ -146,8 +146,8 @@ def lines_html(chart: Lines) -> Markup:
             for value, radius in layout.rings
         )
         curves = join(
-            _curve(one, found * np.array([1.0, -1.0]), 3)
-            for one, found in zip(chart.curves, layout.curves, strict=True)
+            _curve(one, polar * np.array([1.0, -1.0]), 3)
+            for one, polar in zip(chart.curves, layout.curves, strict=True)
         )
         said = f"rings {layout.ring:g} {layout.unit}"
         return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", said, "ws-polar")
@@ -176,10 +176,10 @@ def histogram_html(chart: Histogram) -> Markup:
     if chart.limit is not None:
         at = frame.place(chart.limit, 0.0)[0]
         bars.append(_line(f"M{at:.1f} {TOP}V{HIGH - BOTTOM}", "ws-limit"))
-    told = join(tag("p", spelt(words), class_="ws-tiny" if index else "ws-told")
-                for index, words in enumerate(chart.told))  # fmt: skip
+    statements = join(tag("p", spelt(statement), class_="ws-tiny" if index else "ws-told")
+                for index, statement in enumerate(chart.told))  # fmt: skip
     svg = _svg(frame.axes(chart.x_label, chart.y_label) + join(bars), chart.title)
-    return tag("figure", told + svg + tag("figcaption", chart.subtitle, class_="ws-tiny"))
+    return tag("figure", statements + svg + tag("figcaption", chart.subtitle, class_="ws-tiny"))
 
 
 FLAT = f"0 0 {WIDE:g} {HIGH:g}"
@@ -211,19 +211,19 @@ def _line(path: str, kind: str = "ws-faint") -> Markup:
     return tag("path", class_=kind, d=path)
 
 
-def _text(words: str, x: float, y: float, text_anchor: str = "middle", **more: str) -> Markup:
-    return tag("text", words, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=text_anchor, **more)
+def _text(text: str, x: float, y: float, text_anchor: str = "middle", **attributes: str) -> Markup:
+    return tag("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=text_anchor, **attributes)
 
 
 def _path(points: Array, digits: int = 1, *, dots: bool = False) -> str:
     """Spell a line with gaps where there is no number; dots are strokes without length."""
-    found, joint = "", "M"
+    path, joint = "", "M"
     for x, y in points.tolist():
-        known = not (math.isnan(x) or math.isnan(y))
-        if known:
-            found += f"{joint}{x:.{digits}f} {y:.{digits}f}" + ("h0" if dots else "")
-        joint = "L" if known and not dots else "M"
-    return found
+        is_finite = not (math.isnan(x) or math.isnan(y))
+        if is_finite:
+            path += f"{joint}{x:.{digits}f} {y:.{digits}f}" + ("h0" if dots else "")
+        joint = "L" if is_finite and not dots else "M"
+    return path
 
 
 def _ends(values: Array) -> tuple[float, float]:

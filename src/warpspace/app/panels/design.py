@@ -78,7 +78,9 @@ class TolerancesPanel(AnalysisPanel):
     _order: tuple[Question, tuple[str, ...]] = ((), ())
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name in ("clip", "cylinder", "seed")]
+        return [
+            option for option in super().options() if option.name in ("clip", "cylinder", "seed")
+        ]
 
     def question(self, state: AppState) -> Question:
         values = tuple(self.values(state).items())
@@ -96,81 +98,83 @@ class TolerancesPanel(AnalysisPanel):
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         """Allocate for the limit of the state; what another machine had fixed does not count."""
-        asked: Any = super().ask(state, values, scenes)
-        wanted, known = state.specification, state.amplitudes.keys()
-        fixed = wanted.fixed & known
-        every = read_numbers(wanted.costs, "", "") if wanted.costs else {}
-        costs = tuple((k, cost) for k, cost in every.items() if k in known and k not in fixed)
+        analysis: Any = super().ask(state, values, scenes)
+        specification, keys = state.specification, state.amplitudes.keys()
+        fixed = specification.fixed & keys
+        costs_by_key = read_numbers(specification.costs, "", "") if specification.costs else {}
+        costs = tuple((k, cost) for k, cost in costs_by_key.items() if k in keys and k not in fixed)
         return replace(
-            asked, limit_um=wanted.limit_um, probability=wanted.percent / 100.0, loop=state.loop,
-            over=wanted.over, distribution=wanted.distribution, costs=costs,
+            analysis, limit_um=specification.limit_um, probability=specification.percent / 100.0, loop=state.loop,
+            over=specification.over, distribution=specification.distribution, costs=costs,
             fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
         )  # fmt: skip
 
     def _take_answer(self, answer: AnalysisOutcome) -> None:
         super()._take_answer(answer)
-        found: Any = answer.found
+        result: Any = answer.found
 
         def update(state: AppState) -> AppState:
             if self.question(state) != answer.question:
                 note = "tolerances or limit were changed meanwhile: allocate again"
                 return state.noted(note)
             self.context.last_decision = state, f"{self.title}: allocated for the limit"
-            state = edits.with_half_widths(state, found.tolerances)
+            state = edits.with_half_widths(state, result.tolerances)
             self._applied = self.question(state)
             return state
 
         self.context.post(update)
 
-    def offered(self, found: Result) -> Sequence[int]:
+    def offered(self, result: Result) -> Sequence[int]:
         return ()  # they are set already
 
     def before_result(self, state: AppState) -> Markup:
-        asked = _controls(state, "limit_um", "percent")
+        controls = _controls(state, "limit_um", "percent")
         try:
-            return asked + self._probability(sample_machines(state), state)
+            return controls + self._probability(sample_machines(state), state)
         except WarpspaceError as error:
-            return asked + tag("p", str(error), class_="ws-problem", role="alert")
+            return controls + tag("p", str(error), class_="ws-problem", role="alert")
 
-    def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
-        listed = self._rows(sample_machines(state), state) if self.is_ready(state) else EMPTY
-        return listed + super().options_html(
+    def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
+        tolerance_rows = (
+            self._rows(sample_machines(state), state) if self.is_ready(state) else EMPTY
+        )
+        return tolerance_rows + super().options_html(
             state, _controls(state, "over", "distribution", "costs")
         )
 
     def _probability(self, ensemble: Ensemble, state: AppState) -> Markup:
-        wanted = state.specification
-        stream, kept = estimate(ensemble, state.tolerances, wanted.limit_um)
-        bars = stream.display_histogram()
+        specification = state.specification
+        stream, probability = estimate(ensemble, state.tolerances, specification.limit_um)
+        histogram = stream.display_histogram()
         chart = Histogram(
-            "|E| of the machines", "", "|E| [µm]", "machines", bars.edges_um,
-            bars.counts.astype(float), limit=wanted.limit_um,
+            "|E| of the machines", "", "|E| [µm]", "machines", histogram.edges_um,
+            histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
-        told = fill(
+        headline = fill(
             '<p class="ws-told"><span class="{kind}">{share} %</span> of the machines stay within'
             " {limit} µm {where}</p>",
-            kind="ws-kept" if kept.low >= wanted.percent / 100.0 else "ws-missed",
-            share=percent(kept.probability), limit=f"{wanted.limit_um:g}", where=WHERE[wanted.over],
+            kind="ws-kept" if probability.low >= specification.percent / 100.0 else "ws-missed",
+            share=percent(probability.probability), limit=f"{specification.limit_um:g}", where=WHERE[specification.over],
         )  # fmt: skip
         numbers = (
             f"mean {number(stream.mean_um)} · P95 {number(stream.quantile(0.95))} ·"
             f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines,"
-            f" 95 % confidence {percent(kept.low)} … {percent(kept.high)} %"
+            f" 95 % confidence {percent(probability.low)} … {percent(probability.high)} %"
         )
-        return told + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
+        return headline + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
 
     def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
         shares = tolerance_shares(ensemble, state.tolerances)
-        laid_out: Question = (Identity(state.origin), ensemble.keys)
-        if self._order[0] != laid_out:  # no row moves away under a hand
-            self._order = laid_out, tuple(sorted(shares, key=lambda key: -shares[key]))
+        order_key: Question = (Identity(state.origin), ensemble.keys)
+        if self._order[0] != order_key:  # no row moves away under a hand
+            self._order = order_key, tuple(sorted(shares, key=lambda key: -shares[key]))
         longest = max(shares.values(), default=0.0) or 1.0
-        listed = join(_row(state, key, shares[key], longest) for key in self._order[1])
+        tolerance_rows = join(_row(state, key, shares[key], longest) for key in self._order[1])
         scales = join(
-            button(words, f"{self.name}:scale", words, hint="All but the fixed ones")
-            for words in SCALES
+            button(label, f"{self.name}:scale", label, hint="All but the fixed ones")
+            for label in SCALES
         ) + button("As in the scene", f"{self.name}:reset", kind="quiet")
-        return tag("h4", "Half widths and shares of the variance") + listed + tag(
+        return tag("h4", "Half widths and shares of the variance") + tolerance_rows + tag(
             "div", scales, class_="ws-actions", role="group", aria_label="Scale all tolerances"
         )  # fmt: skip
 
@@ -209,23 +213,29 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
 
 
 def _sampled(state: AppState) -> Question:
-    wanted = state.specification
-    moving = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
-    return (Identity(state.scene), state.seen, wanted.over, wanted.distribution, moving)
+    specification = state.specification
+    positions = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
+    return (
+        Identity(state.scene),
+        state.seen,
+        specification.over,
+        specification.distribution,
+        positions,
+    )
 
 
 def sample_machines(state: AppState) -> Ensemble:
     """Draw the machines that a state's tolerances are held against."""
 
     def build() -> Ensemble:
-        scene, wanted = state.resulting_scene(), state.specification
+        scene, specification = state.resulting_scene(), state.specification
         keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
-        none = np.zeros(len(keys))
-        draws = Draws(keys, none, none, Distribution(wanted.distribution))
-        plan, view = SamplingPlan(SAMPLES, 0, Over(wanted.over)), scene.view(state.loop)
+        zeros = np.zeros(len(keys))
+        draws = Draws(keys, zeros, zeros, Distribution(specification.distribution))
+        plan, view = SamplingPlan(SAMPLES, 0, Over(specification.over)), scene.view(state.loop)
         return build_ensemble(Case(scene.model, draws, scene.workspace, view, plan))
 
-    return ENSEMBLES.get(_sampled(state), build, lambda found: found.size)
+    return ENSEMBLES.get(_sampled(state), build, lambda ensemble: ensemble.size)
 
 
 def allowed_words(state: AppState) -> str:
@@ -239,9 +249,13 @@ def allowed_words(state: AppState) -> str:
 
 
 def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
-    none = Tolerance(0.0, 0.0)
-    found = (tolerances.get(key) or none for key in ensemble.keys)
-    return np.array([(one.centre, one.half_width) for one in found]).reshape(-1, 2).T
+    zero = Tolerance(0.0, 0.0)
+    ranges = (tolerances.get(key) or zero for key in ensemble.keys)
+    return (
+        np.array([(tolerance.centre, tolerance.half_width) for tolerance in ranges])
+        .reshape(-1, 2)
+        .T
+    )
 
 
 def estimate(
@@ -251,16 +265,18 @@ def estimate(
     norm_um = ensemble.norm_um(*_centres_and_widths(ensemble, tolerances))
     stream = Stream(len(norm_um), limit_um)
     stream.add(norm_um)
-    kept = stream.probability()
-    assert kept is not None  # noqa: S101 - a limit was given
-    return stream, kept
+    probability = stream.probability()
+    assert probability is not None  # noqa: S101 - a limit was given
+    return stream, probability
 
 
 def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
     """Say how much each tolerance adds to the scatter of the error."""
-    _, half = _centres_and_widths(ensemble, tolerances)
-    parts = half**2 * ensemble.mean_square_gain
-    return dict(zip(ensemble.keys, (parts / (float(parts.sum()) or 1.0)).tolist(), strict=True))
+    _, half_widths = _centres_and_widths(ensemble, tolerances)
+    variances = half_widths**2 * ensemble.mean_square_gain
+    return dict(
+        zip(ensemble.keys, (variances / (float(variances.sum()) or 1.0)).tolist(), strict=True)
+    )
 
 
 # --- Concepts -------------------------------------------------------------------------------------
@@ -276,12 +292,14 @@ class ConceptsPanel(AnalysisPanel):
 
     def offers(self, state: AppState) -> dict[str, Scene]:
         """Give the machines that can be compared, by title."""
-        found = {PRESENT: state.resulting_scene()}
-        own = {one.machine.title: one for one in library().values()}
-        for title, scene in {**own, **self.context.scenes}.items():
-            if scene not in found.values():
-                found[title] = scene
-        return found
+        machines = {PRESENT: state.resulting_scene()}
+        bundled = {
+            library_scene.machine.title: library_scene for library_scene in library().values()
+        }
+        for title, scene in {**bundled, **self.context.scenes}.items():
+            if scene not in machines.values():
+                machines[title] = scene
+        return machines
 
     def chosen(self, state: AppState) -> list[str]:
         """List the machines that are compared; tolerances are those of the first."""
@@ -289,7 +307,7 @@ class ConceptsPanel(AnalysisPanel):
         return [key for key in text.split("\n") if key][:MOST_CONCEPTS]
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name != "workers"]
+        return [option for option in super().options() if option.name != "workers"]
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {"limit_um": f"{state.specification.limit_um:g}", "samples": str(SAMPLES)}
@@ -302,8 +320,8 @@ class ConceptsPanel(AnalysisPanel):
         return len(self.scenes(state)) > 1  # links may name machines that are not here
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        return replace(asked, workers=1)  # other threads are for who moves sliders meanwhile
+        analysis: Any = super().ask(state, values, scenes)
+        return replace(analysis, workers=1)  # other threads are for who moves sliders meanwhile
 
     def question(self, state: AppState) -> Question:
         return (
@@ -315,25 +333,27 @@ class ConceptsPanel(AnalysisPanel):
         offers, lines = self.offers(state), list[tuple[Markup, Markup]]()
         chosen = [key for key in self.chosen(state) if key in offers]
         for letter, key in zip(ascii_uppercase, chosen, strict=False):
-            opens = button("Open", f"{self.name}:open", key, kind="link", hint="Show it here",
+            open_button = button("Open", f"{self.name}:open", key, kind="link", hint="Show it here",
                            aria_label=f"Open {key}")  # fmt: skip
-            removes = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove it",
+            remove_button = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove it",
                              aria_label=f"Remove {key}")  # fmt: skip
-            title, opens = (key, opens) if key != PRESENT else (state.scene.title, EMPTY)
-            lines.append((tag("b", f"{letter} ") + title, opens + removes))
-        left = {key: key for key in offers if key not in chosen}
-        add = choice(f"{self.name}:set.add", "", {"": ADD, **left},
+            title, open_button = (
+                (key, open_button) if key != PRESENT else (state.scene.title, EMPTY)
+            )
+            lines.append((tag("b", f"{letter} ") + title, open_button + remove_button))
+        remaining = {key: key for key in offers if key not in chosen}
+        add = choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
                      label="Compare with another machine")  # fmt: skip
-        listed = rows(lines) if self.is_ready(state) else EMPTY
-        return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + listed
+        machines = rows(lines) if self.is_ready(state) else EMPTY
+        return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + machines
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
+    def actions(self, result: Result, *, stale: bool) -> Markup:
         """Give a picture for a review first."""
         draws = self.context.services.draw_concepts is not None
         sheet = (button("Picture", f"{self.name}:sheet", kind="main", disabled=stale,
                         hint="One sheet for a review: the machines at one scale with their numbers")
                  if draws else EMPTY)  # fmt: skip
-        return sheet + super().actions(found, stale=stale)
+        return sheet + super().actions(result, stale=stale)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         chosen, offers = self.chosen(state), self.offers(state)
@@ -354,13 +374,13 @@ class ConceptsPanel(AnalysisPanel):
         return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
 
     def _draw(self, state: AppState) -> None:
-        draw, found = self.context.services.draw_concepts, self._answer
-        if draw is None or found is None:
+        draw, outcome = self.context.services.draw_concepts, self._answer
+        if draw is None or outcome is None:
             return
-        asked: Any = found.found
+        result: Any = outcome.found
         scenes, dark = tuple(self.scenes(state)), state.shown.dark
         self._make(
             "Drawing the machines",
-            lambda job: draw(scenes, asked.asked, dark, job),
+            lambda job: draw(scenes, result.asked, dark, job),
             partial(self.context.save_file, "concepts.png"),
         )  # fmt: skip

@@ -68,23 +68,31 @@ class WorstPanel(Section):
         if picture.is_difference:
             return self.title
         kind = self.title if picture.state.picked is None else "This point"
-        found = self._answer(picture)
-        return f"{kind}: why {number(found.length_um)}{length_words(found.uncertainty)} µm"
+        explanation = self._answer(picture)
+        return (
+            f"{kind}: why {number(explanation.length_um)}{length_words(explanation.uncertainty)} µm"
+        )
 
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
             return tag("p", DIFFERENCE, class_="ws-quiet")
-        found, asked = self._answer(picture), EMPTY
+        explanation, controls = self._answer(picture), EMPTY
         if picture.state.picked is not None:
-            back = button("Worst point", "worst:forget", kind="link",
+            reset = button("Worst point", "worst:forget", kind="link",
                           hint="Back to the worst point")  # fmt: skip
             pin = button("Pin a note", "notes:pin", kind="link", hint="Pin a note here (N)")
-            asked = tag("p", join((_axes(found), " ", back, " ", pin)))
+            controls = tag("p", join((_axes(explanation), " ", reset, " ", pin)))
         best = tag("div", "", data_piece="best")
         limit = picture.state.specification.limit_um
-        details = tag("summary", "Details") + _details(found, picture.state.lever)
+        details = tag("summary", "Details") + _details(explanation, picture.state.lever)
         details = tag("details", details, class_="ws-details", data_key="worst.details")
-        return asked + _contributions(found) + _uncertainty(found, limit) + best + details
+        return (
+            controls
+            + _contributions(explanation)
+            + _uncertainty(explanation, limit)
+            + best
+            + details
+        )
 
     def _answer(self, picture: LivePicture) -> PointExplanation:
         if self._found is None or self._found[0] is not picture:
@@ -98,9 +106,9 @@ class WorstPanel(Section):
         if action == "forget":
             return with_picked(state, None)
         if action == "lever" and value in state.amplitudes:
-            shown = self.context.picture
-            if state.picked is None and shown is not None:
-                state = with_picked(state, pick_worst(shown))
+            picture = self.context.picture
+            if state.picked is None and picture is not None:
+                state = with_picked(state, pick_worst(picture))
             return replace(state, lever="" if value == state.lever else value)
         if action == "back":
             self.context.call_soon(self._stand_back)
@@ -110,9 +118,13 @@ class WorstPanel(Section):
         picture, camera = self.context.picture, self.context.camera.remember()
         if picture is None or picture.state.picked is None or picture.is_difference:
             return
-        found = self._answer(picture)
-        parts = found.explanation.contributions
-        origins = [p.origin_mm + found.shift_mm for p in parts if p.key == picture.state.lever]
+        explanation = self._answer(picture)
+        contributions = explanation.explanation.contributions
+        origins = [
+            contribution.origin_mm + explanation.shift_mm
+            for contribution in contributions
+            if contribution.key == picture.state.lever
+        ]
         if origins:
             points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
             room, fov_deg = self.context.camera.room, float(np.rad2deg(camera.fov_rad))
@@ -120,26 +132,26 @@ class WorstPanel(Section):
             self.context.move_camera(pose)
 
 
-def _axes(found: PointExplanation) -> str:
-    return spell_axes(found.at).removeprefix("axes ")
+def _axes(explanation: PointExplanation) -> str:
+    return spell_axes(explanation.at).removeprefix("axes ")
 
 
-def _contributions(found: PointExplanation) -> Markup:
-    first, others = found.ranked[:FIRST], len(found.ranked[FIRST:])
-    left = found.length_um - sum(part.along_um for part in first)
+def _contributions(explanation: PointExplanation) -> Markup:
+    largest, n_others = explanation.ranked[:FIRST], len(explanation.ranked[FIRST:])
+    remainder_um = explanation.length_um - sum(contribution.along_um for contribution in largest)
     # their names stand in the column of errors
-    lines = [(tag("b", part.key, title=f"{parameter(part.key).name}: {signed(part.along_um)} µm"),
-              signed(part.along_um)) for part in first]  # fmt: skip
-    if others or abs(left) >= 0.05:
-        words = f"{others} more" if others else "second order"
-        lines.append((tag("span", words, class_="ws-quiet"), signed(left)))
+    lines = [(tag("b", contribution.key, title=f"{parameter(contribution.key).name}: {signed(contribution.along_um)} µm"),
+              signed(contribution.along_um)) for contribution in largest]  # fmt: skip
+    if n_others or abs(remainder_um) >= 0.05:
+        label = f"{n_others} more" if n_others else "second order"
+        lines.append((tag("span", label, class_="ws-quiet"), signed(remainder_um)))
     if not lines:
         return tag("p", "No error acts at this point.", class_="ws-quiet")
-    told = EMPTY
-    if found.is_corrected:
-        rest = number(float(np.linalg.norm(found.drawn_um)))
-        told = tag("p", f"The table leaves {rest} µm of it, as drawn.")
-    return rows(lines, "ws-rows ws-causes") + told
+    note = EMPTY
+    if explanation.is_corrected:
+        residual = number(float(np.linalg.norm(explanation.drawn_um)))
+        note = tag("p", f"The table leaves {residual} µm of it, as drawn.")
+    return rows(lines, "ws-rows ws-causes") + note
 
 
 def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
@@ -147,20 +159,22 @@ def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
 
     Shares are below zero where correlations make it smaller; all of them add up to 100 %.
     """
-    sure = found.uncertainty
-    if sure is None or not sure.errors.is_known:
-        words = [] if sure is None else sure.errors.remarks()
-        return join(tag("p", said, class_="ws-tiny") for said in words)
-    parts = sure.variance_shares(sure.response @ sure.direction)
+    uncertainty = found.uncertainty
+    if uncertainty is None or not uncertainty.errors.is_known:
+        remarks = [] if uncertainty is None else uncertainty.errors.remarks()
+        return join(tag("p", shares_text, class_="ws-tiny") for shares_text in remarks)
+    parts = uncertainty.variance_shares(uncertainty.response @ uncertainty.direction)
     named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]
     named = [(key, share) for key, share in named if share != "0 %"]
-    said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
-    kept = f"|E| ≤ {limit_um:g} µm with {number(100.0 * float(sure.keeps(limit_um)), 1)} %"
-    words = f"{kept}. U95{length_words(sure)} µm, share of its variance: {said}"
-    rest = rows(named[FIRST:]) if len(named) > FIRST else EMPTY
-    rest = rest and tag("details", tag("summary", "All shares") + rest, class_="ws-details",
+    shares_text = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
+    probability_text = (
+        f"|E| ≤ {limit_um:g} µm with {number(100.0 * float(uncertainty.keeps(limit_um)), 1)} %"
+    )
+    remarks = f"{probability_text}. U95{length_words(uncertainty)} µm, share of its variance: {shares_text}"
+    others = rows(named[FIRST:]) if len(named) > FIRST else EMPTY
+    others = others and tag("details", tag("summary", "All shares") + others, class_="ws-details",
                         data_key="worst.shares")  # fmt: skip
-    return tag("p", words, class_="ws-tiny") + rest
+    return tag("p", remarks, class_="ws-tiny") + others
 
 
 def _details(found: PointExplanation, lever: str) -> Markup:
@@ -219,16 +233,16 @@ class DistancePanel(AnalysisPanel):
         if drawn:
             buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].words()),
                                   hint="Write a note with these numbers"))  # fmt: skip
-        said = tag("p", POINTS[point], role="status") if point else EMPTY
-        return actions(*buttons) + said + tag("p", without_words(state), class_="ws-tiny")
+        status = tag("p", POINTS[point], role="status") if point else EMPTY
+        return actions(*buttons) + status + tag("p", without_words(state), class_="ws-tiny")
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action not in ("pick", "stop", "clear"):
             return super().handle(state, action, value)
-        picked = {one: text for one in POINTS if (text := state.forms.get(one))}
+        picked = {name: text for name in POINTS if (text := state.forms.get(name))}
         points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[action]
-        others = {one: text for one, text in state.forms.items() if one not in POINTS}
-        return replace(state, forms={**others, **points})
+        other_forms = {name: text for name, text in state.forms.items() if name not in POINTS}
+        return replace(state, forms={**other_forms, **points})
 
 
 class VolumePanel(Section):
@@ -238,11 +252,11 @@ class VolumePanel(Section):
     sentence = "Mean, RMS, P95 and max of the position error, and of the tilt of the tool axis"
 
     def body(self, picture: LivePicture) -> Markup:
-        found, state = picture.statistics, picture.drawn_state
+        statistics, state = picture.statistics, picture.drawn_state
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
-        sure = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
-        lines = [(name, f"{number(value, 2)}{sure.get(name, '')} µm")
-                 for name, value in zip(NAMES.values(), found.four, strict=True)]  # fmt: skip
+        intervals = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
+        lines = [(name, f"{number(value, 2)}{intervals.get(name, '')} µm")
+                 for name, value in zip(NAMES.values(), statistics.four, strict=True)]  # fmt: skip
         if not picture.is_difference:
             # the picture has it only where it is coloured
             errors = evaluate_grid(state.active_scene(), picture.grid, picture.view)
@@ -255,6 +269,6 @@ class VolumePanel(Section):
             ("volume", f"{size} mm"),
             ("loop", ", ".join((LOOP_WORDS[state.loop], *placed_words(state.view())))),
         ]
-        at = spell_axes(found.max_at_axes).removeprefix("axes ")
-        where = f"max at {at} · {spell_in_r(found.max_at_mm)} mm"
+        at = spell_axes(statistics.max_at_axes).removeprefix("axes ")
+        where = f"max at {at} · {spell_in_r(statistics.max_at_mm)} mm"
         return rows(lines) + tag("p", where, class_="ws-tiny")

@@ -35,8 +35,10 @@ PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their 
 
 def accepted_endings() -> str:
     """List the endings of files that can be given to the page."""
-    own = (".toml", ".urdf", *(end for ends in transfers.IN_BOX.values() for end in ends))
-    endings = dict.fromkeys((*own, *(end for one in formats() for end in one.endings)))
+    scene_endings = (".toml", ".urdf", *(end for ends in transfers.IN_BOX.values() for end in ends))
+    endings = dict.fromkeys(
+        (*scene_endings, *(end for format in formats() for end in format.endings))
+    )
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
 
@@ -49,12 +51,12 @@ class JobDialog(Dialog):
 
     def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
         """Make a file of what is drawn beside the session, and have the browser save it."""
-        drawn = self.context.picture
-        if drawn is None:
+        shown_picture = self.context.picture
+        if shown_picture is None:
             return
 
         def work(job: Job) -> None:
-            picture = drawn if as_drawn else without_tables(drawn)
+            picture = shown_picture if as_drawn else without_tables(shown_picture)
             content = write(picture, job)
             if not job.is_set():
                 self.context.save_file(f"{transfers.file_stem(picture)}{ending}", content)
@@ -82,11 +84,11 @@ class FilesDialog(JobDialog):
     def body(self, picture: LivePicture) -> Markup:
         services = self.context.services
         figures = {"": "as the drawing is coloured"}
-        figures |= {one: one.replace("-", " ") for one, _ in services.figures}
+        figures |= {name: name.replace("-", " ") for name, _ in services.figures}
         kinds = choice("state:set.page.figure", picture.state.page.figure, figures)
         exports = (
-            button(f"{end[1:].upper()}", "files:export", end, hint=words)
-            for end, words in services.exports
+            button(f"{end[1:].upper()}", "files:export", end, hint=hint)
+            for end, hint in services.exports
         )
         link = (
             tag("h3", "Link"),
@@ -134,9 +136,9 @@ class FilesDialog(JobDialog):
     # --- what is opened --------------------------------------------------------------------------
 
     def _open(self, value: str) -> None:
-        told = value.partition("\n")[2].partition("\n")[0].lower()
+        name = value.partition("\n")[2].partition("\n")[0].lower()
         if part := next(
-            (part for part, ends in transfers.IN_BOX.items() if told.endswith(ends)), ""
+            (part for part, ends in transfers.IN_BOX.items() if name.endswith(ends)), ""
         ):
             self.context.send(f"{part}:file", value)
             return
@@ -154,9 +156,11 @@ class FilesDialog(JobDialog):
             self.context.call_soon(partial(self.context.offer_import, name, content))
             return
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
-        whole = is_robot or scene_file.settings_of(text) != ""
+        replaces_all = is_robot or scene_file.settings_of(text) != ""
         if not job.is_set():
-            self.context.call_soon(partial(self.context.show_opened, opened, camera, whole=whole))
+            self.context.call_soon(
+                partial(self.context.show_opened, opened, camera, whole=replaces_all)
+            )
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
     def _follow(self, word: str) -> None:
@@ -167,7 +171,7 @@ class FilesDialog(JobDialog):
 
     def _save(self) -> None:
         state, camera = self.context.state, self.context.camera.remember()
-        text = self._alone_if_large(lambda one: scene_file.state_to_toml(one, camera))
+        text = self._alone_if_large(lambda state: scene_file.state_to_toml(state, camera))
         self.context.save_file(f"{transfers.safe_name(state.scene.name)}.toml", text)
         if not self.context.services.is_current(state.origin):
             self.context.notify("The file of this scene has changed", CHANGED, "stays")
@@ -192,9 +196,9 @@ class FilesDialog(JobDialog):
         edited = len(context.state.changed_keys)
         edits = f" {edited} changed error{'s' if edited > 1 else ''}," if edited else ""
         compared = " the comparison," if context.state.comparison.b is not None else ""
-        held = f"the scene {context.state.scene.title},{edits}{compared} view and camera"
-        warned = " Whoever has it can use this app." if token else ""
-        context.page.call("share", transfers.pack(link), token, f"It holds {held}.{warned}")
+        contents = f"the scene {context.state.scene.title},{edits}{compared} view and camera"
+        warning = " Whoever has it can use this app." if token else ""
+        context.page.call("share", transfers.pack(link), token, f"It holds {contents}.{warning}")
         context.client.flush()
 
     def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
@@ -218,8 +222,8 @@ class FilesDialog(JobDialog):
         client, camera = self.context.client, self.context.camera
 
         def draw(picture: LivePicture, job: Job) -> bytes:
-            seen = client.camera
-            height, width = np.clip((seen.image_height, seen.image_width), *VIEW_PX).tolist()
+            camera = client.camera
+            height, width = np.clip((camera.image_height, camera.image_width), *VIEW_PX).tolist()
             pixels: Any = client.get_render(
                 height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
             )

@@ -97,47 +97,54 @@ class ImportResult(Result):
         return (Change(self.files, self.made.scene),)
 
     def blocks(self) -> Iterator[Block]:
-        found = self.reading.found
-        units = ", ".join(found.units).replace("um", "µm").replace("urad", "µrad")
+        errors = self.reading.found
+        units = ", ".join(errors.units).replace("um", "µm").replace("urad", "µrad")
         yield f"{self.reading.format.title} from {self.files}, in {units}."
-        old = [key for key in found.keys if self.before.errors.amplitude(key)]
-        new = [key for key in found.keys if key not in old]
-        said = [f"replaces {', '.join(old)}"] if old else []
-        said += [f"adds {', '.join(new)}"] if new else []
-        yield f"It {' and '.join(said) or 'holds no errors'}."
-        yield summary_table(found)
-        for one in found.series[:MOST_CURVES]:
-            row, place = parameter(one.key), "mm" if is_linear(parameter(one.key).axis) else "°"
-            title, curves = f"{one.key} {row.name}", tuple(_curves(one))
+        replaced = [key for key in errors.keys if self.before.errors.amplitude(key)]
+        added = [key for key in errors.keys if key not in replaced]
+        effects = [f"replaces {', '.join(replaced)}"] if replaced else []
+        effects += [f"adds {', '.join(added)}"] if added else []
+        yield f"It {' and '.join(effects) or 'holds no errors'}."
+        yield summary_table(errors)
+        for series in errors.series[:MOST_CURVES]:
+            row, place = (
+                parameter(series.key),
+                "mm" if is_linear(parameter(series.key).axis) else "°",
+            )
+            title, curves = f"{series.key} {row.name}", tuple(_curves(series))
             yield Lines("lines", title, f"{row.axis} [{place}]", f"[{row.unit}]", curves)
 
     def doubts(self) -> Iterator[str]:
-        found, kept = self.reading.found, f"kept from {self.before.name}:"
-        for one in (*found.assumed, *found.notes, *self.made.notes):
-            if not one.startswith("replaced: "):
-                yield _without_options(one.replace(kept, "unchanged:"))
-        if (left := len(found.series) - MOST_CURVES) > 0:
-            yield f"{left} more curves are not drawn"
+        errors, unchanged = self.reading.found, f"kept from {self.before.name}:"
+        for note in (*errors.assumed, *errors.notes, *self.made.notes):
+            if not note.startswith("replaced: "):
+                yield _without_options(note.replace(unchanged, "unchanged:"))
+        if (n_hidden := len(errors.series) - MOST_CURVES) > 0:
+            yield f"{n_hidden} more curves are not drawn"
 
 
-def _curves(one: ErrorSeries) -> Iterator[Curve]:
-    at = np.array(one.positions)
+def _curves(series: ErrorSeries) -> Iterator[Curve]:
+    at = np.array(series.positions)
     thin = slice(None, None, max(1, len(at) // MOST_POINTS))
 
-    def curve(words: str, values: Array, way: int, style: Style) -> Curve:
-        held = np.isfinite(values)
-        return Curve(words, at[held][thin], values[held][thin], list(WAYS).index(way), style)
+    def curve(name: str, values: Array, direction: int, style: Style) -> Curve:
+        is_finite = np.isfinite(values)
+        return Curve(
+            name, at[is_finite][thin], values[is_finite][thin], list(WAYS).index(direction), style
+        )
 
-    means = [(way, mean) for way in WAYS if (mean := one.mean(way)) is not None]
-    yield from (curve(WAYS[way], mean, way, "line") for way, mean in means)
-    if len(one.runs) > len(means):
-        yield from (curve("", np.array(run.values), run.direction, "dots") for run in one.runs)
+    means = [
+        (direction, mean) for direction in WAYS if (mean := series.mean(direction)) is not None
+    ]
+    yield from (curve(WAYS[direction], mean, direction, "line") for direction, mean in means)
+    if len(series.runs) > len(means):
+        yield from (curve("", np.array(run.values), run.direction, "dots") for run in series.runs)
 
 
 def _without_options(text: str) -> str:
     """Name the controls of the page in place of the options of a command."""
-    for flag, words in OPTIONS.items():
-        text = text.replace(flag, words)
+    for flag, label in OPTIONS.items():
+        text = text.replace(flag, label)
     return text
 
 
@@ -148,8 +155,8 @@ class ImportPanel(FilesPanel):
     """Files that are read together, what they do not say, and what they bring."""
 
     def __init__(self, context: Context) -> None:
-        words = "Measured errors, or a controller's table"
-        super().__init__(context, Entry(NAME, "measure", words, f"{__name__}:Import"))
+        sentence = "Measured errors, or a controller's table"
+        super().__init__(context, Entry(NAME, "measure", sentence, f"{__name__}:Import"))
         context.offer_import = lambda name, content: self.receive(lambda: (name, content))
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
@@ -159,22 +166,22 @@ class ImportPanel(FilesPanel):
         """Leave out what the format has no choice of."""
         if not files:
             return ()
-        found = {one.name: one for one in self.options()}
-        names = {one.name: one.title for one in registry.formats()}
-        own = _recognised(files)
-        first = own.title if own is not None else "none, choose one"
-        found["format"] = replace(
-            found["format"], choices=tuple(names), words=names, unset=f"recognised: {first}"
+        options = {option.name: option for option in self.options()}
+        names = {option.name: option.title for option in registry.formats()}
+        recognised = _recognised(files)
+        first = recognised.title if recognised is not None else "none, choose one"
+        options["format"] = replace(
+            options["format"], choices=tuple(names), words=names, unset=f"recognised: {first}"
         )
         chosen = self.values(state).get("format")
-        kind = registry.find_format(chosen) if chosen in names else own
+        kind = registry.find_format(chosen) if chosen in names else recognised
         if kind is None or kind.tables is None:
-            del found["sign"]
+            del options["sign"]
         if kind is None or not kind.variants:
-            del found["variant"]
+            del options["variant"]
         else:
-            found["variant"] = replace(found["variant"], choices=kind.variants)
-        return list(found.values())
+            options["variant"] = replace(options["variant"], choices=kind.variants)
+        return list(options.values())
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         return self._ask(state, self._files, values, scenes[0])
@@ -186,8 +193,8 @@ class ImportPanel(FilesPanel):
         values: Mapping[str, str],
         scene: Scene,
     ) -> Analysis:
-        asked = read_form(Import, self._options(state, files), values, scene)
-        return replace(asked, sources=tuple(one.content for one in files))
+        analysis = read_form(Import, self._options(state, files), values, scene)
+        return replace(analysis, sources=tuple(file.content for file in files))
 
     def is_quick(self, state: AppState) -> bool:
         return True
@@ -198,13 +205,13 @@ class ImportPanel(FilesPanel):
             "Import a file", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind=kind,
             hint="Several that belong together may follow each other",
         )  # fmt: skip
-        words = EMPTY if self._files else tag("p", OFFERED)
-        return words + self.files_html() + tag("div", upload, class_="ws-actions")
+        introduction = EMPTY if self._files else tag("p", OFFERED)
+        return introduction + self.files_html() + tag("div", upload, class_="ws-actions")
 
-    def result_html(self, found: Result) -> Markup:
-        return details_html(one for one in found.blocks() if not isinstance(one, str))
+    def result_html(self, result: Result) -> Markup:
+        return details_html(block for block in result.blocks() if not isinstance(block, str))
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
+    def actions(self, result: Result, *, stale: bool) -> Markup:
         return EMPTY
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
@@ -213,31 +220,31 @@ class ImportPanel(FilesPanel):
         Alone it is kept also where it cannot be read yet: the section asks for what it does not
         say, or another file comes to it.
         """
-        own, before, problem = (
+        uploaded, present, problem = (
             UploadedFile(name, registry.open_upload(name, content)),
             self._files,
             None,
         )
-        is_applied = self._applied[-1:] == (before,)
-        held = () if is_applied else tuple(one for one in before if one.name != name)
-        state, keeps, files = self.context.state, False, before
+        is_applied = self._applied[-1:] == (present,)
+        joined = () if is_applied else tuple(file for file in present if file.name != name)
+        state, is_joined, files = self.context.state, False, present
         scene = state.active_scene()
-        for keeps in (True, False) if 0 < len(held) < MOST_FILES else (False,):
-            files = (*held, own) if keeps else (own,)
+        for is_joined in (True, False) if 0 < len(joined) < MOST_FILES else (False,):
+            files = (*joined, uploaded) if is_joined else (uploaded,)
             try:
-                values = self.values(state) if keeps else {}
+                values = self.values(state) if is_joined else {}
                 self._ask(state, files, values, scene).run(scene, ignore_progress)
                 break
             except WarpspaceError as error:
                 problem = error
         else:
-            if held and problem is not None:
+            if joined and problem is not None:
                 raise problem
-        return partial(self._show, files, keeps=keeps)
+        return partial(self._show, files, keeps=is_joined)
 
-    def _show(self, files: tuple[UploadedFile, ...], *, keeps: bool) -> None:
+    def _show(self, files: tuple[UploadedFile, ...], *, is_joined: bool) -> None:
         self._hold(files)
-        self.context.post(partial(_unfolded, keeps=keeps))
+        self.context.post(partial(_unfolded, keeps=is_joined))
 
     def problem_html(self, state: AppState) -> Markup:
         return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before
@@ -245,7 +252,7 @@ class ImportPanel(FilesPanel):
 
 def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
     try:
-        return registry.recognise([one.content for one in files])
+        return registry.recognise([file.content for file in files])
     except WarpspaceError:  # none that is known, or several
         return None
 

@@ -49,44 +49,45 @@ class RepairPanel(AnalysisPanel):
     at_once = True
 
     def options(self) -> Sequence[Option]:
-        words = {"default": None, "choices": ("all",), "words": {"all": "any error"}}
+        changes = {"default": None, "choices": ("all",), "words": {"all": "any error"}}
         return [
-            replace(one, **words) if one.name == "adjustable" else one for one in super().options()
+            replace(option, **changes) if option.name == "adjustable" else option
+            for option in super().options()
         ]
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "objective": Objective.MAX}
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked = super().ask(state, values, scenes)
+        analysis = super().ask(state, values, scenes)
         keys = tuple(key for key in state.amplitudes if state.exclusions.active(key))
-        return IncludedRepair(**vars(asked), keys=keys)
+        return IncludedRepair(**vars(analysis), keys=keys)
 
     def question(self, state: AppState) -> Question:
         return (*super().question(state), state.exclusions)  # even where an excluded one is zero
 
-    def headline(self, found: Any) -> Markup:
-        if not found.before.max_um:
+    def headline(self, result: Any) -> Markup:
+        if not result.before.max_um:
             return tag("p", "The error is zero everywhere: there is nothing to repair.")
-        if not found.adjustable:
+        if not result.adjustable:
             return tag("p", "No squareness or alignment acts in this loop; choose any error below.")
-        if not self.offered(found):
-            return tag("p", f"{', '.join(found.adjustable)}: at their best values already.")
-        smallest = "largest |E|" if found.objective is Objective.MAX else "RMS of |E|"
+        if not self.offered(result):
+            return tag("p", f"{', '.join(result.adjustable)}: at their best values already.")
+        smallest = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
         return tag("p", f"Adjustments that minimise the {smallest}.", class_="ws-quiet")
 
-    def offered(self, found: Any) -> Sequence[int]:
+    def offered(self, result: Any) -> Sequence[int]:
         """Offer the sets that gain something over the smaller ones, which come first."""
-        name, kept = f"{found.objective}_um", list[int]()
-        least: float = getattr(found.before, name)
-        for index, one in enumerate(found.adjustments):
-            if least - getattr(one, name) >= NO_GAIN_UM:
-                kept.append(index)
-                least = getattr(one, name)
-        return kept
+        name, indices = f"{result.objective}_um", list[int]()
+        least: float = getattr(result.before, name)
+        for index, adjustment in enumerate(result.adjustments):
+            if least - getattr(adjustment, name) >= NO_GAIN_UM:
+                indices.append(index)
+                least = getattr(adjustment, name)
+        return indices
 
-    def result_html(self, found: Result) -> Markup:
-        blocks = (one for one in found.blocks() if not isinstance(one, str))
+    def result_html(self, result: Result) -> Markup:
+        blocks = (block for block in result.blocks() if not isinstance(block, str))
         return details_html(blocks, "Each error alone")
 
 
@@ -96,7 +97,7 @@ class BestPanel(RepairPanel):
     refresh = Refresh.IDLE
 
     def __init__(self, context: Context) -> None:
-        super().__init__(context, next(one for one in entries() if one.name == Adjust.name))
+        super().__init__(context, next(entry for entry in entries() if entry.name == Adjust.name))
         self.name, self.title = "best", "One adjustment"
 
     def is_visible(self, state: AppState) -> bool:
@@ -117,9 +118,9 @@ class BestPanel(RepairPanel):
         question = self.question(state)
         self.keep_up(state)
         is_known = answer is not None and answer.question == question
-        words = "No adjustment helps." if is_known else "Searching …"
+        status = "No adjustment helps." if is_known else "Searching …"
         body = self.problem_html(state) or self.cards_html(question)
-        body = body or tag("p", words, class_="ws-quiet")
+        body = body or tag("p", status, class_="ws-quiet")
         body += RECORD if question == self._applied else EMPTY
         return {self.name: tag("h4", "Best single adjustment") + body}
 
@@ -150,11 +151,11 @@ class CompensatePanel(AnalysisPanel):
         if not self.is_ready(state):
             return ()
         kind = find_format(self.values(state)["formats"])
-        turns = any(not is_linear(axis) for axis in state.scene.machine.axes)
+        has_rotary = any(not is_linear(axis) for axis in state.scene.machine.axes)
         unused = {"formats", "sweep"}
         unused |= set() if kind.tables else {"resolution", "sign"}
-        unused |= set() if kind.orientation and turns else {"orientation"}
-        return [one for one in self.options() if one.name not in unused]
+        unused |= set() if kind.orientation and has_rotary else {"orientation"}
+        return [option for option in self.options() if option.name not in unused]
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {}
@@ -165,44 +166,53 @@ class CompensatePanel(AnalysisPanel):
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
         if not self.is_ready(state):
             raise OptionError("choose a controller")
-        asked: Any = super().ask(state, values, scenes)
-        counts = dict(asked.points).values() if isinstance(asked.points, tuple) else [asked.points]
-        if max(one or 0 for one in counts) > MOST_POINTS:
+        analysis: Any = super().ask(state, values, scenes)
+        counts = (
+            dict(analysis.points).values()
+            if isinstance(analysis.points, tuple)
+            else [analysis.points]
+        )
+        if max(count or 0 for count in counts) > MOST_POINTS:
             raise OptionError(f"{{points}} {max(counts)}; expected at most {MOST_POINTS} here")
-        return replace(asked, formats=(values["formats"],))
+        return replace(analysis, formats=(values["formats"],))
 
     def before_result(self, state: AppState) -> Markup:
-        chosen, words = self.values(state).get("formats", ""), {"": "Choose your control …"}
-        table = choice(f"{self.name}:set.formats", chosen, words | _writable(), label="Control")
+        chosen, placeholder = self.values(state).get("formats", ""), {"": "Choose your control …"}
+        table = choice(
+            f"{self.name}:set.formats", chosen, placeholder | _writable(), label="Control"
+        )
         if chosen:
             return table
         return table + tag("p", "A compensation table for the control, and the error that would"
                            " remain.", class_="ws-quiet")  # fmt: skip
 
-    def headline(self, found: Result) -> Markup:
+    def headline(self, result: Result) -> Markup:
         return EMPTY
 
-    def result_html(self, found: Any) -> Markup:
+    def result_html(self, result: Any) -> Markup:
         """Set before and after beside each other; what was assumed is folded away."""
-        _, table, *said = found.blocks()
+        _, table, *assumptions = result.blocks()
         drawn = [result_html([table])]
-        if _is_rounding(found):
+        if _is_rounding(result):
             drawn.append(tag("p", "What is left is the resolution of the numbers in the file, not"
                              " an error of the machine.", class_="ws-kept"))  # fmt: skip
-        if self._picture is not None and self._picture[0] is found:
+        if self._picture is not None and self._picture[0] is result:
             drawn.append(tag("img", src=self._picture[1], alt="Maps of |E| before and after",
                              width="100%"))  # fmt: skip
-        return join(drawn) + details_html(said, "Points, loop, what is assumed")
+        return join(drawn) + details_html(assumptions, "Points, loop, what is assumed")
 
-    def actions(self, found: Any, *, stale: bool) -> Markup:
+    def actions(self, result: Any, *, stale: bool) -> Markup:
         """Save the table first; then what the box shows, and maps."""
         state, hint = self.context.state, "Several files come as one ZIP; the box then shows both"
-        here, unseen = holds_for(state, found.controller), {LEFT} if _is_rounding(found) else set()
+        is_applicable, disabled_boxes = (
+            holds_for(state, result.controller),
+            {LEFT} if _is_rounding(result) else set(),
+        )
         boxes = join(
-            button(words, f"{self.name}:box", key, pressed=key == box_of(state), kind="chip",
-                   disabled=not here or key in unseen,
-                   hint="Nothing is left but rounding" if key in unseen else "")
-            for key, words in BOXES.items()
+            button(label, f"{self.name}:box", key, pressed=key == box_of(state), kind="chip",
+                   disabled=not is_applicable or key in disabled_boxes,
+                   hint="Nothing is left but rounding" if key in disabled_boxes else "")
+            for key, label in BOXES.items()
         )  # fmt: skip
         row = [button("Save table", f"{self.name}:table", kind="main", hint=hint)]
         if self.context.services.draw_compensation is not None:
@@ -212,61 +222,63 @@ class CompensatePanel(AnalysisPanel):
             ]
         row.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         row += [RECORD] if box_of(state) != MACHINE else []
-        shown = tag("div", tag("span", "The box shows", class_="ws-quiet") + boxes,
+        box_choice = tag("div", tag("span", "The box shows", class_="ws-quiet") + boxes,
                     class_="ws-actions", role="group", aria_label="The box shows")  # fmt: skip
-        return tag("div", join(row), class_="ws-actions") + shown
+        return tag("div", join(row), class_="ws-actions") + box_choice
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        found = self._answer.found if self._answer is not None else None
+        result = self._answer.found if self._answer is not None else None
         if action == "set.formats":
             self._answer = None  # a table of another control says nothing of this one
-        if not isinstance(found, Compensation) or action not in ("table", "box", "maps"):
+        if not isinstance(result, Compensation) or action not in ("table", "box", "maps"):
             return super().handle(state, action, value)
         if action == "maps":
-            self._draw(found, dark=state.shown.dark, saves=value == "save")
+            self._draw(result, dark=state.shown.dark, saves=value == "save")
             return state
         if action == "table":
-            self.context.call_soon(partial(self.context.save_file, *packed(found)))
-        if not holds_for(state, found.controller):
+            self.context.call_soon(partial(self.context.save_file, *packed(result)))
+        if not holds_for(state, result.controller):
             return state
-        left = f"{found.after_statistics.max_um:.1f} µm"
+        residual = f"{result.after_statistics.max_um:.1f} µm"
         self.context.last_decision = (
             without_table(state),
-            f"{self.title}: a table leaves at most {left}",
+            f"{self.title}: a table leaves at most {residual}",
         )
-        return with_box(state, BOTH if action == "table" else value, found.controller)
+        return with_box(state, BOTH if action == "table" else value, result.controller)
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), box_of(picture.state))
 
-    def _draw(self, found: Compensation, *, dark: bool, saves: bool) -> None:
+    def _draw(self, result: Compensation, *, dark: bool, saves: bool) -> None:
         draw = self.context.services.draw_compensation
         if draw is None:
             return
         save = partial(self.context.save_file, f"{STEM}.png")
         self._make(
-            "Drawing the maps", lambda job: draw(found, dark, not saves, job),
-            save if saves else partial(self._take_picture, found),
+            "Drawing the maps", lambda job: draw(result, dark, not saves, job),
+            save if saves else partial(self._take_picture, result),
         )  # fmt: skip
 
-    def _take_picture(self, found: Compensation, png: bytes) -> None:
-        self._picture = found, f"data:image/png;base64,{base64.b64encode(png).decode()}"
+    def _take_picture(self, result: Compensation, png: bytes) -> None:
+        self._picture = result, f"data:image/png;base64,{base64.b64encode(png).decode()}"
         self.rerender()
 
 
 def _writable() -> dict[str, str]:
-    found = sorted((one for one in formats() if one.can_write), key=lambda one: one.title)
-    return {one.name: one.title for one in found}
+    writable = sorted(
+        (format for format in formats() if format.can_write), key=lambda format: format.title
+    )
+    return {format.name: format.title for format in writable}
 
 
-def _is_rounding(found: Compensation) -> bool:
-    return found.after_statistics.max_um <= max(RESOLUTION_UM, 1000.0 * found.resolution)
+def _is_rounding(result: Compensation) -> bool:
+    return result.after_statistics.max_um <= max(RESOLUTION_UM, 1000.0 * result.resolution)
 
 
-def packed(found: Compensation) -> tuple[str, bytes]:
+def packed(result: Compensation) -> tuple[str, bytes]:
     """Give name and content of what is saved: the file of the table, or a ZIP of several."""
-    ending = found.format.endings[0]
-    files = {f"{STEM}{add or ending}": text.encode("utf-8") for add, text in found.files.items()}
+    ending = result.format.endings[0]
+    files = {f"{STEM}{add or ending}": text.encode("utf-8") for add, text in result.files.items()}
     if len(files) == 1:
         return next(iter(files.items()))
     buffer = io.BytesIO()
@@ -295,8 +307,10 @@ def box_of(state: AppState) -> str:
     if state.controller is None:
         return MACHINE
     before = state.comparison.a.state
-    beside = state.comparison.b is not None and before is not None and before.controller is None
-    return BOTH if beside else LEFT
+    is_compared = (
+        state.comparison.b is not None and before is not None and before.controller is None
+    )
+    return BOTH if is_compared else LEFT
 
 
 def holds_for(state: AppState, controller: Controller) -> bool:

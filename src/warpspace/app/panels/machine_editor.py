@@ -141,14 +141,18 @@ def _trace(picture: LivePicture) -> Markup:
     if not moved:
         return tag("p", NOTHING_MOVED, class_="ws-quiet")
     name, path = chosen_trace(picture), "state:set.rotary.chosen"
-    chosen = field("Trace", choice(path, name, {one: one for one in moved}), path)
-    motions = {one: motion_of(picture, moved[one]) for one in [*moved][:MOST_ROWS]}
+    chosen = field(
+        "Trace", choice(path, name, {trace_name: trace_name for trace_name in moved}), path
+    )
+    motions = {
+        trace_name: motion_of(picture, moved[trace_name]) for trace_name in [*moved][:MOST_ROWS]
+    }
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
-    shown = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
-    head = join(fill("<th>{} <small>{}</small></th>", *one) for one in HEADS.items())
+    motion_plots = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
+    head = join(fill("<th>{} <small>{}</small></th>", *trace_name) for trace_name in HEADS.items())
     table = tag("table", tag("tr", head) + join(starmap(_numbers, motions.items())))
     parts = tag("summary", "All traces in numbers") + tag("p", AVERAGE, class_="ws-tiny") + table
-    return chosen + shown + tag("details", parts, class_="ws-options")
+    return chosen + motion_plots + tag("details", parts, class_="ws-options")
 
 
 def _numbers(name: str, motion: AxisMotion | None) -> Markup:
@@ -167,14 +171,14 @@ def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
     """Evaluate how the axis of a trace runs, with the errors that take part."""
     if picture.compared is None or not picture.is_difference:
         return _of_state(picture.drawn_state, line)
-    one, other = (_of_state(side, line) for side in picture.compared.sides)
-    if one is None or other is None:
+    motion_a, motion_b = (_of_state(side, line) for side in picture.compared.sides)
+    if motion_a is None or motion_b is None:
         return None
     radial, axial, tilt = (
-        b.values - a.values for a, b in zip(one.motions, other.motions, strict=True)
+        b.values - a.values for a, b in zip(motion_a.motions, motion_b.motions, strict=True)
     )
-    turn = other.angle_deg, other.radius_mm
-    return assemble_motion(*turn, (radial, axial, tilt), closed=other.closed)
+    turn = motion_b.angle_deg, motion_b.radius_mm
+    return assemble_motion(*turn, (radial, axial, tilt), closed=motion_b.closed)
 
 
 def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
@@ -183,31 +187,31 @@ def _of_state(state: AppState, line: TraceLine) -> AxisMotion | None:
 
 
 def _motion(motion: AxisMotion, name: str) -> Markup:
-    plots, said = list[Markup](), list[Markup]()
+    plots, notes = list[Markup](), list[Markup]()
     for part in motion.motions:
         chart = motion_lines(part.name, motion, part)
         plots.append(block_html(replace(chart, title=part.name, note="")))
-        said.append(tag("p", f"{part.iso}: {chart.note}.", class_="ws-tiny"))
+        notes.append(tag("p", f"{part.iso}: {chart.note}.", class_="ws-tiny"))
     label = f"Error motion of {name}"
     drawn = tag("div", join(plots), class_="ws-plots", role="group", aria_label=label)
-    return join((drawn, fill(KEY), *said, tag("p", ABOUT, class_="ws-tiny")))
+    return join((drawn, fill(KEY), *notes, tag("p", ABOUT, class_="ws-tiny")))
 
 
 def _points(state: AppState, played: str) -> Markup:
     traced: list[Markup] = []
-    for index, words in leaves(state)["rotary.off"].choices.items():
+    for index, name in leaves(state)["rotary.off"].choices.items():
         on = index not in state.rotary.off
         change = f"{'+' if on else '-'}{index}"
-        traced.append(button(f"Trace {words}", "state:set.rotary.off", change, pressed=on))
+        traced.append(button(f"Trace {name}", "state:set.rotary.off", change, pressed=on))
     parts = [tag("div", join(traced), class_="ws-actions"), setting(state, "rotary.own_mm")]
     if len(state.positions) > 1:
         parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
         low, high = state.scene.machine.axes[played].travel
         high = min(high, low + 359.0)  # a full turn once
         turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
-        every, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis turns"
+        positions, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis turns"
         path = f"state:set.rotary.held.{played}"
-        parts.append(button(f"Hold {played} at every 90°", path, every, hint=hint))
+        parts.append(button(f"Hold {played} at every 90°", path, positions, hint=hint))
     summary = tag("summary", "Traced points and positions")
     return tag("details", summary + join(parts), class_="ws-options")
 
@@ -259,7 +263,7 @@ class EditorSection(Section):
         chain, tables = state.scene.machine.chain, machine_edits.tables_of(state.scene)
         typed, problem = self._refused if self._refused[1] else (str(chain), "")
         box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
-        whole = (button(*words, hint=hint) for *words, hint in WHOLE)
+        machine_buttons = (button(*arguments, hint=hint) for *arguments, hint in WHOLE)
         return join((
             field("Chain", box, name, hint=CHAIN_HINT),
             tag("p", problem, class_="ws-problem", role="alert") if problem else EMPTY,
@@ -267,7 +271,7 @@ class EditorSection(Section):
               for frame in ("w", *reversed(chain.workpiece), *chain.tool, "S", "t")),
             _bodies(tables["mesh"]),
             *(tag("p", note, class_="ws-tiny") for note in state.scene.notes),
-            tag("div", join(whole), class_="ws-actions"),
+            tag("div", join(machine_buttons), class_="ws-actions"),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -302,22 +306,24 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
         side, other = "workpiece", "tool"
         if name in machine.chain.tool:
             side, other = other, side
-        way = "moves along" if axis.is_linear else "turns about"
+        motion = "moves along" if axis.is_linear else "turns about"
         sense = "" if axis.direction == 1 else " against its name"
-        about = f"{way} {'xyz'[axis.index]}{sense}, carries the {side}"
-        words = {
+        about = f"{motion} {'xyz'[axis.index]}{sense}, carries the {side}"
+        labels = {
             "left": "Nearer to the workpiece",
             "right": "Nearer to the tool",
             "side": f"Carry the {other}",
             "turn": "Reverse direction",
             "remove": f"Remove {name}",
         }
-        found = [button(said, "editor:do", f"{do} {name}") for do, said in words.items()]
+        buttons = [
+            button(text, "editor:do", f"{command} {name}") for command, text in labels.items()
+        ]
         if axis.is_linear:
             hint, pressed = "A gantry: two guides, each with an error", gantry is not None
             guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)
-            found.insert(-1, guides)
-        lines += [*_guides(state, gantry), tag("div", join(found), class_="ws-actions")]
+            buttons.insert(-1, guides)
+        lines += [*_guides(state, gantry), tag("div", join(buttons), class_="ws-actions")]
     summary = fill("<summary><b>{}</b> {}</summary>", name, about)
     return tag("details", summary + join(lines), class_="ws-frame", data_key=f"frame-{name}")
 
@@ -329,8 +335,8 @@ def _boxes(
     about = what.partition(" ")[2]
     boxes: list[Markup] = []
     for index, (value, letter) in enumerate(zip(values, letters, strict=True)):
-        name, words = f"editor:set.{what} {index}", f"{label} of {about}, {letter} in {unit}"
-        box = text_box(name, spell_typed(value), label=words, inputmode="decimal")
+        name, description = f"editor:set.{what} {index}", f"{label} of {about}, {letter} in {unit}"
+        box = text_box(name, spell_typed(value), label=description, inputmode="decimal")
         boxes.append(fill('<label for="{}">{}</label>{}', ident(name), letter, box))
     head = fill("<span>{} <small>{}</small></span>", label, unit)
     return tag("div", head + join(boxes), class_="ws-numbers-line")
@@ -340,25 +346,25 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
     if gantry is None:
         return []
     name, errors = gantry.axis, machine_edits.guide_errors(state, gantry)
-    words = (
+    note = (
         f"{gantry.positioning_key} is the mean of the guides, {gantry.rotation_key} follows from"
         " their difference."
     )
     lines: list[Markup] = []
     if errors is None:
-        words += " Their curves differ: set both errors in the column at the left."
+        note += " Their curves differ: set both errors in the column at the left."
     else:
         values = [round(value, 9) for value in errors]
         lines.append(_boxes(f"guide {name}", "Each off by", MICROMETRE, values, "12"))
     hint = "Click for the other direction"
     across = button(f"Apart along {gantry.across}", "editor:do", f"across {name}", kind="link",
                     hint=hint)  # fmt: skip
-    return [*lines, across, tag("p", words, class_="ws-tiny")]
+    return [*lines, across, tag("p", note, class_="ws-tiny")]
 
 
-def _bodies(own: dict[str, BodySource]) -> Markup:
+def _bodies(bodies: dict[str, BodySource]) -> Markup:
     lines: list[Markup] = []
-    for frame, source in own.items():
+    for frame, source in bodies.items():
         remove = button("Remove", "editor:do", f"mesh {frame}", kind="link",
                         aria_label=f"Remove the body of {frame}")  # fmt: skip
         lines.append(tag("p", join((tag("b", frame), " ", _source(source), " ", remove))))
@@ -371,12 +377,12 @@ def _bodies(own: dict[str, BodySource]) -> Markup:
 def _source(source: BodySource) -> str:
     """Say where a body comes from; of a file its name alone, never its folder."""
     file = f"{source.file} · {source.unit or 'unit of its format'}"
-    words = [f"shape {source.shape}" if source.shape else file]
+    parts = [f"shape {source.shape}" if source.shape else file]
     placed = {"offset {} mm": source.offset_mm, "turned {} °": source.rotation_deg}
-    for said, values in placed.items():
+    for template, values in placed.items():
         if any(values):
-            words.append(said.format(", ".join(map(spell_typed, values))))
-    return " · ".join(words)
+            parts.append(template.format(", ".join(map(spell_typed, values))))
+    return " · ".join(parts)
 
 
 # --- The machines to start from: a small picture, a title and a chain each ------------------------
@@ -391,8 +397,8 @@ class MachinesDialog(Dialog):
         present = picture.state.scene.machine.name
         return tag("div", join(
             tag("button", join((
-                fill('<img src="{}" alt="" width="150">', found)
-                if (found := small_picture(name)) else tag("i", "no picture"),
+                fill('<img src="{}" alt="" width="150">', image)
+                if (image := small_picture(name)) else tag("i", "no picture"),
                 tag("b", scene.machine.title), tag("small", str(scene.machine.chain)),
             )), type="button", data_do="machines:choose", data_value=name,
                 aria_current="true" if name == present else None)
@@ -403,9 +409,9 @@ class MachinesDialog(Dialog):
         scene = machine_edits.library().get(value)
         if action != "choose" or scene is None:
             return state
-        found = machine_edits.with_library_scene(state, scene)
-        self.context.call_soon(lambda: self.context.scenes.add(found.origin) and None)
-        return self.closed(replace(found, page=state.page))
+        opened = machine_edits.with_library_scene(state, scene)
+        self.context.call_soon(lambda: self.context.scenes.add(opened.origin) and None)
+        return self.closed(replace(opened, page=state.page))
 
 
 @cache

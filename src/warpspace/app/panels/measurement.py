@@ -90,32 +90,32 @@ class FilesPanel(AnalysisPanel):
     def files_html(self) -> Markup:
         """List the files, and say why the last one is not among them."""
         lines = [
-            (tag("span", one.name) + tag("small", f" {one.words}"),
-             button("✕", f"{self.name}:remove", at, kind="link", aria_label=f"Remove {one.name}"))
-            for at, one in enumerate(self._files)
+            (tag("span", file.name) + tag("small", f" {file.words}"),
+             button("✕", f"{self.name}:remove", index, kind="link", aria_label=f"Remove {file.name}"))
+            for index, file in enumerate(self._files)
         ]  # fmt: skip
         problem = tag("p", self._trouble, class_="ws-problem", role="alert")
-        found = rows(lines) if lines else EMPTY
-        return join((problem if self._trouble else EMPTY, found, self._uploads.html()))
+        table = rows(lines) if lines else EMPTY
+        return join((problem if self._trouble else EMPTY, table, self._uploads.html()))
 
-    def upload_html(self, words: str) -> Markup:
+    def upload_html(self, label: str) -> Markup:
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
-        upload = upload_button(words, self.name, MOST_BYTES, ".csv", hint=hint)
+        upload = upload_button(label, self.name, MOST_BYTES, ".csv", hint=hint)
         return tag("div", upload, class_="ws-actions")
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
         """Parse a file beside the session, one after the other; errors stand above the files."""
 
         def work(job: Job) -> None:
-            take_in = self.parse(*read())
+            accept = self.parse(*read())
             if not job.is_set():
-                self.context.call_soon(partial(self._take_in, take_in))
+                self.context.call_soon(partial(self._take_in, accept))
 
         self._uploads.queue("Reading", work)
 
-    def _take_in(self, take_in: Callable[[], None]) -> None:
+    def _take_in(self, accept: Callable[[], None]) -> None:
         self._trouble = ""
-        take_in()
+        accept()
         self.rerender()
 
     def _refuse(self, error: Exception) -> None:
@@ -125,8 +125,8 @@ class FilesPanel(AnalysisPanel):
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "file":
             self.receive(partial(read_upload, value, self.most_bytes, self.what))
-        elif action == "remove" and (at := index_of(value, len(self._files))) is not None:
-            self._files = (*self._files[:at], *self._files[at + 1 :])
+        elif action == "remove" and (index := index_of(value, len(self._files))) is not None:
+            self._files = (*self._files[:index], *self._files[index + 1 :])
             self.context.call_soon(self.rerender)
         else:
             if action == "cancel":
@@ -145,8 +145,8 @@ class TestsPanel(FilesPanel):
     at_once = True
 
     def __init__(self, context: Context) -> None:
-        words = "A test by its standard, on the model as it would be on the machine"
-        super().__init__(context, Entry(TEST, "measure", words))
+        sentence = "A test by its standard, on the model as it would be on the machine"
+        super().__init__(context, Entry(TEST, "measure", sentence))
         self.title = "Standard tests"
 
     @property
@@ -163,28 +163,28 @@ class TestsPanel(FilesPanel):
         return (self.question(picture.drawn_state), picture.is_difference)
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        plan_test(asked, scenes[0])
-        for one in self._files:
-            table = parse_test(one.content, asked.data_columns(scenes[0]), one.name)
-            asked = replace(asked, data=table)
-        return asked
+        analysis: Any = super().ask(state, values, scenes)
+        plan_test(analysis, scenes[0])
+        for file in self._files:
+            table = parse_test(file.content, analysis.data_columns(scenes[0]), file.name)
+            analysis = replace(analysis, data=table)
+        return analysis
 
     def body(self, picture: LivePicture) -> Markup:
         state, kind = picture.drawn_state, chosen_test(picture.drawn_state)
         tests = [find_test(name) for name in bench_names()]
         names = {"": "Choose a test …"} | {
-            one.name: f"{one.title} ({one.standard})" for one in tests
+            test.name: f"{test.title} ({test.standard})" for test in tests
         }
-        chosen = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
+        chooser = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
         if kind is None:
-            return chosen
-        told = tag("p", "A difference of two machines cannot be tested: show A or B.",
+            return chooser
+        no_difference = tag("p", "A difference of two machines cannot be tested: show A or B.",
                    class_="ws-problem", role="alert")  # fmt: skip
         columns = ",".join(column.name for column in kind.columns)
-        about = join(tag("p", one) for one in (kind.words, f"Columns of a file: {columns}"))
+        about = join(tag("p", test) for test in (kind.words, f"Columns of a file: {columns}"))
         return join((
-            chosen, told if picture.is_difference else self._body(state), self.files_html(),
+            chooser, no_difference if picture.is_difference else self._body(state), self.files_html(),
             EMPTY if self._files else self.upload_html("Measured readings …"),
             switch("test:path", "Path in the box", on=state.forms.get("test.path") != "0",
                    hint="Nominal in grey, actual in colour, exaggerated as the box is"),
@@ -192,20 +192,20 @@ class TestsPanel(FilesPanel):
                 data_key="test.procedure"),
         ))  # fmt: skip
 
-    def headline(self, found: Result) -> Markup:
-        assert isinstance(found, BenchResult)  # noqa: S101 - of a test
-        rms = found.rms_difference
-        apart = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
-        return apart + tag("p", found.model.plan.place, class_="ws-tiny")
+    def headline(self, result: Result) -> Markup:
+        assert isinstance(result, BenchResult)  # noqa: S101 - of a test
+        rms = result.rms_difference
+        difference = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
+        return difference + tag("p", result.model.plan.place, class_="ws-tiny")
 
-    def result_html(self, found: Result) -> Markup:
-        return join(map(block_html, (*found.blocks_of(Lines), *found.blocks_of(Table))))
+    def result_html(self, result: Result) -> Markup:
+        return join(map(block_html, (*result.blocks_of(Lines), *result.blocks_of(Table))))
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "choose" and value in ("", *bench_names()):
             self._answer, self._files, self._trouble = None, (), ""
-            kept = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
-            state = replace(state, forms=kept | ({TEST: value} if value else {}))
+            other_forms = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
+            state = replace(state, forms=other_forms | ({TEST: value} if value else {}))
             return edits.with_sight(state, inside=bool(value))
         if action == "path":
             return with_form(state, "test.path", value)
@@ -233,31 +233,34 @@ class CalibrateTexts(Calibrate):
     files: tuple[UploadedFile, ...] = ()
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
-        sets = [
-            parse_readings(one.content, one.name, scene, one.kind, self.frame) for one in self.files
+        reading_sets = [
+            parse_readings(file.content, file.name, scene, file.kind, self.frame)
+            for file in self.files
         ]
-        return self.find(scene, sets, (), lambda: watch(0.0))
+        return self.find(scene, reading_sets, (), lambda: watch(0.0))
 
 
 def take_file(
-    scene: Scene, text: str, name: str, kind: str | None, others: Sequence[UploadedFile]
+    scene: Scene, text: str, name: str, kind: str | None, present: Sequence[UploadedFile]
 ) -> UploadedFile:
     """Take in the text of a file beside those that are there."""
-    if len(others) >= MOST_FILES:
+    if len(present) >= MOST_FILES:
         raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
-    known = {one.name for one in others}
+    present_names = {candidate.name for candidate in present}
     numbered = (f"{name} {count}" for count in range(2, MOST_FILES + 2))
-    unlike = next(one for one in (name, *numbered) if one not in known)
+    unique_name = next(
+        candidate for candidate in (name, *numbered) if candidate not in present_names
+    )
     lines = text.count("\n")
     if kind is None or kind in KINDS:
-        lines = len(parse_table(text, unlike))
-    if lines > MOST_READINGS - sum(one.count for one in others):
+        lines = len(parse_table(text, unique_name))
+    if lines > MOST_READINGS - sum(candidate.count for candidate in present):
         raise OptionError(
             f"{name} has {lines:,} readings; expected at most {MOST_READINGS:,} in all files"
         )
-    readings = parse_readings(text, unlike, scene, kind)
-    words = f"{_kind_words(readings.kind)}, {len(readings)}"
-    return UploadedFile(unlike, text, words, kind, len(readings))
+    readings = parse_readings(text, unique_name, scene, kind)
+    description = f"{_kind_words(readings.kind)}, {len(readings)}"
+    return UploadedFile(unique_name, text, description, kind, len(readings))
 
 
 class CalibratePanel(FilesPanel):
@@ -269,23 +272,25 @@ class CalibratePanel(FilesPanel):
         self._drawn: Nodes | None = None
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name != "kinds"]  # each file has its own
+        return [
+            option for option in super().options() if option.name != "kinds"
+        ]  # each file has its own
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked = read_form(CalibrateTexts, self.options(), values, scenes[0])
-        return replace(asked, files=self._files)
+        analysis = read_form(CalibrateTexts, self.options(), values, scenes[0])
+        return replace(analysis, files=self._files)
 
     def before_result(self, state: AppState) -> Markup:
-        words = "CSV files of readings give the errors of this machine."
+        introduction = "CSV files of readings give the errors of this machine."
         bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
         kinds = {"": "recognised from its columns"}
         kinds |= {name: _kind_words(name) for name in (*KINDS, *test_kinds())}
         name, _, options = self._kind_of_next.partition(":")
         return join((
-            self.files_html(), EMPTY if self._files else tag("p", words, class_="ws-quiet"),
+            self.files_html(), EMPTY if self._files else tag("p", introduction, class_="ws-quiet"),
             self.upload_html("Add readings …"),
             choice("calibrate:bundled", "", bundled, label="Bundled readings"),
             labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
@@ -294,31 +299,33 @@ class CalibratePanel(FilesPanel):
                      placeholder="plane=XZ:radius=150") if name in test_kinds() else EMPTY,
         ))  # fmt: skip
 
-    def headline(self, found: Result) -> Markup:
-        assert isinstance(found, Calibration)  # noqa: S101 - of this analysis
-        before, after = UM_PER_MM * found.rms_before_mm, UM_PER_MM * found.rms_after_mm
-        count = sum(len(one.readings) for one in found.fitted)
+    def headline(self, result: Result) -> Markup:
+        assert isinstance(result, Calibration)  # noqa: S101 - of this analysis
+        before, after = UM_PER_MM * result.rms_before_mm, UM_PER_MM * result.rms_after_mm
+        count = sum(len(group.readings) for group in result.fitted)
         parts = [tag("p", join((f"RMS of {count} residuals: {number(before)} → ",
                                 tag("b", f"{number(after)} µm"))))]  # fmt: skip
-        for told, words in DOUBTS:
-            keys = [one.key for one in found.parameters if one.told == told]
+        for determination, title in DOUBTS:
+            keys = [group.key for group in result.parameters if group.told == determination]
             if keys:
-                more = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
+                omitted = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
                 names = ", ".join(keys[:MOST_NAMED])
-                parts.append(tag("p", f"{words}: {names}{more}", class_="ws-quiet"))
-        notes = (note.replace("--", "") for note in found.notes[:MOST_NAMED])
+                parts.append(tag("p", f"{title}: {names}{omitted}", class_="ws-quiet"))
+        notes = (note.replace("--", "") for note in result.notes[:MOST_NAMED])
         return join((*parts, *(tag("p", note, class_="ws-doubt") for note in notes)))
 
-    def result_html(self, found: Result) -> Markup:
-        blocks = list(found.blocks())
-        shown = [next(one for one in blocks if isinstance(one, Lines))]
-        shown += [one for one in blocks if isinstance(one, Table) and len(one.columns) == 4]
+    def result_html(self, result: Result) -> Markup:
+        blocks = list(result.blocks())
+        visible = [next(block for block in blocks if isinstance(block, Lines))]
+        visible += [
+            block for block in blocks if isinstance(block, Table) and len(block.columns) == 4
+        ]
         arrows = labelled("Arrows in the box", choice("calibrate:arrows", self._arrows, ARROWS),
                           "calibrate:arrows",
                           hint="Observed − predicted at each reading, exaggerated")  # fmt: skip
-        words = tag("p", self._arrow_words(), class_="ws-tiny")
-        rest = details_html(one for one in blocks if one not in shown)
-        return join((arrows, words, *map(block_html, shown), rest))
+        status = tag("p", self._arrow_words(), class_="ws-tiny")
+        folded = details_html(block for block in blocks if block not in visible)
+        return join((arrows, status, *map(block_html, visible), folded))
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "kind":
@@ -344,28 +351,28 @@ class CalibratePanel(FilesPanel):
     # --- arrows ----------------------------------------------------------------------------------
 
     def _arrow_words(self) -> str:
-        picture, found, words = self.context.picture, None, ""
+        picture, calibration, text = self.context.picture, None, ""
         shapes: Shapes = {}
         if self._answer and self.question(self.context.state) in (self._answer[0], self._applied):
-            found = self._answer[1]
-        if self._arrows and picture is not None and isinstance(found, Calibration):
-            words, before = TURNED, self._arrows == "before"
-            if all(axis.is_linear for axis in found.scene.machine.branch("workpiece")):
-                feet, vectors = arrows_of(found, before=before)
+            calibration = self._answer[1]
+        if self._arrows and picture is not None and isinstance(calibration, Calibration):
+            text, before = TURNED, self._arrows == "before"
+            if all(axis.is_linear for axis in calibration.scene.machine.branch("workpiece")):
+                feet, vectors = arrows_of(calibration, before=before)
                 shapes, factor = residuals(feet, vectors, picture.size_mm, before=before)
-                words = f"Residuals {self._arrows}, drawn × {factor:g}"
-                words = words if factor else "No arrows: none of these readings is a vector."
+                text = f"Residuals {self._arrows}, drawn × {factor:g}"
+                text = text if factor else "No arrows: none of these readings is a vector."
         if shapes or self._drawn is not None:
             self._drawn = self._drawn or Nodes(self.context.client.scene)
             self._drawn.draw(shapes)
-        return words
+        return text
 
 
-def arrows_of(found: Calibration, *, before: bool) -> tuple[Array, Array]:
+def arrows_of(calibration: Calibration, *, before: bool) -> tuple[Array, Array]:
     """Give foot and residual of each reading that is a vector, [n, 3] mm and [n, 3] mm."""
     feet: list[Array] = [np.zeros((0, 3))]
     vectors: list[Array] = [np.zeros((0, 3))]
-    for group in found.fitted:
+    for group in calibration.fitted:
         lines = group.before_mm if before else group.after_mm
         if lines.shape[1] == 3:
             feet.append(group.readings.nominal_mm)

@@ -57,11 +57,13 @@ class NotesPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state, bar = picture.state, EMPTY
-        if again := self._shown_again(state):
-            words, own, *_ = again
-            back = button("Back", "notes:back", kind="chip", hint="Back to where you were before")
-            changed = tag("span", "", class_="ws-changed", data_piece=f"note.{own}.bar")
-            bar = tag("p", join((words, back, changed)), role="status", class_="ws-reopened")
+        if reopened_view := self._shown_again(state):
+            title, note_id, *_ = reopened_view
+            back_button = button(
+                "Back", "notes:back", kind="chip", hint="Back to where you were before"
+            )
+            changed = tag("span", "", class_="ws-changed", data_piece=f"note.{note_id}.bar")
+            bar = tag("p", join((title, back_button, changed)), role="status", class_="ws-reopened")
         return {"notes": _panel(state) if state.page.notes else EMPTY, "reopened": bar}
 
     def _shown_again(self, state: AppState) -> tuple[str, str, AppState, CameraMemory] | None:
@@ -73,12 +75,12 @@ class NotesPanel(Panel):
     # --- events ----------------------------------------------------------------------------------
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        do, _, own = action.partition(".")
-        match do, next((one for one in state.review if one.id == own), None):
+        command, _, note_id = action.partition(".")
+        match command, next((one for one in state.review if one.id == note_id), None):
             case "open" | "close", None:
-                return _opened(state, LIST if do == "open" else "")
+                return _opened(state, LIST if command == "open" else "")
             case "pin" | "decide", None:
-                return self._begun(state, value, decided=do == "decide")
+                return self._begun(state, value, decided=command == "decide")
             case "keep", edited:
                 return self._kept(state, edited)
             case "back", None if self._again:
@@ -93,13 +95,16 @@ class NotesPanel(Panel):
             case _, None:
                 return state
             case _, note:
-                return _about(state, note, do, value)
+                return _about(state, note, command, value)
 
-    def _begun(self, state: AppState, text: str, *, decided: bool) -> AppState:
+    def _begun(self, state: AppState, text: str, *, is_decision: bool) -> AppState:
         """Open the form; for a decision filled in with what has just been applied."""
-        self._decided, words = (self.context.last_decision if decided else None) or (None, "")
-        if words:
-            return _opened(state, NEW, "decision", "whole", f"{words}\nReason: ")
+        self._decided, description = (self.context.last_decision if is_decision else None) or (
+            None,
+            "",
+        )
+        if description:
+            return _opened(state, NEW, "decision", "whole", f"{description}\nReason: ")
         # what somebody has measured, say, is about the whole
         return _opened(state, NEW, place="whole" if text else "point", text=text)
 
@@ -133,15 +138,15 @@ class NotesPanel(Panel):
     def _reopened(self, state: AppState, note: Note) -> AppState:
         if not note.view:
             return with_picked(state, Picked.of_note(note))
-        found, camera = reopened(state, note, self.context.scenes.fixed)
-        here = "", "", state, self.context.camera.remember()
-        *_, before, at = self._shown_again(state) or here
+        reopened_state, camera = reopened(state, note, self.context.scenes.fixed)
+        present = "", "", state, self.context.camera.remember()
+        *_, before, at = self._shown_again(state) or present
         number = state.review.index(note) + 1
-        words = f"{note.kind.capitalize()} {number} as it was on {note.date:%d %b %Y} "
-        self._again = words, note.id, before, at
+        title = f"{note.kind.capitalize()} {number} as it was on {note.date:%d %b %Y} "
+        self._again = title, note.id, before, at
         if camera is not None:
             self.context.move_camera(camera)
-        return found
+        return reopened_state
 
 
 # --- What is done with a note ---------------------------------------------------------------------
@@ -158,11 +163,13 @@ def _author(state: AppState) -> str:
     return one_line(clean(state.page.author))[:MOST_AUTHOR]
 
 
-def _about(state: AppState, note: Note, do: str, value: str) -> AppState:
-    heads, changed = (note, *note.versions), note
-    match do:
+def _about(state: AppState, note: Note, command: str, value: str) -> AppState:
+    versions, changed = (note, *note.versions), note
+    match command:
         case "delete":
-            return replace(state, review=tuple(one for one in state.review if one is not note))
+            return replace(
+                state, review=tuple(other for other in state.review if other is not note)
+            )
         case "edit":
             return _opened(state, note.id, note.kind, text=note.text)
         case "take-back":
@@ -171,9 +178,11 @@ def _about(state: AppState, note: Note, do: str, value: str) -> AppState:
             return _in_order(state, note, value)
         case "status":
             changed = note.edited(status="done" if note.status == "open" else "open")
-        case "choose" if (index := index_of(value, len(heads))) is not None:
-            known = note.edited().replaces
-            changed = replace(heads[index], replaces=known, versions=(), replies=note.replies)
+        case "choose" if (index := index_of(value, len(versions))) is not None:
+            replaced_ids = note.edited().replaces
+            changed = replace(
+                versions[index], replaces=replaced_ids, versions=(), replies=note.replies
+            )
         case "reply" if text := clean(value):
             changed = note.answered(Reply(text[:MAX_NOTE_TEXT], _author(state)))
         case _:
@@ -181,50 +190,50 @@ def _about(state: AppState, note: Note, do: str, value: str) -> AppState:
     return replace(state, review=with_note(state.review, changed))
 
 
-def _in_order(state: AppState, note: Note, way: str) -> AppState:
+def _in_order(state: AppState, note: Note, move: str) -> AppState:
     """Move a note "up" or "down" in the story, "add" it at the end, or take it "out"."""
     order = story(state.review)
-    if any(one.versions for one in (note, *order)):
+    if any(other.versions for other in (note, *order)):
         return state.noted("choose first which of the versions side by side is to stay")
     place = order.index(note) if note.step else len(order)
-    order = [one for one in order if one is not note]
-    if way != "out":
-        order.insert(max(place + {"up": -1, "down": 1}.get(way, 0), 0), note)
-    steps = {one.id: number for number, one in enumerate(order, 1)}
-    for one in state.review:
-        if one.step != (step := steps.get(one.id, 0)):
-            state = replace(state, review=with_note(state.review, one.edited(step=step)))
+    order = [other for other in order if other is not note]
+    if move != "out":
+        order.insert(max(place + {"up": -1, "down": 1}.get(move, 0), 0), note)
+    steps = {other.id: number for number, other in enumerate(order, 1)}
+    for other in state.review:
+        if other.step != (step := steps.get(other.id, 0)):
+            state = replace(state, review=with_note(state.review, other.edited(step=step)))
     return state
 
 
 def _taken_back(state: AppState, note: Note) -> AppState:
     """Set what a decision changed back, where it is still as decided."""
-    stayed, known = list[str](), leaves(state)
+    unchanged, paths = list[str](), leaves(state)
     for key, (old, new) in note.change.items():
         name = key.removeprefix(TOLERANCES)
         path = AMPLITUDES + key if name == key else key
         now = stored(state, path)
-        if path not in known:
-            stayed.append(f"{name} is not there any more")
+        if path not in paths:
+            unchanged.append(f"{name} is not there any more")
         elif math.isclose(now, new, abs_tol=SAME):
-            state = set_leaf(state, known[path], repr(old))
+            state = set_leaf(state, paths[path], repr(old))
         else:
-            stayed.append(f"{name} is {spell_short(now)} now, not {spell_short(new)}: it stays")
-    if len(stayed) < len(note.change):
+            unchanged.append(f"{name} is {spell_short(now)} now, not {spell_short(new)}: it stays")
+    if len(unchanged) < len(note.change):
         note = note.edited(status="open")
         if len(note.replies) < MAX_REPLIES:
-            words = "; ".join(("Taken back", *stayed))[:MAX_NOTE_TEXT]
-            note = note.answered(Reply(words, _author(state)))
-    return replace(state, review=with_note(state.review, note)).noted(*stayed)
+            reply = "; ".join(("Taken back", *unchanged))[:MAX_NOTE_TEXT]
+            note = note.answered(Reply(reply, _author(state)))
+    return replace(state, review=with_note(state.review, note)).noted(*unchanged)
 
 
 def _changed(before: AppState, after: AppState) -> dict[str, Pair]:
-    found = {
+    pairs = {
         path.removeprefix(AMPLITUDES): (stored(before, path) or 0.0, stored(after, path))
         for path in leaves(after)
         if path.startswith((AMPLITUDES, TOLERANCES))
     }
-    return {key: pair for key, pair in found.items() if pair[0] != pair[1]}
+    return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
 # --- The list -------------------------------------------------------------------------------------
@@ -255,9 +264,9 @@ def _form(state: AppState, edited: str) -> Markup:
     )), class_="ws-card", data_key=f"note-{edited or NEW}")  # fmt: skip
 
 
-def _said(one: Note | Reply) -> Markup:
-    lines = (tag("p", linked(line)) for line in one.text.splitlines() if line.strip())
-    by = f"{one.author or 'somebody'}, {one.date:%d %b %Y}"
+def _said(message: Note | Reply) -> Markup:
+    lines = (tag("p", linked(line)) for line in message.text.splitlines() if line.strip())
+    by = f"{message.author or 'somebody'}, {message.date:%d %b %Y}"
     return join((*lines, tag("small", by, class_="ws-quiet")))
 
 
@@ -265,15 +274,15 @@ def _entry(number: int, note: Note, steps: Sequence[Note]) -> Markup:
     facts, texts = [spell_place(note), spell_numbers(note), spell_change(note)], [_said(note)]
     if note.versions:
         texts = [tag("p", "Edited by several: which is to stay?", class_="ws-stale")]
-        texts += [_said(one) + actions(button("Keep this one", f"notes:choose.{note.id}", index))
-                  for index, one in enumerate((note, *note.versions))]  # fmt: skip
+        texts += [_said(version) + actions(button("Keep this one", f"notes:choose.{note.id}", index))
+                  for index, version in enumerate((note, *note.versions))]  # fmt: skip
     reply = f"notes:set.reply.{note.id}"
     place = f" · step {steps.index(note) + 1}" if note.step else ""
     return tag("article", join((
         tag("h3", f"{number} · {note.kind}{place}"), *texts,
         tag("p", " · ".join(filter(None, facts)), class_="ws-tiny"),
         tag("p", "", class_="ws-changed", data_piece=f"note.{note.id}"),
-        *(tag("blockquote", _said(one)) for one in note.replies),
+        *(tag("blockquote", _said(version)) for version in note.replies),
         text_box(reply, "", label=f"Reply to note {number}", placeholder="Reply",
                  data_enter=f"notes:reply.{note.id}", maxlength=MAX_NOTE_TEXT),
         _buttons(note, steps),
@@ -321,12 +330,12 @@ class NoteNumbersPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         review, scene = picture.state.review, picture.state.resulting_scene()
-        said = [*map(said_stale, review, note_numbers(scene, review))]
-        stale = [str(number) for number, words in enumerate(said, 1) if words]
+        remarks = [*map(said_stale, review, note_numbers(scene, review))]
+        stale = [str(number) for number, words in enumerate(remarks, 1) if words]
         self.context.page.call("room.show", {"stale": stale})
         return {
             f"note.{note.id}{place}": fill("{}", words)
-            for note, words in zip(review, said, strict=True)
+            for note, words in zip(review, remarks, strict=True)
             for place in ("", ".bar")
         }
 
@@ -370,14 +379,17 @@ class StoryPanel(Panel):
     def _tell(self, now: AppState, notes: Sequence[Note], number: int) -> None:
         context, note, camera, problem = self.context, notes[number], None, ""
         # the page stays the same thing, so that little is written anew
-        found, before = now, context.story_state or replace(now, page=replace(now.page, window=""))
+        story_state, before = (
+            now,
+            context.story_state or replace(now, page=replace(now.page, window="")),
+        )
         try:
             if note.view:
-                found, camera = reopened(now, note, context.scenes.fixed)
+                story_state, camera = reopened(now, note, context.scenes.fixed)
         except WarpspaceError as error:
-            found, problem = before, str(error)
-        context.notes += found.notes
-        context.story_state = replace(found.without_notes(), page=before.page)
+            story_state, problem = before, str(error)
+        context.notes += story_state.notes
+        context.story_state = replace(story_state.without_notes(), page=before.page)
         self._number = number
         self._words = step_words(now.resulting_scene(), notes, number, problem) + actions(
             button("←", "story:back", hint="Back (←)", aria_label="Back", disabled=number == 0),

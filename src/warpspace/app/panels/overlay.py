@@ -42,14 +42,14 @@ class HeadPanel(Panel):
     refresh = Refresh.IMMEDIATE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        words, place = subject_words(picture), place_words(picture)
+        subjects, place = subject_words(picture), place_words(picture)
         head = fill(
             '<div data-piece="reopened"></div><h1>{numbers}</h1>'
             '<div>{place}<span data-piece="head.kept"></span>'
             '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
             numbers=numbers_words(picture), place=place,
-            words=(tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY)
+            words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
             + part_html(picture),
         )  # fmt: skip
         return {"head": head}
@@ -65,16 +65,16 @@ class LegendPanel(Panel):
         return (picture.scale, id(picture))
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        kept = EMPTY
+        limit_menu = EMPTY
         if not picture.is_difference:
-            (words, is_kept), limit = kept_words(picture), picture.state.specification.limit_um
+            (share, is_pass), limit = kept_words(picture), picture.state.specification.limit_um
             box = text_box("state:set.specification.limit_um", f"{limit:g}", size="short",
                            label="Limit", id="ws-limit")  # fmt: skip
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
-            kept = menu(words, body, key="limit", hint="Change the limit",
-                        kind="ws-kept" if is_kept else "ws-missed")  # fmt: skip
-            kept = Markup(" · ") + kept if place_words(picture) else kept
-        return {"head.kept": kept, "legend": legend_html(picture)}
+            limit_menu = menu(share, body, key="limit", hint="Change the limit",
+                        kind="ws-kept" if is_pass else "ws-missed")  # fmt: skip
+            limit_menu = Markup(" · ") + limit_menu if place_words(picture) else limit_menu
+        return {"head.kept": limit_menu, "legend": legend_html(picture)}
 
 
 class OrderPanel(Panel):
@@ -87,10 +87,14 @@ class OrderPanel(Panel):
     refresh = Refresh.IDLE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        words, left = [*order_conditions(picture)], picture.state.left_behind
-        words += [f"with its own errors; those of “{left}” are left behind"] if left else []
+        conditions, left_behind = [*order_conditions(picture)], picture.state.left_behind
+        conditions += (
+            [f"with its own errors; those of “{left_behind}” are left behind"]
+            if left_behind
+            else []
+        )
         allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
-        return {"head.order": tag("p", " · ".join(words)) if words else EMPTY,
+        return {"head.order": tag("p", " · ".join(conditions)) if conditions else EMPTY,
                 "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
 
 
@@ -122,13 +126,13 @@ class RoomPanel(Panel):
 def _facts(picture: LivePicture) -> dict[str, Any]:
     look, grid = picture.state.look, picture.grid
     isolines = look.isolines and look.surface != "grid"
-    bounds = [one.grid.bounds_mm for one in picture.slices]
+    bounds = [piece.grid.bounds_mm for piece in picture.slices]
     return {
         "axes": _words(Identity(axis_labels(picture))),
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
-             "way": [float(k == i) * way for i in range(3)]}
-            for k, (name, way) in enumerate(zip(grid.axes, grid.ways.tolist(), strict=True))
+             "way": [float(k == i) * sign for i in range(3)]}
+            for k, (name, sign) in enumerate(zip(grid.axes, grid.ways.tolist(), strict=True))
         ],
         "perMm": SCENE_PER_MM,
         "centre": _scene(grid.bounds_mm.mean(axis=0)),
@@ -161,10 +165,10 @@ def _words(labels: Identity) -> list[dict[str, Any]]:
 
 
 def _word(label: Label) -> dict[str, Any]:
-    found = {"text": label.text, "at": _scene(label.at_mm), "kind": label.kind}
+    entry = {"text": label.text, "at": _scene(label.at_mm), "kind": label.kind}
     if label.from_mm is not None:
-        found |= {"from": _scene(label.from_mm), "axis": label.axis}
-    return found
+        entry |= {"from": _scene(label.from_mm), "axis": label.axis}
+    return entry
 
 
 # --- A shared review: each tab sees where the others point ----------------------------------------
@@ -187,23 +191,27 @@ class PointerPanel(Panel):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         now, picture, at = time.monotonic(), self.context.picture, None
-        spelt, _, name = value.partition("\n")
+        spelled_ray, _, name = value.partition("\n")
         if action == "at":
-            if len(spelt) > LONGEST_RAY or now - self._last < OFTEN_S or self.context.story_state:
+            if (
+                len(spelled_ray) > LONGEST_RAY
+                or now - self._last < OFTEN_S
+                or self.context.story_state
+            ):
                 return state
             try:
-                ray = np.array([float(one) for one in spelt.split(",")]).reshape(2, 3)
+                ray = np.array([float(tab) for tab in spelled_ray.split(",")]).reshape(2, 3)
             except ValueError:  # not six numbers; what is not finite or too far meets nothing
                 return state
             self._last = now
-            found = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
-            at = found and (found[1] * SCENE_PER_MM).round(4).tolist()
-        for one in self._tabs():
+            picked = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
+            at = picked and (picked[1] * SCENE_PER_MM).round(4).tolist()
+        for tab in self._tabs():
             if (
-                one is not self.context
-                and one.story_state is None
-                and queued(one.client) <= MOST_QUEUED
+                tab is not self.context
+                and tab.story_state is None
+                and queued(tab.client) <= MOST_QUEUED
             ):
-                said = " ".join(name[:LONGEST_NAME].split())
-                one.page.call("pointer", self.context.client.client_id, said, at)
+                label = " ".join(name[:LONGEST_NAME].split())
+                tab.page.call("pointer", self.context.client.client_id, label, at)
         return state

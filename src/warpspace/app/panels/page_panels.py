@@ -59,11 +59,14 @@ class TasksPanel(Panel):
 
     name = "tasks"
 
-    def __init__(self, context: Context, found: Iterable[Section]) -> None:
+    def __init__(self, context: Context, sections: Iterable[Section]) -> None:
         super().__init__(context)
-        names = {one.name: one.task for one in found}
+        names = {section.name: section.task for section in sections}
         names = {name: names[name] for name in (*FIRST, *names)}
-        self.sections = {task: [name for name, of in names.items() if of == task] for task in TASKS}
+        self.sections = {
+            task: [name for name, section_task in names.items() if section_task == task]
+            for task in TASKS
+        }
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         """Write the tabs, and an empty place for each section."""
@@ -96,9 +99,9 @@ def _places(names: Iterable[str]) -> Markup:
 def build_parts(context: Context) -> list[Panel]:
     of_tasks = (WorstPanel, VolumePanel, ImportPanel, TestsPanel)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
-    found: list[Section] = [
+    sections: list[Section] = [
         *(kind(context) for kind in of_tasks),
-        *(HOOKS.get(one.name, AnalysisPanel)(context, one) for one in entries()),
+        *(HOOKS.get(entry.name, AnalysisPanel)(context, entry) for entry in entries()),
         *(kind(context) for kind in of_machine),
     ]
     kinds = (
@@ -106,5 +109,5 @@ def build_parts(context: Context) -> list[Panel]:
         RoomPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
         MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
-    others = [kind(context) for kind in kinds]
-    return [*others, TasksPanel(context, found), *found, BestPanel(context)]
+    panels = [kind(context) for kind in kinds]
+    return [*panels, TasksPanel(context, sections), *sections, BestPanel(context)]

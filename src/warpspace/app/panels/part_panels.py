@@ -55,33 +55,33 @@ class InBoxPanel(FilesPanel):
         return getattr(state.part, self.holds[0]) is not None
 
     def before_result(self, state: AppState) -> Markup:
-        held, name = (getattr(state.part, field) for field in self.holds)
+        content, name = (getattr(state.part, field) for field in self.holds)
         upload = html.upload_button(
-            f"Another {self.name} …" if held else f"{self.title} …", self.name, self.most_bytes,
-            ",".join(IN_BOX[self.name]), kind="" if held else "main",
+            f"Another {self.name} …" if content else f"{self.title} …", self.name, self.most_bytes,
+            ",".join(IN_BOX[self.name]), kind="" if content else "main",
             hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
         missing = f"{name} is not here: links and saved scenes hold only its name."
         about = tag("p", missing, class_="ws-quiet") if name else EMPTY
-        if held:
+        if content:
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
         return join((about, self.files_html(), actions(upload)))
 
-    def show(self, held: object, name: str, **more: Any) -> None:
+    def show(self, content: object, name: str, **changes: Any) -> None:
         """Take something in, and unfold the section."""
 
         def shown(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
             page = replace(state.page, task=self.task, open=opened, window="")
-            return self.hold(replace(state, page=page), held, name, shown=True, **more)
+            return self.hold(replace(state, page=page), content, name, shown=True, **changes)
 
         self.context.post(shown)
 
-    def hold(self, state: AppState, held: object, name: str, **more: Any) -> AppState:
+    def hold(self, state: AppState, content: object, name: str, **changes: Any) -> AppState:
         """Put something into the box, or nothing, and see it through the box."""
         self._answer = None
-        part = replace(state.part, **dict(zip(self.holds, (held, name), strict=True)), **more)
+        part = replace(state.part, **dict(zip(self.holds, (content, name), strict=True)), **changes)
         return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -96,14 +96,18 @@ class PartPanel(InBoxPanel):
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name not in ("place", "predistorted")]
+        return [
+            option for option in super().options() if option.name not in ("place", "predistorted")
+        ]
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        (own, _), part = PartLook.of_scene(state.scene), state.part
-        beside = state.scene.part.path("features") if part.mesh is own.mesh else None
-        told = next(((one.name, one.content) for one in self._files), None)
-        return replace(asked, place=part.place, mesh=part.mesh, features=beside, tolerances=told)
+        analysis: Any = super().ask(state, values, scenes)
+        (scene_part, _), part = PartLook.of_scene(state.scene), state.part
+        features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
+        tolerances = next(((file.name, file.content) for file in self._files), None)
+        return replace(
+            analysis, place=part.place, mesh=part.mesh, features=features, tolerances=tolerances
+        )
 
     def about(self, state: AppState) -> Markup:
         turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
@@ -111,25 +115,25 @@ class PartPanel(InBoxPanel):
                  for axis in "xyz")  # fmt: skip
         return join((
             actions(tag("span", "Turn about"), *turns),
-            *(setting(state, f"part.{one}") for one in ("place", "shown", "normal", "moved")),
+            *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
             html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
                                hint="Names and tolerances of its features"),
         ))  # fmt: skip
 
-    def result_html(self, found: Result) -> Markup:
-        *_, features = (one for one in found.blocks() if isinstance(one, Table))
+    def result_html(self, result: Result) -> Markup:
+        *_, features = (block for block in result.blocks() if isinstance(block, Table))
         judged = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
-        return html.rows(judged) + super().result_html(found)
+        return html.rows(judged) + super().result_html(result)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
             turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
             return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
-        found = super().handle(state, action, value)
+        updated = super().handle(state, action, value)
         if action == "set.unit" and state.part.mesh and self._sent:
             sent = self._sent
             self.receive(lambda: sent)
-        return found
+        return updated
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         """Parse tolerances, or a mesh: of another name it is clamped in the middle."""
@@ -138,8 +142,8 @@ class PartPanel(InBoxPanel):
             return partial(self._hold, (UploadedFile(name, text),))
         self._sent, state = (name, content), self.context.state
         mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
-        kept = state.part.place if name == state.part.name else None
-        place = np.round(place_part(mesh, state.standing, kept).place, 3)
+        present_place = state.part.place if name == state.part.name else None
+        place = np.round(place_part(mesh, state.standing, present_place).place, 3)
         return partial(self.show, mesh, name, place=tuple(place.tolist()))
 
 
@@ -150,8 +154,8 @@ class ProgramPanel(InBoxPanel):
     holds = ("program", "program_name")
 
     def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        return replace(asked, file=state.part.program_name, text=state.part.program)
+        analysis: Any = super().ask(state, values, scenes)
+        return replace(analysis, file=state.part.program_name, text=state.part.program)
 
     def about(self, state: AppState) -> Markup:
         line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
@@ -159,16 +163,18 @@ class ProgramPanel(InBoxPanel):
             return EMPTY
         return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
 
-    def result_html(self, found: Result) -> Markup:
+    def result_html(self, result: Result) -> Markup:
         def link(line: int) -> Markup:
-            words = "Show it in the drawing; a click on the path finds its line"
-            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=words)
+            hint = "Show it in the drawing; a click on the path finds its line"
+            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=hint)
 
-        *rest, worst = (one for one in found.blocks() if isinstance(one, Table))
-        line, *others = worst.columns
-        others = (replace(one, shows=one.heading in ("|E|", "most of it")) for one in others)
-        narrow = replace(worst, columns=(replace(line, form=link), *others))
-        return block_html(narrow) + details_html((*rest, worst))
+        *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
+        line, *columns = worst.columns
+        columns = (
+            replace(block, shows=block.heading in ("|E|", "most of it")) for block in columns
+        )
+        narrow = replace(worst, columns=(replace(line, form=link), *columns))
+        return block_html(narrow) + details_html((*tables, worst))
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         return partial(self.show, content.decode("utf-8-sig", "replace"), name)

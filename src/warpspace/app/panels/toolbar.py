@@ -44,10 +44,10 @@ SWITCHES = (
 )  # fmt: skip
 
 
-def _picks(do: str, words: Mapping[str, object], chosen: str, prefix: str = "") -> Markup:
+def _picks(event: str, labels: Mapping[str, object], chosen: str, prefix: str = "") -> Markup:
     return tag("div", join(
-        button(text, do, prefix + key, pressed=prefix + key == chosen, kind="choice")
-        for key, text in words.items()
+        button(text, event, prefix + key, pressed=prefix + key == chosen, kind="choice")
+        for key, text in labels.items()
     ), class_="ws-choices")  # fmt: skip
 
 
@@ -106,36 +106,36 @@ def _exaggeration(picture: LivePicture) -> Markup:
     state = picture.state
     factors = {"auto": "auto", **{str(n): spell_factor(n) for n in FACTORS}}
     chosen = "auto" if state.exaggeration is None else f"{state.exaggeration:g}"
-    words = "true scale" if picture.exaggeration == 1.0 else spell_factor(picture.exaggeration)
+    label = "true scale" if picture.exaggeration == 1.0 else spell_factor(picture.exaggeration)
     name = "state:set.exaggeration"
     box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
     body = field("Errors drawn ×", box, name) + _picks(name, factors, chosen)
-    return menu(words, body, key="exaggeration", label=f"Exaggeration: {words}", kind="up",
+    return menu(label, body, key="exaggeration", label=f"Exaggeration: {label}", kind="up",
                 hint="How much larger than true the errors are drawn, 0.001 to 1 000 000",
                 )  # fmt: skip
 
 
 def _colours(picture: LivePicture) -> Markup:
     state, look, chosen = picture.state, picture.state.look, chosen_map(picture.state)
-    found = picture.uncertainty
+    uncertainty = picture.uncertainty
     limit = f"within {state.specification.limit_um:g} µm or not"
     body: list[Markup] = []
-    words: object = limit
+    label: object = limit
     for quantity, title in QUANTITIES.items():
-        names = {key: lowered(said) for key, said in COMPONENT_NAMES[quantity].items()}
-        if quantity == "uncertainty" and (found is None or not found.errors.is_known):
-            said = NOT_STATED if found is None else "; ".join(found.errors.remarks())
+        names = {key: lowered(text) for key, text in COMPONENT_NAMES[quantity].items()}
+        if quantity == "uncertainty" and (uncertainty is None or not uncertainty.errors.is_known):
+            text = NOT_STATED if uncertainty is None else "; ".join(uncertainty.errors.remarks())
             if not picture.is_difference:
-                body += [tag("h3", title), tag("p", said, class_="ws-tiny")]
+                body += [tag("h3", title), tag("p", text, class_="ws-tiny")]
             continue
         body += [tag("h3", title), _picks("controls:map", names, chosen, f"{quantity}.")]
         if quantity == picture.quantity and chosen != "limit":
-            words = names[state.component]
+            label = names[state.component]
     body.insert(2, _picks("controls:map", {"limit": limit}, chosen))
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
     body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
              setting(state, "look.range_top", shown=f"{top:.4g}")]  # fmt: skip
-    return menu(words, join(body), key="map", kind="up", hint="What the colours mean")
+    return menu(label, join(body), key="map", kind="up", hint="What the colours mean")
 
 
 def _surface(picture: LivePicture) -> Markup:
@@ -152,8 +152,8 @@ def _surface(picture: LivePicture) -> Markup:
         body.append(setting(state, "placed"))
     direction, name = state.scene.model.direction, "controls:set.travel"
     if state.scene.errors.has_directions or direction != TravelDirection.MEAN:
-        ways = {str(way): words for way, words in DIRECTION_WORDS.items()}
-        body.append(field("Direction of travel", choice(name, str(direction), ways), name))
+        directions = {str(way): words for way, words in DIRECTION_WORDS.items()}
+        body.append(field("Direction of travel", choice(name, str(direction), directions), name))
     body.append(setting(state, "nodes"))
     return menu(SURFACES[state.look.surface], join(body), key="surface", kind="up",
                 hint="How the volume is drawn")  # fmt: skip
@@ -182,24 +182,24 @@ class ComparePanel(Panel):
                 *self.context.scenes)  # fmt: skip
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        state, found = picture.state, picture.compared
-        chosen = state.comparison
-        known = {title: title for title in (*_own_sides(state), *self.context.scenes)}
-        b = NOBODY if chosen.b is None else chosen.b.title
+        state, compared = picture.state, picture.compared
+        comparison = state.comparison
+        titles = {title: title for title in (*_own_sides(state), *self.context.scenes)}
+        b = NOBODY if comparison.b is None else comparison.b.title
         body = [
-            field(title, choice(name, side, words), name)
-            for title, name, side, words in (
-                ("A", "compare:set.a", chosen.a.title, known),
-                ("B", "compare:set.b", b, {NOBODY: NOBODY, **known}),
+            field(title, choice(name, side, label), name)
+            for title, name, side, label in (
+                ("A", "compare:set.a", comparison.a.title, titles),
+                ("B", "compare:set.b", b, {NOBODY: NOBODY, **titles}),
             )
         ]
         body.append(button("Keep the present errors as A", "compare:pin",
                            hint="What is changed from then on is B"))  # fmt: skip
-        if found is not None:
-            body += [setting(state, "comparison.ghost"), comparison_html(found)]
-        words = "compare" if found is None else SHOWN[found.shown]
-        return {"compared": "" if found is None else _sides(found),
-                "compare": menu(words, join(body), key="compare", kind="up wide",
+        if compared is not None:
+            body += [setting(state, "comparison.ghost"), comparison_html(compared)]
+        label = "compare" if compared is None else SHOWN[compared.shown]
+        return {"compared": "" if compared is None else _sides(compared),
+                "compare": menu(label, join(body), key="compare", kind="up wide",
                                 hint="Two scenes, or the errors before and after")}  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -224,12 +224,12 @@ def _own_sides(state: AppState) -> dict[str, Side]:
     return {side.title: side for side in used if side is not None}
 
 
-def _sides(found: Compared) -> Markup:
-    change = found.refused or "The change from A to B, node by node, with colours of its own"
-    hints = {"a": found.titles[0], "b": found.titles[1], "difference": change}
+def _sides(compared: Compared) -> Markup:
+    change = compared.refused or "The change from A to B, node by node, with colours of its own"
+    hints = {"a": compared.titles[0], "b": compared.titles[1], "difference": change}
     choices = (
         button(words, "state:set.comparison.shown", key, kind="chip", hint=hints[key],
-               pressed=found.shown == key, disabled=bool(found.refused) and key == "difference")
+               pressed=compared.shown == key, disabled=bool(compared.refused) and key == "difference")
         for key, words in SHOWN.items()
     )  # fmt: skip
     leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
@@ -240,20 +240,20 @@ def _sides(found: Compared) -> Markup:
 ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
 
 
-def comparison_html(found: Compared) -> Markup:
-    change, lines = found.difference, list[Markup]()
-    for words, name in ROWS.items():
-        a, b = getattr(found.a, name), getattr(found.b, name)
-        own = "" if change is None else number(getattr(change, name), 2)
-        cells = (number(a, 2), number(b, 2), signed(b - a, 2), own)
-        lines.append(tag("tr", tag("th", words) + join(
-            tag("td", cell, data_compared=f"{words} {side}")
+def comparison_html(compared: Compared) -> Markup:
+    change, lines = compared.difference, list[Markup]()
+    for label, name in ROWS.items():
+        a, b = getattr(compared.a, name), getattr(compared.b, name)
+        node_by_node = "" if change is None else number(getattr(change, name), 2)
+        cells = (number(a, 2), number(b, 2), signed(b - a, 2), node_by_node)
+        lines.append(tag("tr", tag("th", label) + join(
+            tag("td", cell, data_compared=f"{label} {side}")
             for side, cell in zip(("A", "B", "change", "B − A"), cells, strict=True)
         )))  # fmt: skip
-    head = join(tag("th", words) for words in (
+    head = join(tag("th", label) for label in (
         "µm", "A", "B", "change", lowered("|E_B − E_A|")))  # fmt: skip
-    titles = rows(zip("AB", found.titles, strict=True), kind="ws-titles")
-    note = found.refused or "change: B − A of each number. |E_B − E_A|: node by node."
+    titles = rows(zip("AB", compared.titles, strict=True), kind="ws-titles")
+    note = compared.refused or "change: B − A of each number. |E_B − E_A|: node by node."
     return (
         titles
         + tag("table", tag("tr", head) + join(lines), class_="ws-numbers")

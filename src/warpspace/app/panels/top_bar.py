@@ -36,11 +36,11 @@ class TopPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         store = self.context.store
-        travel = (
-            button(sign, f"page:{word.lower()}", kind="quiet", aria_label=word, data_key=word,
-                   hint=f"{word}: {what} ({keys})")
-            for word, sign, what, keys in (("Undo", "↶", store.undoes, "Ctrl+Z"),
-                                           ("Redo", "↷", store.redoes, "Ctrl+Shift+Z")) if what
+        history = (
+            button(sign, f"page:{label.lower()}", kind="quiet", aria_label=label, data_key=label,
+                   hint=f"{label}: {description} ({keys})")
+            for label, sign, description, keys in (("Undo", "↶", store.undoes, "Ctrl+Z"),
+                                           ("Redo", "↷", store.redoes, "Ctrl+Shift+Z")) if description
         )  # fmt: skip
         hint = "Open a scene, measured errors, or a controller's table (Ctrl+O)"
         title = picture.state.origin.title or picture.state.origin.name
@@ -63,7 +63,7 @@ class TopPanel(Panel):
                 button("Report", "page:open", "report", kind="quiet"),
                 *notes,
                 tag("span", "", class_="ws-fill"),
-                *travel,
+                *history,
                 button("?", "page:open", "help", kind="quiet", aria_label="Help", hint="Help (H)"),
             ))
         }  # fmt: skip
@@ -86,9 +86,9 @@ class ScenesDialog(Dialog):
                 aria_current="true" if scene is picture.state.origin else None)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
-        words = "A file is opened with Open at the top, or dropped anywhere on the page."
+        label = "A file is opened with Open at the top, or dropped anywhere on the page."
         return tag("div", join(found), class_="ws-list", data_list=True) + tag(
-            "p", words, class_="ws-quiet"
+            "p", label, class_="ws-quiet"
         )
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -115,8 +115,8 @@ class Command:
         """Spell its usual keys for people."""
         if not self.keys:
             return ""
-        *held, key = self.keys[0].split("+")
-        return "+".join((*(word.capitalize() for word in held), key.upper()))
+        *modifiers, key = self.keys[0].split("+")
+        return "+".join((*(word.capitalize() for word in modifiers), key.upper()))
 
 
 # What changes the model needs a modifier. A S D Q E belong to viser's camera.
@@ -154,7 +154,11 @@ COMMANDS = (
 
 def key_events() -> Mapping[str, str]:
     """Give the event, and its value, that the page sends for each key."""
-    return {key: f"{one.event}={one.value}".rstrip("=") for one in COMMANDS for key in one.keys}
+    return {
+        key: f"{command.event}={command.value}".rstrip("=")
+        for command in COMMANDS
+        for key in command.keys
+    }
 
 
 FIRST_HELP = (
@@ -175,8 +179,12 @@ MEANINGS = (
 
 
 def _found(query: str) -> list[Command]:
-    words = query.lower().split()
-    return [one for one in COMMANDS if all(word in one.label.lower() for word in words)]
+    search_words = query.lower().split()
+    return [
+        command
+        for command in COMMANDS
+        if all(word in command.label.lower() for word in search_words)
+    ]
 
 
 class HelpDialog(Dialog):
@@ -186,18 +194,18 @@ class HelpDialog(Dialog):
 
     def body(self, picture: LivePicture) -> Markup:
         query, scene = picture.state.page.command, picture.state.scene
-        words = "Find a command"
-        box = text_box("state:set.page.command", query, label=words, placeholder=words, live=True,
+        label = "Find a command"
+        box = text_box("state:set.page.command", query, label=label, placeholder=label, live=True,
                        data_enter="help:first", autofocus=True)  # fmt: skip
-        found = join(
-            tag("button", tag("kbd", one.spelt) + one.label, type="button", data_do="help:run",
-                data_value=one.label)
-            if ":" in one.event else tag("p", tag("kbd", one.spelt) + one.label)
-            for one in _found(query)
+        commands = join(
+            tag("button", tag("kbd", command.spelt) + command.label, type="button", data_do="help:run",
+                data_value=command.label)
+            if ":" in command.event else tag("p", tag("kbd", command.spelt) + command.label)
+            for command in _found(query)
         )  # fmt: skip
         about = " ".join(scene.description.split())
         return join((
-            tag("div", box + tag("div", found, class_="ws-list ws-columns"), data_list=True),
+            tag("div", box + tag("div", commands, class_="ws-list ws-columns"), data_list=True),
             tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
             tag("h3", "What is drawn"), rows(MEANINGS, "ws-keys"),
             tag("p", "Keys act everywhere except in a text box. After a dropped connection the tab"
@@ -207,8 +215,12 @@ class HelpDialog(Dialog):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         query = state.page.command
-        found = [one for one in _found(query) if ":" in one.event]
-        runs = found[: bool(query)] if action == "first" else [o for o in found if o.label == value]
+        matches = [one for one in _found(query) if ":" in one.event]
+        runs = (
+            matches[: bool(query)]
+            if action == "first"
+            else [command for command in matches if command.label == value]
+        )
         if action not in ("first", "run") or not runs:
             return state
         self.context.send(runs[0].event, runs[0].value)
@@ -253,11 +265,11 @@ class PagePanel(Panel):
             return replace(state, shown=replace(state.shown, **{value: not on}))
         return updates[action]() if action in updates else state
 
-    def _travel(self, done: str, travel: Callable[[], str]) -> None:
+    def _travel(self, label: str, travel: Callable[[], str]) -> None:
         try:
-            what = travel()
+            description = travel()
         except OptionError as error:
             self.context.notes.append(str(error))
             return
-        words = f"{done}: {what}" if what else f"Nothing to be {done.lower()}"
-        self.context.notify(words)
+        text = f"{label}: {description}" if description else f"Nothing to be {label.lower()}"
+        self.context.notify(text)
