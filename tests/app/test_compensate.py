@@ -24,7 +24,14 @@ from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.evaluation.point_explanation import measured, pick_worst, with_picked
 from warpspace.app.panels.analysis_panel import AnalysisOutcome
 from warpspace.app.panels.conventions import with_reference
-from warpspace.app.panels.improve import BOTH, LEFT, CompensatePanel, holds_for, packed, with_box
+from warpspace.app.panels.improve import (
+    BOTH,
+    LEFT,
+    CompensatePanel,
+    is_applicable_to,
+    packed,
+    with_box,
+)
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
@@ -156,8 +163,8 @@ def test_what_changes_the_machine_ends_the_table(left, controller):
     machine = replace(SCENE.model.machine, title="another")
     other = replace(SCENE, model=replace(SCENE.model, machine=machine))
     assert with_changed_scene(left, other).controller is None
-    assert holds_for(START, controller)
-    assert not holds_for(start_state(load_scene("fork_head_bc")), controller)
+    assert is_applicable_to(START, controller)
+    assert not is_applicable_to(start_state(load_scene("fork_head_bc")), controller)
     assert left.reset().controller is controller
     assert left.with_amplitude("EXX", 3.0).controller is controller
 
@@ -191,8 +198,8 @@ def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
 
 def shown(part, state, found):
     """Give what the section says of a table that was computed."""
-    part._asked = part.question(state)
-    part._answer = AnalysisOutcome(part._asked, found)
+    part.last_key = part.result_key(state)
+    part.outcome = AnalysisOutcome(part.last_key, found)
     return section(part, state)
 
 

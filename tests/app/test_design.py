@@ -21,7 +21,7 @@ from warpspace.app.panels.design import (
     sample_machines,
     tolerance_shares,
 )
-from warpspace.app.panels.improve import RepairPanel
+from warpspace.app.panels.improve import AdjustPanel
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Specification, start_state
 from warpspace.app.state.tree import put
@@ -47,13 +47,13 @@ def ran(part, state):
 
 
 def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
-    part = lone_part(RepairPanel, "adjust")
+    part = lone_part(AdjustPanel, "adjust")
     state = replace(START, forms={"adjust.objective": "rms", "adjust.grid": "9"})
     ran(part, state)
-    found = part._answer.found
+    found = part.outcome.result
     said = Adjust(grid=9).run(FIRST, lambda _: None)
     assert [one.adjust for one in found.adjustments] == [one.adjust for one in said.adjustments]
-    assert part.offered(found) == [0, 1]  # of sets of one, two and three
+    assert part.offered_changes(found) == [0, 1]  # of sets of one, two and three
     shown = section(part, state)
     assert shown.count("adjust:apply") == 2
     assert re.search(r"<b>EC0Y 23\.1 → [\d.]+ µrad</b>.*max</th><td>51\.7 → ", shown)
@@ -109,7 +109,7 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
     after = update(state)
     # the machines of the page are those of the allocation, and the lower end of the interval counts
     (_, shown) = estimate(sample_machines(state), after.tolerances, 40.0)
-    found = part._answer.found
+    found = part.outcome.result
     assert shown == found.after
     assert 0.98 <= shown.low < 0.983
     assert edits.half_width_of(after, "EA0Z") == 25.0
@@ -158,7 +158,7 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     chosen = part.handle(part.handle(START, "set.add", key), "set.add", key)
     assert part.chosen(chosen) == [PRESENT, key]
     ran(part, chosen)
-    found = part._answer.found
+    found = part.outcome.result
     plan = Concepts(limit_um=chosen.specification.limit_um, samples=SAMPLES)
     expected = compare_concepts([FIRST, OTHER], plan)
     assert [one.said for one in found.concepts] == [one.said for one in expected]

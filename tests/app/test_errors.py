@@ -62,7 +62,7 @@ def test_a_slider_has_the_range_of_its_kind_again_after_a_wild_number():
     column.do("set.EAY", "-40")
     again = column.do("sort")
     assert 'max="100"' in again["error.EAY"]
-    spans = column.part._spans
+    spans = column.part.spans
     assert spans["EAY"] == spans["EAX"]
 
 

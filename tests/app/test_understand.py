@@ -253,7 +253,7 @@ def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     html_of(part, asked)
     wait(part)
     assert "X 275, Y −225, Z −480" in html_of(part, asked)
-    assert np.isfinite(part._answer[1].gains[0].norm)
+    assert np.isfinite(part.outcome[1].gains[0].norm)
 
 
 # --- A distance, picked on the map ----------------------------------------------------------------

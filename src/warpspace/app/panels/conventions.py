@@ -1,7 +1,7 @@
-"""The conventions a map is drawn with: changing them, and what each choice does to the map.
+"""The conventions of the error map: changing them, and the effect of each choice on the map.
 
-Changed conventions live in the state's scene, so that everything drawn from it (map, traces, why,
-exports) has them; `AppState.origin` keeps the scene's own ones.
+Changed conventions are part of the state's scene, so that maps, traces, explanations and exports
+follow them; `AppState.origin` holds those of the scene.
 """
 
 from collections.abc import Mapping
@@ -38,16 +38,16 @@ Effect = tuple[float, float]
 
 
 def with_travel(state: AppState, direction: str) -> AppState:
-    """Look at errors for another direction of travel; an unknown one changes nothing."""
+    """Set the direction of travel; an unknown one is ignored."""
     if direction not in [*TravelDirection]:
         return state
     return _with_scene(state, replace(state.scene.model, direction=TravelDirection(direction)))
 
 
 def with_reference(state: AppState, at: Mapping[str, float] | None) -> AppState:
-    """Hold a point still, mm in axis coordinates; None shows absolute errors.
+    """Set the reference point, mm in axis coordinates; None shows absolute errors.
 
-    Coordinates outside the travels are clamped and noted; what is no number stays.
+    Coordinates outside the travels are clamped and noted; NaN is ignored.
     """
     scene = state.scene
     if at is None:
@@ -67,19 +67,19 @@ def _with_scene(state: AppState, model: Model, *reference: Mapping[str, float] |
     return state.with_edited(replace(scene, reference=reference[0]) if reference else scene)
 
 
-def choices_of(scene: Scene) -> dict[tuple[str, str], dict[str, str]]:
-    """Give what can be chosen and its words, in groups with a title and a hint."""
+def choice_groups(scene: Scene) -> dict[tuple[str, str], dict[str, str]]:
+    """Return all choices and their labels, in groups with a title and a hint."""
     groups = {
-        ("Component errors", "Where the errors of a motion act"): {
+        ("Component errors", "Point where the errors of a motion act"): {
             f"component_errors={name}": find_convention(name).title for name in convention_names()
         },
-        ("Reference", "What is held still"): {
-            "reference=absolute": "absolute",
-            "reference=point": "a point is held still",
+        ("Reference", "Point of zero error"): {
+            "reference=absolute": "none (absolute errors)",
+            "reference=point": "a point of the working volume",
         },
     }
     for kind, moves in (("Rotary", "turns"), ("Linear", "moves")):
-        hint = f"+1 {moves} with the name of the axis, −1 against it"
+        hint = f"+1 {moves} in the direction of the axis name, −1 against it"
         groups[f"{kind} axes", hint] = {
             f"direction {axis}={sign}": f"{axis} {label}"
             for axis in sorted(scene.machine.axes)
@@ -90,11 +90,11 @@ def choices_of(scene: Scene) -> dict[tuple[str, str], dict[str, str]]:
 
 
 def choices(scene: Scene) -> list[str]:
-    return [choice for group in choices_of(scene).values() for choice in group]
+    return [choice for group in choice_groups(scene).values() for choice in group]
 
 
 def chosen(scene: Scene) -> set[str]:
-    """Tell which choices are in force."""
+    """Return the choices in force."""
     return {
         f"component_errors={scene.model.component_errors}",
         "reference=absolute" if scene.reference is None else "reference=point",
@@ -103,7 +103,7 @@ def chosen(scene: Scene) -> set[str]:
 
 
 def with_choice(state: AppState, choice: str) -> AppState:
-    """Apply a choice as a page spells it; what is none changes nothing."""
+    """Apply a choice of the page; an unknown one is ignored."""
     model, (group, _, chosen_value) = state.scene.model, choice.partition("=")
     if choice not in choices(state.scene):
         return state
@@ -126,7 +126,7 @@ def with_own_conventions(state: AppState) -> AppState:
         name: replace(axis, direction=scene_axes[name].direction)
         for name, axis in machine.axes.items()
     }
-    # an edited machine may not have all axes of the scene's
+    # an edited machine may lack axes of the scene
     reference = {name: at for name, at in (origin.reference or {}).items() if name in axes}
     model = replace(
         state.scene.model,
@@ -139,7 +139,7 @@ def with_own_conventions(state: AppState) -> AppState:
 
 
 def effects_of(state: AppState) -> dict[str, Effect]:
-    """Work out what each choice, taken alone, does to the map; "all" is what is in force."""
+    """Compute the effect of each single choice on the map; "all" are those in force."""
     base = with_own_conventions(state)
     variants = {choice: with_choice(base, choice) for choice in choices(base.scene)} | {
         "all": state
@@ -164,14 +164,14 @@ def _effect(weights: Array, change_um: Array) -> Effect:
     return float(np.sum(weights * length)), float(length.max())
 
 
-# --- What it would cost if errors had been measured in another convention than is read ------------
+# --- Effect of reading measured errors in a wrong convention --------------------------------------
 
 
 def convention_costs(scene: Scene, view: View, nodes: int = 21) -> dict[str, Effect]:
-    """Find what each wrong convention would cost over the working volume, to first order.
+    """Compute the effect of each wrong convention over the working volume, to first order.
 
-    The numbers stay as they are and are read in the convention of the scene and in another one.
-    What cannot be converted has no cost.
+    The same numbers are read in the convention of the scene and in another one. Those that cannot
+    be converted are omitted.
     """
     grid = build_grid(scene.model, scene.workspace, nodes)
 
@@ -193,7 +193,7 @@ def convention_costs(scene: Scene, view: View, nodes: int = 21) -> dict[str, Eff
 
 
 def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
-    """Give by how much curves differ whose lines or values in the middle were taken out."""
+    """Return the changes of curves whose reference line or mid-axis value is subtracted."""
     errors, axes = scene.errors, scene.machine.axes
     middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
     changes = {
@@ -216,7 +216,7 @@ def _changes(scene: Scene) -> dict[str, dict[str, ErrorFunction]]:
 
 
 def _measured_in_the_middle(scene: Scene) -> ErrorSet:
-    """Read translations as measured along lines through the middle of the volume."""
+    """Convert translations measured along lines through the centre of the volume."""
     model = scene.model
     middle = {axis: np.asarray(at) for axis, at in scene.workspace.positions.items()}
     point = nominal_point(model, Loop.TOOL, middle)
@@ -235,31 +235,31 @@ def _measured_in_the_middle(scene: Scene) -> ErrorSet:
 # --- The section ----------------------------------------------------------------------------------
 
 COSTS = {
-    "squareness=over_90": "squareness: positive where the angle is over 90°",
-    "squareness=under_90": "squareness: positive where the angle is under 90°",
-    "measuring_line": "measuring line: through the middle of the volume",
-    "end_point": "straightness: end points taken out",
-    "least_squares": "straightness: least squares taken out",
-    "minimum_zone": "straightness: minimum zone taken out",
-    "zero_at": "curves: zero in the middle of each axis",
+    "squareness=over_90": "squareness: positive if the angle exceeds 90°",
+    "squareness=under_90": "squareness: positive if the angle is below 90°",
+    "measuring_line": "measuring line: through the centre of the volume",
+    "end_point": "straightness: end-point line subtracted",
+    "least_squares": "straightness: least-squares line subtracted",
+    "minimum_zone": "straightness: minimum-zone line subtracted",
+    "zero_at": "curves: zero at the middle of each axis",
 }
 NOTE = (
-    "Change of the error vector over the nodes of the grid, through the loop that is drawn: each"
-    " choice alone, against the conventions of the scene."
+    "Change of the error vector over the grid nodes, for the displayed loop: each choice alone,"
+    " relative to the conventions of the scene."
 )
 RADIO = (
     '<label><input type="radio" name="{}" value="{}"{} data-set="conventions:choose"> {}</label>'
 )
 COST_NOTE = (
-    "What a wrong assumption about the measured data would cost, to first order. The scene's:"
-    " squareness by the right-hand rule, measuring lines at the origin of each axis, straightness"
-    " with its tilt, curves as given."
+    "First-order effect of a wrong assumption about the measured data. The scene assumes squareness"
+    " by the right-hand rule, measuring lines through the origin of each axis, straightness"
+    " including tilt, and curves without offset removal."
 )
 
 
 class ConventionsSection(Section):
     name, task, title = "conventions", "machine", "Conventions"
-    sentence = "Choose what the errors mean, and see what another convention would change"
+    sentence = "Sign and reference conventions of the errors, and the effect of changing them"
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         state = picture.state
@@ -274,7 +274,7 @@ class ConventionsSection(Section):
         effects, in_force = effects_of(state), chosen(state.scene)
         scene_choices = chosen(with_own_conventions(state).scene)
         lines = [fill("<tr><th>µm</th><th class=number>mean</th><th class=number>max</th></tr>")]
-        for head, members in choices_of(state.scene).items():
+        for head, members in choice_groups(state.scene).items():
             lines.append(fill('<tr><th colspan="3"><b>{}</b> {}</th></tr>', *head))
             for choice, label in members.items():
                 checked = Markup(" checked") if choice in in_force else ""
@@ -282,7 +282,7 @@ class ConventionsSection(Section):
                 radio = fill(RADIO, choice.partition("=")[0], choice, checked, title)
                 lines.append(_row(radio, None if choice in scene_choices else effects[choice]))
         lines.append(_row("all choices together", effects["all"]))
-        reset = button("Back to the scene's", "conventions:own", disabled=in_force == scene_choices)
+        reset = button("Reset to the scene", "conventions:own", disabled=in_force == scene_choices)
         return join((
             tag("table", join(lines), class_="ws-choices-table"), tag("p", NOTE, class_="ws-tiny"),
             _reference(state), tag("div", reset, class_="ws-actions"), _wrong(state),
@@ -299,7 +299,7 @@ class ConventionsSection(Section):
             at = read_positions(value)
             if at is not None:
                 return with_reference(state, at)
-            expected = f"expected positions of the axes, for instance {EXAMPLE}"
+            expected = f"expected axis positions, for example {EXAMPLE}"
             return state.noted(f"point {value[:40]!r}: {expected}")
         return state
 
@@ -309,10 +309,10 @@ def _reference(state: AppState) -> Markup:
         return EMPTY
     positions = {**state.scene.workspace.positions, **state.scene.reference}
     text = " ".join(f"{axis} {positions[axis]:g}" for axis in linear_spans(state.scene))
-    name, hint = "conventions:set.reference", "Click a point of the box in the drawing first"
-    box = field("Held at", text_box(name, text), name, hint="Positions of the axes")
+    name, hint = "conventions:set.reference", "First click a point of the volume"
+    box = field("Reference point", text_box(name, text), name, hint="Axis positions")
     nowhere = state.picked is None or state.picked.point_mm is not None
-    pick = button("Hold the clicked point", "conventions:pick", hint=hint, disabled=nowhere)
+    pick = button("Use the clicked point", "conventions:pick", hint=hint, disabled=nowhere)
     return box + tag("div", pick, class_="ws-actions")
 
 
@@ -326,6 +326,6 @@ def _wrong(state: AppState) -> Markup:
     scene = state.active_scene()
     costs = convention_costs(scene, scene.view(state.loop), state.nodes)
     rows = [_row(label, costs.get(name)) for name, label in COSTS.items()]
-    summary = tag("summary", "If the data were measured in another convention")
+    summary = tag("summary", "Effect of data measured in another convention")
     note = tag("p", COST_NOTE, class_="ws-tiny")
     return tag("details", join((summary, note, tag("table", join(rows)))), class_="ws-options")

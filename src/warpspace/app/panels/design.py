@@ -1,4 +1,4 @@
-"""The task "Design": tolerances held against a limit, and machines side by side."""
+"""The task "Design": tolerances and a limit of the error, and comparison of machines."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -35,7 +35,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
-from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, Question
+from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.state import edits
@@ -50,16 +50,16 @@ from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell_count
 
-SAMPLES = 20_000  # machines of a probability on the page
+SAMPLES = 20_000  # machines per probability on the page
 ENSEMBLES: Cache[Ensemble] = Cache(100_000_000)
-"""Sampled machines before their tolerances are known, for all sessions together."""
+"""Sampled machines before tolerances are applied, for all sessions."""
 WHERE = {"max": "everywhere", "sampled": "at a random point"}
 SCALES = {"÷ 1.5": 1.0 / 1.5, "−5 %": 0.95, "+5 %": 1.05, "× 1.5": 1.5}
-"""What all tolerances can be multiplied by."""
+"""Factors for all tolerances, by label."""
 
 
 def percent(share: float) -> str:
-    """Spell a share in per cent; only what is certain reads 0 or 100."""
+    """Format a share in per cent; only a certain one reads 0 or 100."""
     value = f"{100.0 * share:.1f}"
     if value == "100.0" and share < 1.0:
         return "99.9"
@@ -67,22 +67,22 @@ def percent(share: float) -> str:
 
 
 class TolerancesPanel(AnalysisPanel):
-    """Limit and probability, the machines within tolerance, and each tolerance by its share."""
+    """Limit and probability, the machines within tolerance, and each tolerance with its share."""
 
-    sentence = "How likely machines within tolerance keep the limit, and which tolerances"
-    run_words = "Allocate tolerances"
+    sentence = "Probability that machines within tolerance meet the limit; allocation of tolerances"
+    run_label = "Allocate tolerances"
     run_hint = (
-        "The widest tolerances that keep the limit with the wanted probability. A half width w"
-        " costs 1/w, or its cost over w. Fixed ones and those of zero stay. Undo takes it back."
+        "Compute the widest tolerances that meet the limit with the required probability. The cost"
+        " of a half-width w is cost/w (default 1/w). Fixed and zero tolerances are unchanged."
     )
-    _order: tuple[Question, tuple[str, ...]] = ((), ())
+    _order: tuple[ResultKey, tuple[str, ...]] = ((), ())
 
     def options(self) -> Sequence[Option]:
         return [
             option for option in super().options() if option.name in ("clip", "cylinder", "seed")
         ]
 
-    def question(self, state: AppState) -> Question:
+    def result_key(self, state: AppState) -> ResultKey:
         values = tuple(self.values(state).items())
         return (*_sampled(state), state.tolerances, state.specification, values)
 
@@ -93,39 +93,40 @@ class TolerancesPanel(AnalysisPanel):
             return False
         return True
 
-    def is_quick(self, state: AppState) -> bool:
+    def is_automatic(self, state: AppState) -> bool:
         return False  # it would change tolerances by itself
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        """Allocate for the limit of the state; what another machine had fixed does not count."""
-        analysis: Any = super().ask(state, values, scenes)
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
+        """Allocate for the limit of the state; fixed keys of another machine are ignored."""
+        analysis: Any = super().build_analysis(state, values, scenes)
         specification, keys = state.specification, state.amplitudes.keys()
         fixed = specification.fixed & keys
         costs_by_key = read_numbers(specification.costs, "", "") if specification.costs else {}
         costs = tuple((k, cost) for k, cost in costs_by_key.items() if k in keys and k not in fixed)
         return replace(
-            analysis, limit_um=specification.limit_um, probability=specification.percent / 100.0, loop=state.loop,
-            over=specification.over, distribution=specification.distribution, costs=costs,
+            analysis, limit_um=specification.limit_um, loop=state.loop,
+            probability=specification.percent / 100.0, over=specification.over, distribution=specification.distribution, costs=costs,
             fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
         )  # fmt: skip
 
-    def _take_answer(self, answer: AnalysisOutcome) -> None:
-        super()._take_answer(answer)
-        result: Any = answer.found
+    def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
+        super()._accept_outcome(outcome)
+        result: Any = outcome.result
 
         def update(state: AppState) -> AppState:
-            if self.question(state) != answer.question:
-                note = "tolerances or limit were changed meanwhile: allocate again"
-                return state.noted(note)
+            if self.result_key(state) != outcome.key:
+                return state.noted("tolerances or limit changed in the meantime: allocate again")
             self.context.last_decision = state, f"{self.title}: allocated for the limit"
             state = edits.with_half_widths(state, result.tolerances)
-            self._applied = self.question(state)
+            self._applied_key = self.result_key(state)
             return state
 
         self.context.post(update)
 
-    def offered(self, result: Result) -> Sequence[int]:
-        return ()  # they are set already
+    def offered_changes(self, result: Result) -> Sequence[int]:
+        return ()  # applied already
 
     def before_result(self, state: AppState) -> Markup:
         controls = _controls(state, "limit_um", "percent")
@@ -135,12 +136,9 @@ class TolerancesPanel(AnalysisPanel):
             return controls + tag("p", str(error), class_="ws-problem", role="alert")
 
     def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
-        tolerance_rows = (
-            self._rows(sample_machines(state), state) if self.is_ready(state) else EMPTY
-        )
-        return tolerance_rows + super().options_html(
-            state, _controls(state, "over", "distribution", "costs")
-        )
+        controls = _controls(state, "over", "distribution", "costs")
+        listed = self._rows(sample_machines(state), state) if self.is_ready(state) else EMPTY
+        return listed + super().options_html(state, controls)
 
     def _probability(self, ensemble: Ensemble, state: AppState) -> Markup:
         specification = state.specification
@@ -154,7 +152,8 @@ class TolerancesPanel(AnalysisPanel):
             '<p class="ws-told"><span class="{kind}">{share} %</span> of the machines stay within'
             " {limit} µm {where}</p>",
             kind="ws-kept" if probability.low >= specification.percent / 100.0 else "ws-missed",
-            share=percent(probability.probability), limit=f"{specification.limit_um:g}", where=WHERE[specification.over],
+            share=percent(probability.probability), limit=f"{specification.limit_um:g}",
+            where=WHERE[specification.over],
         )  # fmt: skip
         numbers = (
             f"mean {number(stream.mean_um)} · P95 {number(stream.quantile(0.95))} ·"
@@ -165,16 +164,18 @@ class TolerancesPanel(AnalysisPanel):
 
     def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
         shares = tolerance_shares(ensemble, state.tolerances)
-        order_key: Question = (Identity(state.origin), ensemble.keys)
-        if self._order[0] != order_key:  # no row moves away under a hand
+        order_key: ResultKey = (Identity(state.origin), ensemble.keys)
+        if self._order[0] != order_key:  # rows must not move during a drag
             self._order = order_key, tuple(sorted(shares, key=lambda key: -shares[key]))
         longest = max(shares.values(), default=0.0) or 1.0
         tolerance_rows = join(_row(state, key, shares[key], longest) for key in self._order[1])
         scales = join(
-            button(label, f"{self.name}:scale", label, hint="All but the fixed ones")
+            button(
+                label, f"{self.name}:scale", label, hint="Scale all tolerances except fixed ones"
+            )
             for label in SCALES
         ) + button("As in the scene", f"{self.name}:reset", kind="quiet")
-        return tag("h4", "Half widths and shares of the variance") + tolerance_rows + tag(
+        return tag("h4", "Half-widths and shares of the variance") + tolerance_rows + tag(
             "div", scales, class_="ws-actions", role="group", aria_label="Scale all tolerances"
         )  # fmt: skip
 
@@ -202,8 +203,8 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
         name=name, code=key, words=row.name, share=number(100.0 * share),
         length=f"{100.0 * share / longest:.1f}", unit=row.unit,
         slider=slider(name, width, span.low, span.high, span.step, twin=name,
-                      label=f"Half width of {key}", text=f"±{width:g} {row.unit}"),
-        box=text_box(name, spell_typed(width), label=f"Half width of {key} in {row.unit}",
+                      label=f"Half-width of {key}", text=f"±{width:g} {row.unit}"),
+        box=text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
                      size="short", inputmode="decimal"),
         fixed=button("fixed" if is_fixed else "fix", "state:set.specification.fixed",
                      f"{'-' if is_fixed else '+'}{key}", kind="link", pressed=is_fixed,
@@ -212,20 +213,15 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
     )  # fmt: skip
 
 
-def _sampled(state: AppState) -> Question:
+def _sampled(state: AppState) -> ResultKey:
     specification = state.specification
     positions = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
-    return (
-        Identity(state.scene),
-        state.seen,
-        specification.over,
-        specification.distribution,
-        positions,
-    )
+    shape = specification.over, specification.distribution
+    return (Identity(state.scene), state.seen, *shape, positions)
 
 
 def sample_machines(state: AppState) -> Ensemble:
-    """Draw the machines that a state's tolerances are held against."""
+    """Sample machines for the tolerances of a state."""
 
     def build() -> Ensemble:
         scene, specification = state.resulting_scene(), state.specification
@@ -239,7 +235,7 @@ def sample_machines(state: AppState) -> Ensemble:
 
 
 def allowed_words(state: AppState) -> str:
-    """Say the largest error of the machines within tolerance; nothing where there are none."""
+    """Format the largest error of machines within tolerance; empty without tolerances."""
     try:
         ensemble = sample_machines(state)
     except WarpspaceError:
@@ -250,18 +246,14 @@ def allowed_words(state: AppState) -> str:
 
 def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
     zero = Tolerance(0.0, 0.0)
-    ranges = (tolerances.get(key) or zero for key in ensemble.keys)
-    return (
-        np.array([(tolerance.centre, tolerance.half_width) for tolerance in ranges])
-        .reshape(-1, 2)
-        .T
-    )
+    ranges = [tolerances.get(key) or zero for key in ensemble.keys]
+    return np.array([[t.centre for t in ranges], [t.half_width for t in ranges]])
 
 
 def estimate(
     ensemble: Ensemble, tolerances: ToleranceSet, limit_um: float
 ) -> tuple[Stream, Probability]:
-    """Work out what a tolerance set gives, and how likely the limit is kept."""
+    """Evaluate the machines of a tolerance set, and the probability of meeting the limit."""
     norm_um = ensemble.norm_um(*_centres_and_widths(ensemble, tolerances))
     stream = Stream(len(norm_um), limit_um)
     stream.add(norm_um)
@@ -271,38 +263,35 @@ def estimate(
 
 
 def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
-    """Say how much each tolerance adds to the scatter of the error."""
+    """Compute the share of each tolerance in the variance of the error."""
     _, half_widths = _centres_and_widths(ensemble, tolerances)
     variances = half_widths**2 * ensemble.mean_square_gain
-    return dict(
-        zip(ensemble.keys, (variances / (float(variances.sum()) or 1.0)).tolist(), strict=True)
-    )
+    shares = variances / (float(variances.sum()) or 1.0)
+    return dict(zip(ensemble.keys, shares.tolist(), strict=True))
 
 
 # --- Concepts -------------------------------------------------------------------------------------
 
-PRESENT = "the present machine"  # the one that is steered, among those that are compared
+PRESENT = "the present machine"  # the edited one, among the compared machines
 ADD = "Compare with …"
 
 
 class ConceptsPanel(AnalysisPanel):
     """Machines side by side: chosen by title, compared as soon as there are two."""
 
-    at_once = True
+    runs_on_open = True
 
     def offers(self, state: AppState) -> dict[str, Scene]:
-        """Give the machines that can be compared, by title."""
+        """Return the machines that can be compared, by title."""
         machines = {PRESENT: state.resulting_scene()}
-        bundled = {
-            library_scene.machine.title: library_scene for library_scene in library().values()
-        }
+        bundled = {scene.machine.title: scene for scene in library().values()}
         for title, scene in {**bundled, **self.context.scenes}.items():
             if scene not in machines.values():
                 machines[title] = scene
         return machines
 
     def chosen(self, state: AppState) -> list[str]:
-        """List the machines that are compared; tolerances are those of the first."""
+        """List the compared machines; the tolerances are those of the first."""
         text = state.forms.get(f"{self.name}.machines", PRESENT)
         return [key for key in text.split("\n") if key][:MOST_CONCEPTS]
 
@@ -317,13 +306,15 @@ class ConceptsPanel(AnalysisPanel):
         return [offers[key] for key in self.chosen(state) if key in offers]
 
     def is_ready(self, state: AppState) -> bool:
-        return len(self.scenes(state)) > 1  # links may name machines that are not here
+        return len(self.scenes(state)) > 1  # links may name unknown machines
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        analysis: Any = super().ask(state, values, scenes)
-        return replace(analysis, workers=1)  # other threads are for who moves sliders meanwhile
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scenes)
+        return replace(analysis, workers=1)  # leaves threads to the sliders
 
-    def question(self, state: AppState) -> Question:
+    def result_key(self, state: AppState) -> ResultKey:
         return (
             Identity(state.scene.model), Identity(state.scene.workspace), state.tolerances,
             state.scene.title, tuple(self.values(state).items()),
@@ -333,14 +324,15 @@ class ConceptsPanel(AnalysisPanel):
         offers, lines = self.offers(state), list[tuple[Markup, Markup]]()
         chosen = [key for key in self.chosen(state) if key in offers]
         for letter, key in zip(ascii_uppercase, chosen, strict=False):
-            open_button = button("Open", f"{self.name}:open", key, kind="link", hint="Show it here",
-                           aria_label=f"Open {key}")  # fmt: skip
-            remove_button = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove it",
+            open_button = button("Open", f"{self.name}:open", key, kind="link",
+                                 hint="Open this machine", aria_label=f"Open {key}")  # fmt: skip
+            remove_button = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove",
                              aria_label=f"Remove {key}")  # fmt: skip
-            title, open_button = (
-                (key, open_button) if key != PRESENT else (state.scene.title, EMPTY)
-            )
-            lines.append((tag("b", f"{letter} ") + title, open_button + remove_button))
+            if key == PRESENT:
+                title, buttons = state.scene.title, remove_button
+            else:
+                title, buttons = key, open_button + remove_button
+            lines.append((tag("b", f"{letter} ") + title, buttons))
         remaining = {key: key for key in offers if key not in chosen}
         add = choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
                      label="Compare with another machine")  # fmt: skip
@@ -348,10 +340,10 @@ class ConceptsPanel(AnalysisPanel):
         return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + machines
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
-        """Give a picture for a review first."""
+        """Render the buttons below a result, the picture for a review first."""
         draws = self.context.services.draw_concepts is not None
         sheet = (button("Picture", f"{self.name}:sheet", kind="main", disabled=stale,
-                        hint="One sheet for a review: the machines at one scale with their numbers")
+                        hint="One sheet with all machines at the same scale, with their statistics")
                  if draws else EMPTY)  # fmt: skip
         return sheet + super().actions(result, stale=stale)
 
@@ -363,23 +355,25 @@ class ConceptsPanel(AnalysisPanel):
             chosen.remove(value)
         elif action == "open" and value in offers and value != PRESENT:
             opened = start_state(offers[value])
-            self.context.call_soon(partial(self.context.show_opened, opened, None, whole=False))
+            self.context.call_soon(
+                partial(self.context.show_opened, opened, None, keeps_comparison=True)
+            )
             return state
         elif action == "sheet":
             self._draw(state)
             return state
         else:
             return super().handle(state, action, value)
-        self._answer = None  # other machines are compared
+        self.outcome = None  # other machines are compared
         return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
 
     def _draw(self, state: AppState) -> None:
-        draw, outcome = self.context.services.draw_concepts, self._answer
+        draw, outcome = self.context.services.draw_concepts, self.outcome
         if draw is None or outcome is None:
             return
-        result: Any = outcome.found
+        result: Any = outcome.result
         scenes, dark = tuple(self.scenes(state)), state.shown.dark
-        self._make(
+        self._run_job(
             "Drawing the machines",
             lambda job: draw(scenes, result.asked, dark, job),
             partial(self.context.save_file, "concepts.png"),

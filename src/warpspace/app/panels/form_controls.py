@@ -1,4 +1,4 @@
-"""Controls with unit, range and help: of the options of an analysis, of leaves of the state."""
+"""Controls with unit, range and help, for options of an analysis and leaves of the state."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -11,35 +11,32 @@ from warpspace.app.state.app_state import AppState
 from warpspace.app.state.tree import LONGEST, leaves, spell, value
 from warpspace.scene.model import Scene
 
-OWN = ""  # what stands for an option that is left to the analysis
+UNSET = ""  # value of an option that the analysis chooses
 EXAMPLES = {"X=..,Y=..": "X=0,B=30", "X,Y,Z": "100,0,50"}
 
 
 def form_html(
-    part: str, options: Sequence[Option], values: Mapping[str, str], scene: Scene
+    panel: str, options: Sequence[Option], values: Mapping[str, str], scene: Scene
 ) -> Markup:
-    """Give the controls of options; what was typed stands in them, else what they default to."""
-    return join(_control(f"{part}:set.{option.name}", option, values.get(option.name), scene)
+    """Render the controls of options with their values or defaults."""
+    return join(_control(f"{panel}:set.{option.name}", option, values.get(option.name), scene)
                 for option in options)  # fmt: skip
 
 
 def _control(name: str, option: Option, text: str | None, scene: Scene) -> Markup:
-    hint, default, metavar = (
-        f"{option.about}.",
-        option.default_words,
-        option.grammar and option.grammar.metavar,
-    )
+    hint, default = f"{option.about}.", option.default_words
+    metavar = option.grammar and option.grammar.metavar
     if option.kind is bool:
         return switch(name, option.label, hint=hint, on=(text or str(int(option.default))) == "1")
     if option.choices or metavar == "AXIS":
         keys = option.choices or tuple(scene.machine.axes)
         titles = {key: option.words.get(key, re.sub("[_-]", " ", key)) for key in keys}
         if not option.default:
-            titles = {OWN: default or "automatic", **titles}
-        control = choice(name, str(option.default or OWN) if text is None else text, titles)
+            titles = {UNSET: default or "automatic", **titles}
+        control = choice(name, str(option.default or UNSET) if text is None else text, titles)
         return field(option.label, control, name, option.unit, hint)
     if option.low is not None and option.high is not None:
-        hint += f" {option.low:g} to {option.high:g}"
+        hint += f" Range: {option.low:g} to {option.high:g}"
     initial = "" if metavar or option.unset else default
     control = text_box(
         name, initial if text is None else text, size="" if metavar else "short",
@@ -49,7 +46,7 @@ def _control(name: str, option: Option, text: str | None, scene: Scene) -> Marku
 
 
 def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) -> Markup:
-    """Give the control of a leaf of the state: a switch, a list, or a box, with a slider or not."""
+    """Render the control of a leaf of the state: a switch, a list, a text box or a slider."""
     leaf, present, name = leaves(state)[path], value(state, path), f"state:set.{path}"
     if leaf.kind == "switch":
         return switch(name, leaf.label, on=bool(present), hint=leaf.hint)
@@ -57,13 +54,13 @@ def setting(state: AppState, path: str, *, text: str = "", bar: bool = False) ->
     if leaf.kind == "choice":
         control = choice(name, str(present), leaf.choices)
     elif leaf.kind == "lines":
-        control = tag("textarea", str(present), class_="ws-box", id=ident(name), rows=3, data_set=name,
-                      maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
+        control = tag("textarea", str(present), class_="ws-box", id=ident(name), rows=3,
+                      data_set=name, maxlength=LONGEST, placeholder=leaf.hint or None)  # fmt: skip
     elif leaf.kind == "number":
         text = text or f"{present:.6g}"
         control = text_box(name, text, size="short", inputmode="decimal")
         if bar and leaf.span is not None:
             span, label = leaf.span, path.rpartition(".")[2]
-            control = slider(name, present, span.low, span.high, span.step, label=leaf.label, twin=name,
-                             text=f"{text} {leaf.unit}") + control  # fmt: skip
+            control = slider(name, present, span.low, span.high, span.step, label=leaf.label,
+                             twin=name, text=f"{text} {leaf.unit}") + control  # fmt: skip
     return field(label, control, name, leaf.unit, leaf.hint)

@@ -1,4 +1,4 @@
-"""The task "Improve": which errors to adjust, and a table of compensation for the control."""
+"""The task "Improve": adjustments of errors, and compensation tables for controllers."""
 
 import base64
 import io
@@ -18,7 +18,7 @@ from warpspace.analysis.registry import entries
 from warpspace.app.browser.html import EMPTY, button, choice, join, tag
 from warpspace.app.evaluation.compare import pinned_side, with_before, without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, Question
+from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import details_html, result_html
 from warpspace.app.panels.panel import Context, Refresh
 from warpspace.app.state.app_state import AppState
@@ -30,12 +30,12 @@ from warpspace.machine.axes import is_linear
 from warpspace.machine.limits import REPAIR_NODES
 from warpspace.scene.model import Scene
 
-NO_GAIN_UM = 0.005  # what improves by less is not offered
+NO_GAIN_UM = 0.005  # smaller improvements are not offered
 
 
 @dataclass(frozen=True, kw_only=True)
-class IncludedRepair(Adjust):
-    """A repair that leaves alone what is excluded."""
+class AdjustIncluded(Adjust):
+    """An adjustment of errors that are not excluded."""
 
     keys: tuple[str, ...]
 
@@ -43,10 +43,10 @@ class IncludedRepair(Adjust):
         return [key for key in scene.parameter_keys if key in self.keys]
 
 
-class RepairPanel(AnalysisPanel):
-    """The best sets of adjustments, found as soon as the task is open."""
+class AdjustPanel(AnalysisPanel):
+    """The best sets of adjustments, computed when the task is opened."""
 
-    at_once = True
+    runs_on_open = True
 
     def options(self) -> Sequence[Option]:
         changes = {"default": None, "choices": ("all",), "words": {"all": "any error"}}
@@ -58,26 +58,32 @@ class RepairPanel(AnalysisPanel):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "objective": Objective.MAX}
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        analysis = super().ask(state, values, scenes)
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
+        analysis = super().build_analysis(state, values, scenes)
         keys = tuple(key for key in state.amplitudes if state.exclusions.active(key))
-        return IncludedRepair(**vars(analysis), keys=keys)
+        return AdjustIncluded(**vars(analysis), keys=keys)
 
-    def question(self, state: AppState) -> Question:
-        return (*super().question(state), state.exclusions)  # even where an excluded one is zero
+    def result_key(self, state: AppState) -> ResultKey:
+        return (*super().result_key(state), state.exclusions)  # even if an excluded one is zero
 
     def headline(self, result: Any) -> Markup:
         if not result.before.max_um:
-            return tag("p", "The error is zero everywhere: there is nothing to repair.")
+            return tag("p", "The error is zero everywhere; no adjustment is needed.")
         if not result.adjustable:
-            return tag("p", "No squareness or alignment acts in this loop; choose any error below.")
-        if not self.offered(result):
-            return tag("p", f"{', '.join(result.adjustable)}: at their best values already.")
-        smallest = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
-        return tag("p", f"Adjustments that minimise the {smallest}.", class_="ws-quiet")
+            return tag(
+                "p",
+                "No squareness or alignment error acts in this loop; select “any error” in the options.",
+            )
+        if not self.offered_changes(result):
+            keys = ", ".join(result.adjustable)
+            return tag("p", f"No improvement possible: {keys} have their optimum values.")
+        objective = "largest |E|" if result.objective is Objective.MAX else "RMS of |E|"
+        return tag("p", f"Adjustments that minimise the {objective}.", class_="ws-quiet")
 
-    def offered(self, result: Any) -> Sequence[int]:
-        """Offer the sets that gain something over the smaller ones, which come first."""
+    def offered_changes(self, result: Any) -> Sequence[int]:
+        """Return the sets that improve on smaller ones, which come first."""
         name, indices = f"{result.objective}_um", list[int]()
         least: float = getattr(result.before, name)
         for index, adjustment in enumerate(result.adjustments):
@@ -88,11 +94,11 @@ class RepairPanel(AnalysisPanel):
 
     def result_html(self, result: Result) -> Markup:
         blocks = (block for block in result.blocks() if not isinstance(block, str))
-        return details_html(blocks, "Each error alone")
+        return details_html(blocks, "Effect of each single error")
 
 
-class BestPanel(RepairPanel):
-    """The best adjustment of one error for the largest one, below the worst point."""
+class BestPanel(AdjustPanel):
+    """The best adjustment of a single error, in the section of the worst point."""
 
     refresh = Refresh.IDLE
 
@@ -112,16 +118,16 @@ class BestPanel(RepairPanel):
         return (*self.body_dependencies(picture), _is_of_errors(picture))
 
     def render(self, picture: LivePicture) -> dict[str, str]:
-        state, answer = picture.state, self._answer
+        state, outcome = picture.state, self.outcome
         if not _is_of_errors(picture):
             return {self.name: EMPTY}
-        question = self.question(state)
-        self.keep_up(state)
-        is_known = answer is not None and answer.question == question
-        status = "No adjustment helps." if is_known else "Searching …"
-        body = self.problem_html(state) or self.cards_html(question)
+        key = self.result_key(state)
+        self.run_if_stale(state)
+        is_current = outcome is not None and outcome.key == key
+        status = "No single adjustment improves it." if is_current else "Searching …"
+        body = self.problem_html(state) or self.cards_html(key)
         body = body or tag("p", status, class_="ws-quiet")
-        body += RECORD if question == self._applied else EMPTY
+        body += RECORD if key == self._applied_key else EMPTY
         return {self.name: tag("h4", "Best single adjustment") + body}
 
 
@@ -131,23 +137,21 @@ def _is_of_errors(picture: LivePicture) -> bool:
 
 # --- Compensate -----------------------------------------------------------------------------------
 
-MOST_POINTS = 101
-"""Points per axis that a page may ask for; the command takes as many as the controller."""
-RESOLUTION_UM = 0.005
-"""What is left below that, or below the step of the numbers, is rounding, no error of a machine."""
+MOST_POINTS = 101  # per axis on the page; the command accepts as many as the controller
+RESOLUTION_UM = 0.005  # a smaller residual, or one below the resolution of the file, is rounding
 STEM, DATE = "compensation", (1980, 1, 1, 0, 0, 0)  # the same table gives the same bytes
-MACHINE, BOTH, LEFT = "machine", "both", "left"
-BOXES = {MACHINE: "as it is", BOTH: "before and after", LEFT: "what is left"}
+MACHINE, COMPARISON, RESIDUAL = "machine", "comparison", "residual"
+BOXES = {MACHINE: "uncompensated", COMPARISON: "before and after", RESIDUAL: "residual error"}
 
 
 class CompensatePanel(AnalysisPanel):
-    """A table for a control: computed when one is chosen; saved, the box is drawn with it."""
+    """A compensation table: computed when a controller is chosen; applied to the map when saved."""
 
-    at_once = True
+    runs_on_open = True
     _picture: tuple[Result, str] | None = None
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
-        """List what the chosen format and the machine have a use for."""
+        """List the options of the chosen format and the machine."""
         if not self.is_ready(state):
             return ()
         kind = find_format(self.values(state)["formats"])
@@ -163,73 +167,71 @@ class CompensatePanel(AnalysisPanel):
     def is_ready(self, state: AppState) -> bool:
         return self.values(state).get("formats", "") in _writable()
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
         if not self.is_ready(state):
-            raise OptionError("choose a controller")
-        analysis: Any = super().ask(state, values, scenes)
-        counts = (
-            dict(analysis.points).values()
-            if isinstance(analysis.points, tuple)
-            else [analysis.points]
-        )
+            raise OptionError("no controller selected; select one")
+        analysis: Any = super().build_analysis(state, values, scenes)
+        points = analysis.points
+        counts = dict(points).values() if isinstance(points, tuple) else [points]
         if max(count or 0 for count in counts) > MOST_POINTS:
-            raise OptionError(f"{{points}} {max(counts)}; expected at most {MOST_POINTS} here")
+            raise OptionError(f"{{points}} {max(counts)}; expected at most {MOST_POINTS}")
         return replace(analysis, formats=(values["formats"],))
 
     def before_result(self, state: AppState) -> Markup:
-        chosen, placeholder = self.values(state).get("formats", ""), {"": "Choose your control …"}
-        table = choice(
-            f"{self.name}:set.formats", chosen, placeholder | _writable(), label="Control"
-        )
+        chosen = self.values(state).get("formats", "")
+        names = {"": "Select controller …"} | _writable()
+        control = choice(f"{self.name}:set.formats", chosen, names, label="Controller")
         if chosen:
-            return table
-        return table + tag("p", "A compensation table for the control, and the error that would"
-                           " remain.", class_="ws-quiet")  # fmt: skip
+            return control
+        text = "A compensation table for the controller, and the residual error."
+        return control + tag("p", text, class_="ws-quiet")
 
     def headline(self, result: Result) -> Markup:
         return EMPTY
 
     def result_html(self, result: Any) -> Markup:
-        """Set before and after beside each other; what was assumed is folded away."""
+        """Render before and after side by side; assumptions are folded away."""
         _, table, *assumptions = result.blocks()
         drawn = [result_html([table])]
         if _is_rounding(result):
-            drawn.append(tag("p", "What is left is the resolution of the numbers in the file, not"
-                             " an error of the machine.", class_="ws-kept"))  # fmt: skip
+            drawn.append(tag("p", "The residual error is below the resolution of the file.",
+                             class_="ws-kept"))  # fmt: skip
         if self._picture is not None and self._picture[0] is result:
             drawn.append(tag("img", src=self._picture[1], alt="Maps of |E| before and after",
                              width="100%"))  # fmt: skip
-        return join(drawn) + details_html(assumptions, "Points, loop, what is assumed")
+        return join(drawn) + details_html(assumptions, "Points, loop, assumptions")
 
     def actions(self, result: Any, *, stale: bool) -> Markup:
-        """Save the table first; then what the box shows, and maps."""
-        state, hint = self.context.state, "Several files come as one ZIP; the box then shows both"
-        is_applicable, disabled_boxes = (
-            holds_for(state, result.controller),
-            {LEFT} if _is_rounding(result) else set(),
-        )
+        """Render the buttons: save the table, maps, and the state of the map."""
+        state, hint = self.context.state, "Several files are saved as one ZIP file"
+        is_applicable = is_applicable_to(state, result.controller)
+        disabled = {RESIDUAL} if _is_rounding(result) else set[str]()
         boxes = join(
             button(label, f"{self.name}:box", key, pressed=key == box_of(state), kind="chip",
-                   disabled=not is_applicable or key in disabled_boxes,
-                   hint="Nothing is left but rounding" if key in disabled_boxes else "")
+                   disabled=not is_applicable or key in disabled,
+                   hint="Residual below numerical resolution" if key in disabled else "")
             for key, label in BOXES.items()
         )  # fmt: skip
         row = [button("Save table", f"{self.name}:table", kind="main", hint=hint)]
         if self.context.services.draw_compensation is not None:
             row += [
-                button("Maps", f"{self.name}:maps", "show", hint="Before, after and what is left"),
+                button(
+                    "Maps", f"{self.name}:maps", "show", hint="Before, after and residual error"
+                ),
                 button("Save maps", f"{self.name}:maps", "save", hint="One sheet for a report"),
             ]
         row.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         row += [RECORD] if box_of(state) != MACHINE else []
-        box_choice = tag("div", tag("span", "The box shows", class_="ws-quiet") + boxes,
-                    class_="ws-actions", role="group", aria_label="The box shows")  # fmt: skip
+        box_choice = tag("div", tag("span", "Map", class_="ws-quiet") + boxes,
+                         class_="ws-actions", role="group", aria_label="Map")  # fmt: skip
         return tag("div", join(row), class_="ws-actions") + box_choice
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        result = self._answer.found if self._answer is not None else None
+        result = self.outcome.result if self.outcome is not None else None
         if action == "set.formats":
-            self._answer = None  # a table of another control says nothing of this one
+            self.outcome = None  # a table for another controller
         if not isinstance(result, Compensation) or action not in ("table", "box", "maps"):
             return super().handle(state, action, value)
         if action == "maps":
@@ -237,14 +239,11 @@ class CompensatePanel(AnalysisPanel):
             return state
         if action == "table":
             self.context.call_soon(partial(self.context.save_file, *packed(result)))
-        if not holds_for(state, result.controller):
+        if not is_applicable_to(state, result.controller):
             return state
-        residual = f"{result.after_statistics.max_um:.1f} µm"
-        self.context.last_decision = (
-            without_table(state),
-            f"{self.title}: a table leaves at most {residual}",
-        )
-        return with_box(state, BOTH if action == "table" else value, result.controller)
+        description = f"maximum residual error {result.after_statistics.max_um:.1f} µm"
+        self.context.last_decision = without_table(state), f"{self.title}: {description}"
+        return with_box(state, COMPARISON if action == "table" else value, result.controller)
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), box_of(picture.state))
@@ -254,21 +253,20 @@ class CompensatePanel(AnalysisPanel):
         if draw is None:
             return
         save = partial(self.context.save_file, f"{STEM}.png")
-        self._make(
+        self._run_job(
             "Drawing the maps", lambda job: draw(result, dark, not saves, job),
-            save if saves else partial(self._take_picture, result),
+            save if saves else partial(self._show_maps, result),
         )  # fmt: skip
 
-    def _take_picture(self, result: Compensation, png: bytes) -> None:
+    def _show_maps(self, result: Compensation, png: bytes) -> None:
         self._picture = result, f"data:image/png;base64,{base64.b64encode(png).decode()}"
         self.rerender()
 
 
 def _writable() -> dict[str, str]:
-    writable = sorted(
-        (format for format in formats() if format.can_write), key=lambda format: format.title
-    )
-    return {format.name: format.title for format in writable}
+    writable = [file_format for file_format in formats() if file_format.can_write]
+    writable.sort(key=lambda file_format: file_format.title)
+    return {file_format.name: file_format.title for file_format in writable}
 
 
 def _is_rounding(result: Compensation) -> bool:
@@ -276,7 +274,7 @@ def _is_rounding(result: Compensation) -> bool:
 
 
 def packed(result: Compensation) -> tuple[str, bytes]:
-    """Give name and content of what is saved: the file of the table, or a ZIP of several."""
+    """Return name and content of the file to save: a table, or a ZIP file of several."""
     ending = result.format.endings[0]
     files = {f"{STEM}{add or ending}": text.encode("utf-8") for add, text in result.files.items()}
     if len(files) == 1:
@@ -289,7 +287,7 @@ def packed(result: Compensation) -> tuple[str, bytes]:
 
 
 def with_box(state: AppState, box: str, controller: Controller) -> AppState:
-    """Choose what the box shows: a key of `BOXES`; nonsense changes nothing."""
+    """Set the compensation state of the map: a key of `BOXES`; others are ignored."""
     if box not in BOXES or (box == box_of(state) and state.controller in (None, controller)):
         return state
     bare = without_table(state)
@@ -297,22 +295,22 @@ def with_box(state: AppState, box: str, controller: Controller) -> AppState:
         return bare
     bare = replace(bare, loop=controller.loop, placed=bare.placed or controller.scene.placed)
     corrected = replace(bare, controller=controller)
-    if box == BOTH:
+    if box == COMPARISON:
         return with_before(corrected, pinned_side(bare))
     return replace(corrected, comparison=corrected.comparison.off())
 
 
 def box_of(state: AppState) -> str:
-    """Tell what the box shows."""
+    """Return the compensation state of the map, a key of `BOXES`."""
     if state.controller is None:
         return MACHINE
     before = state.comparison.a.state
     is_compared = (
         state.comparison.b is not None and before is not None and before.controller is None
     )
-    return BOTH if is_compared else LEFT
+    return COMPARISON if is_compared else RESIDUAL
 
 
-def holds_for(state: AppState, controller: Controller) -> bool:
-    """Tell whether a table was made for the machine that a state shows."""
+def is_applicable_to(state: AppState, controller: Controller) -> bool:
+    """Check if a table was computed for the machine of a state."""
     return controller.scene.machine == state.scene.machine

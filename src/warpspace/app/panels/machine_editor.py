@@ -1,4 +1,4 @@
-"""The task Machine: where axes stand, how points run while one turns; the editor; the library."""
+"""The task "Machine": axis positions, error motions of rotary axes, editor, library."""
 
 import base64
 import io
@@ -40,38 +40,38 @@ from warpspace.picture.traces import TraceLine, evaluate_axis_motion, motion_lin
 from warpspace.scene.machine_library import machine_picture
 from warpspace.units import MICROMETRE, MINUS
 
-OPEN_MESH = "The surface of a mesh of this machine is not closed; it is drawn as it is."
+OPEN_MESH = "A mesh of this machine is not watertight; it is drawn unchanged."
 
 
 class PositionsSection(Section):
     name, task, title = "positions", "machine", "Axis positions"
-    sentence = "Move the axes: rotary axes carry the working volume, linear ones the tool point"
+    sentence = "Rotary axes move the working volume, linear axes the tool point"
 
     def body(self, picture: LivePicture) -> Markup:
         state = picture.state
         axes, point_mm = standing(state)
         copied = button("Copy", "positions:none", kind="link", hint="Copy the positions",
                         data_copy=spell_at(axes))  # fmt: skip
-        words = join(("Tool point: ", spell_point(axes, point_mm), " ", copied))
+        position = join(("Tool point: ", spell_point(axes, point_mm), " ", copied))
         is_open = state.machine.shown and check_meshes(state.scene.machine)
         linear = (f"machine.linear_mm.{axis}" for axis in linear_spans(state.scene))
         paths = (*(f"positions.{axis}" for axis in state.positions), *linear)
         bars = [setting(state, path, bar=True) for path in paths]
-        said = (words, OPEN_MESH) if is_open else (words,)
-        return join((*bars, *(tag("p", one, class_="ws-tiny") for one in said)))
+        lines = (position, OPEN_MESH) if is_open else (position,)
+        return join((*bars, *(tag("p", line, class_="ws-tiny") for line in lines)))
 
 
-# --- Rotary axes: play, one trace as polar plots, all of them in numbers --------------------------
+# --- Rotary axes: animation, polar plots of one trace, table of all traces ------------------------
 
 NOTHING_MOVED = (
     "No error moves the traced points: all errors of the axes that carry them are zero or"
-    " excluded. Set one, for instance a translation error of a rotary axis, and the traces appear."
+    " excluded. Set one, for example a translation error of a rotary axis."
 )
-ON_THE_AXIS = "The point lies on the axis: it has no direction that deviations could be taken in."
+ON_THE_AXIS = "The point lies on the axis of rotation; its radial direction is undefined."
 ABOUT = (
-    "Error motion of the axis at the height of the point and in its direction, which turns with it:"
-    " peak to valley, and about the axis average line. A tilt or run-out once per turn also results"
-    " from a tilted or displaced axis average line."
+    "Error motion at the axial position of the point, in the radial direction of the point, which"
+    " rotates with the axis: peak-to-valley value, and value about the axis average line. A"
+    " once-per-revolution component also results from a displaced or inclined axis average line."
 )
 KEY = (
     '<p class="ws-key ws-tiny"><span class="ws-s0">actual − nominal</span>'
@@ -86,15 +86,15 @@ HEADS = {
     "tilt": "µrad",
 }
 AVERAGE = (
-    "By how much the axis average line is displaced at the height of the point and inclined; error"
-    " motions peak to valley / about that line."
+    "Displacement at the axial position of the point and inclination of the axis average line;"
+    " error motions: peak to valley / about that line."
 )
 MOST_ROWS = 24  # traces in the table
 
 
 class RotarySection(Section):
     name, task, title = "rotary", "machine", "Rotary axes"
-    sentence = "See how traced points run while a rotary axis turns (ISO 230-7)"
+    sentence = "Error motion of traced points during rotation of an axis (ISO 230-7)"
 
     def body(self, picture: LivePicture) -> Markup:
         state, stage = picture.state, self.context.stage
@@ -105,13 +105,13 @@ class RotarySection(Section):
             stage.moved = self._follow
             playing, position = stage.playing, stage.position
         buttons = [button("Pause" if playing else f"Turn {axis}", "rotary:play",
-                          hint="The points run along their circles")]  # fmt: skip
+                          hint="Animate the traced points")]  # fmt: skip
         if playing or position:
-            hint = "Stop and return to the position of the axis"
+            hint = "Stop and return to the axis position"
             buttons.append(button("Stop", "rotary:stop", hint=hint))
         if position and not playing:
             hint, path = "Move the axis to the paused position", f"state:set.positions.{axis}"
-            buttons.append(button("Stand here", path, round(position[axis]), hint=hint))
+            buttons.append(button("Move axes here", path, round(position[axis]), hint=hint))
         return join((
             tag("div", join(buttons), class_="ws-actions"),
             fill('<p data-piece="rotary.angle" class="ws-tiny"></p>'),
@@ -135,40 +135,35 @@ class RotarySection(Section):
 
 def _trace(picture: LivePicture) -> Markup:
     if not picture.state.shown.traces:
-        turn_on = button("Draw the traces", "state:set.shown.traces", "1", kind="main")
+        turn_on = button("Show traces", "state:set.shown.traces", "1", kind="main")
         return tag("div", turn_on, class_="ws-actions")
     moved = picture.moved_traces
     if not moved:
         return tag("p", NOTHING_MOVED, class_="ws-quiet")
     name, path = chosen_trace(picture), "state:set.rotary.chosen"
-    chosen = field(
-        "Trace", choice(path, name, {trace_name: trace_name for trace_name in moved}), path
-    )
-    motions = {
-        trace_name: motion_of(picture, moved[trace_name]) for trace_name in [*moved][:MOST_ROWS]
-    }
+    chosen = field("Trace", choice(path, name, {trace: trace for trace in moved}), path)
+    motions = {trace: motion_of(picture, moved[trace]) for trace in [*moved][:MOST_ROWS]}
     motion = motions[name] if name in motions else motion_of(picture, moved[name])
     motion_plots = _motion(motion, name) if motion else tag("p", ON_THE_AXIS, class_="ws-quiet")
-    head = join(fill("<th>{} <small>{}</small></th>", *trace_name) for trace_name in HEADS.items())
+    head = join(fill("<th>{} <small>{}</small></th>", *heading) for heading in HEADS.items())
     table = tag("table", tag("tr", head) + join(starmap(_numbers, motions.items())))
-    parts = tag("summary", "All traces in numbers") + tag("p", AVERAGE, class_="ws-tiny") + table
+    parts = tag("summary", "Table of all traces") + tag("p", AVERAGE, class_="ws-tiny") + table
     return chosen + motion_plots + tag("details", parts, class_="ws-options")
 
 
 def _numbers(name: str, motion: AxisMotion | None) -> Markup:
     cells = ["on the axis"]
     if motion is not None:
-        axis = (f"{one.once_a_turn:.2f}" for one in (motion.radial, motion.tilt))
-        pairs = (
-            f"{one.peak_to_valley:.2f} /\u00a0{one.motion_value:.2f}" for one in motion.motions
-        )
+        axis = (f"{part.once_a_turn:.2f}" for part in (motion.radial, motion.tilt))
+        pairs = (f"{part.peak_to_valley:.2f} /\u00a0{part.motion_value:.2f}"
+                 for part in motion.motions)  # fmt: skip
         cells = [f"{motion.radius_mm:.1f}", *axis, *pairs]
     line = f'<tr><td colspan="{len(HEADS)}" class="ws-quiet">{{}}</td></tr>'
     return fill(line, name) + tag("tr", join(tag("td", cell) for cell in cells))
 
 
 def motion_of(picture: LivePicture, line: TraceLine) -> AxisMotion | None:
-    """Evaluate how the axis of a trace runs, with the errors that take part."""
+    """Evaluate the error motion of the axis of a trace, with the active errors."""
     if picture.compared is None or not picture.is_difference:
         return _of_state(picture.drawn_state, line)
     motion_a, motion_b = (_of_state(side, line) for side in picture.compared.sides)
@@ -207,9 +202,9 @@ def _points(state: AppState, played: str) -> Markup:
     if len(state.positions) > 1:
         parts += [setting(state, f"rotary.held.{axis}") for axis in state.position_spans]
         low, high = state.scene.machine.axes[played].travel
-        high = min(high, low + 359.0)  # a full turn once
+        high = min(high, low + 359.0)  # at most one revolution
         turns = range(math.ceil(low / 90.0), math.floor(high / 90.0) + 1)
-        positions, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis turns"
+        positions, hint = ",".join(str(90 * turn) for turn in turns), "While the other axis rotates"
         path = f"state:set.rotary.held.{played}"
         parts.append(button(f"Hold {played} at every 90°", path, positions, hint=hint))
     summary = tag("summary", "Traced points and positions")
@@ -219,51 +214,51 @@ def _points(state: AppState, played: str) -> Markup:
 # --- The editor: chain, frames, travels and working volume ----------------------------------------
 
 FIXED = {
-    "w": "workpiece, on the last axis of its side",
-    "S": "spindle, on the last axis of its side",
+    "w": "workpiece, on the last axis of the workpiece branch",
+    "S": "spindle, on the last axis of the tool branch",
     "t": "tool, in the spindle",
 }
-"""What the frames are that do not move."""
+"""Descriptions of frames that are no axes."""
 ROWS = {
     "offset": ("Offset", "xyz"),
     "rotation": ("Rotation", "xyz"),
     "travel": ("Travel", ("from", "to")),
     "volume": ("Volume", ("from", "to")),
-    "span": ("Guides", ("apart",)),
+    "span": ("Guides", ("distance",)),
 }
-"""Numbers of a frame: label and what each is."""
+"""Numbers of a frame: label, and label of each number."""
 CHAIN_HINT = (
-    "w, axes, F, axes, t: from the workpiece over the frame F to the tool. An axis is a letter of"
-    " X Y Z U V W A B C and an optional digit."
+    "w, axes, F, axes, t: from the workpiece via the frame F to the tool. An axis is one of the"
+    " letters X Y Z U V W A B C with an optional digit."
 )
 BODIES = (
-    "A mesh of your own (STL, OBJ, PLY, GLB) lies beside the scene file, which names it:"
+    "To use a custom mesh (STL, OBJ, PLY, GLB), put it beside the scene file and refer to it there:"
     ' [bodies] X = "column.stl".'
 )
-WHOLE = (
+MACHINE_BUTTONS = (
     ("Another machine …", "page:open", "machines",
-     "Machines of the library, each with its own errors"),
+     "Library machines with their errors"),
     ("Default dimensions", "editor:do", "sizes",
-     "Offsets, travels, directions and working volume that fit the chain"),
-    ("Back to the scene's", "editor:do", "own",
-     "The machine as it was opened, with the errors of its axes"),
+     "Default offsets, travels, directions and working volume for this chain"),
+    ("Reset to the scene", "editor:do", "own",
+     "The machine as opened, with the errors of its axes"),
 )  # fmt: skip
 
 
 class EditorSection(Section):
     name, task, title = "editor", "machine", "Edit the machine"
-    sentence = "Change axes, their order, places and travels, or start from another machine"
+    sentence = "Axes, their order, offsets and travels; or another machine to start from"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._refused = ("", "")  # chain that was typed, and what is wrong
+        self._refused = ("", "")  # rejected chain and error message
 
     def body(self, picture: LivePicture) -> Markup:
         state, name = picture.state, "editor:set.chain"
         chain, tables = state.scene.machine.chain, machine_edits.tables_of(state.scene)
         typed, problem = self._refused if self._refused[1] else (str(chain), "")
         box = text_box(name, typed, aria_invalid=str(bool(problem)).lower())
-        machine_buttons = (button(*arguments, hint=hint) for *arguments, hint in WHOLE)
+        machine_buttons = (button(*arguments, hint=hint) for *arguments, hint in MACHINE_BUTTONS)
         return join((
             field("Chain", box, name, hint=CHAIN_HINT),
             tag("p", problem, class_="ws-problem", role="alert") if problem else EMPTY,
@@ -278,14 +273,12 @@ class EditorSection(Section):
         self._refused = ("", "")
         if action == "do":
             return machine_edits.with_word(state, value)
-        what = action.removeprefix("set.")
-        changed = machine_edits.with_word(state, f"{what} {value}")
+        quantity = action.removeprefix("set.")
+        changed = machine_edits.with_word(state, f"{quantity} {value}")
         notes = changed.notes[len(state.notes) :]
-        if what == "chain" and notes and changed.scene is state.scene:
-            self._refused = (
-                value[:200],
-                "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}"),
-            )
+        if quantity == "chain" and notes and changed.scene is state.scene:
+            message = "\n".join(notes).removesuffix(f"; {machine_edits.UNCHANGED}")
+            self._refused = value[:200], message
             self.context.call_soon(self.rerender)
             return state
         return changed
@@ -294,25 +287,23 @@ class EditorSection(Section):
 def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
     machine = state.scene.machine
     axis, gantry = machine.axes.get(name), machine.gantries.get(name)
-    lines = [
-        _boxes(
-            f"{what} {name}", label, machine_edits.UNITS[what] or unit, tables[what][name], letters
-        )
-        for what, (label, letters) in ROWS.items()
-        if name in tables[what] and (unit := axis.unit if axis else "mm")
-    ]
+    lines: list[Markup] = []
+    for quantity, (label, letters) in ROWS.items():
+        if name in tables[quantity]:
+            unit = machine_edits.UNITS[quantity] or (axis.unit if axis else "mm")
+            lines.append(_boxes(f"{quantity} {name}", label, unit, tables[quantity][name], letters))
     about = FIXED.get(name, "")
     if axis is not None:
         side, other = "workpiece", "tool"
         if name in machine.chain.tool:
             side, other = other, side
-        motion = "moves along" if axis.is_linear else "turns about"
-        sense = "" if axis.direction == 1 else " against its name"
+        motion = "moves along" if axis.is_linear else "rotates about"
+        sense = "" if axis.direction == 1 else " (reversed)"
         about = f"{motion} {'xyz'[axis.index]}{sense}, carries the {side}"
         labels = {
-            "left": "Nearer to the workpiece",
-            "right": "Nearer to the tool",
-            "side": f"Carry the {other}",
+            "left": "Move towards workpiece",
+            "right": "Move towards tool",
+            "side": f"Move to {other} side",
             "turn": "Reverse direction",
             "remove": f"Remove {name}",
         }
@@ -320,7 +311,7 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
             button(text, "editor:do", f"{command} {name}") for command, text in labels.items()
         ]
         if axis.is_linear:
-            hint, pressed = "A gantry: two guides, each with an error", gantry is not None
+            hint, pressed = "Gantry: two guides with independent errors", gantry is not None
             guides = button("Two guides", "editor:do", f"gantry {name}", hint=hint, pressed=pressed)
             buttons.insert(-1, guides)
         lines += [*_guides(state, gantry), tag("div", join(buttons), class_="ws-actions")]
@@ -329,13 +320,14 @@ def _frame(state: AppState, tables: machine_edits.Tables, name: str) -> Markup:
 
 
 def _boxes(
-    what: str, label: str, unit: str, values: Sequence[float], letters: Sequence[str]
+    command: str, label: str, unit: str, values: Sequence[float], letters: Sequence[str]
 ) -> Markup:
-    """Give a line of number boxes, each with its letter; `what` is the word that they send."""
-    about = what.partition(" ")[2]
+    """Render a line of number boxes with their letters, for a command of the editor."""
+    frame = command.partition(" ")[2]
     boxes: list[Markup] = []
     for index, (value, letter) in enumerate(zip(values, letters, strict=True)):
-        name, description = f"editor:set.{what} {index}", f"{label} of {about}, {letter} in {unit}"
+        name = f"editor:set.{command} {index}"
+        description = f"{label} of {frame}, {letter} in {unit}"
         box = text_box(name, spell_typed(value), label=description, inputmode="decimal")
         boxes.append(fill('<label for="{}">{}</label>{}', ident(name), letter, box))
     head = fill("<span>{} <small>{}</small></span>", label, unit)
@@ -347,17 +339,17 @@ def _guides(state: AppState, gantry: Gantry | None) -> list[Markup]:
         return []
     name, errors = gantry.axis, machine_edits.guide_errors(state, gantry)
     note = (
-        f"{gantry.positioning_key} is the mean of the guides, {gantry.rotation_key} follows from"
-        " their difference."
+        f"{gantry.positioning_key} is the mean of the guide errors, {gantry.rotation_key} results"
+        " from their difference."
     )
     lines: list[Markup] = []
     if errors is None:
-        note += " Their curves differ: set both errors in the column at the left."
+        note += " Their curves differ: edit both errors in the error list."
     else:
         values = [round(value, 9) for value in errors]
-        lines.append(_boxes(f"guide {name}", "Each off by", MICROMETRE, values, "12"))
-    hint = "Click for the other direction"
-    across = button(f"Apart along {gantry.across}", "editor:do", f"across {name}", kind="link",
+        lines.append(_boxes(f"guide {name}", "Error of each guide", MICROMETRE, values, "12"))
+    hint = "Click to change the direction"
+    across = button(f"Spaced along {gantry.across}", "editor:do", f"across {name}", kind="link",
                     hint=hint)  # fmt: skip
     return [*lines, across, tag("p", note, class_="ws-tiny")]
 
@@ -368,26 +360,26 @@ def _bodies(bodies: dict[str, BodySource]) -> Markup:
         remove = button("Remove", "editor:do", f"mesh {frame}", kind="link",
                         aria_label=f"Remove the body of {frame}")  # fmt: skip
         lines.append(tag("p", join((tag("b", frame), " ", _source(source), " ", remove))))
-    lines = lines or [tag("p", "All bodies are generated.")]
-    summary = tag("summary", "Bodies given by the scene")
+    lines = lines or [tag("p", "All bodies are generated automatically.")]
+    summary = tag("summary", "Bodies defined by the scene")
     return tag("details", join((summary, *lines, tag("p", BODIES, class_="ws-tiny"))),
                class_="ws-frame", data_key="frame-bodies")  # fmt: skip
 
 
 def _source(source: BodySource) -> str:
-    """Say where a body comes from; of a file its name alone, never its folder."""
+    """Format the source of a body; of a file only the name, never its folder."""
     file = f"{source.file} · {source.unit or 'unit of its format'}"
     parts = [f"shape {source.shape}" if source.shape else file]
-    placed = {"offset {} mm": source.offset_mm, "turned {} °": source.rotation_deg}
+    placed = {"offset {} mm": source.offset_mm, "rotated {} °": source.rotation_deg}
     for template, values in placed.items():
         if any(values):
             parts.append(template.format(", ".join(map(spell_typed, values))))
     return " · ".join(parts)
 
 
-# --- The machines to start from: a small picture, a title and a chain each ------------------------
+# --- The library: thumbnail, title and chain of each machine --------------------------------------
 
-WIDTH_PX = 240  # of a small picture: it is shown smaller, sharp on fine screens too
+WIDTH_PX = 240  # of a thumbnail; displayed smaller, for high-resolution screens
 
 
 class MachinesDialog(Dialog):
@@ -397,8 +389,8 @@ class MachinesDialog(Dialog):
         present = picture.state.scene.machine.name
         return tag("div", join(
             tag("button", join((
-                fill('<img src="{}" alt="" width="150">', image)
-                if (image := small_picture(name)) else tag("i", "no picture"),
+                fill('<img src="{}" alt="" width="150">', thumbnail(name))
+                if thumbnail(name) else tag("i", "no picture"),
                 tag("b", scene.machine.title), tag("small", str(scene.machine.chain)),
             )), type="button", data_do="machines:choose", data_value=name,
                 aria_current="true" if name == present else None)
@@ -415,13 +407,13 @@ class MachinesDialog(Dialog):
 
 
 @cache
-def small_picture(name: str) -> str:
-    """Give the picture of a machine of the library as a data address; empty where it has none."""
+def thumbnail(name: str) -> str:
+    """Return the picture of a library machine as a data URL; empty if it has none."""
     path = machine_picture(name)
     if path is None:
         return ""
     with Image.open(path) as picture:
-        wide, high = picture.size  # the machine stands at the left, below the title
+        wide, high = picture.size  # the machine is at the left, below the title
         box = (wide // 50, high // 6, wide * 11 // 20, high * 7 // 8)
         small = picture.convert("RGB").crop(box)
     small.thumbnail((WIDTH_PX, WIDTH_PX))

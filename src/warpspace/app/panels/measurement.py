@@ -32,7 +32,7 @@ from warpspace.app.drawing.around import residuals
 from warpspace.app.drawing.shapes import Nodes, Shapes
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
-from warpspace.app.panels.analysis_panel import AnalysisPanel, Question
+from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.panel import Context, Job, Jobs
 from warpspace.app.state import edits
@@ -70,33 +70,33 @@ class FilesPanel(AnalysisPanel):
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
-        self._files: tuple[UploadedFile, ...] = ()
-        self._trouble = ""
+        self.files: tuple[UploadedFile, ...] = ()
+        self._upload_problem = ""
         self._uploads = Jobs(self, self.rerender, self._refuse)
 
-    def question(self, state: AppState) -> Question:
-        return (*super().question(state), self._files)
+    def result_key(self, state: AppState) -> ResultKey:
+        return (*super().result_key(state), self.files)
 
     def is_ready(self, state: AppState) -> bool:
-        return bool(self._files)
+        return bool(self.files)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         """Parse a file beside the session; return what the session does with it."""
         raise NotImplementedError
 
-    def _hold(self, files: tuple[UploadedFile, ...]) -> None:
-        self._files = files
+    def set_files(self, files: tuple[UploadedFile, ...]) -> None:
+        self.files = files
 
     def files_html(self) -> Markup:
         """List the files, and say why the last one is not among them."""
         lines = [
             (tag("span", file.name) + tag("small", f" {file.words}"),
              button("✕", f"{self.name}:remove", index, kind="link", aria_label=f"Remove {file.name}"))
-            for index, file in enumerate(self._files)
+            for index, file in enumerate(self.files)
         ]  # fmt: skip
-        problem = tag("p", self._trouble, class_="ws-problem", role="alert")
+        problem = tag("p", self._upload_problem, class_="ws-problem", role="alert")
         table = rows(lines) if lines else EMPTY
-        return join((problem if self._trouble else EMPTY, table, self._uploads.html()))
+        return join((problem if self._upload_problem else EMPTY, table, self._uploads.html()))
 
     def upload_html(self, label: str) -> Markup:
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
@@ -114,19 +114,19 @@ class FilesPanel(AnalysisPanel):
         self._uploads.queue("Reading", work)
 
     def _take_in(self, accept: Callable[[], None]) -> None:
-        self._trouble = ""
+        self._upload_problem = ""
         accept()
         self.rerender()
 
     def _refuse(self, error: Exception) -> None:
-        self._trouble = error_words(error)
+        self._upload_problem = error_words(error)
         self.rerender()
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "file":
             self.receive(partial(read_upload, value, self.most_bytes, self.what))
-        elif action == "remove" and (index := index_of(value, len(self._files))) is not None:
-            self._files = (*self._files[:index], *self._files[index + 1 :])
+        elif action == "remove" and (index := index_of(value, len(self.files))) is not None:
+            self.files = (*self.files[:index], *self.files[index + 1 :])
             self.context.call_soon(self.rerender)
         else:
             if action == "cancel":
@@ -142,7 +142,7 @@ class TestsPanel(FilesPanel):
     """A standard test on the model as it would be on the machine, its path drawn in the box."""
 
     __test__ = False
-    at_once = True
+    runs_on_open = True
 
     def __init__(self, context: Context) -> None:
         sentence = "A test by its standard, on the model as it would be on the machine"
@@ -153,19 +153,21 @@ class TestsPanel(FilesPanel):
     def kind(self) -> type[BenchTest]:
         return chosen_test(self.context.state) or BenchTest
 
-    def question(self, state: AppState) -> Question:
-        return (*super().question(state), state.forms.get(TEST))
+    def result_key(self, state: AppState) -> ResultKey:
+        return (*super().result_key(state), state.forms.get(TEST))
 
     def is_ready(self, state: AppState) -> bool:
         return chosen_test(state) is not None
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.question(picture.drawn_state), picture.is_difference)
+        return (self.result_key(picture.drawn_state), picture.is_difference)
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        analysis: Any = super().ask(state, values, scenes)
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scenes)
         plan_test(analysis, scenes[0])
-        for file in self._files:
+        for file in self.files:
             table = parse_test(file.content, analysis.data_columns(scenes[0]), file.name)
             analysis = replace(analysis, data=table)
         return analysis
@@ -185,7 +187,7 @@ class TestsPanel(FilesPanel):
         about = join(tag("p", test) for test in (kind.words, f"Columns of a file: {columns}"))
         return join((
             chooser, no_difference if picture.is_difference else self._body(state), self.files_html(),
-            EMPTY if self._files else self.upload_html("Measured readings …"),
+            EMPTY if self.files else self.upload_html("Measured readings …"),
             switch("test:path", "Path in the box", on=state.forms.get("test.path") != "0",
                    hint="Nominal in grey, actual in colour, exaggerated as the box is"),
             tag("details", tag("summary", "Procedure") + tag("div", about), class_="ws-details",
@@ -203,7 +205,7 @@ class TestsPanel(FilesPanel):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "choose" and value in ("", *bench_names()):
-            self._answer, self._files, self._trouble = None, (), ""
+            self.outcome, self.files, self._upload_problem = None, (), ""
             other_forms = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
             state = replace(state, forms=other_forms | ({TEST: value} if value else {}))
             return edits.with_sight(state, inside=bool(value))
@@ -212,7 +214,7 @@ class TestsPanel(FilesPanel):
         return super().handle(state, action, value)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        return partial(self._hold, (UploadedFile(name, upload_text(content, name, WHAT)),))
+        return partial(self.set_files, (UploadedFile(name, upload_text(content, name, WHAT)),))
 
 
 # --- Calibration ----------------------------------------------------------------------------------
@@ -240,7 +242,7 @@ class CalibrateTexts(Calibrate):
         return self.find(scene, reading_sets, (), lambda: watch(0.0))
 
 
-def take_file(
+def read_uploaded(
     scene: Scene, text: str, name: str, kind: str | None, present: Sequence[UploadedFile]
 ) -> UploadedFile:
     """Take in the text of a file beside those that are there."""
@@ -268,7 +270,7 @@ class CalibratePanel(FilesPanel):
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
-        self._kind_of_next, self._arrows = "", ""
+        self._next_kind, self._arrows = "", ""
         self._drawn: Nodes | None = None
 
     def options(self) -> Sequence[Option]:
@@ -279,18 +281,20 @@ class CalibratePanel(FilesPanel):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
         analysis = read_form(CalibrateTexts, self.options(), values, scenes[0])
-        return replace(analysis, files=self._files)
+        return replace(analysis, files=self.files)
 
     def before_result(self, state: AppState) -> Markup:
         introduction = "CSV files of readings give the errors of this machine."
         bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
         kinds = {"": "recognised from its columns"}
         kinds |= {name: _kind_words(name) for name in (*KINDS, *test_kinds())}
-        name, _, options = self._kind_of_next.partition(":")
+        name, _, options = self._next_kind.partition(":")
         return join((
-            self.files_html(), EMPTY if self._files else tag("p", introduction, class_="ws-quiet"),
+            self.files_html(), EMPTY if self.files else tag("p", introduction, class_="ws-quiet"),
             self.upload_html("Add readings …"),
             choice("calibrate:bundled", "", bundled, label="Bundled readings"),
             labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
@@ -312,7 +316,7 @@ class CalibratePanel(FilesPanel):
                 names = ", ".join(keys[:MOST_NAMED])
                 parts.append(tag("p", f"{title}: {names}{omitted}", class_="ws-quiet"))
         notes = (note.replace("--", "") for note in result.notes[:MOST_NAMED])
-        return join((*parts, *(tag("p", note, class_="ws-doubt") for note in notes)))
+        return join((*parts, *(tag("p", note, class_="ws-caveat") for note in notes)))
 
     def result_html(self, result: Result) -> Markup:
         blocks = list(result.blocks())
@@ -329,10 +333,10 @@ class CalibratePanel(FilesPanel):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action == "kind":
-            self._kind_of_next = value if value in (*KINDS, *test_kinds()) else ""
+            self._next_kind = value if value in (*KINDS, *test_kinds()) else ""
         elif action == "test-options":
-            name = self._kind_of_next.partition(":")[0]
-            self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
+            name = self._next_kind.partition(":")[0]
+            self._next_kind = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
         elif action == "bundled" and value in bundled_data():
             self.receive(lambda: (value, find_data(value).read_bytes()))
         elif action == "arrows":
@@ -345,16 +349,21 @@ class CalibratePanel(FilesPanel):
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         text = upload_text(content, name, WHAT)
-        scene, kind, files = self.context.state.active_scene(), self._kind_of_next, self._files
-        return partial(self._hold, (*files, take_file(scene, text, name, kind or None, files)))
+        scene, kind, files = self.context.state.active_scene(), self._next_kind, self.files
+        return partial(
+            self.set_files, (*files, read_uploaded(scene, text, name, kind or None, files))
+        )
 
     # --- arrows ----------------------------------------------------------------------------------
 
     def _arrow_words(self) -> str:
         picture, calibration, text = self.context.picture, None, ""
         shapes: Shapes = {}
-        if self._answer and self.question(self.context.state) in (self._answer[0], self._applied):
-            calibration = self._answer[1]
+        if self.outcome and self.result_key(self.context.state) in (
+            self.outcome[0],
+            self._applied_key,
+        ):
+            calibration = self.outcome[1]
         if self._arrows and picture is not None and isinstance(calibration, Calibration):
             text, before = TURNED, self._arrows == "before"
             if all(axis.is_linear for axis in calibration.scene.machine.branch("workpiece")):

@@ -80,7 +80,7 @@ class NotesPanel(Panel):
             case "open" | "close", None:
                 return _opened(state, LIST if command == "open" else "")
             case "pin" | "decide", None:
-                return self._begun(state, value, decided=command == "decide")
+                return self._begun(state, value, is_decision=command == "decide")
             case "keep", edited:
                 return self._kept(state, edited)
             case "back", None if self._again:

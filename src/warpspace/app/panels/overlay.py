@@ -98,7 +98,7 @@ class OrderPanel(Panel):
                 "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
 
 
-class RoomPanel(Panel):
+class OverlayPanel(Panel):
     """What the page places by itself as the camera moves, and how large the drawing is."""
 
     name = "room"

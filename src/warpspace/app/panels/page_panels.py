@@ -14,7 +14,7 @@ from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
 from warpspace.app.panels.import_panel import ImportPanel
-from warpspace.app.panels.improve import BestPanel, CompensatePanel, RepairPanel
+from warpspace.app.panels.improve import BestPanel, CompensatePanel, AdjustPanel
 from warpspace.app.panels.machine_editor import (
     EditorSection,
     MachinesDialog,
@@ -23,7 +23,7 @@ from warpspace.app.panels.machine_editor import (
 )
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel, RoomPanel
+from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel, OverlayPanel
 from warpspace.app.panels.panel import Context, Panel, Section
 from warpspace.app.panels.part_panels import PartPanel, ProgramPanel
 from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel
@@ -31,7 +31,7 @@ from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, St
 from warpspace.app.state.app_state import TASKS
 
 HOOKS: dict[str, type[AnalysisPanel]] = {
-    "calibrate": CalibratePanel, "adjust": RepairPanel, "compensate": CompensatePanel,
+    "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
     "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
     "part": PartPanel, "program": ProgramPanel,
 }  # fmt: skip
@@ -96,7 +96,7 @@ def _places(names: Iterable[str]) -> Markup:
     return join(tag("div", "", data_piece=f"section.{name}") for name in names)
 
 
-def build_parts(context: Context) -> list[Panel]:
+def build_panels(context: Context) -> list[Panel]:
     of_tasks = (WorstPanel, VolumePanel, ImportPanel, TestsPanel)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     sections: list[Section] = [
@@ -106,7 +106,7 @@ def build_parts(context: Context) -> list[Panel]:
     ]
     kinds = (
         TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel,
-        RoomPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
+        OverlayPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
         MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
     panels = [kind(context) for kind in kinds]

@@ -162,9 +162,9 @@ class Context:
         self._wake.set()
 
     def show_opened(
-        self, opened: AppState, camera: CameraMemory | None, *, whole: bool = True
+        self, opened: AppState, camera: CameraMemory | None, *, keeps_comparison: bool = False
     ) -> None:
-        """Show an opened state from its camera; unless `whole`, the comparison stays."""
+        """Show an opened state from its camera; optionally the comparison stays."""
         # here, since not every opened scene is drawn if many arrive in a row
         _, dropped = self.scenes.add(opened.origin)
         if dropped:
@@ -175,7 +175,7 @@ class Context:
             if camera is not None:
                 # with this change, not before it: another scene resets the camera
                 self.move_camera(camera)
-            return opened if whole else replace(opened, comparison=now.comparison)
+            return replace(opened, comparison=now.comparison) if keeps_comparison else opened
 
         self.post(update)
 

@@ -17,7 +17,7 @@ from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.transfers import IN_BOX, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_in_box
-from warpspace.app.panels.analysis_panel import Question
+from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
@@ -33,29 +33,32 @@ from warpspace.scene.model import Scene
 MOST_LETTERS = 200  # of a line that is shown
 
 
-class InBoxPanel(FilesPanel):
+class SceneOverlayPanel(FilesPanel):
     """Something to be made, which a page has sent: it stands in the box."""
 
-    at_once = True
+    runs_on_open = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
-    holds = ("", "")  # fields of `PartLook`: what is there, if anything, and the name of its file
+    part_fields = (
+        "",
+        "",
+    )  # fields of `PartLook`: what is there, if anything, and the name of its file
 
     def about(self, state: AppState) -> Markup:
         """Say what is to be known of it, and set."""
         raise NotImplementedError
 
-    def question(self, state: AppState) -> Question:
+    def result_key(self, state: AppState) -> ResultKey:
         made = replace(state.part, shown=True, normal=False, moved=False)
-        return (*super().question(state), made)
+        return (*super().result_key(state), made)
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), picture.state.part)
 
     def is_ready(self, state: AppState) -> bool:
-        return getattr(state.part, self.holds[0]) is not None
+        return getattr(state.part, self.part_fields[0]) is not None
 
     def before_result(self, state: AppState) -> Markup:
-        content, name = (getattr(state.part, field) for field in self.holds)
+        content, name = (getattr(state.part, field) for field in self.part_fields)
         upload = html.upload_button(
             f"Another {self.name} …" if content else f"{self.title} …", self.name, self.most_bytes,
             ",".join(IN_BOX[self.name]), kind="" if content else "main",
@@ -74,25 +77,33 @@ class InBoxPanel(FilesPanel):
         def shown(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
             page = replace(state.page, task=self.task, open=opened, window="")
-            return self.hold(replace(state, page=page), content, name, shown=True, **changes)
+            return self.with_content(
+                replace(state, page=page), content, name, shown=True, **changes
+            )
 
         self.context.post(shown)
 
-    def hold(self, state: AppState, content: object, name: str, **changes: Any) -> AppState:
+    def with_content(self, state: AppState, content: object, name: str, **changes: Any) -> AppState:
         """Put something into the box, or nothing, and see it through the box."""
-        self._answer = None
-        part = replace(state.part, **dict(zip(self.holds, (content, name), strict=True)), **changes)
+        self.outcome = None
+        part = replace(
+            state.part, **dict(zip(self.part_fields, (content, name), strict=True)), **changes
+        )
         return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         is_removed = action == "remove" and not value
-        return self.hold(state, None, "") if is_removed else super().handle(state, action, value)
+        return (
+            self.with_content(state, None, "")
+            if is_removed
+            else super().handle(state, action, value)
+        )
 
 
-class PartPanel(InBoxPanel):
+class PartPanel(SceneOverlayPanel):
     """A part: clamped, and measured as it is cut."""
 
-    holds = ("mesh", "name")
+    part_fields = ("mesh", "name")
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
@@ -100,11 +111,13 @@ class PartPanel(InBoxPanel):
             option for option in super().options() if option.name not in ("place", "predistorted")
         ]
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        analysis: Any = super().ask(state, values, scenes)
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scenes)
         (scene_part, _), part = PartLook.of_scene(state.scene), state.part
         features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
-        tolerances = next(((file.name, file.content) for file in self._files), None)
+        tolerances = next(((file.name, file.content) for file in self.files), None)
         return replace(
             analysis, place=part.place, mesh=part.mesh, features=features, tolerances=tolerances
         )
@@ -139,7 +152,7 @@ class PartPanel(InBoxPanel):
         """Parse tolerances, or a mesh: of another name it is clamped in the middle."""
         if name.lower().endswith(".toml"):
             text = upload_text(content, name, "file of tolerances")
-            return partial(self._hold, (UploadedFile(name, text),))
+            return partial(self.set_files, (UploadedFile(name, text),))
         self._sent, state = (name, content), self.context.state
         mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
         present_place = state.part.place if name == state.part.name else None
@@ -147,14 +160,16 @@ class PartPanel(InBoxPanel):
         return partial(self.show, mesh, name, place=tuple(place.tolist()))
 
 
-class ProgramPanel(InBoxPanel):
+class ProgramPanel(SceneOverlayPanel):
     """A program: a line and its place in the drawing find each other."""
 
     most_bytes = MOST_BYTES  # longer ones would hold up other tabs
-    holds = ("program", "program_name")
+    part_fields = ("program", "program_name")
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        analysis: Any = super().ask(state, values, scenes)
+    def build_analysis(
+        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
+    ) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scenes)
         return replace(analysis, file=state.part.program_name, text=state.part.program)
 
     def about(self, state: AppState) -> Markup:

@@ -134,7 +134,7 @@ def _colours(picture: LivePicture) -> Markup:
     body.insert(2, _picks("controls:map", {"limit": limit}, chosen))
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
     body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
-             setting(state, "look.range_top", shown=f"{top:.4g}")]  # fmt: skip
+             setting(state, "look.range_top", text=f"{top:.4g}")]  # fmt: skip
     return menu(label, join(body), key="map", kind="up", hint="What the colours mean")
 
 

@@ -36,7 +36,7 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick, pick_line, with_clicked
 from warpspace.app.panels.note_panels import StoryPanel
 from warpspace.app.panels.overlay import PointerPanel, Tabs
-from warpspace.app.panels.page_panels import build_parts
+from warpspace.app.panels.page_panels import build_panels
 from warpspace.app.panels.panel import PAUSE_S, Context, Dialog, Panel, Refresh
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState, Comparison, PageLook, PartLook
@@ -379,7 +379,7 @@ class Session:
             context.page.call("stage", "opening")
             layers = [BoxLayer(self._client.scene, context.page, picture)]
             pointer = [PointerPanel(context, self._others)] if self._others else []
-            self.display.add(picture, layers, [*build_parts(context), self._keeper, *pointer])
+            self.display.add(picture, layers, [*build_panels(context), self._keeper, *pointer])
             context.page.call("drawn")
         self._around_at = time.monotonic() + ANSWER_S
 
