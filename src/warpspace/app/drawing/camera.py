@@ -32,7 +32,7 @@ MOST_SHARE, LEAST_SHARE = 0.4, 0.3
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """How large the drawing is, CSS pixels; the page says it (`room.js`) whenever that changes."""
+    """How large the drawing is, CSS pixels; the page says it (`overlay.js`) whenever that changes."""
 
     width: float
     height: float

@@ -1,4 +1,4 @@
-"""Measuring: standard tests that follow the errors, and calibrations out of uploaded readings."""
+"""The task "Measure": standard tests on the model, and calibration from uploaded readings."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -54,17 +54,17 @@ WHAT = "CSV file of readings"
 
 @dataclass(frozen=True, slots=True)
 class UploadedFile:
-    """A file that a page has sent."""
+    """A file uploaded by the page."""
 
     name: str  # never a path
-    content: Any = field(repr=False)  # its text, or what was made of it
-    words: str = ""  # what it was read as
-    kind: str | None = None  # as chosen; None for what its columns tell
+    content: Any = field(repr=False)  # its text, or an object read from it
+    description: str = ""  # kind and number of readings
+    kind: str | None = None  # as selected; None: recognised by its columns
     count: int = 0  # readings
 
 
 class FilesPanel(AnalysisPanel):
-    """An analysis of files that a page has sent."""
+    """An analysis of uploaded files."""
 
     most_bytes, what = MOST_BYTES, WHAT
 
@@ -81,19 +81,19 @@ class FilesPanel(AnalysisPanel):
         return bool(self.files)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse a file beside the session; return what the session does with it."""
+        """Parse a file in a job; return a callback for the session."""
         raise NotImplementedError
 
     def set_files(self, files: tuple[UploadedFile, ...]) -> None:
         self.files = files
 
     def files_html(self) -> Markup:
-        """List the files, and say why the last one is not among them."""
-        lines = [
-            (tag("span", file.name) + tag("small", f" {file.words}"),
-             button("✕", f"{self.name}:remove", index, kind="link", aria_label=f"Remove {file.name}"))
-            for index, file in enumerate(self.files)
-        ]  # fmt: skip
+        """Render the list of files, and the error of the last upload."""
+        lines: list[tuple[Markup, Markup]] = []
+        for index, file in enumerate(self.files):
+            remove = button("✕", f"{self.name}:remove", index, kind="link",
+                            aria_label=f"Remove {file.name}")  # fmt: skip
+            lines.append((tag("span", file.name) + tag("small", f" {file.description}"), remove))
         problem = tag("p", self._upload_problem, class_="ws-problem", role="alert")
         table = rows(lines) if lines else EMPTY
         return join((problem if self._upload_problem else EMPTY, table, self._uploads.html()))
@@ -104,16 +104,16 @@ class FilesPanel(AnalysisPanel):
         return tag("div", upload, class_="ws-actions")
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
-        """Parse a file beside the session, one after the other; errors stand above the files."""
+        """Parse files in jobs, one after the other; errors are shown above the files."""
 
         def work(job: Job) -> None:
             accept = self.parse(*read())
             if not job.is_set():
-                self.context.call_soon(partial(self._take_in, accept))
+                self.context.call_soon(partial(self._accept, accept))
 
         self._uploads.queue("Reading", work)
 
-    def _take_in(self, accept: Callable[[], None]) -> None:
+    def _accept(self, accept: Callable[[], None]) -> None:
         self._upload_problem = ""
         accept()
         self.rerender()
@@ -139,13 +139,13 @@ class FilesPanel(AnalysisPanel):
 
 
 class TestsPanel(FilesPanel):
-    """A standard test on the model as it would be on the machine, its path drawn in the box."""
+    """A standard test simulated on the model, with its path in the drawing."""
 
     __test__ = False
     runs_on_open = True
 
     def __init__(self, context: Context) -> None:
-        sentence = "A test by its standard, on the model as it would be on the machine"
+        sentence = "A standard test, simulated on the model of the machine"
         super().__init__(context, Entry(TEST, "measure", sentence))
         self.title = "Standard tests"
 
@@ -175,21 +175,22 @@ class TestsPanel(FilesPanel):
     def body(self, picture: LivePicture) -> Markup:
         state, kind = picture.drawn_state, chosen_test(picture.drawn_state)
         tests = [find_test(name) for name in bench_names()]
-        names = {"": "Choose a test …"} | {
-            test.name: f"{test.title} ({test.standard})" for test in tests
-        }
+        names = {"": "Select a test …"}
+        names |= {test.name: f"{test.title} ({test.standard})" for test in tests}
         chooser = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
         if kind is None:
             return chooser
-        no_difference = tag("p", "A difference of two machines cannot be tested: show A or B.",
-                   class_="ws-problem", role="alert")  # fmt: skip
+        test = self._body(state)
+        if picture.is_difference:
+            test = tag("p", "Not available for the difference of two machines: show A or B.",
+                       class_="ws-problem", role="alert")  # fmt: skip
         columns = ",".join(column.name for column in kind.columns)
-        about = join(tag("p", test) for test in (kind.words, f"Columns of a file: {columns}"))
+        about = tag("p", kind.words) + tag("p", f"Columns of a file: {columns}")
         return join((
-            chooser, no_difference if picture.is_difference else self._body(state), self.files_html(),
+            chooser, test, self.files_html(),
             EMPTY if self.files else self.upload_html("Measured readings …"),
-            switch("test:path", "Path in the box", on=state.forms.get("test.path") != "0",
-                   hint="Nominal in grey, actual in colour, exaggerated as the box is"),
+            switch("test:path", "Show test path", on=state.forms.get("test.path") != "0",
+                   hint="Nominal grey, actual coloured, with the exaggeration of the map"),
             tag("details", tag("summary", "Procedure") + tag("div", about), class_="ws-details",
                 data_key="test.procedure"),
         ))  # fmt: skip
@@ -219,18 +220,17 @@ class TestsPanel(FilesPanel):
 
 # --- Calibration ----------------------------------------------------------------------------------
 
-MOST_FILES, MOST_READINGS = 6, 5_000
-"""Files of a page, and readings in all of them: what a fit needs of memory goes with it."""
+MOST_FILES, MOST_READINGS = 6, 5_000  # per page; they limit the memory of a fit
 LONGEST_KIND = 200
-MOST_NAMED = 12  # doubtful errors and notes that are listed
+MOST_NAMED = 12  # errors and notes that are listed
 ARROWS = {"": "none", "before": "before", "after": "after"}
-TURNED = "No arrows: a rotary axis carries the workpiece, which the box does not turn with."
-DOUBTS = (("in part", "Determined only in part"), ("no", "Not determined, kept"))
+ROTATED = "No arrows: a rotary axis carries the workpiece, and the drawing does not rotate with it."
+ESTIMABILITY = (("in part", "Confounded"), ("no", "Not estimable, unchanged"))
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateTexts(Calibrate):
-    """A calibration out of texts of files."""
+    """A calibration from uploaded texts."""
 
     files: tuple[UploadedFile, ...] = ()
 
@@ -245,18 +245,16 @@ class CalibrateTexts(Calibrate):
 def read_uploaded(
     scene: Scene, text: str, name: str, kind: str | None, present: Sequence[UploadedFile]
 ) -> UploadedFile:
-    """Take in the text of a file beside those that are there."""
+    """Read the text of a file; its name is made unique among the present files."""
     if len(present) >= MOST_FILES:
         raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
-    present_names = {candidate.name for candidate in present}
+    present_names = {file.name for file in present}
     numbered = (f"{name} {count}" for count in range(2, MOST_FILES + 2))
-    unique_name = next(
-        candidate for candidate in (name, *numbered) if candidate not in present_names
-    )
+    unique_name = next(text for text in (name, *numbered) if text not in present_names)
     lines = text.count("\n")
     if kind is None or kind in KINDS:
         lines = len(parse_table(text, unique_name))
-    if lines > MOST_READINGS - sum(candidate.count for candidate in present):
+    if lines > MOST_READINGS - sum(file.count for file in present):
         raise OptionError(
             f"{name} has {lines:,} readings; expected at most {MOST_READINGS:,} in all files"
         )
@@ -266,7 +264,7 @@ def read_uploaded(
 
 
 class CalibratePanel(FilesPanel):
-    """Readings of a page, what is fitted, and residuals as arrows in the box."""
+    """Uploaded readings, fitted errors, and residuals as arrows in the drawing."""
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
@@ -274,9 +272,7 @@ class CalibratePanel(FilesPanel):
         self._drawn: Nodes | None = None
 
     def options(self) -> Sequence[Option]:
-        return [
-            option for option in super().options() if option.name != "kinds"
-        ]  # each file has its own
+        return [option for option in super().options() if option.name != "kinds"]  # set per file
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
@@ -288,9 +284,9 @@ class CalibratePanel(FilesPanel):
         return replace(analysis, files=self.files)
 
     def before_result(self, state: AppState) -> Markup:
-        introduction = "CSV files of readings give the errors of this machine."
+        introduction = "Errors of this machine are fitted to readings in CSV files."
         bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
-        kinds = {"": "recognised from its columns"}
+        kinds = {"": "recognised by its columns"}
         kinds |= {name: _kind_words(name) for name in (*KINDS, *test_kinds())}
         name, _, options = self._next_kind.partition(":")
         return join((
@@ -298,8 +294,8 @@ class CalibratePanel(FilesPanel):
             self.upload_html("Add readings …"),
             choice("calibrate:bundled", "", bundled, label="Bundled readings"),
             labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
-                     hint="Kind of readings that are added next"),
-            text_box("calibrate:test-options", options, label="Options of the test",
+                     hint="Kind of the readings to be added"),
+            text_box("calibrate:test-options", options, label="Test options",
                      placeholder="plane=XZ:radius=150") if name in test_kinds() else EMPTY,
         ))  # fmt: skip
 
@@ -309,8 +305,8 @@ class CalibratePanel(FilesPanel):
         count = sum(len(group.readings) for group in result.fitted)
         parts = [tag("p", join((f"RMS of {count} residuals: {number(before)} → ",
                                 tag("b", f"{number(after)} µm"))))]  # fmt: skip
-        for determination, title in DOUBTS:
-            keys = [group.key for group in result.parameters if group.told == determination]
+        for verdict, title in ESTIMABILITY:
+            keys = [p.key for p in result.parameters if p.told == verdict]
             if keys:
                 omitted = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
                 names = ", ".join(keys[:MOST_NAMED])
@@ -321,13 +317,11 @@ class CalibratePanel(FilesPanel):
     def result_html(self, result: Result) -> Markup:
         blocks = list(result.blocks())
         visible = [next(block for block in blocks if isinstance(block, Lines))]
-        visible += [
-            block for block in blocks if isinstance(block, Table) and len(block.columns) == 4
-        ]
-        arrows = labelled("Arrows in the box", choice("calibrate:arrows", self._arrows, ARROWS),
+        visible += [b for b in blocks if isinstance(b, Table) and len(b.columns) == 4]
+        arrows = labelled("Residual arrows", choice("calibrate:arrows", self._arrows, ARROWS),
                           "calibrate:arrows",
                           hint="Observed − predicted at each reading, exaggerated")  # fmt: skip
-        status = tag("p", self._arrow_words(), class_="ws-tiny")
+        status = tag("p", self._draw_arrows(), class_="ws-tiny")
         folded = details_html(block for block in blocks if block not in visible)
         return join((arrows, status, *map(block_html, visible), folded))
 
@@ -350,27 +344,25 @@ class CalibratePanel(FilesPanel):
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         text = upload_text(content, name, WHAT)
         scene, kind, files = self.context.state.active_scene(), self._next_kind, self.files
-        return partial(
-            self.set_files, (*files, read_uploaded(scene, text, name, kind or None, files))
-        )
+        uploaded = read_uploaded(scene, text, name, kind or None, files)
+        return partial(self.set_files, (*files, uploaded))
 
     # --- arrows ----------------------------------------------------------------------------------
 
-    def _arrow_words(self) -> str:
+    def _draw_arrows(self) -> str:
+        """Draw the residuals of a current result; return a status."""
         picture, calibration, text = self.context.picture, None, ""
         shapes: Shapes = {}
-        if self.outcome and self.result_key(self.context.state) in (
-            self.outcome[0],
-            self._applied_key,
-        ):
-            calibration = self.outcome[1]
+        key = self.result_key(self.context.state)
+        if self.outcome and key in (self.outcome.key, self._applied_key):
+            calibration = self.outcome.result
         if self._arrows and picture is not None and isinstance(calibration, Calibration):
-            text, before = TURNED, self._arrows == "before"
+            text, before = ROTATED, self._arrows == "before"
             if all(axis.is_linear for axis in calibration.scene.machine.branch("workpiece")):
                 feet, vectors = arrows_of(calibration, before=before)
                 shapes, factor = residuals(feet, vectors, picture.size_mm, before=before)
-                text = f"Residuals {self._arrows}, drawn × {factor:g}"
-                text = text if factor else "No arrows: none of these readings is a vector."
+                text = f"Residuals {self._arrows} calibration, exaggerated × {factor:g}"
+                text = text if factor else "No arrows: none of the readings is a vector."
         if shapes or self._drawn is not None:
             self._drawn = self._drawn or Nodes(self.context.client.scene)
             self._drawn.draw(shapes)
@@ -378,7 +370,7 @@ class CalibratePanel(FilesPanel):
 
 
 def arrows_of(calibration: Calibration, *, before: bool) -> tuple[Array, Array]:
-    """Give foot and residual of each reading that is a vector, [n, 3] mm and [n, 3] mm."""
+    """Return position and residual of each vector reading, [n, 3] mm and [n, 3] mm."""
     feet: list[Array] = [np.zeros((0, 3))]
     vectors: list[Array] = [np.zeros((0, 3))]
     for group in calibration.fitted:

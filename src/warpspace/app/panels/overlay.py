@@ -1,4 +1,4 @@
-"""What lies over the drawing: heading, colour bar, words and scale bars, pointers of other tabs."""
+"""The overlay of the drawing: heading, colour bar, labels, scale bars, pointers of other tabs."""
 
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -36,7 +36,7 @@ from warpspace.units import Array, spell_short
 
 
 class HeadPanel(Panel):
-    """Mean and max with the place of the latter."""
+    """Mean and maximum error, and the place of the maximum."""
 
     name = "head"
     refresh = Refresh.IMMEDIATE
@@ -56,7 +56,7 @@ class HeadPanel(Panel):
 
 
 class LegendPanel(Panel):
-    """The colour bar, and how much of the volume keeps the limit."""
+    """The colour bar, and the share of the volume within the limit."""
 
     name = "legend"
     refresh = Refresh.THROTTLED
@@ -78,30 +78,27 @@ class LegendPanel(Panel):
 
 
 class OrderPanel(Panel):
-    """What machines within tolerance reach, what the first order leaves out, errors left behind.
+    """The errors permitted by the tolerances, second-order remainder, and replaced errors.
 
-    All but the last are too slow for every move.
+    They are too slow to follow a drag.
     """
 
     name = "order"
     refresh = Refresh.IDLE
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        conditions, left_behind = [*order_conditions(picture)], picture.state.left_behind
-        conditions += (
-            [f"with its own errors; those of “{left_behind}” are left behind"]
-            if left_behind
-            else []
-        )
+        conditions, scene = [*order_conditions(picture)], picture.state.left_behind
+        if scene:
+            conditions.append(f"with the errors of this machine; those of “{scene}” are not used")
         allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
         return {"head.order": tag("p", " · ".join(conditions)) if conditions else EMPTY,
                 "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
 
 
 class OverlayPanel(Panel):
-    """What the page places by itself as the camera moves, and how large the drawing is."""
+    """Labels and scale bars that the page places as the camera moves, and the size of the drawing."""
 
-    name = "room"
+    name = "overlay"
     refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
@@ -112,7 +109,7 @@ class OverlayPanel(Panel):
         facts = _facts(picture)
         changes = {name: value for name, value in facts.items() if self._sent.get(name) != value}
         if changes:
-            self.context.page.call("room.show", changes)
+            self.context.page.call("overlay.show", changes)
         self._sent = facts
         return {}
 
@@ -128,7 +125,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
     isolines = look.isolines and look.surface != "grid"
     bounds = [piece.grid.bounds_mm for piece in picture.slices]
     return {
-        "axes": _words(Identity(axis_labels(picture))),
+        "axes": _labels_json(Identity(axis_labels(picture))),
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
              "way": [float(k == i) * sign for i in range(3)]}
@@ -141,7 +138,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
         "factor": picture.exaggeration,
         "spelt": spell_factor(picture.exaggeration),
         "corners": [_scene(at) for at in picture.drawn_mm.reshape(-1, 3)[corners(picture.shape)]],
-        "marks": list(map(_word, (*point_labels(picture), *note_labels(picture)))),
+        "marks": list(map(_label_json, (*point_labels(picture), *note_labels(picture)))),
         "labels": [
             {"at": _scene(label.at_mm), "out": label.outward.tolist(),
              "text": f"{spell_short(label.value)} {picture.scale.unit}"}
@@ -160,27 +157,27 @@ def _scene(point_mm: Array) -> list[float]:
 
 
 @lru_cache(maxsize=32)
-def _words(labels: Identity) -> list[dict[str, Any]]:
-    return list(map(_word, labels.thing))
+def _labels_json(labels: Identity) -> list[dict[str, Any]]:
+    return list(map(_label_json, labels.thing))
 
 
-def _word(label: Label) -> dict[str, Any]:
+def _label_json(label: Label) -> dict[str, Any]:
     entry = {"text": label.text, "at": _scene(label.at_mm), "kind": label.kind}
     if label.from_mm is not None:
         entry |= {"from": _scene(label.from_mm), "axis": label.axis}
     return entry
 
 
-# --- A shared review: each tab sees where the others point ----------------------------------------
+# --- Shared review: pointers of other tabs --------------------------------------------------------
 
-OFTEN_S = 0.08  # between two places of one pointer; a page sends one each tenth of a second
+INTERVAL_S = 0.08  # between two positions of a pointer; a page sends one each tenth of a second
 LONGEST_NAME, LONGEST_RAY = 24, 200  # characters
-MOST_QUEUED = 8  # messages that wait for a page; one that takes none is sent no pointers
+MOST_QUEUED = 8  # messages waiting for a page; beyond that it is sent no pointers
 Tabs = Callable[[], Iterable[Context]]
 
 
 class PointerPanel(Panel):
-    """Takes where the mouse is over the map: ``pointer:at``, a name, then a ray of six numbers."""
+    """Pointer events: ``pointer:at`` with a ray of six numbers and a name."""
 
     name = "pointer"
 
@@ -191,27 +188,21 @@ class PointerPanel(Panel):
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         now, picture, at = time.monotonic(), self.context.picture, None
-        spelled_ray, _, name = value.partition("\n")
+        numbers, _, name = value.partition("\n")
         if action == "at":
-            if (
-                len(spelled_ray) > LONGEST_RAY
-                or now - self._last < OFTEN_S
-                or self.context.story_state
-            ):
+            is_early = now - self._last < INTERVAL_S
+            if len(numbers) > LONGEST_RAY or is_early or self.context.story_state:
                 return state
             try:
-                ray = np.array([float(tab) for tab in spelled_ray.split(",")]).reshape(2, 3)
-            except ValueError:  # not six numbers; what is not finite or too far meets nothing
+                ray = np.array([float(text) for text in numbers.split(",")]).reshape(2, 3)
+            except ValueError:  # not six numbers; a ray that is not finite meets nothing
                 return state
             self._last = now
             picked = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
             at = picked and (picked[1] * SCENE_PER_MM).round(4).tolist()
+        label = " ".join(name[:LONGEST_NAME].split())
         for tab in self._tabs():
-            if (
-                tab is not self.context
-                and tab.story_state is None
-                and queued(tab.client) <= MOST_QUEUED
-            ):
-                label = " ".join(name[:LONGEST_NAME].split())
+            is_free = tab.story_state is None and queued(tab.client) <= MOST_QUEUED
+            if tab is not self.context and is_free:
                 tab.page.call("pointer", self.context.client.client_id, label, at)
         return state

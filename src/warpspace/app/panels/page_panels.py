@@ -1,4 +1,4 @@
-"""The parts that a page consists of, in the order in which they are written."""
+"""The panels of the page, in the order of rendering."""
 
 from collections.abc import Iterable, Mapping
 
@@ -14,7 +14,7 @@ from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
 from warpspace.app.panels.import_panel import ImportPanel
-from warpspace.app.panels.improve import BestPanel, CompensatePanel, AdjustPanel
+from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.machine_editor import (
     EditorSection,
     MachinesDialog,
@@ -30,32 +30,22 @@ from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel
 from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, StatePanel, TopPanel
 from warpspace.app.state.app_state import TASKS
 
-HOOKS: dict[str, type[AnalysisPanel]] = {
+PANELS: dict[str, type[AnalysisPanel]] = {
     "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
     "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
     "part": PartPanel, "program": ProgramPanel,
 }  # fmt: skip
-"""Parts of analyses that do more than their description says, by name."""
-FIRST = ("compensate", "concepts", "allocate")
-"""Sections that stand first in their task, short ones before long ones."""
-RARE = frozenset(
-    {
-        "volume",
-        "gains",
-        "line",
-        "distance",
-        "conformance",
-        "uncertainty",
-        "form",
-        "convert",
-        "contributions",
-    }
-)
-"""Sections that stand under "More analyses", so that a task is calm at first sight."""
+"""Panels with features beyond the description of the analysis, by name of the analysis."""
+FIRST = ("compensate", "concepts", "allocate")  # sections at the top of their task
+RARE = frozenset({
+    "volume", "gains", "line", "distance", "conformance", "uncertainty", "form", "convert",
+    "contributions",
+})  # fmt: skip
+"""Sections under "More analyses"."""
 
 
 class TasksPanel(Panel):
-    """The column at the right: five tasks, one open, each a list of sections that unfold."""
+    """The column at the right: tabs of five tasks, each a list of sections."""
 
     name = "tasks"
 
@@ -69,7 +59,7 @@ class TasksPanel(Panel):
         }
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write the tabs, and an empty place for each section."""
+        """Render the tabs, and an empty place for each section."""
         task = picture.state.page.task
         tabs = join(
             tag(
@@ -81,7 +71,8 @@ class TasksPanel(Panel):
         )  # fmt: skip
         names = self.sections.get(task, ())
         places = _places(name for name in names if name not in RARE)
-        if rare := _places(name for name in names if name in RARE):
+        rare = _places(name for name in names if name in RARE)
+        if rare:
             places += tag("details", tag("summary", "More analyses") + rare, class_="ws-more",
                           data_key=f"more.{task}")  # fmt: skip
         return {
@@ -101,7 +92,7 @@ def build_panels(context: Context) -> list[Panel]:
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
     sections: list[Section] = [
         *(kind(context) for kind in of_tasks),
-        *(HOOKS.get(entry.name, AnalysisPanel)(context, entry) for entry in entries()),
+        *(PANELS.get(entry.name, AnalysisPanel)(context, entry) for entry in entries()),
         *(kind(context) for kind in of_machine),
     ]
     kinds = (

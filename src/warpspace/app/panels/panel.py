@@ -234,7 +234,7 @@ class Section(Panel):
 
     task = ""
     title = ""
-    sentence = ""  # its purpose, the hint of its title
+    sentence = ""  # its purpose, shown as a hint of the title
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         """Return the inputs of its body."""

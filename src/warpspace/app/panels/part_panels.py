@@ -1,4 +1,4 @@
-"""A part in the box, where it is clamped, what an inspector would measure; and a program."""
+"""The workpiece in the working volume: placement and inspection; and the NC program."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -30,26 +30,25 @@ from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
 from warpspace.parts.workpiece import load_part, place_part
 from warpspace.scene.model import Scene
 
-MOST_LETTERS = 200  # of a line that is shown
+MOST_LETTERS = 200  # of a displayed line
 
 
 class SceneOverlayPanel(FilesPanel):
-    """Something to be made, which a page has sent: it stands in the box."""
+    """An uploaded file that is drawn in the working volume: a workpiece or a program."""
 
     runs_on_open = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
-    part_fields = (
-        "",
-        "",
-    )  # fields of `PartLook`: what is there, if anything, and the name of its file
+    part_fields = ("", "")  # fields of `PartLook`: content and name of the file
 
     def about(self, state: AppState) -> Markup:
-        """Say what is to be known of it, and set."""
+        """Render details and settings of the content."""
         raise NotImplementedError
 
     def result_key(self, state: AppState) -> ResultKey:
-        made = replace(state.part, shown=True, normal=False, moved=False)
-        return (*super().result_key(state), made)
+        return (
+            *super().result_key(state),
+            replace(state.part, shown=True, normal=False, moved=False),
+        )
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), picture.state.part)
@@ -64,7 +63,9 @@ class SceneOverlayPanel(FilesPanel):
             ",".join(IN_BOX[self.name]), kind="" if content else "main",
             hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
-        missing = f"{name} is not here: links and saved scenes hold only its name."
+        missing = (
+            f"{name} is not loaded: links and saved scenes store only its name. Open it again."
+        )
         about = tag("p", missing, class_="ws-quiet") if name else EMPTY
         if content:
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
@@ -72,44 +73,38 @@ class SceneOverlayPanel(FilesPanel):
         return join((about, self.files_html(), actions(upload)))
 
     def show(self, content: object, name: str, **changes: Any) -> None:
-        """Take something in, and unfold the section."""
+        """Draw a content, and open the section."""
 
-        def shown(state: AppState) -> AppState:
+        def update(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
             page = replace(state.page, task=self.task, open=opened, window="")
-            return self.with_content(
-                replace(state, page=page), content, name, shown=True, **changes
-            )
+            state = replace(state, page=page)
+            return self.with_content(state, content, name, shown=True, **changes)
 
-        self.context.post(shown)
+        self.context.post(update)
 
     def with_content(self, state: AppState, content: object, name: str, **changes: Any) -> AppState:
-        """Put something into the box, or nothing, and see it through the box."""
+        """Set or remove the content; the map becomes transparent for it."""
         self.outcome = None
-        part = replace(
-            state.part, **dict(zip(self.part_fields, (content, name), strict=True)), **changes
-        )
+        fields = dict(zip(self.part_fields, (content, name), strict=True))
+        part = replace(state.part, **fields, **changes)
         return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        is_removed = action == "remove" and not value
-        return (
-            self.with_content(state, None, "")
-            if is_removed
-            else super().handle(state, action, value)
-        )
+        if action == "remove" and not value:
+            return self.with_content(state, None, "")
+        return super().handle(state, action, value)
 
 
 class PartPanel(SceneOverlayPanel):
-    """A part: clamped, and measured as it is cut."""
+    """A workpiece: its placement, and an inspection of it as machined."""
 
     part_fields = ("mesh", "name")
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
-        return [
-            option for option in super().options() if option.name not in ("place", "predistorted")
-        ]
+        unused = ("place", "predistorted")
+        return [option for option in super().options() if option.name not in unused]
 
     def build_analysis(
         self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
@@ -124,22 +119,23 @@ class PartPanel(SceneOverlayPanel):
 
     def about(self, state: AppState) -> Markup:
         turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
-                        hint=f"Turn it about {axis} of the workpiece, in place")
+                        hint=f"Rotate by 90° about the workpiece axis {axis}, in place")
                  for axis in "xyz")  # fmt: skip
         return join((
-            actions(tag("span", "Turn about"), *turns),
+            actions(tag("span", "Rotate about"), *turns),
             *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
             html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
-                               hint="Names and tolerances of its features"),
+                               hint="Names and tolerances of the features"),
         ))  # fmt: skip
 
     def result_html(self, result: Result) -> Markup:
         *_, features = (block for block in result.blocks() if isinstance(block, Table))
-        judged = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
-        return html.rows(judged) + super().result_html(result)
+        verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
+        return html.rows(verdicts) + super().result_html(result)
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        if action == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
+        part = part_in_box(state) if action == "turn" and value in ("x", "y", "z") else None
+        if part is not None:
             turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
             return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
         updated = super().handle(state, action, value)
@@ -149,9 +145,9 @@ class PartPanel(SceneOverlayPanel):
         return updated
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse tolerances, or a mesh: of another name it is clamped in the middle."""
+        """Parse tolerances, or a mesh; a mesh of another name is placed at the centre."""
         if name.lower().endswith(".toml"):
-            text = upload_text(content, name, "file of tolerances")
+            text = upload_text(content, name, "tolerance file")
             return partial(self.set_files, (UploadedFile(name, text),))
         self._sent, state = (name, content), self.context.state
         mesh = load_part(name, option_values(state, self.name).get("unit") or None, content)
@@ -161,9 +157,9 @@ class PartPanel(SceneOverlayPanel):
 
 
 class ProgramPanel(SceneOverlayPanel):
-    """A program: a line and its place in the drawing find each other."""
+    """A program: its lines and its path in the drawing are linked."""
 
-    most_bytes = MOST_BYTES  # longer ones would hold up other tabs
+    most_bytes = MOST_BYTES  # longer programs would delay other tabs
     part_fields = ("program", "program_name")
 
     def build_analysis(
@@ -180,7 +176,7 @@ class ProgramPanel(SceneOverlayPanel):
 
     def result_html(self, result: Result) -> Markup:
         def link(line: int) -> Markup:
-            hint = "Show it in the drawing; a click on the path finds its line"
+            hint = "Show this line in the drawing; a click on the path selects its line"
             return button(line, f"{self.name}:set.at_line", line, kind="link", hint=hint)
 
         *tables, worst = (block for block in result.blocks() if isinstance(block, Table))

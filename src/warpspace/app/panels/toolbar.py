@@ -1,4 +1,4 @@
-"""The bar below the drawing: how the volume is drawn, from where, and what is compared."""
+"""The toolbar below the drawing: display of the volume, view direction, comparison."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -56,7 +56,7 @@ def _leaf_picks(state: AppState, path: str) -> Markup:
 
 
 def chosen_map(state: AppState) -> str:
-    """Name what is coloured: a word of the event ``controls:map``."""
+    """Return the quantity that colours the map, as a value of the event ``controls:map``."""
     chosen = f"{state.look.quantity}.{state.component}"
     return "limit" if state.look.pass_fail and chosen == "position.norm" else chosen
 
@@ -67,7 +67,7 @@ class ControlsPanel(Panel):
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         camera = self.context.camera
         lens = switch("controls:set.lens", "Orthographic", on=camera.orthographic,
-                      hint="Parallel edges stay parallel")  # fmt: skip
+                      hint="Parallel projection")  # fmt: skip
         triad = fill(
             '<svg data-piece="triad.axes" viewBox="-46 -46 92 92" aria-hidden="true"></svg>'
         )
@@ -77,7 +77,7 @@ class ControlsPanel(Panel):
             "controls": join(menus),
             "triad": menu(triad, _picks("controls:view", VIEWS, camera.view) + lens, key="view",
                           label="View from", kind="up",
-                          hint="The machine's axes; click to look from another side"),
+                          hint="Machine axes; click to select a view direction"),
         }  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
@@ -109,16 +109,15 @@ def _exaggeration(picture: LivePicture) -> Markup:
     label = "true scale" if picture.exaggeration == 1.0 else spell_factor(picture.exaggeration)
     name = "state:set.exaggeration"
     box = text_box(name, f"{picture.exaggeration:.4g}", size="short")
-    body = field("Errors drawn ×", box, name) + _picks(name, factors, chosen)
+    body = field("Exaggeration ×", box, name) + _picks(name, factors, chosen)
     return menu(label, body, key="exaggeration", label=f"Exaggeration: {label}", kind="up",
-                hint="How much larger than true the errors are drawn, 0.001 to 1 000 000",
-                )  # fmt: skip
+                hint="Display factor of the errors, 0.001 to 1 000 000")  # fmt: skip
 
 
 def _colours(picture: LivePicture) -> Markup:
     state, look, chosen = picture.state, picture.state.look, chosen_map(picture.state)
     uncertainty = picture.uncertainty
-    limit = f"within {state.specification.limit_um:g} µm or not"
+    limit = f"pass / fail at {state.specification.limit_um:g} µm"
     body: list[Markup] = []
     label: object = limit
     for quantity, title in QUANTITIES.items():
@@ -135,7 +134,7 @@ def _colours(picture: LivePicture) -> Markup:
     top = look.range_top if look.range_mode == "fixed" else picture.scale.high
     body += [tag("h3", "Colour range"), _leaf_picks(state, "look.range_mode"),
              setting(state, "look.range_top", text=f"{top:.4g}")]  # fmt: skip
-    return menu(label, join(body), key="map", kind="up", hint="What the colours mean")
+    return menu(label, join(body), key="map", kind="up", hint="Quantity shown by the colours")
 
 
 def _surface(picture: LivePicture) -> Markup:
@@ -147,16 +146,16 @@ def _surface(picture: LivePicture) -> Markup:
         axes = slice_positions(state.scene, state.look, state.machine)
         body += [setting(state, f"look.slices_mm.{axis}", bar=True) for axis in axes]
         body.append(setting(state, "look.follow"))
-    body += [tag("h3", "Shown too"), *(setting(state, path) for path in (*switches, "loop"))]
+    body += [tag("h3", "Also show"), *(setting(state, path) for path in (*switches, "loop"))]
     if state.loop is Loop.RELATIVE:
         body.append(setting(state, "placed"))
     direction, name = state.scene.model.direction, "controls:set.travel"
     if state.scene.errors.has_directions or direction != TravelDirection.MEAN:
-        directions = {str(way): words for way, words in DIRECTION_WORDS.items()}
+        directions = {str(travel): label for travel, label in DIRECTION_WORDS.items()}
         body.append(field("Direction of travel", choice(name, str(direction), directions), name))
     body.append(setting(state, "nodes"))
     return menu(SURFACES[state.look.surface], join(body), key="surface", kind="up",
-                hint="How the volume is drawn")  # fmt: skip
+                hint="Display of the volume")  # fmt: skip
 
 
 def _machine(state: AppState) -> Markup:
@@ -165,14 +164,14 @@ def _machine(state: AppState) -> Markup:
     body = _picks("controls:machine", MACHINES, chosen)
     body += setting(state, "machine.bent") if look.shown else EMPTY
     return menu(f"machine: {chosen}", body, key="machine", kind="up",
-                hint="The machine around the volume")  # fmt: skip
+                hint="Display of the machine")  # fmt: skip
 
 
-# --- Comparing ------------------------------------------------------------------------------------
+# --- Comparison -----------------------------------------------------------------------------------
 
 
 class ComparePanel(Panel):
-    """Which two are compared and which of them is drawn, and the numbers of both."""
+    """The two sides of a comparison, the displayed one, and the statistics of both."""
 
     name = "compare"
     refresh = Refresh.IMMEDIATE
@@ -193,17 +192,17 @@ class ComparePanel(Panel):
                 ("B", "compare:set.b", b, {NOBODY: NOBODY, **titles}),
             )
         ]
-        body.append(button("Keep the present errors as A", "compare:pin",
-                           hint="What is changed from then on is B"))  # fmt: skip
+        body.append(button("Set current errors as A", "compare:pin",
+                           hint="Later changes belong to B"))  # fmt: skip
         if compared is not None:
             body += [setting(state, "comparison.ghost"), comparison_html(compared)]
         label = "compare" if compared is None else SHOWN[compared.shown]
         return {"compared": "" if compared is None else _sides(compared),
                 "compare": menu(label, join(body), key="compare", kind="up wide",
-                                hint="Two scenes, or the errors before and after")}  # fmt: skip
+                                hint="Compare two scenes, or errors before and after")}  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
-        """Take what a browser has chosen; a title that nobody has changes nothing."""
+        """Set a side of the comparison; an unknown title is ignored."""
         chosen, scene = state.comparison, self.context.scenes.get(value)
         if action == "pin":
             return with_pin(state)
@@ -225,16 +224,17 @@ def _own_sides(state: AppState) -> dict[str, Side]:
 
 
 def _sides(compared: Compared) -> Markup:
-    change = compared.refused or "The change from A to B, node by node, with colours of its own"
-    hints = {"a": compared.titles[0], "b": compared.titles[1], "difference": change}
-    choices = (
-        button(words, "state:set.comparison.shown", key, kind="chip", hint=hints[key],
-               pressed=compared.shown == key, disabled=bool(compared.refused) and key == "difference")
-        for key, words in SHOWN.items()
-    )  # fmt: skip
+    difference = compared.refused or "Difference of A and B at each node, with its own colours"
+    hints = {"a": compared.titles[0], "b": compared.titles[1], "difference": difference}
+    choices: list[Markup] = []
+    for key, label in SHOWN.items():
+        is_refused = bool(compared.refused) and key == "difference"
+        choices.append(button(label, "state:set.comparison.shown", key, kind="chip",
+                              hint=hints[key], pressed=compared.shown == key,
+                              disabled=is_refused))  # fmt: skip
     leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
                    aria_label="End the comparison")  # fmt: skip
-    return tag("div", join((*choices, leave)), role="group", aria_label="What is drawn")
+    return tag("div", join((*choices, leave)), role="group", aria_label="Displayed side")
 
 
 ROWS = {"mean": "mean_um", "RMS": "rms_um", "P95": "p95_um", "max": "max_um"}
@@ -253,9 +253,6 @@ def comparison_html(compared: Compared) -> Markup:
     head = join(tag("th", label) for label in (
         "µm", "A", "B", "change", lowered("|E_B − E_A|")))  # fmt: skip
     titles = rows(zip("AB", compared.titles, strict=True), kind="ws-titles")
-    note = compared.refused or "change: B − A of each number. |E_B − E_A|: node by node."
-    return (
-        titles
-        + tag("table", tag("tr", head) + join(lines), class_="ws-numbers")
-        + tag("p", lowered(note), class_="ws-tiny")
-    )
+    note = compared.refused or "change: B − A of each statistic. |E_B − E_A|: at each node."
+    table = tag("table", tag("tr", head) + join(lines), class_="ws-numbers")
+    return titles + table + tag("p", lowered(note), class_="ws-tiny")

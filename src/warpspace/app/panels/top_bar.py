@@ -1,4 +1,4 @@
-"""The bar at the top, the scenes, all commands with their keys, and what all parts share."""
+"""The top bar, the scene list, all commands with their keys, and events of the whole page."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -21,7 +21,7 @@ LONGEST_SENTENCE = 110
 
 
 class StatePanel(Panel):
-    """Sets a field of the state to what the page says: ``state:set.PATH``."""
+    """Events that set a leaf of the state: ``state:set.PATH``."""
 
     name = "state"
 
@@ -30,7 +30,7 @@ class StatePanel(Panel):
 
 
 class TopPanel(Panel):
-    """Scene, open, save, share, report, help; notes, undo and redo where there are any."""
+    """Scene, open, save, share, report, help; notes, undo and redo if there are any."""
 
     name = "top"
 
@@ -39,27 +39,28 @@ class TopPanel(Panel):
         history = (
             button(sign, f"page:{label.lower()}", kind="quiet", aria_label=label, data_key=label,
                    hint=f"{label}: {description} ({keys})")
-            for label, sign, description, keys in (("Undo", "↶", store.undoes, "Ctrl+Z"),
-                                           ("Redo", "↷", store.redoes, "Ctrl+Shift+Z")) if description
+            for label, sign, description, keys in (
+                ("Undo", "↶", store.undoes, "Ctrl+Z"), ("Redo", "↷", store.redoes, "Ctrl+Shift+Z"),
+            ) if description
         )  # fmt: skip
-        hint = "Open a scene, measured errors, or a controller's table (Ctrl+O)"
+        hint = "Open a scene, measured errors, or a compensation table (Ctrl+O)"
         title = picture.state.origin.title or picture.state.origin.name
         state = picture.state
         count = sum(note.status == "open" for note in state.review)
         notes = [
             button(f"Notes ({count})" if count else "Notes", "notes:open", kind="quiet",
-                   data_key="notes", hint="Notes of the review; N pins one")
+                   data_key="notes", hint="Review notes; press N to pin one")
         ] if state.review or state.page.notes else []  # fmt: skip
         return {
             "top": join((
                 tag("strong", "warpspace", class_="ws-brand"),
                 button(title, "page:open", "scenes", kind="ws-scene",
-                       hint="Choose another scene"),
+                       hint="Select another scene"),
                 upload_button("Open", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind="quiet",
                               hint=hint),
                 button("Save", "page:open", "files", kind="quiet",
-                       hint="Save the scene, pictures, exports"),
-                button("Share", "files:share", kind="quiet", hint="Copy a link to what is shown"),
+                       hint="Save scene, figures and exports"),
+                button("Share", "files:share", kind="quiet", hint="Copy a link to this view"),
                 button("Report", "page:open", "report", kind="quiet"),
                 *notes,
                 tag("span", "", class_="ws-fill"),
@@ -70,12 +71,12 @@ class TopPanel(Panel):
 
 
 class ScenesDialog(Dialog):
-    """The scenes there are: title, machine, what each shows."""
+    """The list of scenes: title, machine, description."""
 
-    name, title = "scenes", "Choose a scene"
+    name, title = "scenes", "Select a scene"
 
     def body(self, picture: LivePicture) -> Markup:
-        found = (
+        scenes = (
             tag("button", join((
                 tag("b", title),
                 tag("small", scene.machine.title) if scene.machine.title != title else EMPTY,
@@ -86,55 +87,54 @@ class ScenesDialog(Dialog):
                 aria_current="true" if scene is picture.state.origin else None)
             for title, scene in self.context.scenes.items()
         )  # fmt: skip
-        label = "A file is opened with Open at the top, or dropped anywhere on the page."
-        return tag("div", join(found), class_="ws-list", data_list=True) + tag(
-            "p", label, class_="ws-quiet"
-        )
+        hint = tag("p", "To open a file, use Open in the top bar, or drop it on the page.",
+                   class_="ws-quiet")  # fmt: skip
+        return tag("div", join(scenes), class_="ws-list", data_list=True) + hint
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         if action != "choose" or value not in self.context.scenes:
             return state
-        # what is chosen again is reset
+        # selecting the current scene resets it
         return self.closed(replace(state.with_scene(self.context.scenes[value]), page=state.page))
 
 
-# --- All commands in one table: the page's keys, and the help ------------------------------------
+# --- Table of all commands, for the keys of the page and the help ---------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """Something that a key or the help does: an event of the page, with its value."""
+    """A command of the help and the keyboard: an event of the page, with its value."""
 
     label: str
     event: str
     value: str = ""
-    keys: tuple[str, ...] = ()  # as page.js spells them, the usual one first
+    keys: tuple[str, ...] = ()  # in the notation of page.js, the most common one first
 
     @property
-    def spelt(self) -> str:
-        """Spell its usual keys for people."""
+    def key_label(self) -> str:
+        """The most common key, as displayed."""
         if not self.keys:
             return ""
         *modifiers, key = self.keys[0].split("+")
         return "+".join((*(word.capitalize() for word in modifiers), key.upper()))
 
 
-# What changes the model needs a modifier. A S D Q E belong to viser's camera.
+# Keys that change the model need a modifier. viser's camera uses A S D Q E.
 COMMANDS = (
     Command("Undo", "page:undo", keys=("ctrl+z",)),
     Command("Redo", "page:redo", keys=("ctrl+shift+z", "ctrl+y")),
     Command("Open a file", "upload", "files", ("ctrl+o",)),
-    Command("Choose a scene", "page:open", "scenes"),
+    Command("Select a scene", "page:open", "scenes"),
     Command("Save the scene", "files:save", keys=("ctrl+s",)),
     Command("Save and export", "page:open", "files"),
-    Command("Copy a link to what is shown", "files:share"),
+    Command("Copy a link to this view", "files:share"),
     Command("Write a report", "page:open", "report"),
-    Command("Tell the story", "story:start"),
+    Command("Play the story", "story:start"),
     Command("Pin a note", "notes:pin", keys=("n",)),
     Command("Notes", "notes:open"),
     Command("Find an error", "find", keys=("/",)),
     Command("Fit the view", "page:fit", keys=("f",)),
-    Command("Component: length of the error", "state:set.component", "norm", ("1",)),
+    Command("Component: magnitude of the error", "state:set.component", "norm", ("1",)),
     Command("Component: along x", "state:set.component", "x", ("2",)),
     Command("Component: along y", "state:set.component", "y", ("3",)),
     Command("Component: along z", "state:set.component", "z", ("4",)),
@@ -143,17 +143,17 @@ COMMANDS = (
     Command("Grid lines on or off", "page:toggle", "grid_lines", ("g",)),
     Command("Nominal box on or off", "page:toggle", "ghost", ("b",)),
     Command("Rotary traces on or off", "page:toggle", "traces", ("c",)),
-    Command("Dark or light page", "page:toggle", "dark", ("m",)),
+    Command("Dark mode on or off", "page:toggle", "dark", ("m",)),
     Command("Set all errors to zero", "page:zero", keys=("ctrl+alt+0",)),
     Command("Reset all errors to the scene", "page:reset", keys=("ctrl+alt+r",)),
-    Command("Include all errors again", "page:include", keys=("ctrl+alt+l",)),
-    Command("Help, and all commands", "page:open", "help", ("ctrl+k", "h", "?", "shift+?")),
+    Command("Include all errors", "page:include", keys=("ctrl+alt+l",)),
+    Command("Help and all commands", "page:open", "help", ("ctrl+k", "h", "?", "shift+?")),
     Command("First steps", "page:tour"),
 )
 
 
 def key_events() -> Mapping[str, str]:
-    """Give the event, and its value, that the page sends for each key."""
+    """Return the event and its value for each key."""
     return {
         key: f"{command.event}={command.value}".rstrip("=")
         for command in COMMANDS
@@ -162,23 +162,23 @@ def key_events() -> Mapping[str, str]:
 
 
 FIRST_HELP = (
-    ("Turn, move, zoom", "drag, drag with the right button, wheel"),
-    ("Why is a point off", "click it on the volume"),
-    ("Type an exact number", "type digits while a slider has the focus"),
-    ("Next control, press it", "Tab, then Enter or Space"),
-    ("Fly through the drawing", "A S D Q E"),
+    ("Rotate, pan, zoom", "drag, drag with the right button, wheel"),
+    ("Contributions at a point", "click it on the volume"),
+    ("Enter an exact number", "type digits while a slider has the focus"),
+    ("Next control, activate it", "Tab, then Enter or Space"),
+    ("Move the camera", "A S D Q E"),
 )
 MEANINGS = (
-    ("Solid box", "the working volume, each point moved by its error × exaggeration"),
-    ("Dashed box", "the nominal working volume, without errors"),
-    ("Exaggeration", "how much larger than true errors are drawn; numbers stay true"),
-    ("Colours", "the error, or its part along x, y or z, in the unit of the colour bar"),
+    ("Solid box", "working volume, each point displaced by its error × exaggeration"),
+    ("Dashed box", "nominal working volume, without errors"),
+    ("Exaggeration", "display factor of the errors; numbers are not exaggerated"),
+    ("Colours", "magnitude or a component (x, y, z) of the error, in the unit of the colour bar"),
     ("Error", "actual − nominal; a correction has the opposite sign"),
-    ("Mean, P95, max", "of the length of the error over the whole working volume"),
+    ("Mean, P95, max", "statistics of the magnitude of the error over the working volume"),
 )
 
 
-def _found(query: str) -> list[Command]:
+def _find_commands(query: str) -> list[Command]:
     search_words = query.lower().split()
     return [
         command
@@ -188,7 +188,7 @@ def _found(query: str) -> list[Command]:
 
 
 class HelpDialog(Dialog):
-    """All commands, found by their words; what the mouse does, and what is drawn."""
+    """All commands with a search box; mouse and keyboard; legend of the drawing."""
 
     name, title = "help", "Help"
 
@@ -198,24 +198,24 @@ class HelpDialog(Dialog):
         box = text_box("state:set.page.command", query, label=label, placeholder=label, live=True,
                        data_enter="help:first", autofocus=True)  # fmt: skip
         commands = join(
-            tag("button", tag("kbd", command.spelt) + command.label, type="button", data_do="help:run",
+            tag("button", tag("kbd", command.key_label) + command.label, type="button", data_do="help:run",
                 data_value=command.label)
-            if ":" in command.event else tag("p", tag("kbd", command.spelt) + command.label)
-            for command in _found(query)
+            if ":" in command.event else tag("p", tag("kbd", command.key_label) + command.label)
+            for command in _find_commands(query)
         )  # fmt: skip
         about = " ".join(scene.description.split())
         return join((
             tag("div", box + tag("div", commands, class_="ws-list ws-columns"), data_list=True),
             tag("h3", "Mouse and keyboard"), rows(FIRST_HELP, "ws-keys"),
-            tag("h3", "What is drawn"), rows(MEANINGS, "ws-keys"),
-            tag("p", "Keys act everywhere except in a text box. After a dropped connection the tab"
-                " finds its state again for ten minutes.", class_="ws-quiet"),
+            tag("h3", "Legend"), rows(MEANINGS, "ws-keys"),
+            tag("p", "Keys are active except while text is entered. After an interruption of the"
+                " connection, the state of a tab is available for ten minutes.", class_="ws-quiet"),
             *((tag("h3", scene.title), tag("p", about)) if about else ()),
         ))  # fmt: skip
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         query = state.page.command
-        matches = [one for one in _found(query) if ":" in one.event]
+        matches = [command for command in _find_commands(query) if ":" in command.event]
         runs = (
             matches[: bool(query)]
             if action == "first"
@@ -228,7 +228,7 @@ class HelpDialog(Dialog):
 
 
 class PagePanel(Panel):
-    """What acts on the page as a whole: tasks, sections, windows, undo, redo, and all errors."""
+    """Events of the whole page: tasks, sections, dialogs, undo, redo, and all errors."""
 
     name = "page"
     refresh = Refresh.IMMEDIATE
@@ -238,14 +238,14 @@ class PagePanel(Panel):
         context.page.call("keys", key_events())
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
-        # the part of a window that is open fills it
+        # an open dialog renders its own content
         return {} if picture.state.page.window else {"window": ""}
 
     def handle(self, state: AppState, action: str, value: str) -> AppState:
         context = self.context
         actions: dict[str, Callable[[], None]] = {
-            "undo": partial(self._travel, "Undone", context.store.undo),
-            "redo": partial(self._travel, "Done again", context.store.redo),
+            "undo": partial(self._go, "undo", context.store.undo),
+            "redo": partial(self._go, "redo", context.store.redo),
             "fit": context.fit_view,
             "tour": partial(context.page.call, "tour", True),
             "close": context.dialog_closed,
@@ -261,15 +261,16 @@ class PagePanel(Panel):
             "zero": state.zeroed,
             "reset": state.reset,
         }
-        if action == "toggle" and isinstance(on := getattr(state.shown, value, None), bool):
-            return replace(state, shown=replace(state.shown, **{value: not on}))
+        is_on = getattr(state.shown, value, None) if action == "toggle" else None
+        if isinstance(is_on, bool):
+            return replace(state, shown=replace(state.shown, **{value: not is_on}))
         return updates[action]() if action in updates else state
 
-    def _travel(self, label: str, travel: Callable[[], str]) -> None:
+    def _go(self, name: str, go: Callable[[], str]) -> None:
         try:
-            description = travel()
+            description = go()
         except OptionError as error:
             self.context.notes.append(str(error))
             return
-        text = f"{label}: {description}" if description else f"Nothing to be {label.lower()}"
-        self.context.notify(text)
+        done = {"undo": "Undone", "redo": "Redone"}[name]
+        self.context.notify(f"{done}: {description}" if description else f"Nothing to {name}")

@@ -1,7 +1,7 @@
 // What lies over the drawing and follows the camera: scale bars, values on isolines, words beside
 // points with their leaders, numbers and names of the axes, the triad. The camera is read, never moved.
 (() => {
-  if (window.warpspaceRoom) return;
+  if (window.warpspaceOverlay) return;
   const MOST_LABELS = 12, LABEL_APART = 52, BAR_PX = 130, BAR_PART = 0.22;
   const SETTLED_MS = 160, LEAST_FACING = 0.12, PLATE_MS = 250;
   const state = { labels: [], slices: [], axes: [], marks: [], corners: [], triad: [], stale: [],
@@ -258,7 +258,7 @@
       const z = zoom(), head = part("head"), foot = part("foot"), legend = part("legend");
       const top = z * (head.offsetTop + head.offsetHeight), bottom = rect.height - z * foot.offsetTop;
       const right = rect.width - z * legend.offsetLeft;
-      warpspacePage.send("room:size",
+      warpspacePage.send("overlay:size",
         [performance.now(), rect.width, rect.height, top, bottom, right].map(Math.round).join());
     }, SETTLED_MS);
   };
@@ -289,7 +289,7 @@
     drawTriad(camera, world);
   };
 
-  window.warpspaceRoom = {
+  window.warpspaceOverlay = {
     // whatever has changed: what bars and labels follow from
     show(changes) {
       Object.assign(state, changes);
