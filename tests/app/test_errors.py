@@ -62,15 +62,14 @@ def test_a_slider_has_the_range_of_its_kind_again_after_a_wild_number():
     column.do("set.EAY", "-40")
     again = column.do("sort")
     assert 'max="100"' in again["error.EAY"]
-    spans = column.part.spans
-    assert spans["EAY"] == spans["EAX"]
+    assert 'max="100"' in again["error.EAX"]
 
 
 def test_a_row_opens_into_curve_origin_and_numbers_and_goes_back():
     column = Column()
     opened = column.do("row", "EAY")["error.EAY"]
     assert "assumed" in opened
-    assert "Undo the edit" not in opened
+    assert "Reset to the scene" not in opened
     column.do("kind.EAY", "table")
     column.part.context.rerender = (renewed := []).append
     edited = column.do("rows.EAY", "position;value\n-225;0\n225;<b>")["error.EAY"]
@@ -78,7 +77,7 @@ def test_a_row_opens_into_curve_origin_and_numbers_and_goes_back():
     assert 'aria-invalid="true"' in edited
     assert "&lt;b&gt;" in edited
     edited = column.do("rows.EAY", "q;value\n-225;0,5\n225;-30")["error.EAY"]
-    assert "Undo the edit" in edited
+    assert "Reset to the scene" in edited
     assert column.state.amplitudes["EAY"] == -30.0
     column.do("own.EAY")
     assert column.state.amplitudes == STATE.amplitudes
@@ -97,7 +96,7 @@ def test_what_is_no_number_is_said_and_exclusions_are_counted():
     assert column.state.notes == ("EAY = 'x7'; expected a number, it stays as it was",)
     assert column.state.amplitudes == STATE.amplitudes
     column.state = toggled(column.state, "exclusions.only", "EAY")
-    assert "6 of 7 errors left out" in column.do("none")["errors"]
+    assert "6 of 7 errors excluded" in column.do("none")["errors"]
 
 
 @pytest.mark.parametrize(

@@ -209,7 +209,7 @@ def _lever(contribution: PointContribution) -> Markup:
         arm = float(np.linalg.norm(np.cross(contribution.direction, contribution.lever_mm)))
         effect = f"× {number(arm, 0)} mm lever arm"
     show = button("Show the whole lever arm", "worst:back", kind="link",
-                  hint="Move the camera back until axis, lever arm and volume are in view")  # fmt: skip
+                  hint="Move the camera until axis, lever arm and volume are in view")  # fmt: skip
     text = f"{contribution.key}: {signed(contribution.value)} {row.unit} {effect} "
     return tag("p", join((text, show)))
 

@@ -107,7 +107,7 @@ class FilesDialog(JobDialog):
             tag("h3", "Export"),
             actions(button("Interactive page (HTML)", "files:page",
                            hint="A single file that works offline"),
-                    *((button("Story (HTML)", "files:story", hint="The steps of the story in a single offline file"),)
+                    *((button("Story (HTML)", "files:story", hint="Its steps in a single file"),)
                       if story(picture.state.review) else ()), *exports),
             self._jobs.html(),
         ))  # fmt: skip

@@ -72,10 +72,8 @@ class AdjustPanel(AnalysisPanel):
         if not result.before.max_um:
             return tag("p", "The error is zero everywhere; no adjustment is needed.")
         if not result.adjustable:
-            return tag(
-                "p",
-                "No squareness or alignment error acts in this loop; select “any error” in the options.",
-            )
+            text = "No squareness or alignment error acts in this loop; select “any error” below."
+            return tag("p", text)
         if not self.offered_changes(result):
             keys = ", ".join(result.adjustable)
             return tag("p", f"No improvement possible: {keys} have their optimum values.")

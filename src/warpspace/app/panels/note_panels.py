@@ -397,7 +397,8 @@ class StoryPanel(Panel):
         self._number = number
         text = step_words(now.resulting_scene(), notes, number, problem)
         self._step_html = text + actions(
-            button("←", "story:back", hint="Previous step (←)", aria_label="Previous step", disabled=number == 0),
+            button("←", "story:back", hint="Previous step (←)", aria_label="Previous step",
+                   disabled=number == 0),
             button("→", "story:on", kind="main", hint="Next step (→)", aria_label="Next step",
                    disabled=number == len(notes) - 1),
             button("End", "story:end", hint="Return to the previous view (Esc)"),

@@ -96,7 +96,7 @@ class OrderPanel(Panel):
 
 
 class OverlayPanel(Panel):
-    """Labels and scale bars that the page places as the camera moves, and the size of the drawing."""
+    """Labels and scale bars, placed by the page as the camera moves; the size of the drawing."""
 
     name = "overlay"
     refresh = Refresh.IMMEDIATE

@@ -198,8 +198,8 @@ class HelpDialog(Dialog):
         box = text_box("state:set.page.command", query, label=label, placeholder=label, live=True,
                        data_enter="help:first", autofocus=True)  # fmt: skip
         commands = join(
-            tag("button", tag("kbd", command.key_label) + command.label, type="button", data_do="help:run",
-                data_value=command.label)
+            tag("button", tag("kbd", command.key_label) + command.label, type="button",
+                data_do="help:run", data_value=command.label)
             if ":" in command.event else tag("p", tag("kbd", command.key_label) + command.label)
             for command in _find_commands(query)
         )  # fmt: skip
