@@ -368,7 +368,8 @@ def _change_html(state: AppState, change: Change) -> Markup:
             moved.append((-abs(b - a), line))
     steps = [line for _, line in sorted(moved)] or [change.words]
     lines = [tag("div", tag("b", line)) for line in steps[:MOST_STEPS]]
-    if (n_hidden := len(steps) - MOST_STEPS) > 0:
+    n_hidden = len(steps) - MOST_STEPS
+    if n_hidden > 0:
         lines.append(tag("div", f"and {n_hidden} more", class_="ws-quiet"))
     try:
         before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))

@@ -152,19 +152,19 @@ def lines_html(chart: Lines) -> Markup:
             for value, radius in layout.rings
         )
         curves = join(
-            _curve(one, polar * np.array([1.0, -1.0]), 3)
-            for one, polar in zip(chart.curves, layout.curves, strict=True)
+            _curve(curve, polar * np.array([1.0, -1.0]), 3)
+            for curve, polar in zip(chart.curves, layout.curves, strict=True)
         )
-        said = f"rings {layout.ring:g} {layout.unit}"
-        return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", said, "ws-polar")
+        note = f"rings {layout.ring:g} {layout.unit}"
+        return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", note, "ws-polar")
     xs = np.concatenate([curve.x for curve in chart.curves])
     ys = np.concatenate([curve.y for curve in chart.curves])
     frame = PlotFrame(_ends(xs), _ends(ys))
     frame = frame.to_scale() if chart.kind == "plane" else frame
-    curves = join(_curve(one, frame.place(one.x, one.y)) for one in chart.curves)
-    for one in chart.bands:
-        edges = frame.place(one.x, one.low), frame.place(one.x, one.high)[::-1]
-        curves += _line(_path(np.concatenate(edges)), f"ws-band ws-s{one.colour % SERIES}")
+    curves = join(_curve(curve, frame.place(curve.x, curve.y)) for curve in chart.curves)
+    for band in chart.bands:
+        edges = frame.place(band.x, band.low), frame.place(band.x, band.high)[::-1]
+        curves += _line(_path(np.concatenate(edges)), f"ws-band ws-s{band.colour % SERIES}")
     return _figure(chart, frame.axes(chart.x_label, chart.y_label) + curves)
 
 

@@ -107,8 +107,8 @@ class TolerancesPanel(AnalysisPanel):
         costs = tuple((k, cost) for k, cost in costs_by_key.items() if k in keys and k not in fixed)
         return replace(
             analysis, limit_um=specification.limit_um, probability=specification.percent / 100.0,
-            loop=state.loop, over=specification.over, costs=costs,
-            distribution=specification.distribution, fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
+            loop=state.loop, over=specification.over, distribution=specification.distribution,
+            costs=costs, fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
         )  # fmt: skip
 
     def _accept_outcome(self, outcome: AnalysisOutcome) -> None:

@@ -126,23 +126,17 @@ def _curves(series: ErrorSeries) -> Iterator[Curve]:
     at = np.array(series.positions)
     thin = slice(None, None, max(1, len(at) // MOST_POINTS))
 
-    def curve(name: str, values: Array, direction: int, style: Style) -> Curve:
-        is_finite = np.isfinite(values)
-        return Curve(
-            name,
-            at[is_finite][thin],
-            values[is_finite][thin],
-            list(DIRECTIONS).index(direction),
-            style,
-        )
+    def curve(name: str, readings: Array, direction: int, style: Style) -> Curve:
+        is_finite, colour = np.isfinite(readings), list(DIRECTIONS).index(direction)
+        return Curve(name, at[is_finite][thin], readings[is_finite][thin], colour, style)
 
-    means = [
-        (direction, mean)
-        for direction in DIRECTIONS
-        if (mean := series.mean(direction)) is not None
-    ]
-    yield from (curve(DIRECTIONS[direction], mean, direction, "line") for direction, mean in means)
-    if len(series.runs) > len(means):
+    n_means = 0
+    for direction, name in DIRECTIONS.items():
+        mean = series.mean(direction)
+        if mean is not None:
+            n_means += 1
+            yield curve(name, mean, direction, "line")
+    if len(series.runs) > n_means:
         yield from (curve("", np.array(run.values), run.direction, "dots") for run in series.runs)
 
 

@@ -40,7 +40,7 @@ PAUSE_S = 0.1  # without changes: longer than between two moves of a drag
 
 
 class Context:
-    """What the panels of one tab share: page, camera, state, queues of the session."""
+    """Page, camera, state and queues of one tab, shared by its panels."""
 
     def __init__(
         self,

@@ -170,7 +170,8 @@ class ProgramPanel(SceneOverlayPanel):
 
     def about(self, state: AppState) -> Markup:
         line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
-        if not (at := index_of(line, len(text) + 1)):
+        at = index_of(line, len(text) + 1)
+        if not at:
             return EMPTY
         return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
 
