@@ -114,7 +114,7 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
     assert 0.98 <= shown.low < 0.983
     assert edits.half_width_of(after, "EA0Z") == 25.0
     assert edits.half_width_of(after, "EB0Z") > 1.3 * edits.half_width_of(after, "EC0Y")
-    assert f'<span class="ws-kept">{percent(shown.probability)} %</span>' in section(part, after)
+    assert f'<span class="ws-pass">{percent(shown.probability)} %</span>' in section(part, after)
     assert f"{100.0 * found.after.probability:.2f} % of the machines" in section(part, after)
     assert "Applied" in section(part, after)
     # what was changed meanwhile is not overwritten; errors are none of its inputs

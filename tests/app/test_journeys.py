@@ -59,9 +59,9 @@ def test_95_percent_within_40_um_in_three_actions_in_sight(tab):
     assert tab.actions <= 3
     tab.until(lambda: tab.state.tolerances != start_state(SCENES[0]).tolerances)
     tab.until(lambda: "within 40 µm everywhere" in tab.page.inner_text("#ws-task"))
-    told = tab.page.locator("#ws-task .ws-told").first
+    told = tab.page.locator("#ws-task .ws-headline").first
     tab.until(lambda: float(told.inner_text().split()[0]) >= 94.5)
-    assert tab.in_sight("#ws-task .ws-told")
+    assert tab.in_sight("#ws-task .ws-headline")
 
 
 def test_a_table_is_imported_in_four_actions_and_says_what_changes(tab):

@@ -71,7 +71,7 @@ class Page:
         """Show a message in this tab: "done", "warning", "problem", or one that "stays"."""
         self.call("toast", kind, title, text)
 
-    def report(self, error: Exception, title: str = "That did not work") -> None:
+    def report(self, error: Exception, title: str = "The action failed") -> None:
         self.notify(title, error_words(error), "problem")
 
 

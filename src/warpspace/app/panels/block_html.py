@@ -182,7 +182,7 @@ def histogram_html(chart: Histogram) -> Markup:
     if chart.limit is not None:
         at = frame.place(chart.limit, 0.0)[0]
         bars.append(_line(f"M{at:.1f} {TOP}V{HIGH - BOTTOM}", "ws-limit"))
-    statements = join(tag("p", spelt(statement), class_="ws-tiny" if index else "ws-told")
+    statements = join(tag("p", spelt(statement), class_="ws-tiny" if index else "ws-headline")
                 for index, statement in enumerate(chart.told))  # fmt: skip
     svg = _svg(frame.axes(chart.x_label, chart.y_label) + join(bars), chart.title)
     return tag("figure", statements + svg + tag("figcaption", chart.subtitle, class_="ws-tiny"))

@@ -149,9 +149,9 @@ class TolerancesPanel(AnalysisPanel):
             histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
         headline = fill(
-            '<p class="ws-told"><span class="{kind}">{share} %</span> of the machines stay within'
+            '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay within'
             " {limit} µm {where}</p>",
-            kind="ws-kept" if probability.low >= specification.percent / 100.0 else "ws-missed",
+            kind="ws-pass" if probability.low >= specification.percent / 100.0 else "ws-fail",
             share=percent(probability.probability), limit=f"{specification.limit_um:g}",
             where=WHERE[specification.over],
         )  # fmt: skip

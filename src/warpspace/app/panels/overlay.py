@@ -72,7 +72,7 @@ class LegendPanel(Panel):
                            label="Limit", id="ws-limit")  # fmt: skip
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
             limit_menu = menu(share, body, key="limit", hint="Change the limit",
-                        kind="ws-kept" if is_pass else "ws-missed")  # fmt: skip
+                        kind="ws-pass" if is_pass else "ws-fail")  # fmt: skip
             limit_menu = Markup(" · ") + limit_menu if place_words(picture) else limit_menu
         return {"head.kept": limit_menu, "legend": legend_html(picture)}
 
