@@ -278,7 +278,7 @@ def test_machines_with_few_moving_axes_have_box_and_maps_too(name):
 @pytest.mark.parametrize(
     ("name", "choice", "says"),
     [
-        ("", {"formats": "<b>nonsense"}, "choose a controller"),
+        ("", {"formats": "<b>nonsense"}, "no controller selected"),
         ("", {**CHOICE, "points": "102"}, "at most 101"),
         ("", {**CHOICE, "resolution": "nan"}, "expected"),
         ("wCFt", CHOICE, "to correct"),

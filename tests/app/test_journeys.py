@@ -35,7 +35,7 @@ def test_the_first_screen_is_calm(tab):
 def test_why_the_worst_corner_is_off_and_the_best_adjustment_in_two_actions(tab):
     start = start_state(SCENES[0])
     found = Adjust(objective=Objective.MAX, count=1).run(SCENES[0], lambda _: None).adjustments[0]
-    tab.says("Worst point: why 51.7 µm")
+    tab.says("Worst point: 51.7 µm")
     assert "+49.1" in tab.page.inner_text(".ws-causes")
     tab.says("51.7 → 46.1 µm")
     tab.click("Apply")
@@ -157,11 +157,11 @@ def test_an_adjustment_is_decided_on_and_taken_back(tab):
     tab.click("Apply")
     tab.click("Record decision")
     tab.until(lambda: "EA0Z" in tab.page.locator("#ws-notes textarea").input_value())
-    tab.click("Keep")
+    tab.click("Save note")
     tab.says("max 51.72 → 46.0", within="#ws-notes .ws-note")
     (note,) = tab.state.review
     assert (note.kind, note.change["EA0Z"][0]) == ("decision", start["EA0Z"])
-    tab.click("Take back")
+    tab.click("Revert")
     tab.says("Taken back")
     tab.says("changed: ", within="#ws-notes .ws-note")
     assert tab.state.amplitudes == start

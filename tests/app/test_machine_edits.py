@@ -271,7 +271,7 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     name = "C at B 0°, point (0, 275, 450) mm"
     assert f"{name}</td></tr><tr><td>{'</td><td>'.join(row)}</td>" in text
     hidden = body_of(RotarySection, put(state, "shown.traces", "0"))
-    assert "Draw the traces" in hidden
+    assert "Show traces" in hidden
     assert "<svg" not in hidden
     mill = start_state(load_scene("machine_c_frame_mill"))
     assert "no rotary axis" in body_of(RotarySection, mill)

@@ -63,7 +63,7 @@ class Column(Alone):
     def settle(self):
         """Wait until what is asked now is answered."""
         question, _ = self.part.result_key(self.state), self.html
-        while self.part._jobs.busy or not any(
+        while self.part.context.jobs or not any(
             found and found[0] == question for found in (self.part.outcome, self.part.problem)
         ):
             time.sleep(0.01)
@@ -192,7 +192,7 @@ def test_the_numbers_are_those_of_the_analysis(fitted):
     for one, row in zip(found.parameters, said["parameters"], strict=True):
         assert (one.key, one.identifiable) == (row["key"], row["identifiable"])
         assert one.value == pytest.approx(row["value"], rel=1e-9)
-    assert "Determined only in part" in html
+    assert "Confounded" in html
     assert arrows_of(found, before=True)[0].shape == (23, 3)
 
 
@@ -291,7 +291,7 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert (column.state.page.task, column.state.forms) == ("measure", {})
     html = column.settle()
     assert "<img" not in html
-    assert "It adds EXX." in html
+    assert "The import adds EXX." in html
     before = LIVE.evaluate(STATE).statistics
     assert f"{before.mean_um:.1f} → " in html
     Alone.do(column, "apply", "0")
@@ -305,9 +305,9 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert "Applied" in column.html
     column.part.parse("y.csv", TABLE.replace(b"EXX", b"EYX"))()
     html = column.settle()
-    assert "It adds EYX." in html
+    assert "The import adds EYX." in html
     column.part.parse("x.csv", TABLE)()
-    assert "It replaces EXX and adds EYX." in column.settle()
+    assert "The import replaces EXX and adds EYX." in column.settle()
     with pytest.raises(SceneError, match="does not say which axis"):
         column.part.parse("other.comp", COMP.encode())()
     assert [one.name for one in column.part.files] == ["y.csv", "x.csv"]
@@ -330,7 +330,7 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     assert "no format that is known" in column.settle()
     for word, value, said in (
         ("set.format", "linuxcnc-comp", "which axis"),
-        ("set.axis", "X", "It adds EXX."),
+        ("set.axis", "X", "The import adds EXX."),
         ("set.format", "heidenhain", "data.dat: "),
         ("set.format", HOSTILE, "expected one of"),
     ):

@@ -82,7 +82,7 @@ def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_hold
     part.store.apply(lambda state: state.with_amplitude("EB0Z", 2.0))
     found = part.do("take-back." + note.id)
     assert (found.amplitudes["EA0Z"], found.amplitudes["EB0Z"]) == (was["EA0Z"], 2.0)
-    assert "EB0Z is 2 now, not 1.5: it stays" in found.review[0].replies[0].text
+    assert "EB0Z not reverted: now 2 instead of 1.5" in found.review[0].replies[0].text
 
 
 def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
@@ -192,7 +192,7 @@ def test_a_note_in_the_browser(browser):
         page.locator("#ws-notes textarea:focus").wait_for()
         page.keyboard.type("Why here? http://a.b/c")
         tab.type("Your name", "Ada")
-        tab.click("Keep")
+        tab.click("Save note")
         tab.until(lambda: len(tab.state.review) == 1)
         note = tab.state.review[0]
         assert note.author == "Ada"

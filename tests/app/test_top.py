@@ -95,7 +95,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
         window.do("share")
         opened, _ = open_link(unpack(window.called[-1][1]), None)
         assert len(opened.review) == expected
-        assert ["Without the notes" in one[0] for one in window.said] == [True] * (1 - expected)
+        assert ["Notes not included" in one[0] for one in window.said] == [True] * (1 - expected)
         assert len(window.store.state.review) == count
 
 
@@ -137,4 +137,4 @@ def test_a_scene_is_saved_with_a_warning_where_its_file_has_changed(is_current):
     window = Alone(FilesDialog, STATE, services=services)
     window.do("save")
     assert len(window.saved) == 1
-    assert ["has changed" in one[0] for one in window.said] == [True] * (not is_current)
+    assert ["changed on the server" in one[0] for one in window.said] == [True] * (not is_current)

@@ -176,7 +176,7 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
     if "No error acts" in html:
         return
     html = html.replace("−", "-")
-    (shown,) = map(float, re.findall(rf"why ({NUMBER}) µm", html))
+    (shown,) = map(float, re.findall(rf": ({NUMBER}) µm", html))
     causes = html[html.index("ws-causes") : html.index('data-piece="best"')]
     parts = [*map(float, re.findall(rf"<td>({NUMBER})</td>", causes))]
     assert sum(parts) == pytest.approx(shown, abs=0.05 * (len(parts) + 1) + 1e-9)
@@ -184,7 +184,7 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
 
 def test_the_worst_point_of_the_thesis_and_another_one():
     part = lone_part(WorstPanel)
-    assert "why 51.7 µm" in html_of(part)
+    assert ": 51.7 µm" in html_of(part)
     assert re.search(r'title="squareness of Z to Y[^"]*">EA0Z</b></th><td>\+49.1', html_of(part))
     typed = part.handle(START, "set.at", "X 0 Y 0 Z −280")
     assert "This point" in html_of(part, typed)
@@ -192,7 +192,7 @@ def test_the_worst_point_of_the_thesis_and_another_one():
     part.context.picture = LIVE.evaluate(START)
     asked = part.handle(START, "lever", "EA0Z")
     assert (asked.lever, asked.picked) == ("EA0Z", pick_worst(part.context.picture))
-    assert "mm across the axis" in html_of(part, asked)
+    assert "mm lever arm" in html_of(part, asked)
     for word in ("<img>", "", "x" * 500):
         assert part.handle(START, "lever", word).lever == ""
         assert "<img" not in html_of(part, part.handle(START, "set.at", word))
@@ -236,7 +236,7 @@ def test_nothing_is_adjusted_where_all_errors_are_excluded():
     part = lone_part(BestPanel)
     html_of(part, state)
     wait(part)
-    assert "No adjustment helps." in html_of(part, state)
+    assert "No single adjustment improves it." in html_of(part, state)
 
 
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():

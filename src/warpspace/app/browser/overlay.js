@@ -40,7 +40,7 @@
     const mm = roundDown(free / perMm), perUm = perMm * 1e-3 * state.factor;
     const um = roundDown(free / perUm);
     const rows = [["mm", mm, mm * perMm, `${spell(mm)} mm geometry`], ["um", um, um * perUm,
-      `${um < 1e4 ? `${spell(um)} µm` : `${spell(um * 1e-3)} mm`} error, ${state.spelt}`]];
+      `${um < 1e4 ? `${spell(um)} µm` : `${spell(um * 1e-3)} mm`} error, drawn ${state.spelt}`]];
     bars.innerHTML = rows.map(([name, length, width, text]) => `<div data-bar-scale="${name}"
       data-length="${length}"><i style="width:${width.toFixed(2)}px"></i>${text}</div>`).join("");
   };
