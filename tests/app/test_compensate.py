@@ -238,9 +238,9 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
 def test_what_is_left_of_rounding_is_said_and_not_drawn(found):
     # its largest error is below the step that was asked for
     words = shown(*asking(), replace(found, resolution=0.05))
-    assert "resolution of the numbers in the file" in words
+    assert "below the resolution of the file" in words
     assert 'data-value="residual" title="Residual below numerical resolution"' in words
-    assert "resolution of the numbers" not in shown(*asking(), found)
+    assert "resolution of the file" not in shown(*asking(), found)
 
 
 def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):

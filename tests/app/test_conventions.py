@@ -61,7 +61,7 @@ def test_the_section_offers_what_is_in_force_and_holds_the_point_that_is_picked(
     state = section.handle(state, "set.reference", "X 100,5 mm")
     assert state.scene.reference["X"] == 100.5
     assert 'value="X 100.5 Y ' in section.body(LIVE.evaluate(state))
-    assert "expected positions" in section.handle(state, "set.reference", "<b>").notes[-1]
+    assert "expected axis positions" in section.handle(state, "set.reference", "<b>").notes[-1]
     clicked = replace(state, picked=Picked({"X": 0.0, "Y": 10.0, "Z": -280.0}))
     assert section.handle(clicked, "pick", "").scene.reference == clicked.picked.at
     assert "disabled" in section.body(LIVE.evaluate(state))

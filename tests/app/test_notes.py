@@ -48,7 +48,7 @@ def test_a_note_is_shown_again_as_it_was_and_back_leads_to_where_one_was():
     second = pin(part)
     present = part.store.apply(lambda state: state.with_amplitude("EA0Z", 5.0)) or part.store.state
     assert part.do("show." + first.id).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
-    assert "Note 1 as it was" in part.part.render(part.context.picture)["reopened"]
+    assert "Note 1, state of" in part.part.render(part.context.picture)["reopened"]
     assert part.do("show." + second.id).amplitudes["EA0Z"] == 0.0
     part.do("reply." + second.id, "seen")  # is not lost
     back = part.do("back")

@@ -170,7 +170,7 @@ def test_cancelling_frees_the_place_at_once(watched):
     def slow(job):
         go.wait(10)
         with pytest.raises(CancelledError):
-            job.tell(0.5)
+            job.report_progress(0.5)
         told.set()
         raise RuntimeError("too late")
 

@@ -176,7 +176,7 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
     if "No error acts" in html:
         return
     html = html.replace("−", "-")
-    (shown,) = map(float, re.findall(rf": ({NUMBER}) µm", html))
+    (shown,) = map(float, re.findall(rf"<h3>Worst point: ({NUMBER}) µm", html))
     causes = html[html.index("ws-causes") : html.index('data-piece="best"')]
     parts = [*map(float, re.findall(rf"<td>({NUMBER})</td>", causes))]
     assert sum(parts) == pytest.approx(shown, abs=0.05 * (len(parts) + 1) + 1e-9)

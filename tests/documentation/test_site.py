@@ -123,7 +123,7 @@ def test_every_command_of_the_page_and_its_key_are_named():
     named = re.split(r"[\s,]+", " ".join(re.findall(r"^\| ([^|]+) \|", text, re.MULTILINE)))
     for one in KEYS:
         if one.keys:
-            assert one.spelt in named, one.label
+            assert one.key_label in named, one.label
         else:
             assert f"*{one.label}*" in " ".join(text.split())
 

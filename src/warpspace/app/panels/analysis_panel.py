@@ -273,7 +273,9 @@ class AnalysisPanel(Section):
                 return with_proposal(state, change.scene, name or f"after {title}: {change.words}")
             applied_state = with_applied(state, change.scene, f"before {title}")
             self._applied_key = self.result_key(applied_state)
-            description = change.words.removeprefix(f"after {title}: ")
+            description = change.words
+            if description.startswith("after "):
+                description = description.partition(": ")[2]
             self.context.last_decision = state, f"{self.title}: {description}"
             return applied_state
         return state

@@ -149,8 +149,8 @@ class TolerancesPanel(AnalysisPanel):
             histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
         headline = fill(
-            '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay within'
-            " {limit} µm {where}</p>",
+            '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay'
+            " within {limit} µm {where}</p>",
             kind="ws-pass" if probability.low >= specification.percent / 100.0 else "ws-fail",
             share=percent(probability.probability), limit=f"{specification.limit_um:g}",
             where=WHERE[specification.over],
