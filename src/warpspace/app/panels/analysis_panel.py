@@ -275,7 +275,7 @@ class AnalysisPanel(Section):
             self._applied_key = self.result_key(applied_state)
             description = change.words
             if description.startswith("after "):
-                description = description.partition(": ")[2]
+                description = description.partition(": ")[2] or description
             self.context.last_decision = state, f"{self.title}: {description}"
             return applied_state
         return state
