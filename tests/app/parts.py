@@ -97,7 +97,7 @@ def body_of(kind: Any, state: AppState) -> str:
 def answer_of(part: Any, state: AppState) -> Any:
     """Run the analysis of a part here."""
     (values, scenes) = part.values(state), part.scenes(state)
-    return part.build_analysis(state, values, scenes).run_all(scenes, lambda _: None)
+    return part.build_analysis(state, values, scenes[0]).run_all(scenes, lambda _: None)
 
 
 def section(part: Any, state: AppState) -> str:

@@ -97,11 +97,7 @@ class AnalysisPanel(Section):
 
     def options(self) -> Sequence[Option]:
         """List the options that the page supports."""
-        return [
-            option
-            for option in self.kind.options()
-            if not (option.grammar and option.grammar.is_file)
-        ]
+        return [o for o in self.kind.options() if not (o.grammar and o.grammar.is_file)]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
         """List the options that apply to the state."""
@@ -113,11 +109,7 @@ class AnalysisPanel(Section):
         state_values["placed"] = str(int(state.seen[1]))
         if state.picked is not None:
             state_values["at"] = spell_at(state.picked.at)
-        return {
-            option.name: state_values[option.name]
-            for option in self.options()
-            if option.name in state_values
-        }
+        return {o.name: state_values[o.name] for o in self.options() if o.name in state_values}
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
         """Return the scenes to analyse: the machine as drawn."""
@@ -138,10 +130,8 @@ class AnalysisPanel(Section):
         """Check if it runs by itself after each change."""
         return self.outcome.took_s < QUICK_S if self.outcome else self.runs_on_open
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        return read_form(self.kind, self.shown_options(state), values, scenes[0])
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        return read_form(self.kind, self.shown_options(state), values, scene)
 
     def before_result(self, state: AppState) -> Markup:
         return EMPTY
@@ -149,12 +139,8 @@ class AnalysisPanel(Section):
     def headline(self, result: Result) -> Markup:
         """Render the sentences of the result."""
         # the title of the scene is at the top of the page
-        sentences = (
-            block.removeprefix(self._title_prefix)
-            for block in result.blocks()
-            if isinstance(block, str)
-        )
-        return join(map(block_html, sentences))
+        prefix, sentences = self._title_prefix, (b for b in result.blocks() if isinstance(b, str))
+        return join(block_html(sentence.removeprefix(prefix)) for sentence in sentences)
 
     def offered_changes(self, result: Result) -> Sequence[int]:
         """List the indices of the offered changes, best first."""
@@ -166,9 +152,7 @@ class AnalysisPanel(Section):
 
     def actions(self, result: Result, *, stale: bool) -> Markup:
         """Render the buttons below a result."""
-        saves = [
-            button(f"Save {ending}", f"{self.name}:save", ending) for ending in _endings(result)
-        ]
+        saves = [button(f"Save {end}", f"{self.name}:save", end) for end in _endings(result)]
         saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         return tag("div", join(saves), class_="ws-actions")
 
@@ -176,11 +160,7 @@ class AnalysisPanel(Section):
 
     def values(self, state: AppState) -> dict[str, str]:
         defaults, chosen = self.defaults(state), option_values(state, self.name)
-        return {
-            **defaults,
-            **chosen,
-            **{name: defaults[name] for name in OF_STATE & defaults.keys()},
-        }
+        return {**defaults, **chosen, **{k: defaults[k] for k in OF_STATE & defaults.keys()}}
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.result_key(picture.state),)
@@ -261,9 +241,8 @@ class AnalysisPanel(Section):
         elif action == "cancel":
             self._jobs.cancel()
         elif action in ("save", "report"):
-            self.context.call_soon(
-                partial(self._save, value) if action == "save" else self._add_to_report
-            )
+            save = partial(self._save, value) if action == "save" else self._add_to_report
+            self.context.call_soon(save)
         elif action in ("preview", "apply"):
             change, title = self._change(state, value), self.title.lower()
             if change is None:
@@ -291,7 +270,7 @@ class AnalysisPanel(Section):
         key, scenes = self.result_key(state), self.scenes(state)
         self.last_key, self._title_prefix = key, f"{state.scene.title} · "
         try:
-            analysis = self.build_analysis(state, self.values(state), scenes)
+            analysis = self.build_analysis(state, self.values(state), scenes[0])
         except WarpspaceError as error:
             self._fail(error)
             return
@@ -315,13 +294,11 @@ class AnalysisPanel(Section):
         else:
             self._run(state)
 
-    def _run_job(
-        self, name: str, compute: Callable[[Job], T], deliver: Callable[[T], None]
-    ) -> None:
+    def _run_job(self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None]) -> None:
         def work(job: Job) -> None:
             product = compute(job)
             if not job.is_set():
-                self.context.call_soon(partial(deliver, product))
+                self.context.call_soon(partial(accept, product))
 
         self._jobs.start(name, work)
 

@@ -78,9 +78,7 @@ class TolerancesPanel(AnalysisPanel):
     _order: tuple[ResultKey, tuple[str, ...]] = ((), ())
 
     def options(self) -> Sequence[Option]:
-        return [
-            option for option in super().options() if option.name in ("clip", "cylinder", "seed")
-        ]
+        return [o for o in super().options() if o.name in ("clip", "cylinder", "seed")]
 
     def result_key(self, state: AppState) -> ResultKey:
         values = tuple(self.values(state).items())
@@ -96,11 +94,9 @@ class TolerancesPanel(AnalysisPanel):
     def is_automatic(self, state: AppState) -> bool:
         return False  # it would change tolerances by itself
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
         """Allocate for the limit of the state; fixed keys of another machine are ignored."""
-        analysis: Any = super().build_analysis(state, values, scenes)
+        analysis: Any = super().build_analysis(state, values, scene)
         specification, keys = state.specification, state.amplitudes.keys()
         fixed = specification.fixed & keys
         costs_by_key = read_numbers(specification.costs, "", "") if specification.costs else {}
@@ -308,10 +304,8 @@ class ConceptsPanel(AnalysisPanel):
     def is_ready(self, state: AppState) -> bool:
         return len(self.scenes(state)) > 1  # links may name unknown machines
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scenes)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
         return replace(analysis, workers=1)  # leaves threads to the sliders
 
     def result_key(self, state: AppState) -> ResultKey:

@@ -220,11 +220,10 @@ class FilesDialog(JobDialog):
 
         def draw(picture: LivePicture, job: Job) -> bytes:
             view_camera = client.camera
-            height, width = np.clip(
-                (view_camera.image_height, view_camera.image_width), *VIEW_PX
-            ).tolist()
+            size = view_camera.image_height, view_camera.image_width
+            size_px = np.clip(size, *VIEW_PX).tolist()
             pixels: Any = client.get_render(
-                height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
+                *size_px, transport_format="png", timeout=RENDER_TIMEOUT_S
             )
             return self.context.services.draw_view(picture, pixels, camera.remember(), job)
 

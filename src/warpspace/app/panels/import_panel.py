@@ -182,10 +182,8 @@ class ImportPanel(FilesPanel):
             options["variant"] = replace(options["variant"], choices=kind.variants)
         return list(options.values())
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        return self._build_analysis(state, self.files, values, scenes[0])
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        return self._build_analysis(state, self.files, values, scene)
 
     def _build_analysis(
         self,

@@ -50,18 +50,13 @@ class AdjustPanel(AnalysisPanel):
 
     def options(self) -> Sequence[Option]:
         changes = {"default": None, "choices": ("all",), "words": {"all": "any error"}}
-        return [
-            replace(option, **changes) if option.name == "adjustable" else option
-            for option in super().options()
-        ]
+        return [replace(o, **changes) if o.name == "adjustable" else o for o in super().options()]
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "objective": Objective.MAX}
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        analysis = super().build_analysis(state, values, scenes)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis = super().build_analysis(state, values, scene)
         keys = tuple(key for key in state.amplitudes if state.exclusions.active(key))
         return AdjustIncluded(**vars(analysis), keys=keys)
 
@@ -165,12 +160,10 @@ class CompensatePanel(AnalysisPanel):
     def is_ready(self, state: AppState) -> bool:
         return self.values(state).get("formats", "") in _writable()
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
         if not self.is_ready(state):
             raise OptionError("no controller selected; select one")
-        analysis: Any = super().build_analysis(state, values, scenes)
+        analysis: Any = super().build_analysis(state, values, scene)
         points = analysis.points
         counts = dict(points).values() if isinstance(points, tuple) else [points]
         if max(count or 0 for count in counts) > MOST_POINTS:
@@ -262,9 +255,8 @@ class CompensatePanel(AnalysisPanel):
 
 
 def _writable() -> dict[str, str]:
-    writable = [file_format for file_format in formats() if file_format.can_write]
-    writable.sort(key=lambda file_format: file_format.title)
-    return {file_format.name: file_format.title for file_format in writable}
+    writable = sorted((f for f in formats() if f.can_write), key=lambda f: f.title)
+    return {f.name: f.title for f in writable}
 
 
 def _is_rounding(result: Compensation) -> bool:
@@ -303,10 +295,8 @@ def box_of(state: AppState) -> str:
     if state.controller is None:
         return MACHINE
     before = state.comparison.a.state
-    is_compared = (
-        state.comparison.b is not None and before is not None and before.controller is None
-    )
-    return COMPARISON if is_compared else RESIDUAL
+    is_uncompensated = before is not None and before.controller is None
+    return COMPARISON if is_uncompensated and state.comparison.b is not None else RESIDUAL
 
 
 def is_applicable_to(state: AppState, controller: Controller) -> bool:

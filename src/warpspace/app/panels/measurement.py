@@ -162,13 +162,11 @@ class TestsPanel(FilesPanel):
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (self.result_key(picture.drawn_state), picture.is_difference)
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scenes)
-        plan_test(analysis, scenes[0])
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
+        plan_test(analysis, scene)
         for file in self.files:
-            table = parse_test(file.content, analysis.data_columns(scenes[0]), file.name)
+            table = parse_test(file.content, analysis.data_columns(scene), file.name)
             analysis = replace(analysis, data=table)
         return analysis
 
@@ -277,10 +275,8 @@ class CalibratePanel(FilesPanel):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        analysis = read_form(CalibrateTexts, self.options(), values, scenes[0])
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis = read_form(CalibrateTexts, self.options(), values, scene)
         return replace(analysis, files=self.files)
 
     def before_result(self, state: AppState) -> Markup:

@@ -103,19 +103,15 @@ class PartPanel(SceneOverlayPanel):
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
-        unused = ("place", "predistorted")
-        return [option for option in super().options() if option.name not in unused]
+        return [o for o in super().options() if o.name not in ("place", "predistorted")]
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scenes)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
         (scene_part, _), part = PartLook.of_scene(state.scene), state.part
         features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
         tolerances = next(((file.name, file.content) for file in self.files), None)
-        return replace(
-            analysis, place=part.place, mesh=part.mesh, features=features, tolerances=tolerances
-        )
+        files = {"features": features, "tolerances": tolerances}
+        return replace(analysis, place=part.place, mesh=part.mesh, **files)
 
     def about(self, state: AppState) -> Markup:
         turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
@@ -162,10 +158,8 @@ class ProgramPanel(SceneOverlayPanel):
     most_bytes = MOST_BYTES  # longer programs would delay other tabs
     part_fields = ("program", "program_name")
 
-    def build_analysis(
-        self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]
-    ) -> Analysis:
-        analysis: Any = super().build_analysis(state, values, scenes)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
         return replace(analysis, file=state.part.program_name, text=state.part.program)
 
     def about(self, state: AppState) -> Markup:

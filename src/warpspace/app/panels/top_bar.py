@@ -154,11 +154,7 @@ COMMANDS = (
 
 def key_events() -> Mapping[str, str]:
     """Return the event and its value for each key."""
-    return {
-        key: f"{command.event}={command.value}".rstrip("=")
-        for command in COMMANDS
-        for key in command.keys
-    }
+    return {key: f"{c.event}={c.value}".rstrip("=") for c in COMMANDS for key in c.keys}
 
 
 FIRST_HELP = (
@@ -180,11 +176,7 @@ MEANINGS = (
 
 def _find_commands(query: str) -> list[Command]:
     search_words = query.lower().split()
-    return [
-        command
-        for command in COMMANDS
-        if all(word in command.label.lower() for word in search_words)
-    ]
+    return [c for c in COMMANDS if all(word in c.label.lower() for word in search_words)]
 
 
 class HelpDialog(Dialog):
