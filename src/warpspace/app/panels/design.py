@@ -165,11 +165,9 @@ class TolerancesPanel(AnalysisPanel):
             self._order = order_key, tuple(sorted(shares, key=lambda key: -shares[key]))
         longest = max(shares.values(), default=0.0) or 1.0
         tolerance_rows = join(_row(state, key, shares[key], longest) for key in self._order[1])
+        hint = "Scale all tolerances except fixed ones"
         scales = join(
-            button(
-                label, f"{self.name}:scale", label, hint="Scale all tolerances except fixed ones"
-            )
-            for label in SCALES
+            button(label, f"{self.name}:scale", label, hint=hint) for label in SCALES
         ) + button("As in the scene", f"{self.name}:reset", kind="quiet")
         return tag("h4", "Half-widths and shares of the variance") + tolerance_rows + tag(
             "div", scales, class_="ws-actions", role="group", aria_label="Scale all tolerances"

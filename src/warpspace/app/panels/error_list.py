@@ -315,25 +315,18 @@ class ErrorsPanel(Panel):
 
     def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
-        inputs = (state.seen, tuple(state.positions.items()))
-        gains = self._gains.get((Identity(state.scene), *inputs), lambda: _gains(picture, state))
-        ranking = self._rank(
-            state, gains, (Identity(state.origin), tuple(state.amplitudes), *inputs)
-        )
-        listed = (
-            ranking.order,
-            ranking.used,
-            state.page,
-            state.exclusions,
-            bool(state.changed_keys),
-        )
-        errors = self._list.get(listed, lambda: _list_html(state, ranking))
+        inputs = (Identity(state.scene), state.seen, tuple(state.positions.items()))
+        gains = self._gains.get(inputs, lambda: _gains(picture, state))
+        ranking = self._rank(state, gains)
+        listed = (ranking.order, ranking.used, bool(state.changed_keys))
+        inputs = (*listed, state.page, state.exclusions)
+        errors = self._list.get(inputs, lambda: _list_html(state, ranking))
         return {"errors": errors, **self._render_rows(state, ranking, gains)}
 
-    def _rank(
-        self, state: AppState, gains: Mapping[str, float], inputs: tuple[object, ...]
-    ) -> Ranking:
-        ranking = self._ranking
+    def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
+        """Return the present ranking, or a new one if it is out of date."""
+        ranking, positions = self._ranking, tuple(state.positions.items())
+        inputs = (Identity(state.origin), tuple(state.amplitudes), state.seen, positions)
         if ranking is not None and ranking.inputs == inputs:
             before = ranking.amplitudes
             changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}
@@ -341,12 +334,11 @@ class ErrorsPanel(Panel):
                 return ranking
         effects = {key: gains.get(key, 0.0) * abs(at) for key, at in state.amplitudes.items()}
         order = tuple(sorted(effects, key=lambda key: -effects[key]))
-        largest = max(effects.values(), default=0.0) or 1.0
+        largest, used = max(effects.values(), default=0.0) or 1.0, used_keys(state)
         self._edited = set()
-        self._ranking = Ranking(
-            inputs, gains, state.amplitudes, order, used_keys(state), largest, _spans(state)
-        )
-        return self._ranking
+        ranking = Ranking(inputs, gains, state.amplitudes, order, used, largest, _spans(state))
+        self._ranking = ranking
+        return ranking
 
     def _render_rows(
         self, state: AppState, ranking: Ranking, gains: Mapping[str, float]

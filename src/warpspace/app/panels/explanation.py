@@ -78,9 +78,8 @@ class WorstPanel(Section):
         if picture.state.picked is not None:
             reset = button("Worst point", "worst:forget", kind="link",
                           hint="Return to the worst point")  # fmt: skip
-            pin = button(
-                "Pin a note", "notes:pin", kind="link", hint="Pin a note to this point (N)"
-            )
+            hint = "Pin a note to this point (N)"
+            pin = button("Pin a note", "notes:pin", kind="link", hint=hint)
             controls = tag("p", join((_axes(explanation), " ", reset, " ", pin)))
         best = tag("div", "", data_piece="best")
         limit = picture.state.specification.limit_um

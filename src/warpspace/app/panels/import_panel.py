@@ -183,17 +183,8 @@ class ImportPanel(FilesPanel):
         return list(options.values())
 
     def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
-        return self._build_analysis(state, self.files, values, scene)
-
-    def _build_analysis(
-        self,
-        state: AppState,
-        files: Sequence[UploadedFile],
-        values: Mapping[str, str],
-        scene: Scene,
-    ) -> Analysis:
-        analysis = read_form(Import, self._options(state, files), values, scene)
-        return replace(analysis, sources=tuple(file.content for file in files))
+        analysis = read_form(Import, self._options(state, self.files), values, scene)
+        return replace(analysis, sources=tuple(file.content for file in self.files))
 
     def is_automatic(self, state: AppState) -> bool:
         return True
@@ -229,7 +220,9 @@ class ImportPanel(FilesPanel):
             files = (*joined, uploaded) if is_joined else (uploaded,)
             try:
                 values = self.values(state) if is_joined else {}
-                self._build_analysis(state, files, values, scene).run(scene, ignore_progress)
+                analysis = read_form(Import, self._options(state, files), values, scene)
+                sources = tuple(file.content for file in files)
+                replace(analysis, sources=sources).run(scene, ignore_progress)
                 break
             except WarpspaceError as error:
                 problem = error

@@ -45,10 +45,8 @@ class SceneOverlayPanel(FilesPanel):
         raise NotImplementedError
 
     def result_key(self, state: AppState) -> ResultKey:
-        return (
-            *super().result_key(state),
-            replace(state.part, shown=True, normal=False, moved=False),
-        )
+        part = replace(state.part, shown=True, normal=False, moved=False)
+        return (*super().result_key(state), part)
 
     def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (*super().body_dependencies(picture), picture.state.part)
