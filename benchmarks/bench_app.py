@@ -172,7 +172,7 @@ def is_picture(message: Any) -> bool:
 
 def replayed(messages: list[Any]) -> Iterator[Any]:
     """Select messages of the drawing, of pieces of the page, and of drawn nodes that move."""
-    ours = ("warpspacePage.show(", "warpspaceRoom.", "warpspaceMesh.")
+    ours = ("warpspacePage.show(", "warpspaceOverlay.", "warpspaceMesh.")
     for message in messages:
         lines = getattr(message, "source", "").split("\n")
         script = "\n".join(line for line in lines if line.startswith(ours))

@@ -154,7 +154,7 @@ def tested(page: Page) -> None:
 def improved(page: Page) -> None:
     """Choose a control; the repairs stand below."""
     open_task(page, "Improve")
-    page.get_by_label("Control", exact=True).select_option("sinumerik-cec")
+    page.get_by_label("Controller", exact=True).select_option("sinumerik-cec")
     page.get_by_role("button", name="Save table").wait_for()
 
 
@@ -196,7 +196,7 @@ def noted(page: Page) -> None:
 def open_story(page: Page) -> None:
     """Play the story up to its second step, which shows the lever arm of an error."""
     noted(page)
-    press(page, "Tell the story")
+    press(page, "Play the story")
     page.locator("[data-do='story:on']").click()
 
 

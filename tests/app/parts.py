@@ -19,14 +19,14 @@ LIVE = LiveModel()
 class Nobody(SimpleNamespace):
     """The context of a page that is not there; what it posts and tells a user goes into lists."""
 
-    is_still, shown, stage = True, None, None
+    is_paused, picture, stage = True, None, None
 
     def __init__(self, **given: Any) -> None:
         posted, told = [], []
         super().__init__(
             jobs=set(), scenes=SceneList({}), services=Services(), posted=posted, told=told,
             offers={},
-            act=lambda do: do(), renew=lambda _: None, post=posted.append,
+            call_soon=lambda do: do(), rerender=lambda _: None, post=posted.append,
             notify=lambda *words: told.append(words), save_file=lambda *file: told.append(file),
         )  # fmt: skip
         vars(self).update(given)
@@ -44,9 +44,9 @@ class Alone:
         self.said, self.sent, self.saved, self.called = [], [], [], []
         self.store = StateStore(state)
         self.context = Nobody(
-            act=self._act, store=self.store, shown=LIVE.evaluate(state),
-            notify=lambda *words: self.said.append(words), post=self.store.apply, reported=[],
-            send=lambda *event: self.sent.append(event), closed=lambda: None,
+            call_soon=self._call, store=self.store, picture=LIVE.evaluate(state),
+            notify=lambda *words: self.said.append(words), post=self.store.apply, report_results=[],
+            send=lambda *event: self.sent.append(event), dialog_closed=lambda: None,
             save_file=lambda *file: self.saved.append(file), fit_view=lambda: None,
             offers={}, page=SimpleNamespace(
                 report=lambda error: self.said.append(("", str(error))),
@@ -57,7 +57,7 @@ class Alone:
         )  # fmt: skip
         self.part = kind(self.context, *more)
 
-    def _act(self, action: Callable[[], None]) -> None:
+    def _call(self, action: Callable[[], None]) -> None:
         try:
             action()
         except WarpspaceError as error:  # as the session says it
@@ -65,16 +65,16 @@ class Alone:
 
     def do(self, word: str, value: str = "") -> Any:
         """Do what an event says; give what is shown then."""
-        self.store.apply(lambda state: self.part.take(state, word, value))
+        self.store.apply(lambda state: self.part.handle(state, word, value))
         while word in ("file", "bundled", "set.unit") and self.context.jobs:
             time.sleep(0.01)  # files are parsed beside the session
-        self.context.shown = LIVE.evaluate(self.store.state)
+        self.context.picture = LIVE.evaluate(self.store.state)
         return self.store.state
 
     @property
     def html(self) -> str:
         """What it shows."""
-        (found,) = self.part.pieces(LIVE.evaluate(self.store.state)).values()
+        (found,) = self.part.render(LIVE.evaluate(self.store.state)).values()
         return str(found)
 
 
@@ -85,7 +85,7 @@ def lone_part(kind: Any, name: str = "") -> Any:
 
 def wait(part: Any) -> None:
     """Wait until nothing is computed for a part."""
-    while part._jobs.busy:
+    while part.context.jobs:
         time.sleep(0.01)
 
 
@@ -97,7 +97,7 @@ def body_of(kind: Any, state: AppState) -> str:
 def answer_of(part: Any, state: AppState) -> Any:
     """Run the analysis of a part here."""
     (values, scenes) = part.values(state), part.scenes(state)
-    return part.ask(state, values, scenes).run_all(scenes, lambda _: None)
+    return part.build_analysis(state, values, scenes[0]).run_all(scenes, lambda _: None)
 
 
 def section(part: Any, state: AppState) -> str:

@@ -14,7 +14,7 @@ from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import TASKS, start_state
 
 START = start_state(SCENES[0])
-TITLES = ["The bent volume", "Its errors", "Five tasks"]
+TITLES = ["Deformed volume", "Errors", "Five tasks"]
 APART = """() => {
   const [card, target] = ["#ws-tour", ".ws-pointed"].map(
     which => document.querySelector(which).getBoundingClientRect());
@@ -182,8 +182,8 @@ def test_a_screen_reader_finds_landmarks_headings_and_names(tab, themes):
             tab.page.locator("#ws-notes textarea:focus").wait_for()
             if text:
                 tab.page.keyboard.type(text)
-                tab.click("Keep")
-                tab.click("Add to the story")
+                tab.click("Save note")
+                tab.click("Add to story")
                 tab.page.locator("#ws-notes textarea").wait_for(state="detached")
         assert serious(tab) == []
         tab.send("notes:close")

@@ -24,7 +24,14 @@ from warpspace.app.evaluation.machine_edits import with_changed_scene
 from warpspace.app.evaluation.point_explanation import measured, pick_worst, with_picked
 from warpspace.app.panels.analysis_panel import AnalysisOutcome
 from warpspace.app.panels.conventions import with_reference
-from warpspace.app.panels.improve import BOTH, LEFT, CompensatePanel, holds_for, packed, with_box
+from warpspace.app.panels.improve import (
+    COMPARISON,
+    RESIDUAL,
+    CompensatePanel,
+    is_applicable_to,
+    packed,
+    with_box,
+)
 from warpspace.app.server.tab_keeper import NO_TABLE, kept_text, read_kept
 from warpspace.app.state.app_state import PartLook, start_state
 from warpspace.app.state.tree import put
@@ -69,7 +76,7 @@ def controller(found):
 @pytest.fixture(scope="module")
 def left(controller):
     """The machine with its table."""
-    return with_box(START, LEFT, controller)
+    return with_box(START, RESIDUAL, controller)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +97,7 @@ def test_the_box_has_the_field_of_the_command(name, points, loop, orientation):
         orientation=orientation,
     )  # fmt: skip
     command = compensate(SCENE, asked, 9)
-    picture = LIVE.evaluate(with_box(START, LEFT, given.controller))
+    picture = LIVE.evaluate(with_box(START, RESIDUAL, given.controller))
     assert picture.state.loop == Loop(command.loop)
     assert np.abs(picture.field.error_um - command.after.error_um).max() < 1e-9
     tilts = picture.field.orientation_urad - command.after.orientation_urad
@@ -112,7 +119,7 @@ def test_the_machine_may_drift_under_its_table(left, controller):
 
 
 def test_before_and_after_stand_side_by_side(left, controller):
-    compared = LIVE.evaluate(with_box(START, BOTH, controller)).compared
+    compared = LIVE.evaluate(with_box(START, COMPARISON, controller)).compared
     before, after = LIVE.evaluate(START), LIVE.evaluate(left)
     assert (compared.a, compared.b) == (before.statistics, after.statistics)
     assert WITH_TABLE in compared.titles[1]
@@ -121,7 +128,7 @@ def test_before_and_after_stand_side_by_side(left, controller):
 
 def test_slices_and_the_tool_point_have_the_table_too(controller):
     look = replace(START.look, surface="slices")
-    left = with_box(replace(START, look=look), LEFT, controller)
+    left = with_box(replace(START, look=look), RESIDUAL, controller)
     bare, picture = LIVE.evaluate(replace(START, look=look)), LIVE.evaluate(left)
     for plain, cut in zip(bare.slices, picture.slices, strict=True):
         wanted = controller.field(cut.grid.coordinates, cut.grid.nominal_mm)
@@ -156,14 +163,14 @@ def test_what_changes_the_machine_ends_the_table(left, controller):
     machine = replace(SCENE.model.machine, title="another")
     other = replace(SCENE, model=replace(SCENE.model, machine=machine))
     assert with_changed_scene(left, other).controller is None
-    assert holds_for(START, controller)
-    assert not holds_for(start_state(load_scene("fork_head_bc")), controller)
+    assert is_applicable_to(START, controller)
+    assert not is_applicable_to(start_state(load_scene("fork_head_bc")), controller)
     assert left.reset().controller is controller
     assert left.with_amplitude("EXX", 3.0).controller is controller
 
 
 def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
-    both = with_box(START, BOTH, controller)
+    both = with_box(START, COMPARISON, controller)
     picture = LIVE.evaluate(left)
     page = build_offline_html(picture)
     for shown in (subject_words(picture), picture_conditions(picture), page):
@@ -180,7 +187,7 @@ def test_whatever_is_shown_says_which_machine_it_is_of(left, controller):
 
 
 def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
-    both = with_box(START, BOTH, controller)
+    both = with_box(START, COMPARISON, controller)
     assert state_to_toml(without_table(both), None) == state_to_toml(START, None)
     restored, _, missing = read_kept(kept_text(both, None, [SCENE]), [SCENE])
     assert restored.controller is None
@@ -191,8 +198,8 @@ def test_no_file_keeps_the_table_and_a_restored_tab_says_so(controller):
 
 def shown(part, state, found):
     """Give what the section says of a table that was computed."""
-    part._asked = part.question(state)
-    part._answer = AnalysisOutcome(part._asked, found)
+    part.last_key = part.result_key(state)
+    part.outcome = AnalysisOutcome(part.last_key, found)
     return section(part, state)
 
 
@@ -200,7 +207,7 @@ def test_words_of_others_are_escaped(found, controller):
     hostile = "<script>alert(1)</script>"
     worded = replace(controller, label=hostile, notes=(hostile,), assumed=(hostile,))
     given = replace(found, controller=worded)
-    left = with_box(START, LEFT, worded)
+    left = with_box(START, RESIDUAL, worded)
     for text in (
         shown(*asking(), given),
         build_offline_html(LIVE.evaluate(left)).partition("<iframe")[0],
@@ -214,7 +221,7 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
     html = shown(part, state, found)
     assert "SINUMERIK $AN_CEC" in html
     assert 'data-do="compensate:table"' in html
-    after = part.take(state, "table", "")
+    after = part.handle(state, "table", "")
     assert after.controller is found.controller
     assert after.comparison.b is not None
     ((name, content),) = part.context.told
@@ -223,17 +230,17 @@ def test_a_table_is_saved_whole_and_the_box_then_shows_before_and_after(found):
         f"compensation{add or found.format.endings[0]}" for add in found.files
     ]
     assert packed(found) == (name, content)  # the same table gives the same bytes
-    assert part.take(after, "box", "machine").controller is None
-    assert part.take(state, "box", "<b>") == state
-    assert part.take(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
+    assert part.handle(after, "box", "machine").controller is None
+    assert part.handle(state, "box", "<b>") == state
+    assert part.handle(state, "set.formats", "<b>").forms["compensate.formats"] == "<b>"
 
 
 def test_what_is_left_of_rounding_is_said_and_not_drawn(found):
     # its largest error is below the step that was asked for
     words = shown(*asking(), replace(found, resolution=0.05))
-    assert "resolution of the numbers in the file" in words
-    assert 'data-value="left" title="Nothing is left but rounding"' in words
-    assert "resolution of the numbers" not in shown(*asking(), found)
+    assert "below the resolution of the file" in words
+    assert 'data-value="residual" title="Residual below numerical resolution"' in words
+    assert "resolution of the file" not in shown(*asking(), found)
 
 
 def test_a_point_that_is_asked_about_lies_on_the_drawn_box(left):
@@ -262,7 +269,7 @@ def test_maps_are_drawn_beside_the_page(found):
 def test_machines_with_few_moving_axes_have_box_and_maps_too(name):
     state = start_state(still_scene(name))
     given = computed(state, {**CHOICE, "points": "5"})
-    picture = LIVE.evaluate(with_box(state, BOTH, given.controller))
+    picture = LIVE.evaluate(with_box(state, COMPARISON, given.controller))
     assert picture.compared.b.max_um <= picture.compared.a.max_um
     for narrow in (True, False):
         assert compensation_maps(given, False, narrow).axes
@@ -271,7 +278,7 @@ def test_machines_with_few_moving_axes_have_box_and_maps_too(name):
 @pytest.mark.parametrize(
     ("name", "choice", "says"),
     [
-        ("", {"formats": "<b>nonsense"}, "choose a controller"),
+        ("", {"formats": "<b>nonsense"}, "no controller selected"),
         ("", {**CHOICE, "points": "102"}, "at most 101"),
         ("", {**CHOICE, "resolution": "nan"}, "expected"),
         ("wCFt", CHOICE, "to correct"),

@@ -168,7 +168,7 @@ def test_only_so_many_files_wait_at_once():
     context.notify = lambda *words: said.append(words)
     file = Events([("files:file", "x" * (LONGEST_VALUE + 1))])
     for _ in range(MOST_FILES + 3):
-        context.take(file)
-        context.take(Events([("errors:set.EXX", "1")]))
+        context.receive(file)
+        context.receive(Events([("errors:set.EXX", "1")]))
     assert len(context.events) == 2 * MOST_FILES + 3
     assert "at once" in said[0][1]

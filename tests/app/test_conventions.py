@@ -57,18 +57,18 @@ def test_the_section_offers_what_is_in_force_and_holds_the_point_that_is_picked(
     text = section.body(LIVE.evaluate(START))
     assert 'value="component_errors=after_motion" checked' in text
     assert "before motion" in text
-    state = section.take(START, "choose", "reference=point")
-    state = section.take(state, "set.reference", "X 100,5 mm")
+    state = section.handle(START, "choose", "reference=point")
+    state = section.handle(state, "set.reference", "X 100,5 mm")
     assert state.scene.reference["X"] == 100.5
     assert 'value="X 100.5 Y ' in section.body(LIVE.evaluate(state))
-    assert "expected positions" in section.take(state, "set.reference", "<b>").notes[-1]
+    assert "expected axis positions" in section.handle(state, "set.reference", "<b>").notes[-1]
     clicked = replace(state, picked=Picked({"X": 0.0, "Y": 10.0, "Z": -280.0}))
-    assert section.take(clicked, "pick", "").scene.reference == clicked.picked.at
+    assert section.handle(clicked, "pick", "").scene.reference == clicked.picked.at
     assert "disabled" in section.body(LIVE.evaluate(state))
-    assert section.take(state, "own", "").scene is START.scene
-    assert section.take(START, "set.Q", "<b>") is START
+    assert section.handle(state, "own", "").scene is START.scene
+    assert section.handle(START, "set.Q", "<b>") is START
     for word in ("", "direction Q=1", "direction C=2", "reference=<b>", "x" * 500):
-        assert section.take(START, "choose", word) is START
+        assert section.handle(START, "choose", word) is START
 
 
 def test_a_reference_is_held_still_clamped_and_taken_back():

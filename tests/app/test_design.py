@@ -21,7 +21,7 @@ from warpspace.app.panels.design import (
     sample_machines,
     tolerance_shares,
 )
-from warpspace.app.panels.improve import RepairPanel
+from warpspace.app.panels.improve import AdjustPanel
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import Specification, start_state
 from warpspace.app.state.tree import put
@@ -38,7 +38,7 @@ KEYS = ("EXX", "EYX", "EA0Z")
 
 
 def ran(part, state):
-    part.take(state, "run", "")
+    part.handle(state, "run", "")
     wait(part)
     return part
 
@@ -47,22 +47,22 @@ def ran(part, state):
 
 
 def test_repair_offers_what_the_command_finds_and_nothing_that_gains_nothing():
-    part = lone_part(RepairPanel, "adjust")
+    part = lone_part(AdjustPanel, "adjust")
     state = replace(START, forms={"adjust.objective": "rms", "adjust.grid": "9"})
     ran(part, state)
-    found = part._answer.found
+    found = part.outcome.result
     said = Adjust(grid=9).run(FIRST, lambda _: None)
     assert [one.adjust for one in found.adjustments] == [one.adjust for one in said.adjustments]
-    assert part.offered(found) == [0, 1]  # of sets of one, two and three
+    assert part.offered_changes(found) == [0, 1]  # of sets of one, two and three
     shown = section(part, state)
     assert shown.count("adjust:apply") == 2
     assert re.search(r"<b>EC0Y 23\.1 → [\d.]+ µrad</b>.*max</th><td>51\.7 → ", shown)
-    applied = part.take(state, "apply", "1")
+    applied = part.handle(state, "apply", "1")
     assert applied.comparison.a.title == "before adjustment"
     ran(part, applied)
-    assert "at their best values already" in section(part, applied)
+    assert "No improvement possible" in section(part, applied)
     for index in ("9", "-1", "²", ""):
-        assert part.take(applied, "apply", index) is applied
+        assert part.handle(applied, "apply", index) is applied
 
 
 # --- Tolerances -----------------------------------------------------------------------------------
@@ -109,7 +109,7 @@ def test_an_allocation_reaches_what_was_wanted_and_is_one_change():
     after = update(state)
     # the machines of the page are those of the allocation, and the lower end of the interval counts
     (_, shown) = estimate(sample_machines(state), after.tolerances, 40.0)
-    found = part._answer.found
+    found = part.outcome.result
     assert shown == found.after
     assert 0.98 <= shown.low < 0.983
     assert edits.half_width_of(after, "EA0Z") == 25.0
@@ -130,14 +130,14 @@ def test_tolerances_are_typed_fixed_scaled_and_reset():
     state = put(START, "specification.fixed", "+EXX")
     assert 'data-value="-EXX"' in section(part, state)
     state = put(state, "tolerances.EYX", "0")
-    scaled = part.take(state, "scale", "× 1.5")
+    scaled = part.handle(state, "scale", "× 1.5")
     assert [edits.half_width_of(scaled, key) for key in KEYS] == [10.0, 0.0, 37.5]
     for _ in range(20):
-        scaled = part.take(scaled, "scale", "× 1.5")
+        scaled = part.handle(scaled, "scale", "× 1.5")
     assert edits.half_width_of(scaled, "EA0Z") == 1000.0
-    assert part.take(scaled, "reset", "").tolerances == FIRST.tolerances
+    assert part.handle(scaled, "reset", "").tolerances == FIRST.tolerances
     for word, value in (("scale", "1e9"), ("set.x", "3")):
-        assert part.take(START, word, value) is START
+        assert part.handle(START, word, value) is START
 
 
 # --- Machines side by side ------------------------------------------------------------------------
@@ -154,22 +154,22 @@ def test_machines_are_compared_as_the_command_does_and_drawn():
     part = concepts_part()
     part.context.services = Services(draw_concepts=lambda scenes, *_: asked.append(scenes) or b"")
     key = next(key for key, scene in part.offers(START).items() if scene == OTHER)
-    assert part.take(START, "run", "") is START  # one machine alone is not compared
-    chosen = part.take(part.take(START, "set.add", key), "set.add", key)
+    assert part.handle(START, "run", "") is START  # one machine alone is not compared
+    chosen = part.handle(part.handle(START, "set.add", key), "set.add", key)
     assert part.chosen(chosen) == [PRESENT, key]
     ran(part, chosen)
-    found = part._answer.found
+    found = part.outcome.result
     plan = Concepts(limit_um=chosen.specification.limit_um, samples=SAMPLES)
     expected = compare_concepts([FIRST, OTHER], plan)
     assert [one.json_fields for one in found.concepts] == [one.json_fields for one in expected]
     assert "largest contributions share of the variance" in section(part, chosen)
-    part.take(chosen, "sheet", "")
+    part.handle(chosen, "sheet", "")
     wait(part)
     assert [one.title for one in asked[0]] == [FIRST.title, OTHER.title]
     assert ("concepts.png", b"") in part.context.told
-    assert part.chosen(part.take(chosen, "remove", PRESENT)) == [key]
+    assert part.chosen(part.handle(chosen, "remove", PRESENT)) == [key]
     for word in ("set.add", "remove", "open"):
-        assert part.take(chosen, word, "none of them") == chosen
+        assert part.handle(chosen, word, "none of them") == chosen
 
 
 def test_titles_of_machines_are_escaped_and_there_is_a_most():

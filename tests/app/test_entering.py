@@ -145,7 +145,7 @@ def test_another_kind_starts_from_the_present_curve(function, kind):
         assert converted.amplitude == pytest.approx(function.amplitude, rel=1e-6)
     # what the editor would show is what it would read
     assert read(kind, spell_rows(converted)) is not None
-    assert "expected one of" in edit_curve(state, "kind", "EXX", "none such")[1][1]
+    assert "expected one of" in edit_curve(state, "kind", "EXX", "none such")[1].message
 
 
 def test_long_tables_are_thinned_out_for_editing():

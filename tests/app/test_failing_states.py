@@ -51,14 +51,14 @@ def test_a_panel_that_fails_whatever_is_shown_does_not_hold_the_state(
         raise KeyError("x")
 
     with opened(load_scene("dvf5000_first")) as (wire, session):
-        monkeypatch.setattr(STAGES["conditions"][0], "pieces", fail)
+        monkeypatch.setattr(STAGES["conditions"][0], "render", fail)
         for value in ("3", "4"):
             wire.say("errors:set.EXX", value)
             assert wire.read_until(lambda: session.display.due_in_s is None and any(wire.toasts))
             wire.toasts.clear()
         wire.say("errors:set.EXX", "5")
         assert wire.read_until(lambda: any(wire.toasts))
-        assert wire.toasts[0][1] == "That did not work"
+        assert wire.toasts[0][1] == "The action failed"
         assert session.state.amplitudes["EXX"] == 5.0
 
 

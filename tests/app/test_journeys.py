@@ -36,7 +36,7 @@ def test_the_first_screen_is_calm(tab):
 def test_why_the_worst_corner_is_off_and_the_best_adjustment_in_two_actions(tab):
     start = start_state(SCENES[0])
     found = Adjust(objective=Objective.MAX, count=1).run(SCENES[0], lambda _: None).adjustments[0]
-    tab.says("Worst point: why 51.7 µm")
+    tab.says("Worst point: 51.7 µm")
     assert "+49.1" in tab.page.inner_text(".ws-causes")
     tab.says("51.7 → 46.1 µm")
     tab.click("Apply")
@@ -60,9 +60,9 @@ def test_95_percent_within_40_um_in_three_actions_in_sight(tab):
     assert tab.actions <= 3
     tab.until(lambda: tab.state.tolerances != start_state(SCENES[0]).tolerances)
     tab.until(lambda: "within 40 µm everywhere" in tab.page.inner_text("#ws-task"))
-    told = tab.page.locator("#ws-task .ws-told").first
+    told = tab.page.locator("#ws-task .ws-headline").first
     tab.until(lambda: float(told.inner_text().split()[0]) >= 94.5)
-    assert tab.in_sight("#ws-task .ws-told")
+    assert tab.in_sight("#ws-task .ws-headline")
 
 
 @pytest.mark.daily
@@ -161,11 +161,11 @@ def test_an_adjustment_is_decided_on_and_taken_back(tab):
     tab.click("Apply")
     tab.click("Record decision")
     tab.until(lambda: "EA0Z" in tab.page.locator("#ws-notes textarea").input_value())
-    tab.click("Keep")
+    tab.click("Save note")
     tab.says("max 51.72 → 46.0", within="#ws-notes .ws-note")
     (note,) = tab.state.review
     assert (note.kind, note.change["EA0Z"][0]) == ("decision", start["EA0Z"])
-    tab.click("Take back")
+    tab.click("Revert")
     tab.says("Taken back")
     tab.says("changed: ", within="#ws-notes .ws-note")
     assert tab.state.amplitudes == start

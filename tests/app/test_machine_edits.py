@@ -138,7 +138,7 @@ def test_every_machine_of_the_library_starts_with_its_own_scene(state):
     state = state.with_amplitude("EAX", 33.0)
     window = lone_part(MachinesDialog)
     for name, scene in library().items():
-        changed = window.take(state, "choose", name)
+        changed = window.handle(state, "choose", name)
         if name == state.scene.machine.name:  # as it was opened, with all that has been entered
             assert changed == state
             continue
@@ -177,12 +177,12 @@ def test_what_stands_somewhere_stays_within_the_ranges_of_another_machine(state)
 
 def test_a_chain_that_is_refused_stays_in_its_box_with_the_reason(state):
     editor = lone_part(EditorSection)
-    assert editor.take(state, "set.chain", "wC<script>") is state
+    assert editor.handle(state, "set.chain", "wC<script>") is state
     text = editor.body(LIVE.evaluate(state))
     assert 'value="wC&lt;script&gt;"' in text
     assert "cannot be read" in text
     assert "<script>" not in text
-    moved = editor.take(state, "set.offset X 0", "12,5")
+    moved = editor.handle(state, "set.offset X 0", "12,5")
     assert moved.scene.machine.axes["X"].offset_mm[0] == 12.5
     assert "cannot be read" not in editor.body(LIVE.evaluate(moved))
 
@@ -272,7 +272,7 @@ def test_traces_are_drawn_in_numbers_where_an_error_moves_them():
     name = "C at B 0°, point (0, 275, 450) mm"
     assert f"{name}</td></tr><tr><td>{'</td><td>'.join(row)}</td>" in text
     hidden = body_of(RotarySection, put(state, "shown.traces", "0"))
-    assert "Draw the traces" in hidden
+    assert "Show traces" in hidden
     assert "<svg" not in hidden
     mill = start_state(load_scene("machine_c_frame_mill"))
     assert "no rotary axis" in body_of(RotarySection, mill)

@@ -20,7 +20,7 @@ from warpspace.app.panels.measurement import (
     TestsPanel,
     UploadedFile,
     arrows_of,
-    take_file,
+    read_uploaded,
 )
 from warpspace.app.state.app_state import start_state
 from warpspace.app.state.store import StateStore
@@ -62,9 +62,9 @@ class Column(Alone):
 
     def settle(self):
         """Wait until what is asked now is answered."""
-        question, _ = self.part.question(self.state), self.html
-        while self.part._jobs.busy or not any(
-            found and found[0] == question for found in (self.part._answer, self.part._problem)
+        question, _ = self.part.result_key(self.state), self.html
+        while self.part.context.jobs or not any(
+            found and found[0] == question for found in (self.part.outcome, self.part.problem)
         ):
             time.sleep(0.01)
             _ = self.html
@@ -89,11 +89,11 @@ def positioned(targets):
 @pytest.mark.parametrize("name", bench_names())
 def test_figure_and_path_follow_the_errors(name):
     column = Column(TestsPanel, STATE)
-    depends = column.part.depends(LIVE.evaluate(column.state))
+    depends = column.part.dependencies(LIVE.evaluate(column.state))
     column.do("choose", name)
-    assert column.part.depends(LIVE.evaluate(column.state)) != depends
+    assert column.part.dependencies(LIVE.evaluate(column.state)) != depends
     html = column.settle()
-    result = column.part._answer.found
+    result = column.part.outcome.result
     assert "<svg" in html
     assert "nan" not in html
     for quantity in result.model.outcome.quantities:
@@ -132,7 +132,7 @@ def test_a_test_runs_where_the_tables_stand_or_says_why_it_cannot():
     turned = put(replace(STATE, forms={"test": "r-test"}), "positions.B", "-20.0")
     column = Column(TestsPanel, turned)
     column.settle()
-    assert column.part._answer.found.model.plan.coordinates["B"][0] == -20.0
+    assert column.part.outcome.result.model.plan.coordinates["B"][0] == -20.0
     column = Column(TestsPanel, start_state(load_scene("machine_c_frame_mill"), nodes=3))
     column.do("choose", "r-test")
     assert "no rotary axis" in column.settle()
@@ -149,7 +149,7 @@ def test_measured_readings_stand_beside_the_model_and_go_into_the_report():
     assert "RMS of measured − model" in html
     assert "<img" not in html
     column.do("report")
-    ((_, result),) = column.context.reported
+    ((_, result),) = column.context.report_results
     assert result.rms_difference > 0.1
     column.do("remove", "0")
     assert "RMS of measured" not in column.settle()
@@ -185,23 +185,23 @@ def fitted():
 
 def test_the_numbers_are_those_of_the_analysis(fitted):
     column, html = fitted
-    found = column.part._answer.found
+    found = column.part.outcome.result
     said = Calibrate(data=("tcp_on.csv",), next_count=3).run(SCENE, lambda _: None).as_json()
     assert "RMS of 23 residuals: 278.3 → <b>61.5 µm</b>" in html
     assert found.as_json()["next"] == said["next"]
     for one, row in zip(found.parameters, said["parameters"], strict=True):
         assert (one.key, one.identifiable) == (row["key"], row["identifiable"])
         assert one.value == pytest.approx(row["value"], rel=1e-9)
-    assert "Confounded with others" in html
+    assert "Confounded" in html
     assert arrows_of(found, before=True)[0].shape == (23, 3)
 
 
 def test_an_applied_fit_gives_errors_that_had_no_row_and_one_undo_takes_it_back(fitted):
     column, _ = fitted
     state = column.state
-    (found,) = [one for one in column.part._answer.found.parameters if one.key == "EB0B"]
+    (found,) = [one for one in column.part.outcome.result.parameters if one.key == "EB0B"]
     store = StateStore(state)
-    store.apply(lambda now: column.part.take(now, "apply", "0"))
+    store.apply(lambda now: column.part.handle(now, "apply", "0"))
     assert store.state.amplitudes["EB0B"] == round(found.value, 3) != 0.0
     compared = LIVE.evaluate(store.state).compared
     assert compared.a.max_um == 0.0
@@ -219,14 +219,14 @@ def test_a_page_gives_only_known_words_and_small_readable_files():
     assert "2.0 MB" in column.html
     assert "9.5 MB" in column.do("file", f"10000000\n{HOSTILE}\n")
     receive("../../tcp<b>.csv", BUNDLED)
-    assert [one.name for one in column.part._files] == ["tcp_b.csv"]
+    assert [one.name for one in column.part.files] == ["tcp_b.csv"]
     for word, value in (
         ("remove", "9"), ("remove", "-1"), ("remove", ""), ("bundled", "../tcp_on.csv"),
         ("bundled", HOSTILE), ("kind", HOSTILE), ("arrows", HOSTILE), ("x" * 100, ""),
         ("file", ""), ("preview", "0"), ("test-options", HOSTILE),
     ):  # fmt: skip
         assert "<img" not in column.do(word, value)
-    assert len(column.part._files) == 1
+    assert len(column.part.files) == 1
     assert column.state.comparison.b is None
     assert "tcp_b.csv" not in column.do("remove", "0")
 
@@ -237,25 +237,25 @@ def test_nothing_of_a_browser_becomes_a_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for kind in (None, "sphere-tcp", "positioning", "circular:plane=XY"):
         with pytest.raises(WarpspaceError, match="secret"):
-            take_file(SCENE, "", str(secret), kind, ())
+            read_uploaded(SCENE, "", str(secret), kind, ())
     column = calibrate()
     for name in (str(secret), "secret.csv", "../secret.csv"):
         column.do("bundled", name)
         column.do("set.data", name)
-    assert column.part._files == ()
+    assert column.part.files == ()
     assert "data" not in column.part.values(column.state)
 
 
 def test_files_have_names_of_their_own_and_are_few():
     files: tuple[UploadedFile, ...] = ()
     for _ in range(MOST_FILES):
-        files = (*files, take_file(SCENE, BUNDLED.decode(), "a.csv", None, files))
+        files = (*files, read_uploaded(SCENE, BUNDLED.decode(), "a.csv", None, files))
     assert len({one.name for one in files}) == MOST_FILES
     with pytest.raises(OptionError, match="remove one first"):
-        take_file(SCENE, BUNDLED.decode(), "a.csv", None, files)
+        read_uploaded(SCENE, BUNDLED.decode(), "a.csv", None, files)
     rows = "".join(f"1,1,{n},2\n" for n in range(5_001))
     with pytest.raises(OptionError, match="at most 5,000"):
-        take_file(SCENE, f"x_mm,y_mm,z_mm,b_deg\n{rows}", "a.csv", None, ())
+        read_uploaded(SCENE, f"x_mm,y_mm,z_mm,b_deg\n{rows}", "a.csv", None, ())
 
 
 @pytest.mark.parametrize("keys", ["EQ0", "auto,EX0B", HOSTILE])
@@ -263,7 +263,7 @@ def test_bad_parameters_and_hostile_sessions_are_said_escaped(keys):
     column = calibrate()
     column.give("x.csv", BUNDLED.replace(b"c1", b"<img src=x>"))
     column.do("set.fit", keys)
-    column.part._problem = None
+    column.part.problem = None
     html = column.run()
     assert "ws-problem" in html
     assert "<img" not in html
@@ -276,7 +276,7 @@ def test_readings_of_a_standard_test_come_with_its_options():
     column.give("x.csv", positioned(range(150, 551, 50)))
     column.do("set.fit", "EXX")
     column.run()
-    found = column.part._answer.found
+    found = column.part.outcome.result
     assert found.rms_after_mm < 1e-9 < found.rms_before_mm
     assert arrows_of(found, before=True)[0].shape == (0, 3)
 
@@ -291,7 +291,7 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert (column.state.page.task, column.state.forms) == ("measure", {})
     html = column.settle()
     assert "<img" not in html
-    assert "It adds EXX." in html
+    assert "The import adds EXX." in html
     before = LIVE.evaluate(STATE).statistics
     assert f"{before.mean_um:.1f} → " in html
     Alone.do(column, "apply", "0")
@@ -305,12 +305,12 @@ def test_a_file_says_what_it_adds_and_what_it_does_before_it_is_applied():
     assert "Applied" in column.html
     column.part.parse("y.csv", TABLE.replace(b"EXX", b"EYX"))()
     html = column.settle()
-    assert "It adds EYX." in html
+    assert "The import adds EYX." in html
     column.part.parse("x.csv", TABLE)()
-    assert "It replaces EXX and adds EYX." in column.settle()
+    assert "The import replaces EXX and adds EYX." in column.settle()
     with pytest.raises(SceneError, match="does not state its axis"):
         column.part.parse("other.comp", COMP.encode())()
-    assert [one.name for one in column.part._files] == ["y.csv", "x.csv"]
+    assert [one.name for one in column.part.files] == ["y.csv", "x.csv"]
 
 
 def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_page():
@@ -324,13 +324,13 @@ def test_a_file_that_does_not_say_its_axis_or_format_asks_in_the_words_of_the_pa
     assert column.state.comparison.b is None
     column.do("set.axis", HOSTILE * 100_000)
     assert "<img" not in column.settle()
-    assert len(column.part._problem[1]) <= 1500
+    assert len(column.part.problem[1]) <= 1500
     column.do("remove", "0")
     column.part.parse("data.dat", b"0\t0.001\t0.002\n")()
     assert "matches no known format" in column.settle()
     for word, value, said in (
         ("set.format", "linuxcnc-comp", "its axis"),
-        ("set.axis", "X", "It adds EXX."),
+        ("set.axis", "X", "The import adds EXX."),
         ("set.format", "heidenhain", "data.dat: "),
         ("set.format", HOSTILE, "expected one of"),
     ):

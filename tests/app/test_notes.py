@@ -30,7 +30,7 @@ CAMERA = CameraMemory((9.0, -12.0, 8.0), (0.5, 0.0, -2.5), (0.0, 0.0, 1.0), 0.4)
 def alone(state=START):
     """A notes part on a page that is not there, and the cameras it was put to."""
     cameras: list[CameraMemory] = []
-    found = Alone(NotesPanel, state, look_from=cameras.append, decided=None)
+    found = Alone(NotesPanel, state, move_camera=cameras.append, last_decision=None)
     found.context.camera.remember = lambda: CAMERA
     return found, cameras
 
@@ -48,14 +48,14 @@ def test_a_note_is_shown_again_as_it_was_and_back_leads_to_where_one_was():
     second = pin(part)
     present = part.store.apply(lambda state: state.with_amplitude("EA0Z", 5.0)) or part.store.state
     assert part.do("show." + first.id).amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
-    assert "Note 1 as it was" in part.part.pieces(part.context.shown)["reopened"]
+    assert "Note 1, state of" in part.part.render(part.context.picture)["reopened"]
     assert part.do("show." + second.id).amplitudes["EA0Z"] == 0.0
     part.do("reply." + second.id, "seen")  # is not lost
     back = part.do("back")
     assert replace(back, review=present.review) == present
     assert back.review[1].replies[0].text == "seen"
     assert cameras == [CAMERA] * 3
-    assert part.part.pieces(part.context.shown)["reopened"] == ""
+    assert part.part.render(part.context.picture)["reopened"] == ""
 
 
 def test_numbers_of_a_note_are_those_of_check_and_grow_stale():
@@ -70,7 +70,7 @@ def test_numbers_of_a_note_are_those_of_check_and_grow_stale():
 
 def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_holds():
     part, _ = alone()
-    part.context.decided = START, "Repair: EA0Z to 20"
+    part.context.last_decision = START, "Repair: EA0Z to 20"
     part.store.apply(lambda state: state.with_amplitude("EA0Z", 20.0).with_amplitude("EB0Z", 1.5))
     part.do("decide")
     note = part.do("keep").review[0]
@@ -82,7 +82,7 @@ def test_a_decision_holds_what_was_changed_and_is_taken_back_where_it_still_hold
     part.store.apply(lambda state: state.with_amplitude("EB0Z", 2.0))
     found = part.do("take-back." + note.id)
     assert (found.amplitudes["EA0Z"], found.amplitudes["EB0Z"]) == (was["EA0Z"], 2.0)
-    assert "EB0Z is 2 now, not 1.5: it stays" in found.review[0].replies[0].text
+    assert "EB0Z not reverted: now 2 instead of 1.5" in found.review[0].replies[0].text
 
 
 def test_one_of_two_versions_stays_and_what_was_deleted_comes_back():
@@ -175,7 +175,7 @@ def test_hostile_events_change_nothing(word):
         review = part.store.state.review
         assert part.do(word, value).review == review
     part.do("open")
-    assert "<img" not in str(part.part.pieces(part.context.shown))
+    assert "<img" not in str(part.part.render(part.context.picture))
 
 
 def stands(tab):
@@ -192,7 +192,7 @@ def test_a_note_in_the_browser(browser):
         page.locator("#ws-notes textarea:focus").wait_for()
         page.keyboard.type("Why here? http://a.b/c")
         tab.type("Your name", "Ada")
-        tab.click("Keep")
+        tab.click("Save note")
         tab.until(lambda: len(tab.state.review) == 1)
         note = tab.state.review[0]
         assert note.author == "Ada"

@@ -36,7 +36,7 @@ def limited(limit_um):
 def pieces(kind, state):
     part = lone_part(kind)
     part.context.scenes, part.context.camera = {}, SimpleNamespace(view="iso", orthographic=False)
-    return part.pieces(LIVE.evaluate(state))
+    return part.render(LIVE.evaluate(state))
 
 
 def test_the_heading_says_what_machines_within_tolerance_reach():
@@ -106,14 +106,14 @@ def test_the_worst_corner_is_labelled_once():
 
 def test_controls_set_what_is_coloured_and_how_the_machine_is_drawn():
     part = lone_part(ControlsPanel)
-    limit = part.take(START, "map", "limit")
+    limit = part.handle(START, "map", "limit")
     assert chosen_map(limit) == "limit"
-    assert chosen_map(part.take(limit, "map", "orientation.y")) == "orientation.y"
+    assert chosen_map(part.handle(limit, "map", "orientation.y")) == "orientation.y"
     for word, drawn in (("off", (False, False)), ("ghost", (False, True)), ("solid", (True, True))):
-        machine = part.take(START, "machine", word).machine
+        machine = part.handle(START, "machine", word).machine
         assert (machine.shown, machine.ghost) == drawn
     for word in ("map", "machine", "set.travel", "view"):
-        assert part.take(START, word, "<script>").scene is FIRST
+        assert part.handle(START, word, "<script>").scene is FIRST
     html = pieces(ControlsPanel, START)["controls"]
     assert 'data-set="state:set.look.isolines"' in html
     assert 'data-value="slices"' in html
@@ -126,9 +126,9 @@ def test_comparing_is_shown_and_left_by_one_switch():
     assert html.count('aria-pressed="true"') == 1
     part = lone_part(ComparePanel)
     part.context.scenes = {}
-    assert part.take(pinned, "leave", "").comparison.b is None
-    assert part.take(pinned, "set.b", NOBODY).comparison.b is None
-    assert part.take(pinned, "set.a", "no such scene") is pinned
+    assert part.handle(pinned, "leave", "").comparison.b is None
+    assert part.handle(pinned, "set.b", NOBODY).comparison.b is None
+    assert part.handle(pinned, "set.a", "no such scene") is pinned
     change = put(pinned, "comparison.shown", "difference")
     assert "change: mean" in pieces(HeadPanel, change)["head"]
     legend = pieces(LegendPanel, change)

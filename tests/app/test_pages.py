@@ -149,7 +149,7 @@ def test_one_job_at_a_time_says_how_far_it_is_and_hands_over_what_it_raises(watc
 
     def work(job):
         for share in (0.25, 0.5):
-            job.tell(share)
+            job.report_progress(share)
         go.wait(10)
         raise WarpspaceError("broken")
 
@@ -170,7 +170,7 @@ def test_cancelling_frees_the_place_at_once(watched):
     def slow(job):
         go.wait(10)
         with pytest.raises(CancelledError):
-            job.tell(0.5)
+            job.report_progress(0.5)
         told.set()
         raise RuntimeError("too late")
 

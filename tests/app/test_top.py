@@ -95,7 +95,7 @@ def test_a_link_that_notes_make_too_large_leaves_them_out_and_says_so():
         window.do("share")
         opened, _ = open_link(unpack(window.called[-1][1]), None)
         assert len(opened.review) == expected
-        assert ["Without the notes" in one[0] for one in window.said] == [True] * (1 - expected)
+        assert ["Notes not included" in one[0] for one in window.said] == [True] * (1 - expected)
         assert len(window.store.state.review) == count
 
 
@@ -115,7 +115,7 @@ def test_the_report_has_author_questions_and_every_result_under_a_name_of_its_ow
     asked, done = [], (b"%PDF", ())
     write = Services(write_report=lambda _, *about: asked.append(about) or done)
     window = Alone(ReportDialog, STATE, services=write)
-    window.context.reported[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
+    window.context.report_results[:] = [("Gains", 1), ("Gains", 2), (HOSTILE, 3)]
     page = replace(STATE.page, author=HOSTILE, questions="one\n\n two ")
     window.store.apply(lambda state: replace(state, page=page))
     assert "<img" not in window.html
@@ -137,4 +137,4 @@ def test_a_scene_is_saved_with_a_warning_where_its_file_has_changed(is_current):
     window = Alone(FilesDialog, STATE, services=services)
     window.do("save")
     assert len(window.saved) == 1
-    assert ["has changed" in one[0] for one in window.said] == [True] * (not is_current)
+    assert ["changed on the server" in one[0] for one in window.said] == [True] * (not is_current)

@@ -166,7 +166,7 @@ NUMBER = r"[+-]?\d+\.\d"
 
 
 def html_of(part, state=START):
-    return "".join(part.pieces(LIVE.evaluate(state)).values())
+    return "".join(part.render(LIVE.evaluate(state)).values())
 
 
 @pytest.mark.parametrize("name", scene_names())
@@ -176,7 +176,7 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
     if "No error acts" in html:
         return
     html = html.replace("−", "-")
-    (shown,) = map(float, re.findall(rf"why ({NUMBER}) µm", html))
+    (shown,) = map(float, re.findall(rf"<h3>Worst point: ({NUMBER}) µm", html))
     causes = html[html.index("ws-causes") : html.index('data-piece="best"')]
     parts = [*map(float, re.findall(rf"<td>({NUMBER})</td>", causes))]
     assert sum(parts) == pytest.approx(shown, abs=0.05 * (len(parts) + 1) + 1e-9)
@@ -184,18 +184,18 @@ def test_what_is_said_of_the_worst_point_adds_up_to_its_error(name):
 
 def test_the_worst_point_of_the_thesis_and_another_one():
     part = lone_part(WorstPanel)
-    assert "why 51.7 µm" in html_of(part)
+    assert ": 51.7 µm" in html_of(part)
     assert re.search(r'title="squareness of Z to Y[^"]*">EA0Z</b></th><td>\+49.1', html_of(part))
-    typed = part.take(START, "set.at", "X 0 Y 0 Z −280")
+    typed = part.handle(START, "set.at", "X 0 Y 0 Z −280")
     assert "This point" in html_of(part, typed)
-    assert part.take(typed, "forget", "").picked is None
-    part.context.shown = LIVE.evaluate(START)
-    asked = part.take(START, "lever", "EA0Z")
-    assert (asked.lever, asked.picked) == ("EA0Z", pick_worst(part.context.shown))
-    assert "mm across the axis" in html_of(part, asked)
+    assert part.handle(typed, "forget", "").picked is None
+    part.context.picture = LIVE.evaluate(START)
+    asked = part.handle(START, "lever", "EA0Z")
+    assert (asked.lever, asked.picked) == ("EA0Z", pick_worst(part.context.picture))
+    assert "mm lever arm" in html_of(part, asked)
     for word in ("<img>", "", "x" * 500):
-        assert part.take(START, "lever", word).lever == ""
-        assert "<img" not in html_of(part, part.take(START, "set.at", word))
+        assert part.handle(START, "lever", word).lever == ""
+        assert "<img" not in html_of(part, part.handle(START, "set.at", word))
 
 
 def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_holds():
@@ -205,10 +205,10 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     html = html_of(part)
     assert "EA0Z 33.9 → 30.0 µrad" in html
     assert "30.9 → 28.3 µm" in html
-    applied = part.take(START, "apply", "0")
+    applied = part.handle(START, "apply", "0")
     assert LIVE.evaluate(applied).statistics.max_um == pytest.approx(46.09, abs=0.01)
     assert applied.comparison.b is not None
-    previewed = part.take(START, "preview", "0")
+    previewed = part.handle(START, "preview", "0")
     assert previewed.comparison.b.title == "after adjustment: EA0Z → 30.0"
     assert previewed.amplitudes == START.amplitudes
     assert LIVE.evaluate(previewed).statistics.max_um == pytest.approx(46.09, abs=0.01)
@@ -216,7 +216,7 @@ def test_the_best_adjustment_is_that_of_repair_and_is_applied_only_while_it_hold
     assert "disabled" in html_of(part, moved)
     wait(part)
     for state, word, number in ((START, "apply", "0"), (moved, "apply", "7"), (moved, "x", "0")):
-        assert part.take(state, word, number) is state
+        assert part.handle(state, word, number) is state
 
 
 def test_an_excluded_error_is_neither_adjusted_nor_lost():
@@ -225,7 +225,7 @@ def test_an_excluded_error_is_neither_adjusted_nor_lost():
     html_of(part, state)
     wait(part)
     assert "EA0Z" not in html_of(part, state)
-    applied = part.take(state, "apply", "0")
+    applied = part.handle(state, "apply", "0")
     assert applied.amplitudes["EA0Z"] == START.amplitudes["EA0Z"]
 
 
@@ -236,7 +236,7 @@ def test_nothing_is_adjusted_where_all_errors_are_excluded():
     part = lone_part(BestPanel)
     html_of(part, state)
     wait(part)
-    assert "No adjustment helps." in html_of(part, state)
+    assert "No single adjustment improves it." in html_of(part, state)
 
 
 def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
@@ -253,7 +253,7 @@ def test_numbers_of_the_volume_and_gains_at_the_point_that_was_asked_about():
     html_of(part, asked)
     wait(part)
     assert "X 275, Y −225, Z −480" in html_of(part, asked)
-    assert np.isfinite(part._answer[1].gains[0].norm)
+    assert np.isfinite(part.outcome[1].gains[0].norm)
 
 
 # --- A distance, picked on the map ----------------------------------------------------------------

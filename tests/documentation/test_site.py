@@ -12,7 +12,7 @@ import pytest
 
 import warpspace
 from doc_pages import DOCS, ROOT, anchors, blocks, entries, links, pages, section
-from warpspace.app.panels.page_panels import build_parts
+from warpspace.app.panels.page_panels import build_panels
 from warpspace.app.panels.panel import Section
 from warpspace.app.panels.top_bar import COMMANDS as KEYS
 from warpspace.app.state.app_state import TASKS
@@ -107,7 +107,7 @@ def test_every_task_has_a_how_to_and_a_picture():
 
 def test_every_section_of_a_task_has_its_words():
     text = (DOCS / "app.md").read_text("utf-8")
-    parts = {one.name: one for one in build_parts(MagicMock())}
+    parts = {one.name: one for one in build_panels(MagicMock())}
     names = [name for names in parts["tasks"].sections.values() for name in names]
     found = [parts[name] for name in names if isinstance(parts.get(name), Section)]
     assert len(found) > len(TASKS)
@@ -124,7 +124,7 @@ def test_every_command_of_the_page_and_its_key_are_named():
     named = re.split(r"[\s,]+", " ".join(re.findall(r"^\| ([^|]+) \|", text, re.MULTILINE)))
     for one in KEYS:
         if one.keys:
-            assert one.spelt in named, one.label
+            assert one.key_label in named, one.label
         else:
             assert f"*{one.label}*" in " ".join(text.split())
 

@@ -122,7 +122,7 @@ def test_every_panel_has_words_for_it(state):
         " ".join((numbers_words(picture), kept_words(picture)[0], *subject_words(picture))),
         lone_part(RotarySection).body(picture),
         lone_part(ConventionsSection).body(picture),
-        *WorstPanel(None).pieces(asked).values(),
+        *WorstPanel(None).render(asked).values(),
     ]
     for html in said:
         assert not {"nan", "inf"} & set(html.replace("<", " ").replace(">", " ").split())

@@ -35,11 +35,11 @@ STAGES: dict[str, tuple[object, str]] = {
     "map": (BoxLayer, "show"),
     "around the map": (MovingLayer, "show"),
     "at rest": (BoxLayer, "rest"),
-    "heading": (HeadPanel, "pieces"),
-    "legend": (LegendPanel, "pieces"),
-    "conditions": (OrderPanel, "pieces"),
-    "panel": (ErrorsPanel, "pieces"),
-    "bar at the top": (TopPanel, "pieces"),
+    "heading": (HeadPanel, "render"),
+    "legend": (LegendPanel, "render"),
+    "conditions": (OrderPanel, "render"),
+    "panel": (ErrorsPanel, "render"),
+    "bar at the top": (TopPanel, "render"),
 }
 ERRORS: tuple[Callable[[], Exception], ...] = (
     lambda: OverflowError("int too large to convert to float"),

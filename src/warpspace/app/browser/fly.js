@@ -1,11 +1,11 @@
-// The camera of a story: it flies around what it looks at.
+// The animated camera of a story: it moves around the point that it looks at.
 (() => {
   if (window.warpspaceFly) return;
   let turn = 0;
   const length = v => Math.hypot(...v);
   const mix = (a, b, share) => a.map((x, i) => x + share * (b[i] - x));
   const less = (a, b) => a.map((x, i) => x - b[i]);
-  // the drawing is turned in viser's world; its rows turn back
+  // the drawing is rotated in viser's world; the rows of the matrix rotate back
   const world = () => window.__viserMutable?.nodeRefFromName?.[""]?.matrixWorld.elements;
   const out = ([x, y, z]) => [0, 1, 2].map(i => world()[i] * x + world()[4 + i] * y + world()[8 + i] * z);
   const back = v => [0, 1, 2].map(i => [0, 1, 2].reduce((sum, k) => sum + world()[4 * i + k] * v[k], 0));
@@ -17,7 +17,7 @@
     return { at: back(place.toArray()), to: back(target.toArray()), up: back(camera.up.toArray()),
       fov: camera.fov * Math.PI / 180 };
   };
-  const stand = ({ camera, cameraControl, sendCamera, requestRender }, { at, to, up, fov }) => {
+  const place = ({ camera, cameraControl, sendCamera, requestRender }, { at, to, up, fov }) => {
     camera.up.set(...out(up));
     cameraControl.updateCameraUp();
     camera.setFocalLength(0.5 * camera.getFilmHeight() / Math.tan(fov / 2));
@@ -26,20 +26,20 @@
     requestRender?.();
   };
 
-  window.warpspaceFly = ({ position, look_at, up, fov_rad }, long) => {
+  window.warpspaceFly = ({ position, look_at, up, fov_rad }, duration) => {
     const view = window.__viserMutable;
     if (!view?.cameraControl || !world()) return false;
     const end = { at: position, to: look_at, up, fov: fov_rad };
-    const start = now(view), own = ++turn;
-    const from = less(start.at, start.to), way = less(end.at, end.to);
-    const one = from.map(x => x / length(from)), other = way.map(x => x / length(way));
-    warpspaceMesh.eased(long, share => {
-      if (own !== turn) return;
-      if (share === 1) { stand(view, end); return; }
-      // around the point that is looked at, not through it
-      const seen = mix(one, other, share), far = length(from) ** (1 - share) * length(way) ** share;
-      const to = mix(start.to, end.to, share), long = length(seen) || 1;
-      stand(view, { at: to.map((x, i) => x + far * seen[i] / long), to,
+    const start = now(view), current = ++turn;
+    const from = less(start.at, start.to), target = less(end.at, end.to);
+    const first = from.map(x => x / length(from)), last = target.map(x => x / length(target));
+    warpspaceMesh.eased(duration, share => {
+      if (current !== turn) return;
+      if (share === 1) { place(view, end); return; }
+      // around the point that it looks at, not through it
+      const direction = mix(first, last, share), far = length(from) ** (1 - share) * length(target) ** share;
+      const to = mix(start.to, end.to, share), norm = length(direction) || 1;
+      place(view, { at: to.map((x, i) => x + far * direction[i] / norm), to,
         up: mix(start.up, end.up, share), fov: start.fov ** (1 - share) * end.fov ** share });
     });
     return true;

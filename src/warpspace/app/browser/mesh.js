@@ -1,16 +1,16 @@
-// The bent box while it moves: points and colours only. Triangles, the ends of its lines and the
-// table of colours are sent once; what viser holds of it follows when the change has come to rest.
+// The deformed box during a change: only points and colours are sent. Triangles, ends of lines and the
+// colour table are sent once; viser's copy is updated when the change is finished.
 (() => {
   if (window.warpspaceMesh) return;
   const known = { lines: {}, palette: null, count: 0 };
   const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
   const floats = text => text.BYTES_PER_ELEMENT ? text : new Float32Array(bytes(text).buffer);
-  const find = (name, wanted) => {
-    let found = null;
+  const find = (name, matches) => {
+    let match = null;
     window.__viserMutable?.nodeRefFromName[name]?.traverse(part => {
-      if (!found && wanted(part)) found = part;
+      if (!match && matches(part)) match = part;
     });
-    return found;
+    return match;
   };
   const follow = (attribute, values) => { attribute.array.set(values); attribute.needsUpdate = true; };
 
@@ -32,9 +32,9 @@
   let turn = 0;
 
   window.warpspaceMesh = {
-    glide: 0,  // how long the next changes take, ms; between steps of a story
-    moves: 0,  // for whoever measures from outside
-    // number of points, table of colours, per lines their ends' points and how far these are lifted
+    glide: 0,  // duration of the next changes, ms; between steps of a story
+    moves: 0,  // number of changes, for benchmarks
+    // number of points, colour table; of each set of lines the points of their ends, and their offsets
     open({ count, palette, lines }) {
       known.count = count;
       known.palette = floats(palette);
@@ -44,31 +44,31 @@
     bend(points, colours) {
       const mesh = find("/box/surface", part => part.isMesh && part.geometry.attributes.color);
       const at = mesh?.geometry.attributes;
-      if (!at || at.position.count !== known.count) return false;  // it comes with what is sent at rest
+      if (!at || at.position.count !== known.count) return false;  // sent when the change is finished
       const place = floats(points), level = bytes(colours), { palette } = known;
       const size = at.color.itemSize, shade = at.color.array.slice();
       for (let i = 0; i < level.length; i++)
         for (let k = 0; k < 3; k++) shade[size * i + k] = palette[3 * level[i] + k];
-      const own = ++turn, was = this.glide && [at.position.array.slice(), at.color.array.slice()];
+      const current = ++turn, was = this.glide && [at.position.array.slice(), at.color.array.slice()];
       const mixed = (from, to, share) => share < 1 ? to.map((x, i) => from[i] + share * (x - from[i])) : to;
       this.eased(this.glide, share => {
-        if (own === turn) draw(mesh, mixed(was[0], place, share), mixed(was[1], shade, share));
+        if (current === turn) draw(mesh, mixed(was[0], place, share), mixed(was[1], shade, share));
       });
       this.moves++;
       return true;
     },
-    // calls with a share that goes from 0 to 1 in a time, ms
-    eased(long, call) {
-      if (!long || matchMedia("(prefers-reduced-motion: reduce)").matches) { call(1); return; }
+    // call with a share that goes from 0 to 1 during a time, ms
+    eased(duration, call) {
+      if (!duration || matchMedia("(prefers-reduced-motion: reduce)").matches) { call(1); return; }
       const start = performance.now();
       const next = now => {
-        const part = Math.min(1, Math.max(0, now - start) / long);
+        const part = Math.min(1, Math.max(0, now - start) / duration);
         call(part * part * (3 - 2 * part));
         if (part < 1) requestAnimationFrame(next);
       };
       requestAnimationFrame(next);
     },
-    // as viser does what its own message says
+    // like viser's message for a pose
     move(name, at) {
       const pose = window.__viserMutable?.nodePoseData[name];
       if (!pose) return;

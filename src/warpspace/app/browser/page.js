@@ -1,11 +1,10 @@
-// The page around the drawing: bar at the top, errors at the left, tasks at the right, what lies over
-// the drawing. The server writes pieces of HTML into named places; what a user does goes back as
-// events. Nothing here knows what a piece is about.
+// The page around the drawing: top bar, error list, tasks, overlay of the drawing. The server writes
+// HTML into named places; user actions go back as events. This file is independent of the contents.
 (() => {
   if (window.warpspacePage) return;
   const MOST_EVENTS = 16, SEND_MS = 30, TOAST_MS = 8000, MOST_FILES = 16;
   const pending = [];  // events
-  const texts = new Map();  // of all pieces, also while their place is not there
+  const texts = new Map();  // of all places, including those that do not exist yet
   const known = { keys: {} };
   let timer = 0, last = 0;
 
@@ -14,12 +13,12 @@
   shell.innerHTML = `
     <header id="ws-top" data-piece="top"></header>
     <nav id="ws-left" aria-label="Errors" data-piece="errors"></nav>
-    <div id="ws-over" role="region" aria-label="Over the drawing"><section class="ws-head" data-piece="head" aria-label="What is shown"></section>
-      <section class="ws-legend" data-piece="legend" aria-label="Colours"></section>
+    <div id="ws-over" role="region" aria-label="Overlay of the drawing"><section class="ws-head" data-piece="head" aria-label="Summary"></section>
+      <section class="ws-legend" data-piece="legend" aria-label="Colour legend"></section>
       <div class="ws-compared" data-piece="compared"></div>
       <svg class="ws-leaders" aria-hidden="true"></svg>
       <div class="ws-labels" aria-hidden="true"></div><div class="ws-words" aria-hidden="true"></div>
-      <div class="ws-foot"><div class="ws-controls" role="group" aria-label="How it is drawn"><div data-piece="controls"></div>
+      <div class="ws-foot"><div class="ws-controls" role="group" aria-label="Display settings"><div data-piece="controls"></div>
         <div data-piece="compare"></div></div>
       <div class="ws-lengths"><div class="ws-triad" data-piece="triad"></div><div class="ws-bars"></div></div></div></div>
     <section id="ws-story" aria-label="Story" aria-live="polite" data-piece="story"></section>
@@ -28,10 +27,10 @@
     <dialog id="ws-window" aria-labelledby="ws-window-title" data-piece="window"></dialog>
     <div id="ws-toasts" role="status" aria-live="polite" popover="manual"></div>`;
 
-  // --- pieces of HTML: only what differs is touched, so that focus and typed text stay -------------
+  // --- HTML: only differences are applied, so that focus and typed text are preserved --------------
   const keyOf = node => node.nodeType === 1 ? node.id || node.dataset.key || node.dataset.piece || "" : "";
   const typing = node => node === document.activeElement && node.dataset.dirty;
-  const ruled = node => node.firstElementChild?.dataset.do;  // whether the server says what is unfolded
+  const ruled = node => node.firstElementChild?.dataset.do;  // true if the server opens and closes it
   const copyAttributes = (old, fresh) => {
     for (const { name } of [...old.attributes])
       if (!fresh.hasAttribute(name) && (name !== "open" || ruled(old))
@@ -81,7 +80,7 @@
     place.querySelectorAll(`[data-set="${AUTHOR}"]`).forEach(fillAuthor);
   };
 
-  // --- review notes: the form takes the focus when it opens; one's name stays in this browser ------
+  // --- review notes: an opening form takes the focus; the author is stored in this browser ---------
   const AUTHOR = "state:set.page.author", AUTHOR_KEY = "warpspace-author";
   const prepareNotes = place => {
     const first = place.querySelector("textarea"), form = first?.closest("[data-key]").dataset.key;
@@ -89,12 +88,12 @@
     known.form = form;
   };
   const fillAuthor = box => {
-    let own = "";
-    try { own = localStorage.getItem(AUTHOR_KEY) ?? ""; } catch { /* nothing may be kept */ }
-    if (own && !box.value && !typing(box)) { box.value = own; send(AUTHOR, own); }
+    let author = "";
+    try { author = localStorage.getItem(AUTHOR_KEY) ?? ""; } catch { /* no storage */ }
+    if (author && !box.value && !typing(box)) { box.value = author; send(AUTHOR, author); }
   };
 
-  // --- a window: keeps the focus, closes with its cross, Esc, or a click beside it ------------------
+  // --- the dialog: modal, closed by its button, Esc, or a click outside ----------------------------
   let before = null;
   const showWindow = dialog => {
     const filled = dialog.childElementCount > 0;
@@ -102,21 +101,21 @@
     if (!filled && dialog.open) { dialog.close(); (document.querySelector("#ws-tour .main") ?? before)?.focus?.(); }
   };
 
-  const closeWindow = () => {  // at once, whenever the server gets to it
+  const closeWindow = () => {  // without waiting for the server
     const dialog = document.getElementById("ws-window");
     dialog.replaceChildren();
     showWindow(dialog);
     send("page:close");
   };
 
-  // --- events, in order: the first goes at once, those that follow quickly go together ------------
-  const say = events => window.__viserMutable.sendMessage({ type: "WarpspaceEvents", events });
+  // --- events, in order: the first is sent immediately, those that follow quickly are sent together -
+  const post = events => window.__viserMutable.sendMessage({ type: "WarpspaceEvents", events });
   const flush = () => {
     clearTimeout(timer);
     timer = window.__viserMutable ? 0 : setTimeout(flush, SEND_MS);
     if (timer || !pending.length) return;
     last = performance.now();
-    say(pending.splice(0, MOST_EVENTS));
+    post(pending.splice(0, MOST_EVENTS));
   };
   const send = (name, value = "") => {
     const same = pending.findIndex(([other]) => other === name);
@@ -141,7 +140,7 @@
     if (copy) copyText(copy.dataset.copy);
     const go = event.target.closest("[data-go]");
     if (go) document.querySelector(go.dataset.go)?.focus();
-    if (event.target.id === "ws-window") closeWindow();  // beside the window
+    if (event.target.id === "ws-window") closeWindow();  // outside the dialog
   });
   shell.addEventListener("input", event => {
     const node = event.target, name = node.dataset?.live ?? (node.type === "range" ? node.dataset?.set : null);
@@ -156,16 +155,16 @@
     const node = event.target;
     delete node.dataset?.dirty;
     if (node.dataset?.set) send(node.dataset.set, valueOf(node));
-    if (node.dataset?.set === AUTHOR) try { localStorage.setItem(AUTHOR_KEY, node.value); } catch { /* likewise */ }
+    if (node.dataset?.set === AUTHOR) try { localStorage.setItem(AUTHOR_KEY, node.value); } catch { /* no storage */ }
   });
-  for (const [what, held] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]])
-    addEventListener(what, event => {
-      for (const node of held ? [event.target] : shell.querySelectorAll("[data-held]"))
-        if (node.type === "range") { if (held) node.dataset.held = "1"; else delete node.dataset.held; }
+  for (const [type, pressed] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]])
+    addEventListener(type, event => {
+      for (const node of pressed ? [event.target] : shell.querySelectorAll("[data-held]"))
+        if (node.type === "range") { if (pressed) node.dataset.held = "1"; else delete node.dataset.held; }
     }, true);
   shell.addEventListener("focusout", event => { delete event.target.dataset?.held; });
 
-  // --- a number that is a box only while somebody types it: [data-box] names what it sets -----------
+  // --- a number that becomes a text box while it is edited: [data-box] is its event ----------------
   const typeInto = text => {
     const box = Object.assign(document.createElement("input"),
       { className: "ws-box ws-typed", value: text.dataset.text, defaultValue: text.dataset.text });
@@ -173,7 +172,7 @@
     box.setAttribute("inputmode", "decimal");
     box.setAttribute("aria-label", text.dataset.label);
     const leave = () => { if (box.isConnected) box.remove(); };
-    box.addEventListener("blur", () => setTimeout(leave));  // what was typed is sent before
+    box.addEventListener("blur", () => setTimeout(leave));  // after the typed text has been sent
     box.addEventListener("keydown", event => {
       if (event.key !== "Enter" && event.key !== "Escape") return;
       if (event.key === "Escape") box.value = box.defaultValue;
@@ -184,24 +183,24 @@
     return box;
   };
 
-  // --- a list that is sorted anew when hand and focus have left it: [data-leave] names the event ----
-  const left = event => {
+  // --- a list that is sorted again when pointer and focus leave it: [data-leave] is the event -------
+  const leaveList = event => {
     const list = event.target.closest?.("[data-leave]");
     if (!list?.dataset.touched || list.contains(event.relatedTarget)) return;
     setTimeout(() => {
-      const own = document.activeElement, inside = list.contains(own) && own.matches(":focus-visible");
+      const active = document.activeElement, inside = list.contains(active) && active.matches(":focus-visible");
       if (inside || list.matches(":hover") || list.querySelector("[data-held]")) return;
       delete list.dataset.touched;
       send(list.dataset.leave);
     });
   };
-  for (const name of ["pointerout", "focusout", "pointerup"]) addEventListener(name, left);
+  for (const name of ["pointerout", "focusout", "pointerup"]) addEventListener(name, leaveList);
   shell.addEventListener("change", event => {
     const list = event.target.closest("[data-leave]");
     if (list) list.dataset.touched = "1";
   });
 
-  // --- menus: one at a time, closed by a click beside them or Esc ----------------------------------
+  // --- menus: one at a time, closed by a click outside or Esc --------------------------------------
   const closeMenus = but => shell.querySelectorAll("details:is(.ws-menu, .ws-pop)[open]").forEach(menu => {
     if (menu !== but) menu.open = false;
   });
@@ -211,13 +210,13 @@
     if (menu) { menu.open = false; menu.querySelector("summary").focus(); }
   });
 
-  // --- keys: digits typed on a slider set its number; others act unless something is typed into -----
+  // --- keys: digits typed on a slider set its number; others act unless text is entered ------------
   const spelt = event => [event.ctrlKey || event.metaKey ? "ctrl" : "", event.shiftKey ? "shift" : "",
     event.altKey ? "alt" : "", event.key.toLowerCase()].filter(Boolean).join("+");
   addEventListener("keydown", event => {
-    if (document.documentElement.classList.contains("ws-told")) return;  // keys are those of the story
-    const node = event.target, own = node.tagName;
-    if (own === "INPUT" && node.type === "range" && /^[-−0-9.,]$/.test(event.key)) {
+    if (document.documentElement.classList.contains("ws-playing")) return;  // keys of the story
+    const node = event.target, tagName = node.tagName;
+    if (tagName === "INPUT" && node.type === "range" && /^[-−0-9.,]$/.test(event.key)) {
       const box = document.getElementById(node.dataset.twin ?? "");
       if (box) {
         event.preventDefault();
@@ -226,7 +225,7 @@
       }
       return;
     }
-    if (node.getAttribute?.("role") === "tab") {  // arrows go along the tabs, Enter opens one
+    if (node.getAttribute?.("role") === "tab") {  // arrows move along the tabs, Enter opens one
       const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
       const tabs = [...node.parentElement.children];
       const to = step ? tabs[(tabs.indexOf(node) + step + tabs.length) % tabs.length]
@@ -243,19 +242,19 @@
     if (event.key === "Escape" && node.dataset?.dirty) {
       delete node.dataset.dirty; node.value = node.defaultValue; return;
     }
-    const writes = own === "TEXTAREA" || own === "SELECT"
-      || own === "INPUT" && !["range", "checkbox", "radio"].includes(node.type);
+    const writes = tagName === "TEXTAREA" || tagName === "SELECT"
+      || tagName === "INPUT" && !["range", "checkbox", "radio"].includes(node.type);
     if (writes && !(event.ctrlKey || event.metaKey)) return;
     const [name, value] = (known.keys[spelt(event)] ?? "").split("=");
     if (!name || document.getElementById("ws-window").open && name !== "page:close") return;
-    if (writes && ["page:undo", "page:redo"].includes(name)) return;  // of what is typed
+    if (writes && ["page:undo", "page:redo"].includes(name)) return;  // undo of the text box
     event.preventDefault();
     event.stopImmediatePropagation();
     if (name === "find") document.querySelector("#ws-find")?.focus();
     else if (name === "upload") chooseFiles(buttonOf(value));
     else send(name, value);
   }, true);
-  // a box with data-enter sends it with Enter only; arrows go from it through the list below it
+  // a box with data-enter sends it on Enter; arrows move from it into the list below it
   shell.addEventListener("keydown", event => {
     const node = event.target;
     if (event.key === "Escape" && !node.dataset?.dirty && node.closest("#ws-notes"))
@@ -271,13 +270,13 @@
     if (event.target.id === "ws-window") { event.preventDefault(); closeWindow(); }
   }, true);
 
-  // --- files: each an event of its own, with nothing in it where it is too large -------------------
+  // --- files: one event each, without content if the file is too large -----------------------------
   const sendFile = async ({ upload, most }, file) => {
     const reader = new FileReader();
     if (file.size <= Number(most))
       await new Promise(done => { reader.onload = done; reader.readAsDataURL(file); });
-    const held = reader.result?.split(",")[1] ?? "";
-    say([[`${upload}:file`, `${file.size}\n${file.name}\n${held}`]]);
+    const content = reader.result?.split(",")[1] ?? "";
+    post([[`${upload}:file`, `${file.size}\n${file.name}\n${content}`]]);
   };
   const sendFiles = (button, files) =>
     [...files].slice(0, MOST_FILES).forEach(file => sendFile(button.dataset, file));
@@ -304,14 +303,14 @@
     sendFiles(buttonOf("files"), event.dataTransfer.files);
   });
 
-  // above a window that is open, too
+  // above an open dialog, too
   const raiseToasts = () => {
     const shelf = shell.querySelector("#ws-toasts");
     if (!shelf.isConnected || !shelf.showPopover) return;
     if (shelf.matches(":popover-open")) shelf.hidePopover();
     if (shelf.childElementCount) shelf.showPopover();
   };
-  // --- messages that go by themselves --------------------------------------------------------------
+  // --- messages that disappear by themselves -------------------------------------------------------
   const toast = (kind, title, text = "") => {
     const box = document.createElement("section");
     box.className = `ws-toast ws-${kind}`;
@@ -328,31 +327,31 @@
   };
   const copyText = async (text, title = "Copied", words = "") => {
     try { await navigator.clipboard.writeText(text); toast("done", title, words); }
-    catch { toast("stays", "Copy this", `${text}\n${words}`); }
+    catch { toast("stays", "Copy this text", `${text}\n${words}`); }
   };
 
-  // --- the page's address: the link it was opened with, taken once a tab, and the link that is shared --
+  // --- the address of the page: the link it was opened with, opened once per tab, and shared links --
   const LINK_KEY = "warpspace-link", LINK = "view";
   const stored = () => { try { return sessionStorage.getItem(LINK_KEY); } catch { return null; } };
   const store = link => {
     window.__warpspaceLink = link;
-    try { sessionStorage.setItem(LINK_KEY, link); } catch { /* a page that may keep nothing */ }
+    try { sessionStorage.setItem(LINK_KEY, link); } catch { /* no storage */ }
   };
   const linkOf = () => new URLSearchParams(location.search).get(LINK);
   const showAddress = parameters =>
     history.replaceState(null, "", location.pathname + (String(parameters) && `?${parameters}`));
-  const tidyAddress = () => {  // the token has let the cookie in, and is needed no more
+  const tidyAddress = () => {  // the token has set the cookie and is no longer needed
     const parameters = new URLSearchParams(location.search);
     if (!parameters.has("token")) return;
     parameters.delete("token");
     showAddress(parameters);
   };
 
-  // --- which tab it is ------------------------------------------------------------------------------
+  // --- identity of the tab --------------------------------------------------------------------------
   const TAB_KEY = "warpspace-tab";
   const rename = name => {
     window.__warpspaceTab = name;
-    try { sessionStorage.setItem(TAB_KEY, name); } catch { /* it lives as long as the page */ }
+    try { sessionStorage.setItem(TAB_KEY, name); } catch { /* valid until the page is closed */ }
   };
   const tabName = () => {
     try { return sessionStorage.getItem(TAB_KEY) || window.__warpspaceTab; }
@@ -361,15 +360,15 @@
 
   document.body.append(shell);
   document.getElementById("root").setAttribute("role", "main");
-  document.getElementById("root").setAttribute("aria-label", "Drawing of the bent volume");
+  document.getElementById("root").setAttribute("aria-label", "3-D view of the deformed working volume");
   window.warpspacePage = {
     send, rename, toast, copyText, over: shell.querySelector("#ws-over"),
-    // whether it was opened with a link that has just been taken
+    // true if the page was opened with a link
     hasLink: () => known.hasLink,
     style(css) {
       document.head.append(Object.assign(document.createElement("style"), { textContent: css }));
     },
-    // connected, for the first time or again: its tab, how wide it is, the link it was opened with
+    // connected, for the first time or again: send identity of the tab and link
     arrive() {
       rename(tabName() || [...crypto.getRandomValues(new Uint8Array(16))]
         .map(byte => byte.toString(16).padStart(2, "0")).join(""));
@@ -380,16 +379,16 @@
       known.hasLink = Boolean(link) && link !== (stored() || window.__warpspaceLink);
       if (known.hasLink) { store(link); send("files:link", link); }
     },
-    // how far the page is, for whoever drives it from outside
+    // progress of the page, for tests
     stage(word) {
       document.documentElement.dataset.warpspace = word;
       if (word === "open") this.tour();
     },
-    // says when all before it is drawn
+    // report when everything before it is drawn
     drawn() {
-      const tell = () => send("tab:drawn");
-      if (document.hidden) setTimeout(tell, 0);
-      else requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(tell, 0)));
+      const report = () => send("tab:drawn");
+      if (document.hidden) setTimeout(report, 0);
+      else requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(report, 0)));
     },
     share(word, token, words) {
       const parameters = new URLSearchParams(location.search);
@@ -401,7 +400,7 @@
       copyText(address.href, "Link copied", words);
     },
     keys(events) { known.keys = events; },
-    // brings a note into sight, once its list is there
+    // scroll to a note, after the list is opened
     reveal(id) { setTimeout(() => document.getElementById(id)?.focus(), 300); },
     show(pieces) { for (const [name, html] of Object.entries(pieces)) write(name, html); },
     title(words) { document.title = `${words} · warpspace`; },

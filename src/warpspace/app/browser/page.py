@@ -12,7 +12,7 @@ from viser import ClientHandle, ViserServer
 from warpspace.app.browser.viser_private import send_at_once, send_script
 from warpspace.exceptions import WarpspaceError
 
-SCRIPTS = ("page", "room", "mesh", "fly", "server", "tour", "story", "together")
+SCRIPTS = ("page", "overlay", "mesh", "fly", "server", "tour", "story", "together")
 
 
 class Page:
@@ -50,8 +50,8 @@ class Page:
         self._sent.pop(place, None)
 
     def call(self, name: str, *values: object) -> None:
-        """Call a function of the page: of `warpspacePage`, or ``room.NAME`` of the drawing's."""
-        home = f"warpspacePage.{name}".replace("warpspacePage.room.", "warpspaceRoom.")
+        """Call a function of the page: of `warpspacePage`, or ``overlay.NAME`` of the drawing."""
+        home = f"warpspacePage.{name}".replace("warpspacePage.overlay.", "warpspaceOverlay.")
         self.run_script(f"{home}({', '.join(map(_spelt, values))});")
 
     @property
@@ -71,7 +71,7 @@ class Page:
         """Show a message in this tab: "done", "warning", "problem", or one that "stays"."""
         self.call("toast", kind, title, text)
 
-    def report(self, error: Exception, title: str = "That did not work") -> None:
+    def report(self, error: Exception, title: str = "The action failed") -> None:
         self.notify(title, error_words(error), "problem")
 
 

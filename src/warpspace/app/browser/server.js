@@ -1,17 +1,17 @@
-// A page whose server is gone says so, keeps its state, and hands it back when it answers again.
-// A page notices that its connection is closed by `sendMessage`, which viser replaces then; viser
-// itself connects anew every second while the page is in front.
+// Loss of the server: the page shows a message, stores its state, and sends it back on reconnection.
+// A closed connection is detected by `sendMessage`, which viser replaces; viser reconnects every second
+// while the page is in the foreground.
 (() => {
   const KEPT_KEY = "warpspace-kept";
-  const LOST = "The connection to its server is lost: it was ended or restarted, or the network is down."
-    + " What you see is the last picture; nothing can be changed until it answers again.";
-  const KEPT = "Kept in this tab: scene, errors, view, camera, comparison and the point asked about, as of"
-    + " {time}. Leave the tab open; they come back by themselves.";
-  const NOT_KEPT = "Nothing could be kept in this tab. After a restart of the server it begins anew;"
-    + " after an interruption of less than ten minutes everything is still there.";
-  const OTHER_LINK = "If the server was started again under another link, open that in this tab: what is"
-    + " kept comes back there only if its address is the same up to the question mark.";
-  const BACK = "The app answers again";
+  const LOST = "The server has stopped or was restarted, or the network is down. The last picture remains"
+    + " on screen; changes are possible again after reconnection.";
+  const KEPT = "Saved in this tab: scene, errors, view, camera, comparison and selected point, as of {time}."
+    + " Leave the tab open; the state is restored automatically.";
+  const NOT_KEPT = "The state could not be saved in this tab. It is available after an interruption of less"
+    + " than ten minutes, but not after a restart of the server.";
+  const OTHER_LINK = "If the server was restarted with another link, open that link in this tab. The state"
+    + " is restored only if the address is the same up to the question mark.";
+  const BACK = "Connection restored";
   const say = (title, lines, role = "status") => {
     document.getElementById("warpspace-server")?.remove();
     const box = document.createElement("section");
@@ -35,7 +35,7 @@
 
   window.warpspacePage.server = {
     say,
-    // to be called with every connection: what it knows is what viser sends with now
+    // called with every connection, after viser has set `sendMessage`
     watch() {
       clearInterval(window.__warpspaceWatch);
       const send = window.__viserMutable?.sendMessage;
@@ -46,39 +46,39 @@
           since ||= Date.now();
           const kept = read(), time = kept && new Date(kept.at).toLocaleTimeString();
           const lines = [LOST, kept?.text ? KEPT.replace("{time}", time) : NOT_KEPT, OTHER_LINK];
-          count = say("The app does not answer", lines, "alert")("");
-          count.setAttribute("aria-hidden", "true");  // it changes: not to be read out each time
+          count = say("Connection to the server lost", lines, "alert")("");
+          count.setAttribute("aria-hidden", "true");  // changes every second, not to be read out
           window.__warpspaceLost = true;
           document.documentElement.dataset.warpspace = "lost";
         }
         const text = document.hasFocus()
-          ? `Trying again every second, for ${Math.round((Date.now() - since) / 1000)} s so far.`
-          : "It tries again as soon as this page is in front.";
+          ? `Reconnecting, for ${Math.round((Date.now() - since) / 1000)} s so far.`
+          : "Reconnects as soon as this page is in the foreground.";
         if (count.textContent !== text) count.textContent = text;
       }, 250);
     },
-    // an empty text takes away what was kept
+    // an empty text deletes the saved state
     keep(text) {
       try {
         if (text) sessionStorage.setItem(KEPT_KEY, JSON.stringify({ at: Date.now(), text }));
         else sessionStorage.removeItem(KEPT_KEY);
-      } catch { try { sessionStorage.removeItem(KEPT_KEY); } catch { /* nothing is kept there */ } }
+      } catch { try { sessionStorage.removeItem(KEPT_KEY); } catch { /* no storage */ } }
     },
-    // the page is connected, for the first time or again; to a server that knows its tab or not
+    // the page is connected, for the first time or again; `known`: the server knows this tab
     back(known) {
       const was = window.__warpspaceLost;
       window.__warpspaceLost = false;
       document.getElementById("warpspace-server")?.remove();
       if (known) {
-        if (was) say(BACK, ["Only the connection was interrupted; everything is as it was, Undo too."]);
+        if (was) say(BACK, ["Only the connection was interrupted. The state and the undo history are unchanged."]);
         return;
       }
       const kept = read();
       if (kept?.text && !window.warpspacePage.hasLink())
         window.warpspacePage.send("keeper:kept", kept.text);
       else if (was)
-        say(BACK, ["Its server was restarted, or has forgotten this tab, and nothing was kept here:"
-          + " it begins anew."]);
+        say(BACK, ["The server was restarted or has discarded this tab, and no state was saved here."
+          + " The scene was opened again."]);
     },
   };
 })();

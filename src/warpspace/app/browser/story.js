@@ -1,31 +1,31 @@
-// A story that is told: the columns give way to its words, keys go from step to step.
+// The player of a story: its text replaces the columns, keys move from step to step.
 (() => {
   const page = window.warpspacePage, root = document.documentElement;
-  const isTold = () => root.classList.contains("ws-told");
+  const isPlaying = () => root.classList.contains("ws-playing");
   let before = null;
 
   page.story = on => {
-    if (on === isTold()) return;
-    root.classList.toggle("ws-told", on);
+    if (on === isPlaying()) return;
+    root.classList.toggle("ws-playing", on);
     if (on) before = document.activeElement; else before?.focus?.({ preventScroll: true });
-    if (on) root.requestFullscreen?.().catch(() => { /* the page itself is large enough */ });
+    if (on) root.requestFullscreen?.().catch(() => { /* stays in the window */ });
     else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
   };
-  // a step: how long points, colours and camera take to it, ms
-  page.step = (long, camera) => {
-    warpspaceMesh.glide = long;
-    if (camera) warpspaceFly(camera, long);
+  // a step: duration of the animation of points, colours and camera, ms
+  page.step = (duration, camera) => {
+    warpspaceMesh.glide = duration;
+    if (camera) warpspaceFly(camera, duration);
   };
   addEventListener("keydown", event => {
-    if (!isTold() || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!isPlaying() || event.ctrlKey || event.metaKey || event.altKey) return;
     const press = [" ", "Enter"].includes(event.key) && event.target.closest?.("button, a, summary");
     const name = { ArrowRight: "on", " ": "on", ArrowLeft: "back", Escape: "end" }[event.key];
-    event.stopImmediatePropagation();  // no other key acts on what is not to be seen
+    event.stopImmediatePropagation();  // hidden parts of the page must not react
     if (press || !name) return;
     event.preventDefault();
     page.send(`story:${name}`);
   }, true);
-  document.addEventListener("fullscreenchange", () => {  // left with Esc, say
-    if (isTold() && !document.fullscreenElement) page.send("story:end");
+  document.addEventListener("fullscreenchange", () => {  // for example with Esc
+    if (isPlaying() && !document.fullscreenElement) page.send("story:end");
   });
 })();

@@ -1,4 +1,4 @@
-// A shared review: where the others point on the map, as dots with their names.
+// A shared review: pointers of the other participants on the map, as dots with their names.
 (() => {
   const OFTEN_MS = 100, GONE_MS = 3000;
   const pointers = new Map();
@@ -24,9 +24,9 @@
     const { canvas, camera } = view() ?? {}, now = performance.now(), root = warpspacePage.over;
     for (const [key, { dot, at, until }] of pointers) {
       if (now > until || !canvas) { dot.remove(); pointers.delete(key); continue; }
-      const seen = camera.position.clone().set(...warpspaceFly.out(at)).project(camera);
-      dot.style.left = `${50 * (seen.x + 1)}%`;
-      dot.style.top = `${50 * (1 - seen.y)}%`;
+      const projected = camera.position.clone().set(...warpspaceFly.out(at)).project(camera);
+      dot.style.left = `${50 * (projected.x + 1)}%`;
+      dot.style.top = `${50 * (1 - projected.y)}%`;
       if (dot.parentElement !== root) root.append(dot);
     }
     drawing = pointers.size > 0;
@@ -44,7 +44,7 @@
     const known = pointers.get(key);
     if (!at) { if (known) known.until = 0; return; }
     const dot = known?.dot ?? Object.assign(document.createElement("span"), { className: "ws-pointer" });
-    dot.textContent = name || "somebody";
+    dot.textContent = name || "anonymous";
     pointers.set(key, { dot, at, until: performance.now() + GONE_MS });
     if (!drawing) { drawing = true; requestAnimationFrame(draw); }
   };

@@ -1,36 +1,36 @@
-// First steps: three cards, each beside what it explains; at the first visit, and from the help.
+// First steps: three cards beside the parts of the page; at the first visit, and from the help.
 (() => {
   const KEY = "warpspace-visited", GAP = 10;
   const STEPS = [
-    ["#ws-over", "The bent volume", "This is the working volume of the machine, bent by its geometric errors and"
-      + " drawn much larger than true. Colours show how large the error is; the dashed box is nominal."
-      + " Drag to turn it; click a point to see why it is off."],
-    ["#ws-left", "Its errors", "Each row is one geometric error; the largest effect stands first. Drag its slider"
-      + " or type a number, and the drawing follows. Ctrl+Z takes it back."],
-    ["#ws-right", "Five tasks", "Understand the error, measure it, find what improves it, design tolerances, or"
-      + " change the machine. ? at the top lists all keys."],
+    ["#ws-over", "Deformed volume", "The working volume of the machine, deformed by its geometric errors, with"
+      + " exaggeration. Colours show the magnitude of the error; the dashed box is nominal."
+      + " Drag to rotate; click a point to see the contributions to its error."],
+    ["#ws-left", "Errors", "Each row is one geometric error; the largest effect comes first. Drag the slider"
+      + " or type a number to change it. Ctrl+Z undoes a change."],
+    ["#ws-right", "Five tasks", "Understand, measure and improve the error, design tolerances, or edit the"
+      + " machine. ? in the top bar lists all keys."],
   ];
   const wasHere = () => {
     if (window.__warpspaceVisited) return true;
     try { return localStorage.getItem(KEY) !== null; } catch { return false; }
   };
   const place = (card, box) => {
-    const own = card.getBoundingClientRect();
-    let x = 12, y = innerHeight - own.height - 12;  // where there is room beside nothing: at the bottom
-    if (box.right + GAP + own.width <= innerWidth) [x, y] = [box.right + GAP, box.top + GAP];
-    else if (box.left - GAP - own.width >= 0) [x, y] = [box.left - GAP - own.width, box.top + GAP];
+    const { width, height } = card.getBoundingClientRect();
+    let x = 12, y = innerHeight - height - 12;  // at the bottom, if there is no space beside the part
+    if (box.right + GAP + width <= innerWidth) [x, y] = [box.right + GAP, box.top + GAP];
+    else if (box.left - GAP - width >= 0) [x, y] = [box.left - GAP - width, box.top + GAP];
     card.style.left = `${x}px`;
-    card.style.top = `${Math.max(12, Math.min(y, innerHeight - own.height - 12))}px`;
+    card.style.top = `${Math.max(12, Math.min(y, innerHeight - height - 12))}px`;
   };
 
-  // a page that a program opens has fixedDpr in its address
-  window.warpspacePage.tour = asked => {
+  // the address of a page opened by a program contains fixedDpr
+  window.warpspacePage.tour = requested => {
     const address = new URLSearchParams(location.search), wish = address.get("tour");
     const first = !window.__warpspaceVisited && (wish === "on"
       || wish !== "off" && !address.has("fixedDpr") && !wasHere());
-    if (!asked && !first || document.getElementById("ws-tour")) return;
+    if (!requested && !first || document.getElementById("ws-tour")) return;
     window.__warpspaceVisited = true;
-    try { localStorage.setItem(KEY, "1"); } catch { /* it is shown again next time */ }
+    try { localStorage.setItem(KEY, "1"); } catch { /* shown again at the next visit */ }
     const before = document.activeElement, card = document.createElement("section");
     card.id = "ws-tour";
     card.setAttribute("role", "dialog");

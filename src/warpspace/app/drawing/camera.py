@@ -32,7 +32,7 @@ MOST_SHARE, LEAST_SHARE = 0.4, 0.3
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """How large the drawing is, CSS pixels; the page says it (`room.js`) whenever that changes."""
+    """Size of the drawing, CSS pixels; sent by the page (`overlay.js`) whenever it changes."""
 
     width: float
     height: float

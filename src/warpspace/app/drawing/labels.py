@@ -1,6 +1,6 @@
 """Words beside points of the drawing: axes and their numbers, worst point, corners, names.
 
-The page places them as the camera moves (`browser/room.js`); an offline page has them in 3-D.
+The page places them as the camera moves (`browser/overlay.js`); an offline page has them in 3-D.
 """
 
 from collections.abc import Iterator, Mapping

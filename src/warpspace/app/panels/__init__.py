@@ -1,1 +1,1 @@
-"""What a page says and asks: errors, the bar at the top, what lies over the drawing, five tasks."""
+"""Panels of the page: error list, top bar, overlay of the drawing, tasks and dialogs."""

@@ -1,7 +1,7 @@
-"""An analysis on the page: its result, what to do with it, and its options, from its description.
+"""The panel of an analysis, generated from its description: options, result and actions.
 
-What only a page can do (numbers that follow a drag, a picture in the box) is a hook beside it, by
-the analysis' name: a subclass of `AnalysisPart` in `HOOKS` of the catalogue.
+Features that only a page has (numbers that follow a drag, a picture in the box) are added by a
+subclass of `AnalysisPanel`, registered in `page_panels.PANELS` by the name of the analysis.
 """
 
 import csv
@@ -50,304 +50,308 @@ TITLES = {
     "montecarlo": "Random machines", "contributions": "Contributions of tolerances",
     "adjust": "Adjustment", "allocate": "Tolerances", "concepts": "Machines side by side",
 }  # fmt: skip
-"""What sections are called, where the name of the command does not do."""
-OF_STATE = frozenset({"loop", "placed"})
-"""Options that are set for the whole page, in one place."""
-QUICK_S = 0.4  # what is answered within that time is answered anew with every change
-MOST_STEPS = 4  # errors that a card names one by one
-SAME = 1e-3  # µm or µrad; an error that moves by less stays
+"""Titles of sections that differ from the name of the command."""
+OF_STATE = frozenset({"loop", "placed"})  # options that are set once, for the whole page
+QUICK_S = 0.4  # an analysis that takes less is repeated after each change
+MOST_STEPS = 4  # errors listed on a card
+SAME = 1e-3  # µm or µrad; smaller changes of an error are not listed
 RECORD = button("Record decision", "notes:decide",
-                hint="Keep what was changed, and why, among the notes")  # fmt: skip
+                hint="Record the change and its reason as a note")  # fmt: skip
 T = TypeVar("T")
-Question = tuple[object, ...]
+ResultKey = tuple[object, ...]
 
 
 class AnalysisOutcome(NamedTuple):
-    question: Question  # that it answers
-    found: Result
-    cards: tuple[tuple[Change, Markup], ...] = ()  # what it proposes, and that in words
+    key: ResultKey  # of the inputs
+    result: Result
+    cards: tuple[tuple[Change, Markup], ...] = ()  # proposed changes and their descriptions
     took_s: float = 0.0
 
 
 class AnalysisPanel(Section):
     """One analysis: a section of its task."""
 
-    at_once = False  # whether it runs by itself as soon as it is unfolded
-    run_words, run_hint = "Run", ""
+    runs_on_open = False
+    run_label, run_hint = "Run", ""
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context)
         self.entry, self.name, self.task = entry, entry.name, entry.task
         self.title = TITLES.get(entry.name) or entry.name.replace("-", " ").capitalize()
-        words = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
-        self.sentence = self.sentence or words.rstrip(".")
-        self.at_once = self.at_once or entry.task == "understand"
-        self._answer: AnalysisOutcome | None = None
-        self._applied: Question = ()  # what is asked once a change has been applied
-        self._problem: tuple[Question, str] | None = None
-        self._jobs = Jobs(self, self.renew, self._fail)
-        self._asked: Question = ()
-        self._subject = ""
+        sentence = entry.sentence.replace(" of SCENE", "").replace("SCENE", "the machine")
+        self.sentence = self.sentence or sentence.rstrip(".")
+        self.runs_on_open = self.runs_on_open or entry.task == "understand"
+        self.outcome: AnalysisOutcome | None = None
+        self._applied_key: ResultKey = ()  # of the state after a proposed change was applied
+        self.problem: tuple[ResultKey, str] | None = None
+        self._jobs = Jobs(self, self.rerender, self._fail)
+        self.last_key: ResultKey = ()  # of the last run
+        self._title_prefix = ""
 
     @property
     def kind(self) -> type[Analysis]:
-        """The analysis, imported when it is first asked."""
+        """The analysis, imported on first use."""
         return self.entry.load()
 
-    # --- what a hook may say otherwise ---------------------------------------------------------
+    # --- what a subclass may override ------------------------------------------------------------
 
     def options(self) -> Sequence[Option]:
-        """List the options that a page asks for."""
-        return [one for one in self.kind.options() if not (one.grammar and one.grammar.is_file)]
+        """List the options that the page supports."""
+        return [o for o in self.kind.options() if not (o.grammar and o.grammar.is_file)]
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
-        """List those that are shown under "Options" and count."""
+        """List the options that apply to the state."""
         return self.options()
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
-        """Give what the state says of options that nobody has set."""
-        found = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
-        found["placed"] = str(int(state.seen[1]))
+        """Return values of options that follow the state unless they are set."""
+        state_values = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
+        state_values["placed"] = str(int(state.seen[1]))
         if state.picked is not None:
-            found["at"] = spell_at(state.picked.at)
-        return {one.name: found[one.name] for one in self.options() if one.name in found}
+            state_values["at"] = spell_at(state.picked.at)
+        return {o.name: state_values[o.name] for o in self.options() if o.name in state_values}
 
     def scenes(self, state: AppState) -> Sequence[Scene]:
-        """Give what it is asked of: the machine as it is drawn."""
+        """Return the scenes to analyse: the machine as drawn."""
         return [state.active_scene()]
 
-    def question(self, state: AppState) -> Question:
-        """Give all that an answer depends on; equal questions have equal answers."""
+    def result_key(self, state: AppState) -> ResultKey:
+        """Return all inputs of the result; equal keys have equal results."""
         return (
             Identity(state.scene), tuple(state.active.items()), tuple(state.positions.items()),
             state.tolerances, state.placed, tuple(self.values(state).items()),
         )  # fmt: skip
 
     def is_ready(self, state: AppState) -> bool:
-        """Tell whether enough is chosen to run it."""
+        """Check if all required inputs are chosen."""
         return True
 
-    def is_quick(self, state: AppState) -> bool:
-        """Tell whether it follows every change by itself."""
-        return self._answer.took_s < QUICK_S if self._answer else self.at_once
+    def is_automatic(self, state: AppState) -> bool:
+        """Check if it runs by itself after each change."""
+        return self.outcome.took_s < QUICK_S if self.outcome else self.runs_on_open
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        return read_form(self.kind, self.shown_options(state), values, scenes[0])
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        return read_form(self.kind, self.shown_options(state), values, scene)
 
     def before_result(self, state: AppState) -> Markup:
         return EMPTY
 
-    def headline(self, found: Result) -> Markup:
-        """Say what matters most of the result: its sentences."""
-        # which scene it is stands at the top of the page
-        words = (one.removeprefix(self._subject) for one in found.blocks() if isinstance(one, str))
-        return join(map(block_html, words))
+    def headline(self, result: Result) -> Markup:
+        """Render the sentences of the result."""
+        # the title of the scene is at the top of the page
+        prefix, sentences = self._title_prefix, (b for b in result.blocks() if isinstance(b, str))
+        return join(block_html(sentence.removeprefix(prefix)) for sentence in sentences)
 
-    def offered(self, found: Result) -> Sequence[int]:
-        """List the places of the changes that are offered, in order: the best first."""
-        return range(len(self._answer.cards) if self._answer else 0)[::-1]
+    def offered_changes(self, result: Result) -> Sequence[int]:
+        """List the indices of the offered changes, best first."""
+        return range(len(self.outcome.cards) if self.outcome else 0)[::-1]
 
-    def result_html(self, found: Result) -> Markup:
-        """Draw its tables and charts."""
-        return result_html(one for one in found.blocks() if not isinstance(one, str))
+    def result_html(self, result: Result) -> Markup:
+        """Render its tables and charts."""
+        return result_html(block for block in result.blocks() if not isinstance(block, str))
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
-        """Give what can be done with a result beside its cards."""
-        saves = [button(f"Save {one}", f"{self.name}:save", one) for one in _endings(found)]
+    def actions(self, result: Result, *, stale: bool) -> Markup:
+        """Render the buttons below a result."""
+        saves = [button(f"Save {end}", f"{self.name}:save", end) for end in _endings(result)]
         saves.append(button("Add to report", f"{self.name}:report", kind="quiet"))
         return tag("div", join(saves), class_="ws-actions")
 
     # --- the page --------------------------------------------------------------------------------
 
     def values(self, state: AppState) -> dict[str, str]:
-        found, told = self.defaults(state), option_values(state, self.name)
-        return {**found, **told, **{name: found[name] for name in OF_STATE & found.keys()}}
+        defaults, chosen = self.defaults(state), option_values(state, self.name)
+        return {**defaults, **chosen, **{k: defaults[k] for k in OF_STATE & defaults.keys()}}
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.question(picture.state),)
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (self.result_key(picture.state),)
 
     def body(self, picture: LivePicture) -> Markup:
         return self._body(picture.state)
 
     def _body(self, state: AppState) -> Markup:
-        question, is_quick = self.question(state), self.is_quick(state)
-        is_ready, answer = self.is_ready(state), self._answer
-        if is_quick and is_ready:
-            self.keep_up(state)
-        stale = answer is not None and answer.question != question
+        key, is_automatic = self.result_key(state), self.is_automatic(state)
+        is_ready, outcome = self.is_ready(state), self.outcome
+        if is_automatic and is_ready:
+            self.run_if_stale(state)
+        stale = outcome is not None and outcome.key != key
         problem = self.problem_html(state)
         parts: list[object] = [self.before_result(state), problem]
-        if answer is not None and not problem:
-            if question == self._applied:
-                words = "Applied: this is what is shown now. Undo takes it back."
-                parts.append(tag("p", words, role="status"))
+        if outcome is not None and not problem:
+            if key == self._applied_key:
+                text = "Applied to the displayed machine. Undo reverts it."
+                parts.append(tag("p", text, role="status"))
                 parts.append(RECORD)
-            elif stale and not is_quick:
-                words = "Something has changed since: run it again."
-                parts.append(tag("p", words, class_="ws-stale"))
-            found, faded = answer.found, stale and question != self._applied
-            said = join((self.headline(found), self.cards_html(question), self.result_html(found)))
-            parts.append(tag("div", said, class_="ws-result" + (" stale" if faded else "")))
-            parts += [tag("p", words, class_="ws-doubt") for words in found.caveats()]
-            parts.append(self.actions(found, stale=stale))
-        bar = EMPTY if stale and is_quick else self._jobs.html()
-        wanted = answer is None or problem or (stale and not is_quick)
-        if wanted and is_ready and not bar:
-            words = f"{self.run_words} again" if answer else self.run_words
-            run = button(words, f"{self.name}:run", kind="" if answer else "main",
+            elif stale and not is_automatic:
+                text = "Out of date: inputs have changed. Run again."
+                parts.append(tag("p", text, class_="ws-stale"))
+            result, faded = outcome.result, stale and key != self._applied_key
+            content = join((self.headline(result), self.cards_html(key), self.result_html(result)))
+            parts.append(tag("div", content, class_="ws-result" + (" stale" if faded else "")))
+            parts += [tag("p", caveat, class_="ws-caveat") for caveat in result.caveats()]
+            parts.append(self.actions(result, stale=stale))
+        bar = EMPTY if stale and is_automatic else self._jobs.html()
+        needs_run = outcome is None or problem or (stale and not is_automatic)
+        if needs_run and is_ready and not bar:
+            label = f"{self.run_label} again" if outcome else self.run_label
+            run = button(label, f"{self.name}:run", kind="" if outcome else "main",
                          hint=self.run_hint)  # fmt: skip
             bar = tag("div", run, class_="ws-actions ws-run")
         parts.append(bar)
         return join((*parts, self.options_html(state)))
 
     def problem_html(self, state: AppState) -> Markup:
-        if self._problem is None or self._problem[0] != self.question(state):
+        if self.problem is None or self.problem[0] != self.result_key(state):
             return EMPTY
-        return tag("p", self._problem[1], class_="ws-problem", role="alert")
+        return tag("p", self.problem[1], class_="ws-problem", role="alert")
 
-    def cards_html(self, question: Question) -> Markup:
-        answer, cards = self._answer, list[Markup]()
-        if answer is None:
+    def cards_html(self, key: ResultKey) -> Markup:
+        outcome, cards = self.outcome, list[Markup]()
+        if outcome is None:
             return EMPTY
-        hints = {"Preview": "Draw the result beside the present state",
-                 "Apply": "Change the errors; the state before it is kept as A"}  # fmt: skip
-        for index in self.offered(answer.found):
+        hints = {"Preview": "Compare the result with the current state",
+                 "Apply": "Change the errors; the current state becomes A"}  # fmt: skip
+        for index in self.offered_changes(outcome.result):
             buttons = join(
-                button(words, f"{self.name}:{words.lower()}", index, hint=hint,
-                       kind="main" if words == "Apply" else "",
-                       disabled=answer.question != question)
-                for words, hint in hints.items()
+                button(label, f"{self.name}:{label.lower()}", index, hint=hint,
+                       kind="main" if label == "Apply" else "",
+                       disabled=outcome.key != key)
+                for label, hint in hints.items()
             )  # fmt: skip
             row = tag("div", buttons, class_="ws-actions")
-            cards.append(tag("div", answer.cards[index][1] + row, class_="ws-card"))
+            cards.append(tag("div", outcome.cards[index][1] + row, class_="ws-card"))
         return join(cards)
 
-    def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
-        options = [one for one in self.shown_options(state) if one.name not in OF_STATE]
+    def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
+        options = [option for option in self.shown_options(state) if option.name not in OF_STATE]
         if not options:
             return EMPTY
-        form = above + form_html(self.name, options, self.values(state), state.scene)
+        form = controls + form_html(self.name, options, self.values(state), state.scene)
         return tag("details", tag("summary", "Options") + form, class_="ws-options",
                    open=bool(self.problem_html(state)),
                    data_key=f"{self.name}.options")  # fmt: skip
 
     # --- events --------------------------------------------------------------------------------
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        name = word.removeprefix("set.")
-        if word.startswith("set.") and name in {one.name for one in self.options()}:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        name = action.removeprefix("set.")
+        if action.startswith("set.") and name in {option.name for option in self.options()}:
             return replace(state, forms={**state.forms, f"{self.name}.{name}": value[:LONGEST]})
-        if word == "run" and self.is_ready(state):
+        if action == "run" and self.is_ready(state):
             self._run(state)
-        elif word == "cancel":
+        elif action == "cancel":
             self._jobs.cancel()
-        elif word in ("save", "report"):
-            self.context.act(partial(self._save, value) if word == "save" else self._into_report)
-        elif word in ("preview", "apply") and (change := self._change(state, value)) is not None:
-            what = self.title.lower()
-            if word == "preview":
-                words = change.label if change.label.startswith("after ") else ""
-                words = words or f"after {what}: {change.label}"
-                return with_proposal(state, change.scene, words)
-            found = with_applied(state, change.scene, f"before {what}")
-            self._applied = self.question(found)
-            done = change.label.removeprefix(f"after {what}: ")
-            self.context.decided = state, f"{self.title}: {done}"
-            return found
+        elif action in ("save", "report"):
+            save = partial(self._save, value) if action == "save" else self._add_to_report
+            self.context.call_soon(save)
+        elif action in ("preview", "apply"):
+            change, title = self._change(state, value), self.title.lower()
+            if change is None:
+                return state
+            if action == "preview":
+                name = change.label if change.label.startswith("after ") else ""
+                return with_proposal(state, change.scene, name or f"after {title}: {change.label}")
+            applied_state = with_applied(state, change.scene, f"before {title}")
+            self._applied_key = self.result_key(applied_state)
+            description = change.label
+            if description.startswith("after "):
+                description = description.partition(": ")[2] or description
+            self.context.last_decision = state, f"{self.title}: {description}"
+            return applied_state
         return state
 
     def _change(self, state: AppState, value: str) -> Change | None:
-        answer = self._answer
-        if answer is None or answer.question != self.question(state):
+        outcome = self.outcome
+        if outcome is None or outcome.key != self.result_key(state):
             return None
-        index = index_of(value, len(answer.cards))
-        return None if index is None else answer.cards[index][0]
+        index = index_of(value, len(outcome.cards))
+        return None if index is None else outcome.cards[index][0]
 
     def _run(self, state: AppState) -> None:
-        question, scenes = self.question(state), self.scenes(state)
-        self._asked, self._subject = question, f"{state.scene.title} · "
+        key, scenes = self.result_key(state), self.scenes(state)
+        self.last_key, self._title_prefix = key, f"{state.scene.title} · "
         try:
-            asked = self.ask(state, self.values(state), scenes)
+            analysis = self.build_analysis(state, self.values(state), scenes[0])
         except WarpspaceError as error:
             self._fail(error)
             return
 
-        def answer(job: Job) -> AnalysisOutcome:
-            with taken_turn(lambda: job.tell(job.share)):
-                started = time.monotonic()
-                found = asked.run_all(scenes, job.tell)
-                took_s = time.monotonic() - started
-            cards = tuple((one, _change_html(state, one)) for one in found.changes())
-            return AnalysisOutcome(question, found, cards, took_s)
+        def compute(job: Job) -> AnalysisOutcome:
+            with taken_turn(lambda: job.report_progress(job.share)):
+                start_s = time.monotonic()
+                result = analysis.run_all(scenes, job.report_progress)
+                took_s = time.monotonic() - start_s
+            cards = tuple((change, _change_html(state, change)) for change in result.changes())
+            return AnalysisOutcome(key, result, cards, took_s)
 
-        self._make(self.kind.doing, answer, self._take_answer)
+        self._run_job(self.kind.doing, compute, self._accept_outcome)
 
-    def keep_up(self, state: AppState) -> None:
-        """Run it for what has changed; while something is dragged, once that rests."""
-        if self.question(state) == self._asked or self._jobs.busy:
+    def run_if_stale(self, state: AppState) -> None:
+        """Run it if its inputs have changed; during a drag, when that pauses."""
+        if self.result_key(state) == self.last_key or self._jobs.busy:
             return
-        if self._asked and not self.context.is_still:
-            self.context.rest_again(self)
+        if self.last_key and not self.context.is_paused:
+            self.context.restart_idle(self)
         else:
             self._run(state)
 
-    def _make(self, words: str, make: Callable[[Job], T], take: Callable[[T], None]) -> None:
+    def _run_job(self, name: str, compute: Callable[[Job], T], accept: Callable[[T], None]) -> None:
         def work(job: Job) -> None:
-            made = make(job)
+            product = compute(job)
             if not job.is_set():
-                self.context.act(partial(take, made))
+                self.context.call_soon(partial(accept, product))
 
-        self._jobs.start(words, work)
+        self._jobs.start(name, work)
 
-    def _take_answer(self, answer: AnalysisOutcome) -> None:
-        self._answer, self._problem = answer, None
-        self.renew()
+    def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
+        self.outcome, self.problem = outcome, None
+        self.rerender()
 
     def _fail(self, error: Exception) -> None:
-        words = error_words(error)
+        text = error_words(error)
         if isinstance(error, OptionError):
-            labels = {one.name: one.label for one in self.kind.options()}
-            words = error.with_names(lambda name: labels.get(name, name))
-        self._problem = (self._asked, words)
-        self.renew()
+            labels = {option.name: option.label for option in self.kind.options()}
+            text = error.with_names(lambda name: labels.get(name, name))
+        self.problem = (self.last_key, text)
+        self.rerender()
 
     def _save(self, ending: str) -> None:
-        found = self._answer.found if self._answer else None
-        if found is None or ending not in _endings(found):
+        result = self.outcome.result if self.outcome else None
+        if result is None or ending not in _endings(result):
             return
-        text, table = io.StringIO(), found.file_table()
+        text, table = io.StringIO(), result.file_table()
         if ending == "JSON":
-            json.dump(found.as_json(), text, indent=2, ensure_ascii=False)
+            json.dump(result.as_json(), text, indent=2, ensure_ascii=False)
         elif table is not None:
             csv.writer(text, lineterminator="\n").writerows(table.csv_rows())
         self.context.save_file(f"{self.name}.{ending.lower()}", text.getvalue())
 
-    def _into_report(self) -> None:
-        if self._answer is not None:
+    def _add_to_report(self) -> None:
+        if self.outcome is not None:
             title = self.kind.title or self.title
-            self.context.reported.append((title, self._answer.found))
-            self.context.notify("Added to the report", f"{title}; see Report at the top")
+            self.context.report_results.append((title, self.outcome.result))
+            self.context.notify("Added to the report", f"{title}; open Report in the top bar")
 
 
-def _endings(found: Result) -> tuple[str, ...]:
-    return ("JSON",) if found.file_table() is None else ("CSV", "JSON")
+def _endings(result: Result) -> tuple[str, ...]:
+    return ("JSON",) if result.file_table() is None else ("CSV", "JSON")
 
 
 def _change_html(state: AppState, change: Change) -> Markup:
-    now = without_table(plain_state(state))
-    then = applied(now, change.scene)
+    before_state = without_table(plain_state(state))
+    after_state = applied(before_state, change.scene)
     moved: list[tuple[float, str]] = []
-    for key in {**now.amplitudes, **then.amplitudes}:
-        a, b = (one.amplitudes.get(key, 0.0) for one in (now, then))
+    for key in {**before_state.amplitudes, **after_state.amplitudes}:
+        a, b = (state.amplitudes.get(key, 0.0) for state in (before_state, after_state))
         if abs(b - a) > SAME:
-            said = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
-            moved.append((-abs(b - a), said))
-    steps = [said for _, said in sorted(moved)] or [change.label]
-    lines = [tag("div", tag("b", said)) for said in steps[:MOST_STEPS]]
-    if (more := len(steps) - MOST_STEPS) > 0:
-        lines.append(tag("div", f"and {more} more", class_="ws-quiet"))
+            line = f"{key} {number(a)} → {number(b)} {parameter(key).unit}"
+            moved.append((-abs(b - a), line))
+    steps = [line for _, line in sorted(moved)] or [change.label]
+    lines = [tag("div", tag("b", line)) for line in steps[:MOST_STEPS]]
+    n_hidden= len(steps) - MOST_STEPS
+    if n_hidden > 0:
+        lines.append(tag("div", f"and {n_hidden} more", class_="ws-quiet"))
     try:
-        before, after = (PLAIN.evaluate(one).statistics for one in (now, then))
+        before, after = (PLAIN.evaluate(state).statistics for state in (before_state, after_state))
     except WarpspaceError:
         return join(lines)
     pairs = (("max", before.max_um, after.max_um), ("mean", before.mean_um, after.mean_um))

@@ -1,4 +1,4 @@
-"""What a result says as HTML: sentences, tables, bars, and curves as SVG."""
+"""Results as HTML: sentences, tables, bars, and curves as SVG."""
 
 import math
 import re
@@ -23,11 +23,10 @@ from warpspace.bench.base import SMALLEST_DEVIATION, lay_polar
 from warpspace.geometry.colour import tick_values
 from warpspace.units import MINUS, THIN_SPACE, Array, spell_short
 
-WIDEST = 5  # columns of a table that the column of the page has room for
-MOST_BARS = 10  # that are in sight at once
-WIDE, HIGH = 320.0, 190.0
-"""Size of a chart in units of its drawing."""
-LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 30.0
+WIDEST = 5  # columns of a table that fit into the column of the page
+MOST_BARS = 10
+WIDE, HIGH = 320.0, 190.0  # of a chart, in its own units
+MARGIN_LEFT, RIGHT, TOP, BOTTOM = 40.0, 8.0, 8.0, 30.0
 SERIES = 6  # colours of series in the style sheet
 ANGLES = Markup(
     '<path class="ws-faint" d="M-1 0H1M0 -1V1"/><text x="1.02" y=".05">0°</text>'
@@ -37,22 +36,27 @@ ANGLES = Markup(
 
 
 def result_html(blocks: Iterable[Block]) -> Markup:
-    """Draw tables and charts; what is too wide for the column of the page is folded."""
-    found = [_turned(one) if isinstance(one, Table) else one for one in blocks]
-    wide = [one for one in found if isinstance(one, Bars) or _is_wide(one)]
-    shown = (_first_bars(one) if isinstance(one, Bars) else block_html(one)
-             for one in found if isinstance(one, Bars) or one not in wide)  # fmt: skip
-    return join(shown) + details_html(wide)
+    """Render tables and charts; those too wide for the column of the page are folded."""
+    visible, folded = list[Markup](), list[Block]()
+    for block in blocks:
+        narrow = _transposed(block) if isinstance(block, Table) else block
+        if isinstance(narrow, Bars):
+            visible.append(_first_bars(narrow))
+        elif not _is_wide(narrow):
+            visible.append(block_html(narrow))
+        if isinstance(narrow, Bars) or _is_wide(narrow):
+            folded.append(narrow)
+    return join(visible) + details_html(folded)
 
 
-def details_html(blocks: Iterable[Block], words: str = "Details") -> Markup:
-    """Fold what is too wide for the column, or rarely read."""
+def details_html(blocks: Iterable[Block], title: str = "Details") -> Markup:
+    """Render blocks that are too wide for the column, or rarely read, folded away."""
     inner = join(map(block_html, blocks))
     if not inner:
         return EMPTY
-    wide = tag("div", inner, tabindex=0, role="group", aria_label=words)  # scrolled by keys
-    return tag("details", tag("summary", words) + wide, class_="ws-details",
-               data_key=f"details.{words}")  # fmt: skip
+    wide = tag("div", inner, tabindex=0, role="group", aria_label=title)  # scrolled by keys
+    return tag("details", tag("summary", title) + wide, class_="ws-details",
+               data_key=f"details.{title}")  # fmt: skip
 
 
 def block_html(block: Block) -> Markup:
@@ -66,7 +70,7 @@ def block_html(block: Block) -> Markup:
 
 
 def spelt(sentence: str) -> str:
-    """Give a sentence of a command as a page has it: true minus, thin spaces in large counts."""
+    """Format a sentence of a command for the page: true minus, thin spaces in large counts."""
     text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, sentence.strip())
     return re.sub(r"(?<=\d),(?=\d{3}\b)", THIN_SPACE, text[:1].upper() + text[1:])
 
@@ -75,7 +79,7 @@ def _is_wide(block: Block) -> bool:
     return isinstance(block, Table) and len(block.visible_columns) > WIDEST
 
 
-def _turned(table: Table) -> Table:
+def _transposed(table: Table) -> Table:
     if not _is_wide(table) or not 0 < len(table.rows) < WIDEST:
         return table
     (first, *names), *lines = zip(table.visible_columns, *table.cells(), strict=True)
@@ -91,9 +95,9 @@ def _first_bars(bars: Bars) -> Markup:
     longest = max((abs(value) for value in values if value is not None), default=0.0) or 1.0
     lines = [
         fill('<div class="ws-pair"><span>{words}</span><span>{value}</span></div>'
-             '<div class="ws-effect"><i style="width:{share}%"></i></div>', words=words,
+             '<div class="ws-effect"><i style="width:{share}%"></i></div>', words=label,
              value=number(value, 2), share=number(100.0 * abs(value) / longest))
-        for words, value in zip(bars.rows, values, strict=True) if value is not None
+        for label, value in zip(bars.rows, values, strict=True) if value is not None
     ]  # fmt: skip
     head = tag("p", " · ".join(filter(None, (panel.title, panel.unit))), class_="ws-tiny")
     return head + join(lines[:MOST_BARS])
@@ -101,20 +105,22 @@ def _first_bars(bars: Bars) -> Markup:
 
 @dataclass(frozen=True, slots=True)
 class PlotFrame:
-    """Ends of two axes, and where a point lies between them."""
+    """Limits of the two axes of a chart, and the transformation to its drawing."""
 
     x: tuple[float, float]
     y: tuple[float, float]
 
     def place(self, x: Array | float, y: Array | float) -> Array:
-        """Give points of the drawing, [..., 2]."""
-        across = LEFT + (WIDE - LEFT - RIGHT) * (x - self.x[0]) / (self.x[1] - self.x[0])
+        """Compute points of the drawing, [..., 2]."""
+        across = MARGIN_LEFT + (WIDE - MARGIN_LEFT - RIGHT) * (x - self.x[0]) / (
+            self.x[1] - self.x[0]
+        )
         down = TOP + (HIGH - TOP - BOTTOM) * (self.y[1] - y) / (self.y[1] - self.y[0])
         return np.stack(np.broadcast_arrays(across, down), axis=-1)
 
     def to_scale(self) -> "PlotFrame":
         """Widen one of the axes until a unit is as long on both."""
-        rooms = (self.x, WIDE - LEFT - RIGHT), (self.y, HIGH - TOP - BOTTOM)
+        rooms = (self.x, WIDE - MARGIN_LEFT - RIGHT), (self.y, HIGH - TOP - BOTTOM)
         per = max((high - low) / room for (low, high), room in rooms) / 2.0
         x, y = (
             ((low + high) / 2.0 - per * room, (low + high) / 2.0 + per * room)
@@ -123,22 +129,22 @@ class PlotFrame:
         return PlotFrame(x, y)
 
     def axes(self, x_label: str, y_label: str) -> Markup:
-        """Draw ticks with their values, and what the axes are."""
+        """Draw ticks with their values, and the labels of the axes."""
         floor, middle = HIGH - BOTTOM, (TOP + HIGH - BOTTOM) / 2.0
-        parts = [_text(x_label, (LEFT + WIDE - RIGHT) / 2.0, HIGH - 4),
+        parts = [_text(x_label, (MARGIN_LEFT + WIDE - RIGHT) / 2.0, HIGH - 4),
                  _text(y_label, 9, middle, transform=f"rotate(-90 9 {middle:.0f})")]  # fmt: skip
         for value in tick_values(*self.x, 6.0):
             at = self.place(value, self.y[0])[0]
             parts += [_line(f"M{at:.1f} {TOP}V{floor}"), _text(spell_short(value), at, floor + 11)]
         for value in tick_values(*self.y, 5.0):
             at = self.place(self.x[0], value)[1]
-            words = _text(spell_short(value), LEFT - 4, at + 3, text_anchor="end")
-            parts += [_line(f"M{LEFT} {at:.1f}H{WIDE - RIGHT}"), words]
+            label = _text(spell_short(value), MARGIN_LEFT - 4, at + 3, text_anchor="end")
+            parts += [_line(f"M{MARGIN_LEFT} {at:.1f}H{WIDE - RIGHT}"), label]
         return join(parts)
 
 
 def lines_html(chart: Lines) -> Markup:
-    """Draw curves over an abscissa, to scale, or around the angle."""
+    """Draw curves over an abscissa, to scale, or in polar coordinates."""
     if chart.kind == "polar":
         layout = lay_polar(chart)
         rings = join(
@@ -146,24 +152,24 @@ def lines_html(chart: Lines) -> Markup:
             for value, radius in layout.rings
         )
         curves = join(
-            _curve(one, found * np.array([1.0, -1.0]), 3)
-            for one, found in zip(chart.curves, layout.curves, strict=True)
+            _curve(curve, polar * np.array([1.0, -1.0]), 3)
+            for curve, polar in zip(chart.curves, layout.curves, strict=True)
         )
-        said = f"rings {layout.ring:g} {layout.unit}"
-        return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", said, "ws-polar")
+        note = f"rings {layout.ring:g} {layout.unit}"
+        return _figure(chart, ANGLES + rings + curves, "-1.3 -1.16 2.6 2.24", note, "ws-polar")
     xs = np.concatenate([curve.x for curve in chart.curves])
     ys = np.concatenate([curve.y for curve in chart.curves])
     frame = PlotFrame(_ends(xs), _ends(ys))
     frame = frame.to_scale() if chart.kind == "plane" else frame
-    curves = join(_curve(one, frame.place(one.x, one.y)) for one in chart.curves)
-    for one in chart.bands:
-        edges = frame.place(one.x, one.low), frame.place(one.x, one.high)[::-1]
-        curves += _line(_path(np.concatenate(edges)), f"ws-band ws-s{one.colour % SERIES}")
+    curves = join(_curve(curve, frame.place(curve.x, curve.y)) for curve in chart.curves)
+    for band in chart.bands:
+        edges = frame.place(band.x, band.low), frame.place(band.x, band.high)[::-1]
+        curves += _line(_path(np.concatenate(edges)), f"ws-band ws-s{band.colour % SERIES}")
     return _figure(chart, frame.axes(chart.x_label, chart.y_label) + curves)
 
 
 def histogram_html(chart: Histogram) -> Markup:
-    """Draw a distribution with its marks and its limit."""
+    """Draw a distribution with its limit."""
     limit = math.inf if chart.limit is None else chart.limit
     ends = float(chart.edges[0]), max(float(chart.edges[-1]), chart.limit or 0.0)
     frame = PlotFrame(ends, (0.0, max(float(chart.heights.max()), 1e-9) * 1.05))
@@ -176,10 +182,10 @@ def histogram_html(chart: Histogram) -> Markup:
     if chart.limit is not None:
         at = frame.place(chart.limit, 0.0)[0]
         bars.append(_line(f"M{at:.1f} {TOP}V{HIGH - BOTTOM}", "ws-limit"))
-    told = join(tag("p", spelt(words), class_="ws-tiny" if index else "ws-told")
-                for index, words in enumerate(chart.captions))  # fmt: skip
+    statements = join(tag("p", spelt(statement), class_="ws-tiny" if index else "ws-headline")
+                for index, statement in enumerate(chart.captions))  # fmt: skip
     svg = _svg(frame.axes(chart.x_label, chart.y_label) + join(bars), chart.title)
-    return tag("figure", told + svg + tag("figcaption", chart.subtitle, class_="ws-tiny"))
+    return tag("figure", statements + svg + tag("figcaption", chart.subtitle, class_="ws-tiny"))
 
 
 FLAT = f"0 0 {WIDE:g} {HIGH:g}"
@@ -211,19 +217,19 @@ def _line(path: str, kind: str = "ws-faint") -> Markup:
     return tag("path", class_=kind, d=path)
 
 
-def _text(words: str, x: float, y: float, text_anchor: str = "middle", **more: str) -> Markup:
-    return tag("text", words, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=text_anchor, **more)
+def _text(text: str, x: float, y: float, text_anchor: str = "middle", **attributes: str) -> Markup:
+    return tag("text", text, x=f"{x:.1f}", y=f"{y:.1f}", text_anchor=text_anchor, **attributes)
 
 
 def _path(points: Array, digits: int = 1, *, dots: bool = False) -> str:
-    """Spell a line with gaps where there is no number; dots are strokes without length."""
-    found, joint = "", "M"
+    """Format a path with gaps at NaN; dots are strokes without length."""
+    path, joint = "", "M"
     for x, y in points.tolist():
-        known = not (math.isnan(x) or math.isnan(y))
-        if known:
-            found += f"{joint}{x:.{digits}f} {y:.{digits}f}" + ("h0" if dots else "")
-        joint = "L" if known and not dots else "M"
-    return found
+        is_finite = not (math.isnan(x) or math.isnan(y))
+        if is_finite:
+            path += f"{joint}{x:.{digits}f} {y:.{digits}f}" + ("h0" if dots else "")
+        joint = "L" if is_finite and not dots else "M"
+    return path
 
 
 def _ends(values: Array) -> tuple[float, float]:

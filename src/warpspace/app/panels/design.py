@@ -1,4 +1,4 @@
-"""The task "Design": tolerances held against a limit, and machines side by side."""
+"""The task "Design": tolerances and a limit of the error, and comparison of machines."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -30,7 +30,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.cache import Cache
 from warpspace.app.evaluation.machine_edits import library
-from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, Question
+from warpspace.app.panels.analysis_panel import AnalysisOutcome, AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import histogram_html
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.state import edits
@@ -45,16 +45,16 @@ from warpspace.machine.limits import MOST_CONCEPTS
 from warpspace.scene.model import Scene
 from warpspace.units import Array, spell_count
 
-SAMPLES = 20_000  # machines of a probability on the page
+SAMPLES = 20_000  # machines per probability on the page
 ENSEMBLES: Cache[Ensemble] = Cache(100_000_000)
-"""Sampled machines before their tolerances are known, for all sessions together."""
+"""Sampled machines before tolerances are applied, for all sessions."""
 WHERE = {"max": "everywhere", "sampled": "at a random point"}
 SCALES = {"÷ 1.5": 1.0 / 1.5, "−5 %": 0.95, "+5 %": 1.05, "× 1.5": 1.5}
-"""What all tolerances can be multiplied by."""
+"""Factors for all tolerances, by label."""
 
 
 def percent(share: float) -> str:
-    """Spell a share in per cent; only what is certain reads 0 or 100."""
+    """Format a share in per cent; only a certain one reads 0 or 100."""
     value = f"{100.0 * share:.1f}"
     if value == "100.0" and share < 1.0:
         return "99.9"
@@ -62,20 +62,20 @@ def percent(share: float) -> str:
 
 
 class TolerancesPanel(AnalysisPanel):
-    """Limit and probability, the machines within tolerance, and each tolerance by its share."""
+    """Limit and probability, the machines within tolerance, and each tolerance with its share."""
 
-    sentence = "How likely machines within tolerance keep the limit, and which tolerances"
-    run_words = "Allocate tolerances"
+    sentence = "Probability that machines within tolerance meet the limit; allocation of tolerances"
+    run_label = "Allocate tolerances"
     run_hint = (
-        "The widest tolerances that keep the limit with the wanted probability. A half width w"
-        " costs 1/w, or its cost over w. Fixed ones and those of zero stay. Undo takes it back."
+        "Compute the widest tolerances that meet the limit with the required probability. The cost"
+        " of a half-width w is cost/w (default 1/w). Fixed and zero tolerances are unchanged."
     )
-    _order: tuple[Question, tuple[str, ...]] = ((), ())
+    _order: tuple[ResultKey, tuple[str, ...]] = ((), ())
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name in ("clip", "cylinder", "seed")]
+        return [o for o in super().options() if o.name in ("clip", "cylinder", "seed")]
 
-    def question(self, state: AppState) -> Question:
+    def result_key(self, state: AppState) -> ResultKey:
         values = tuple(self.values(state).items())
         return (*_sampled(state), state.tolerances, state.specification, values)
 
@@ -86,95 +86,93 @@ class TolerancesPanel(AnalysisPanel):
             return False
         return True
 
-    def is_quick(self, state: AppState) -> bool:
+    def is_automatic(self, state: AppState) -> bool:
         return False  # it would change tolerances by itself
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        """Allocate for the limit of the state; what another machine had fixed does not count."""
-        asked: Any = super().ask(state, values, scenes)
-        wanted, known = state.specification, state.amplitudes.keys()
-        fixed = wanted.fixed & known
-        every = read_numbers(wanted.costs, "", "") if wanted.costs else {}
-        costs = tuple((k, cost) for k, cost in every.items() if k in known and k not in fixed)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        """Allocate for the limit of the state; fixed keys of another machine are ignored."""
+        analysis: Any = super().build_analysis(state, values, scene)
+        specification, keys = state.specification, state.amplitudes.keys()
+        fixed = specification.fixed & keys
+        costs_by_key = read_numbers(specification.costs, "", "") if specification.costs else {}
+        costs = tuple((k, cost) for k, cost in costs_by_key.items() if k in keys and k not in fixed)
         return replace(
-            asked, limit_um=wanted.limit_um, probability=wanted.percent / 100.0, loop=state.loop,
-            over=wanted.over, distribution=wanted.distribution, costs=costs,
-            fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
+            analysis, limit_um=specification.limit_um, probability=specification.percent / 100.0,
+            loop=state.loop, over=specification.over, distribution=specification.distribution,
+            costs=costs, fixed=tuple(sorted(fixed)), samples=SAMPLES, workers=1,
         )  # fmt: skip
 
-    def _take_answer(self, answer: AnalysisOutcome) -> None:
-        super()._take_answer(answer)
-        found: Any = answer.found
+    def _accept_outcome(self, outcome: AnalysisOutcome) -> None:
+        super()._accept_outcome(outcome)
+        result: Any = outcome.result
 
         def update(state: AppState) -> AppState:
-            if self.question(state) != answer.question:
-                note = "tolerances or limit were changed meanwhile: allocate again"
-                return state.noted(note)
-            self.context.decided = state, f"{self.title}: allocated for the limit"
-            state = edits.with_half_widths(state, found.tolerances)
-            self._applied = self.question(state)
+            if self.result_key(state) != outcome.key:
+                return state.noted("tolerances or limit changed in the meantime: allocate again")
+            self.context.last_decision = state, f"{self.title}: allocated for the limit"
+            state = edits.with_half_widths(state, result.tolerances)
+            self._applied_key = self.result_key(state)
             return state
 
         self.context.post(update)
 
-    def offered(self, found: Result) -> Sequence[int]:
-        return ()  # they are set already
+    def offered_changes(self, result: Result) -> Sequence[int]:
+        return ()  # applied already
 
     def before_result(self, state: AppState) -> Markup:
-        asked = _controls(state, "limit_um", "percent")
+        controls = _controls(state, "limit_um", "percent")
         try:
-            return asked + self._probability(sample_machines(state), state)
+            return controls + self._probability(sample_machines(state), state)
         except WarpspaceError as error:
-            return asked + tag("p", str(error), class_="ws-problem", role="alert")
+            return controls + tag("p", str(error), class_="ws-problem", role="alert")
 
-    def options_html(self, state: AppState, above: Markup = EMPTY) -> Markup:
+    def options_html(self, state: AppState, controls: Markup = EMPTY) -> Markup:
+        controls = _controls(state, "over", "distribution", "costs")
         listed = self._rows(sample_machines(state), state) if self.is_ready(state) else EMPTY
-        return listed + super().options_html(
-            state, _controls(state, "over", "distribution", "costs")
-        )
+        return listed + super().options_html(state, controls)
 
     def _probability(self, ensemble: Ensemble, state: AppState) -> Markup:
-        wanted = state.specification
-        stream, kept = estimate(ensemble, state.tolerances, wanted.limit_um)
-        bars = stream.display_histogram()
+        specification = state.specification
+        stream, probability = estimate(ensemble, state.tolerances, specification.limit_um)
+        histogram = stream.display_histogram()
         chart = Histogram(
-            "|E| of the machines", "", "|E| [µm]", "machines", bars.edges_um,
-            bars.counts.astype(float), limit=wanted.limit_um,
+            "|E| of the machines", "", "|E| [µm]", "machines", histogram.edges_um,
+            histogram.counts.astype(float), limit=specification.limit_um,
         )  # fmt: skip
-        told = fill(
-            '<p class="ws-told"><span class="{kind}">{share} %</span> of the machines stay within'
-            " {limit} µm {where}</p>",
-            kind="ws-pass" if kept.low >= wanted.percent / 100.0 else "ws-fail",
-            share=percent(kept.probability), limit=f"{wanted.limit_um:g}", where=WHERE[wanted.over],
+        headline = fill(
+            '<p class="ws-headline"><span class="{kind}">{share} %</span> of the machines stay'
+            " within {limit} µm {where}</p>",
+            kind="ws-pass" if probability.low >= specification.percent / 100.0 else "ws-fail",
+            share=percent(probability.probability), limit=f"{specification.limit_um:g}", where=WHERE[specification.over],
         )  # fmt: skip
         numbers = (
             f"mean {number(stream.mean_um)} · P95 {number(stream.quantile(0.95))} ·"
             f" largest {number(stream.max_um)} µm; {spell_count(stream.count)} machines,"
-            f" 95 % confidence {percent(kept.low)} … {percent(kept.high)} %"
+            f" 95 % confidence {percent(probability.low)} … {percent(probability.high)} %"
         )
-        return told + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
+        return headline + histogram_html(chart) + tag("p", numbers, class_="ws-tiny")
 
     def _rows(self, ensemble: Ensemble, state: AppState) -> Markup:
         shares = tolerance_shares(ensemble, state.tolerances)
-        laid_out: Question = (Identity(state.origin), ensemble.keys)
-        if self._order[0] != laid_out:  # no row moves away under a hand
-            self._order = laid_out, tuple(sorted(shares, key=lambda key: -shares[key]))
+        order_key: ResultKey = (Identity(state.origin), ensemble.keys)
+        if self._order[0] != order_key:  # rows must not move during a drag
+            self._order = order_key, tuple(sorted(shares, key=lambda key: -shares[key]))
         longest = max(shares.values(), default=0.0) or 1.0
-        listed = join(_row(state, key, shares[key], longest) for key in self._order[1])
+        tolerance_rows = join(_row(state, key, shares[key], longest) for key in self._order[1])
+        hint = "Scale all tolerances except fixed ones"
         scales = join(
-            button(words, f"{self.name}:scale", words, hint="All but the fixed ones")
-            for words in SCALES
+            button(label, f"{self.name}:scale", label, hint=hint) for label in SCALES
         ) + button("As in the scene", f"{self.name}:reset", kind="quiet")
-        return tag("h4", "Half widths and shares of the variance") + listed + tag(
+        return tag("h4", "Half-widths and shares of the variance") + tolerance_rows + tag(
             "div", scales, class_="ws-actions", role="group", aria_label="Scale all tolerances"
         )  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "scale" and value in SCALES:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "scale" and value in SCALES:
             return edits.with_scaled_tolerances(state, self._order[1], SCALES[value])
-        if word == "reset":
+        if action == "reset":
             return edits.with_scene_tolerances(state)
-        return super().take(state, word, value)
+        return super().handle(state, action, value)
 
 
 def _controls(state: AppState, *names: str) -> Markup:
@@ -193,8 +191,8 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
         name=name, code=key, words=row.name, share=number(100.0 * share),
         length=f"{100.0 * share / longest:.1f}", unit=row.unit,
         slider=slider(name, width, span.low, span.high, span.step, twin=name,
-                      label=f"Half width of {key}", text=f"±{width:g} {row.unit}"),
-        box=text_box(name, spell_typed(width), label=f"Half width of {key} in {row.unit}",
+                      label=f"Half-width of {key}", text=f"±{width:g} {row.unit}"),
+        box=text_box(name, spell_typed(width), label=f"Half-width of {key} in {row.unit}",
                      size="short", inputmode="decimal"),
         fixed=button("fixed" if is_fixed else "fix", "state:set.specification.fixed",
                      f"{'-' if is_fixed else '+'}{key}", kind="link", pressed=is_fixed,
@@ -203,28 +201,29 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
     )  # fmt: skip
 
 
-def _sampled(state: AppState) -> Question:
-    wanted = state.specification
-    moving = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
-    return (Identity(state.scene), state.seen, wanted.over, wanted.distribution, moving)
+def _sampled(state: AppState) -> ResultKey:
+    specification = state.specification
+    positions = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
+    shape = specification.over, specification.distribution
+    return (Identity(state.scene), state.seen, *shape, positions)
 
 
 def sample_machines(state: AppState) -> Ensemble:
-    """Draw the machines that a state's tolerances are held against."""
+    """Sample machines for the tolerances of a state."""
 
     def build() -> Ensemble:
-        scene, wanted = state.resulting_scene(), state.specification
+        scene, specification = state.resulting_scene(), state.specification
         keys = loop_keys(scene.model, state.loop, scene.parameter_keys)
-        none = np.zeros(len(keys))
-        draws = Draws(keys, none, none, Distribution(wanted.distribution))
-        plan, view = SamplingPlan(SAMPLES, 0, Over(wanted.over)), scene.view(state.loop)
+        zeros = np.zeros(len(keys))
+        draws = Draws(keys, zeros, zeros, Distribution(specification.distribution))
+        plan, view = SamplingPlan(SAMPLES, 0, Over(specification.over)), scene.view(state.loop)
         return build_ensemble(Case(scene.model, draws, scene.workspace, view, plan))
 
-    return ENSEMBLES.get(_sampled(state), build, lambda found: found.size)
+    return ENSEMBLES.get(_sampled(state), build, lambda ensemble: ensemble.size)
 
 
 def allowed_words(state: AppState) -> str:
-    """Say the largest error of the machines within tolerance; nothing where there are none."""
+    """Format the largest error of machines within tolerance; empty without tolerances."""
     try:
         ensemble = sample_machines(state)
     except WarpspaceError:
@@ -234,57 +233,58 @@ def allowed_words(state: AppState) -> str:
 
 
 def _centres_and_widths(ensemble: Ensemble, tolerances: ToleranceSet) -> Array:
-    none = Tolerance(0.0, 0.0)
-    found = (tolerances.get(key) or none for key in ensemble.keys)
-    return np.array([(one.centre, one.half_width) for one in found]).reshape(-1, 2).T
+    zero = Tolerance(0.0, 0.0)
+    ranges = [tolerances.get(key) or zero for key in ensemble.keys]
+    return np.array([[t.centre for t in ranges], [t.half_width for t in ranges]])
 
 
 def estimate(
     ensemble: Ensemble, tolerances: ToleranceSet, limit_um: float
 ) -> tuple[Stream, Probability]:
-    """Work out what a tolerance set gives, and how likely the limit is kept."""
+    """Evaluate the machines of a tolerance set, and the probability of meeting the limit."""
     norm_um = ensemble.norm_um(*_centres_and_widths(ensemble, tolerances))
     stream = Stream(len(norm_um), limit_um)
     stream.add(norm_um)
-    kept = stream.probability()
-    assert kept is not None  # noqa: S101 - a limit was given
-    return stream, kept
+    probability = stream.probability()
+    assert probability is not None  # noqa: S101 - a limit was given
+    return stream, probability
 
 
 def tolerance_shares(ensemble: Ensemble, tolerances: ToleranceSet) -> dict[str, float]:
-    """Say how much each tolerance adds to the scatter of the error."""
-    _, half = _centres_and_widths(ensemble, tolerances)
-    parts = half**2 * ensemble.mean_square_gain
-    return dict(zip(ensemble.keys, (parts / (float(parts.sum()) or 1.0)).tolist(), strict=True))
+    """Compute the share of each tolerance in the variance of the error."""
+    _, half_widths = _centres_and_widths(ensemble, tolerances)
+    variances = half_widths**2 * ensemble.mean_square_gain
+    shares = variances / (float(variances.sum()) or 1.0)
+    return dict(zip(ensemble.keys, shares.tolist(), strict=True))
 
 
 # --- Concepts -------------------------------------------------------------------------------------
 
-PRESENT = "the present machine"  # the one that is steered, among those that are compared
+PRESENT = "the present machine"  # the edited one, among the compared machines
 ADD = "Compare with …"
 
 
 class ConceptsPanel(AnalysisPanel):
     """Machines side by side: chosen by title, compared as soon as there are two."""
 
-    at_once = True
+    runs_on_open = True
 
     def offers(self, state: AppState) -> dict[str, Scene]:
-        """Give the machines that can be compared, by title."""
-        found = {PRESENT: state.resulting_scene()}
-        own = {one.machine.title: one for one in library().values()}
-        for title, scene in {**own, **self.context.scenes}.items():
-            if scene not in found.values():
-                found[title] = scene
-        return found
+        """Return the machines that can be compared, by title."""
+        machines = {PRESENT: state.resulting_scene()}
+        bundled = {scene.machine.title: scene for scene in library().values()}
+        for title, scene in {**bundled, **self.context.scenes}.items():
+            if scene not in machines.values():
+                machines[title] = scene
+        return machines
 
     def chosen(self, state: AppState) -> list[str]:
-        """List the machines that are compared; tolerances are those of the first."""
+        """List the compared machines; the tolerances are those of the first."""
         text = state.forms.get(f"{self.name}.machines", PRESENT)
         return [key for key in text.split("\n") if key][:MOST_CONCEPTS]
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name != "workers"]
+        return [option for option in super().options() if option.name != "workers"]
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {"limit_um": f"{state.specification.limit_um:g}", "samples": str(SAMPLES)}
@@ -294,13 +294,13 @@ class ConceptsPanel(AnalysisPanel):
         return [offers[key] for key in self.chosen(state) if key in offers]
 
     def is_ready(self, state: AppState) -> bool:
-        return len(self.scenes(state)) > 1  # links may name machines that are not here
+        return len(self.scenes(state)) > 1  # links may name unknown machines
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        return replace(asked, workers=1)  # other threads are for who moves sliders meanwhile
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
+        return replace(analysis, workers=1)  # leaves threads to the sliders
 
-    def question(self, state: AppState) -> Question:
+    def result_key(self, state: AppState) -> ResultKey:
         return (
             Identity(state.scene.model), Identity(state.scene.workspace), state.tolerances,
             state.scene.title, tuple(self.values(state).items()),
@@ -310,52 +310,57 @@ class ConceptsPanel(AnalysisPanel):
         offers, lines = self.offers(state), list[tuple[Markup, Markup]]()
         chosen = [key for key in self.chosen(state) if key in offers]
         for letter, key in zip(ascii_uppercase, chosen, strict=False):
-            opens = button("Open", f"{self.name}:open", key, kind="link", hint="Show it here",
-                           aria_label=f"Open {key}")  # fmt: skip
-            removes = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove it",
+            open_button = button("Open", f"{self.name}:open", key, kind="link",
+                                 hint="Open this machine", aria_label=f"Open {key}")  # fmt: skip
+            remove_button = button("✕", f"{self.name}:remove", key, kind="link", hint="Remove",
                              aria_label=f"Remove {key}")  # fmt: skip
-            title, opens = (key, opens) if key != PRESENT else (state.scene.title, EMPTY)
-            lines.append((tag("b", f"{letter} ") + title, opens + removes))
-        left = {key: key for key in offers if key not in chosen}
-        add = choice(f"{self.name}:set.add", "", {"": ADD, **left},
+            if key == PRESENT:
+                title, buttons = state.scene.title, remove_button
+            else:
+                title, buttons = key, open_button + remove_button
+            lines.append((tag("b", f"{letter} ") + title, buttons))
+        remaining = {key: key for key in offers if key not in chosen}
+        add = choice(f"{self.name}:set.add", "", {"": ADD, **remaining},
                      label="Compare with another machine")  # fmt: skip
-        listed = rows(lines) if self.is_ready(state) else EMPTY
-        return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + listed
+        machines = rows(lines) if self.is_ready(state) else EMPTY
+        return (add if len(chosen) < MOST_CONCEPTS else EMPTY) + machines
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
-        """Give a picture for a review first."""
+    def actions(self, result: Result, *, stale: bool) -> Markup:
+        """Render the buttons below a result, the picture for a review first."""
         draws = self.context.services.draw_concepts is not None
         sheet = (button("Picture", f"{self.name}:sheet", kind="main", disabled=stale,
-                        hint="One sheet for a review: the machines at one scale with their numbers")
+                        hint="One sheet with all machines at the same scale, with their statistics")
                  if draws else EMPTY)  # fmt: skip
-        return sheet + super().actions(found, stale=stale)
+        return sheet + super().actions(result, stale=stale)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         chosen, offers = self.chosen(state), self.offers(state)
-        if word == "set.add" and value in offers and value not in chosen:
+        if action == "set.add" and value in offers and value not in chosen:
             chosen = [*chosen, value][:MOST_CONCEPTS]
-        elif word == "remove" and value in chosen:
+        elif action == "remove" and value in chosen:
             chosen.remove(value)
-        elif word == "open" and value in offers and value != PRESENT:
+        elif action == "open" and value in offers and value != PRESENT:
             opened = start_state(offers[value])
-            self.context.act(partial(self.context.show_opened, opened, None, whole=False))
+            self.context.call_soon(
+                partial(self.context.show_opened, opened, None, keeps_comparison=True)
+            )
             return state
-        elif word == "sheet":
+        elif action == "sheet":
             self._draw(state)
             return state
         else:
-            return super().take(state, word, value)
-        self._answer = None  # other machines are compared
+            return super().handle(state, action, value)
+        self.outcome = None  # other machines are compared
         return replace(state, forms={**state.forms, f"{self.name}.machines": "\n".join(chosen)})
 
     def _draw(self, state: AppState) -> None:
-        draw, found = self.context.services.draw_concepts, self._answer
-        if draw is None or found is None:
+        draw, outcome = self.context.services.draw_concepts, self.outcome
+        if draw is None or outcome is None:
             return
-        asked: Any = found.found
+        result: Any = outcome.result
         scenes, dark = tuple(self.scenes(state)), state.shown.dark
-        self._make(
+        self._run_job(
             "Drawing the machines",
-            lambda job: draw(scenes, asked.analysis, dark, job),
+            lambda job: draw(scenes, result.analysis, dark, job),
             partial(self.context.save_file, "concepts.png"),
         )  # fmt: skip

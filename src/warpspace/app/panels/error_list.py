@@ -1,11 +1,12 @@
-"""The column at the left: errors by their effect, the largest first; a row opens into its curve."""
+"""The error list: errors by their effect, largest first; a row opens its curve and an editor."""
 
 import unicodedata
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import lru_cache
+from typing import Generic, TypeVar
 
 import numpy as np
 from markupsafe import Markup
@@ -27,7 +28,7 @@ from warpspace.app.browser.html import (
 )
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.block_html import lines_html
-from warpspace.app.panels.panel import Context, Panel
+from warpspace.app.panels.panel import Context, Panel, Refresh
 from warpspace.app.state import edits
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.edits import amplitude_span
@@ -45,19 +46,19 @@ from warpspace.scene.model import grid_basis
 from warpspace.units import MINUS, Array, spell
 
 CHART_SAMPLES = 181
-MAX_KINKS = 500  # kinks of a curve that are drawn where they are
+MAX_KINKS = 500  # of a curve, drawn exactly
 
 
 def kind_titles() -> list[str]:
-    """List what the kinds of curve are called that people can write, simplest first."""
+    """List the titles of the kinds of curve that can be edited, simplest first."""
     return [kind.title for kind in curve_kinds() if kind.edited_as_rows]
 
 
 def spell_rows(function: ErrorFunction) -> str:
-    """Write the numbers of a function as the rows that `read_curve` reads.
+    """Format the numbers of a function as the rows that `read_curve` reads.
 
-    A measured table with more rows than may be edited is thinned out; of a kind that cannot be
-    written as rows it is said where it comes from.
+    A table with more rows than can be edited is thinned out; kinds that have no rows return their
+    description.
     """
     if not function.edited_as_rows:
         return function.row_words
@@ -70,9 +71,9 @@ def spell_rows(function: ErrorFunction) -> str:
 def read_curve(
     kind: CurveKind, text: str, span: tuple[float, float]
 ) -> tuple[ErrorFunction, tuple[str, ...]]:
-    """Read the rows that a user has edited, or pasted from a spreadsheet.
+    """Read rows that a user has edited, or pasted from a spreadsheet.
 
-    Gives with the curve what was left out or put in order, a sentence each.
+    Returns the curve and remarks on ignored or reordered rows, a sentence each.
     """
     if len(text) > MAX_CURVE_TEXT:
         raise OptionError(f"{len(text):,} characters; expected at most {MAX_CURVE_TEXT:,}")
@@ -88,7 +89,7 @@ def read_curve(
 def _read(
     kind: CurveKind, text: str, span: tuple[float, float]
 ) -> tuple[ErrorFunction, tuple[str, ...]]:
-    rows, left_out = read_rows(text)
+    rows, ignored = read_rows(text)
     if not rows:
         raise OptionError(f"no numbers; expected {kind.row_words}")
     ordered, tidied = kind.tidied(rows)
@@ -96,7 +97,7 @@ def _read(
     peak = function.amplitude
     if not abs(peak) <= MAX_ERROR:
         raise OptionError(f"the curve reaches {peak:.3g}; expected at most ±{MAX_ERROR:g}")
-    return function, (*left_out, *tidied)
+    return function, (*ignored, *tidied)
 
 
 def sample_curve(function: ErrorFunction, span: tuple[float, float]) -> tuple[Array, Array]:
@@ -107,93 +108,106 @@ def sample_curve(function: ErrorFunction, span: tuple[float, float]) -> tuple[Ar
 
 # --- The row of an error --------------------------------------------------------------------------
 
-FEW_READINGS = 400  # that are drawn at most, evenly picked from all
+MOST_READINGS = 400  # drawn, evenly spaced
 TYPING = (
-    "Blanks, tabs or semicolons between numbers; decimal point or comma. Cells of a spreadsheet can"
-    " be pasted, a CSV file dropped here."
+    "Separate numbers by blanks, tabs or semicolons; use a decimal point or comma. Cells of a"
+    " spreadsheet can be pasted, CSV files dropped here."
 )
 
 
-Said = tuple[str, str, bool]
-"""The rows as typed or read, what is said of them, and whether that is a problem."""
+@dataclass(frozen=True, slots=True)
+class CurveEditFeedback:
+    """Feedback on an edited curve."""
+
+    text: str  # rows as typed or read
+    message: str
+    is_problem: bool
 
 
-def curve_html(state: AppState, key: str, said: Said | None) -> Markup:
-    """Give chart, origin and editor of an error."""
+def curve_html(state: AppState, key: str, feedback: CurveEditFeedback | None) -> Markup:
+    """Render chart, origin and editor of an error."""
     row, function = parameter(key), state.curve(key)
     only, excluded = key in state.exclusions.only, key in state.exclusions.excluded
-    own, edited = origin_words(state, key)
-    back = button("Undo the edit", f"errors:own.{key}", kind="link",
-                  hint="Value and curve of the scene")  # fmt: skip
+    origin, is_edited = origin_words(state, key)
+    reset = EMPTY
+    if is_edited:
+        reset = button("Reset to the scene", f"errors:own.{key}", kind="link",
+                       hint="Restore value and curve of the scene")  # fmt: skip
+    feedback = feedback or CurveEditFeedback(spell_rows(function), "", is_problem=False)
     return tag("div", join((
         _chart(state, row, function),
-        rows([("Origin", own + (back if edited else EMPTY))], "ws-origin"),
-        _editor(row, function, said or (spell_rows(function), "", False)),
+        rows([("Origin", origin + reset)], "ws-origin"),
+        _editor(row, function, feedback),
         tag("div", join((
             button("Only this error", "state:set.exclusions.only", f"{'-' if only else '+'}{key}",
-                   pressed=only, hint="Draw the machine with the errors chosen so, and no other"),
+                   pressed=only, hint="Evaluate the machine with the errors selected here only"),
             button("Exclude", "state:set.exclusions.excluded", f"{'-' if excluded else '+'}{key}",
-                   pressed=excluded, hint="Draw the machine without this error; its value is kept"),
+                   pressed=excluded, hint="Evaluate the machine without this error"),
         )), class_="ws-actions"),
     )), class_="ws-error-more", data_key=f"more-{key}")  # fmt: skip
 
 
-def _editor(row: Parameter, function: ErrorFunction, told: Said) -> Markup:
-    name, kind, words = f"errors:rows.{row.key}", f"errors:kind.{row.key}", function.row_words
+def _editor(row: Parameter, function: ErrorFunction, feedback: CurveEditFeedback) -> Markup:
+    name, kind, columns = f"errors:rows.{row.key}", f"errors:kind.{row.key}", function.row_words
     titles = [Constant.title] if row.is_constant else kind_titles()
-    titles += [] if function.edited_as_rows else [function.title]
+    if not function.edited_as_rows:
+        titles.append(function.title)
     fields = field("Curve", choice(kind, function.title, {title: title for title in titles}), kind)
     if not function.edited_as_rows:
-        return fields + tag("p", words[0].upper() + words[1:] + ".", class_="ws-tiny")
-    text, said, wrong = told
+        return fields + tag("p", columns[0].upper() + columns[1:] + ".", class_="ws-tiny")
+    text, is_problem, message = feedback.text, feedback.is_problem, EMPTY
+    if feedback.message:
+        message = tag("p", feedback.message, class_="ws-problem" if is_problem else "ws-quiet",
+                      role="alert" if is_problem else "status")  # fmt: skip
     return fields + fill(
         '<textarea id="{id}" class="ws-box ws-rows-box" data-set="{name}" rows="{count}"'
-        ' spellcheck="false" aria-label="{label}" aria-invalid="{wrong}" title="{hint}">'
-        '\n{text}</textarea><p class="ws-tiny">{words}</p>{said}',
+        ' spellcheck="false" aria-label="{label}" aria-invalid="{invalid}" title="{hint}">'
+        '\n{text}</textarea><p class="ws-tiny">{columns}</p>{message}',
         id=ident(name), name=name, count=min(max(text.count("\n") + 1, 2), 8), text=text,
-        label=f"Numbers of {row.key}: {words}", hint=TYPING, wrong=str(wrong).lower(),
-        words=f"{words}, in {row.unit}",
-        said=tag("p", said, class_="ws-problem" if wrong else "ws-quiet",
-                 role="alert" if wrong else "status") if said else EMPTY,
+        label=f"Numbers of {row.key}: {columns}", hint=TYPING, invalid=str(is_problem).lower(),
+        columns=f"{columns}, in {row.unit}", message=message,
     )  # fmt: skip
 
 
-def edit_curve(state: AppState, what: str, key: str, value: str) -> tuple[AppState, Said | None]:
-    """Change kind or numbers of a curve, or go back to the scene's; say what there is to say."""
-    span, present = state.axis_span(key), state.curve(key)
-    said: Said | None = None
+def edit_curve(
+    state: AppState, command: str, key: str, value: str
+) -> tuple[AppState, CurveEditFeedback | None]:
+    """Edit kind or rows of a curve, or reset it to the scene; return the feedback."""
+    span, present, feedback = state.axis_span(key), state.curve(key), None
     try:
-        if what == "rows":
+        if command == "rows":
             function, remarks = read_curve(type(present), value, span)
-            said = (spell_rows(function), " ".join(remarks), False) if remarks else None
-        elif what == "kind":
+            if remarks:
+                message = " ".join(remarks)
+                feedback = CurveEditFeedback(spell_rows(function), message, is_problem=False)
+        elif command == "kind":
             kind = curve_kind(value)
             function = present if type(present) is kind else kind.from_curve(present, span)
         else:
             function = state.own_curves.get(key) or Constant(span)
     except (OptionError, UnknownNameError) as error:
-        return state, (value if what == "rows" else spell_rows(present), str(error), True)
-    return edits.with_curve(state, key, function), said
+        text = value if command == "rows" else spell_rows(present)
+        return state, CurveEditFeedback(text, str(error), is_problem=True)
+    return edits.with_curve(state, key, function), feedback
 
 
 def origin_words(state: AppState, key: str) -> tuple[str, bool]:
-    scene = state.origin
-    own = state.own_curves.get(key)
+    """Describe the origin of an error; return also if it is edited."""
+    scene, scene_curve = state.origin, state.own_curves.get(key)
     uncertainty, measurement = scene.uncertainty.get(key), scene.measured.get(key)
-    if own is None:
-        words = "zero, not given in the scene"
+    if scene_curve is None:
+        text = "zero, not specified in the scene"
     elif measurement is not None:
         runs = len(measurement.runs)
-        words = f"measured: {measurement.count} readings in {runs} runs, file {scene.name}"
+        text = f"measured: {measurement.count} readings in {runs} runs, file {scene.name}"
     elif uncertainty is not None:
-        words = f"fitted to measurements, file {scene.name}"
+        text = f"fitted to measurements, file {scene.name}"
     else:
-        words = "assumed: given without readings"
+        text = "assumed: specified without readings"
     if uncertainty is not None:
-        words += f"; u = {spell(abs(uncertainty.amplitude))} {parameter(key).unit} (k = 1)"
-    before = own or Constant(state.axis_span(key))
-    edited = state.curve(key) != before
-    return (f"edited; before: {words} " if edited else words), edited
+        text += f"; u = {spell(abs(uncertainty.amplitude))} {parameter(key).unit} (k = 1)"
+    is_edited = state.curve(key) != (scene_curve or Constant(state.axis_span(key)))
+    return (f"edited; before: {text} " if is_edited else text), is_edited
 
 
 def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Markup:
@@ -208,15 +222,18 @@ def _chart(state: AppState, row: Parameter, function: ErrorFunction) -> Markup:
             for (name, line), style in zip(ends, styles, strict=True)
         ]
     bands = []
-    if (uncertainty := state.scene.uncertainty.get(row.key)) is not None:
+    uncertainty = state.scene.uncertainty.get(row.key)
+    measured = state.scene.measured.get(row.key)
+    if uncertainty is not None:
         half = uncertainty.evaluate(at)
         bands = [Band("standard uncertainty", at, value - half, value + half)]
-    if (measured := state.scene.measured.get(row.key)) is not None:
-        for way, points in measured.scatter.items():
-            few = points[:: -(-len(points) // FEW_READINGS)]
-            few = few[np.argsort(few[:, 0], kind="stable")]
-            name = "readings backward" if way == BACKWARD else "readings"
-            curves.append(Curve(name, few[:, 0], few[:, 1], 1 + (way == BACKWARD), "dots"))
+    if measured is not None:
+        for direction, points in measured.scatter.items():
+            drawn = points[:: -(-len(points) // MOST_READINGS)]
+            drawn = drawn[np.argsort(drawn[:, 0], kind="stable")]
+            is_backward = direction == BACKWARD
+            name = "readings backward" if is_backward else "readings"
+            curves.append(Curve(name, drawn[:, 0], drawn[:, 1], 1 + is_backward, "dots"))
     title = describe_curve(f"{row.key}, {row.name}", row.unit, unit, at, value)
     chart = Lines("lines", title, f"{row.axis} [{unit}]", f"{row.key} [{row.unit}]",
                   tuple(curves), tuple(bands))  # fmt: skip
@@ -228,162 +245,181 @@ def _finite(values: Array) -> Array:
 
 
 def describe_curve(name: str, unit: str, along: str, at: Array, value: Array) -> str:
-    """Say what the curve of an error shows, for those who do not see it."""
+    """Describe the curve of an error for screen readers."""
     if np.ptp(value) == 0.0:
         return f"{name}: {spell(float(value[0]))} {unit} everywhere"
     ends = (0, len(at) - 1)
     places = {"starts with": ends[0], "ends with": ends[1], "least": int(np.argmin(value)),
               "greatest": int(np.argmax(value))}  # fmt: skip
-    said = [
+    extremes = [
         f"{word} {spell(float(value[place]))} {unit} at {spell(float(at[place]))} {along}"
         for word, place in places.items()
         if word.endswith("with") or place not in ends
     ]
-    return f"{name}: " + ", ".join(said)
+    return f"{name}: " + ", ".join(extremes)
 
 
 LONGEST_QUERY = 80
 FOLDED = "zero"  # section of the errors that are zero
-OF_ALL = {
-    "reset": ("Reset to the scene", "Values and curves of the scene"),
-    "zero": ("Set all to zero", "The nominal machine"),
-    "include": ("Include all", "End every “only” and “exclude”"),
+ALL_ERRORS = {
+    "reset": ("Reset to the scene", "Restore values and curves of the scene"),
+    "zero": ("Set all to zero", "Nominal machine"),
+    "include": ("Include all", "Cancel all “Only this error” and “Exclude”"),
 }
-"""What can be done with all errors: words and hint by event of the page."""
+"""Commands for all errors: label and hint, by action of the page."""
+T = TypeVar("T")
+
+
+class Memo(Generic[T]):
+    """The last value computed from an input."""
+
+    def __init__(self) -> None:
+        self._memory: tuple[object, T] | None = None
+
+    def get(self, inputs: object, compute: Callable[[], T]) -> T:
+        if self._memory is None or self._memory[0] != inputs:
+            self._memory = inputs, compute()
+        return self._memory[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Ranking:
+    """Order, bar scale and slider ranges of the rows; they are constant during a drag."""
+
+    inputs: tuple[object, ...]
+    gains: Mapping[str, float]
+    amplitudes: Mapping[str, float]
+    order: tuple[str, ...]
+    used: tuple[str, ...]
+    largest: float  # effect of the longest bar, µm
+    spans: dict[str, Span]
 
 
 class ErrorsPanel(Panel):
-    """Search, rows by effect, and those that are zero folded away.
+    """Search box, rows by effect, and a folded section of errors that are zero.
 
-    Order, scale of the bars and ranges of the sliders stay until the hand has left the column
-    (`sort`, sent by the page), or something else has changed the errors: nothing slips away from
-    under the pointer.
+    The ranking is renewed when focus and pointer leave the list (`sort`, sent by the page), or when
+    errors are changed elsewhere, so that no row moves away from the pointer.
     """
 
     name = "errors"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._said: Mapping[str, Said | None] = {}  # of the rows of curves
-        self._gains: Mapping[str, float] = {}
-        self._gains_for: tuple[object, ...] = ()
-        self._sorted_for: tuple[object, ...] = ()
-        self._sorted_at: Mapping[str, float] = {}  # amplitudes when the rows were last sorted
-        self._own: set[str] = set()  # errors that this column has changed since then
-        self._order: tuple[str, ...] = ()
-        self._used: tuple[str, ...] = ()
-        self._largest = 1.0
-        self._spans: dict[str, Span] = {}
-        self._listed: object = None  # what the list was written for
-        self._made: Mapping[str, float] = {}  # amplitudes that the rows were written with
-        self._made_for: tuple[object, ...] = ()
+        self._feedback: Mapping[str, CurveEditFeedback | None] = {}
+        self._edited: set[str] = set()  # errors changed in this list since the last ranking
+        self._ranking: Ranking | None = None
+        self._gains, self._list = Memo[Mapping[str, float]](), Memo[str]()
+        self._rows = Memo[dict[str, tuple[float, str]]]()  # HTML of a value, by key
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
-        made_for = (Identity(state.scene), state.seen, tuple(state.positions.items()))
-        if made_for != self._gains_for:
-            self._gains, self._gains_for = _gains(picture, state), made_for
-            self._sorted_for = self._sorted_for if self._own else ()
-        sorted_for = (Identity(state.origin), tuple(state.amplitudes), *made_for[1:])
-        before = self._sorted_at
-        changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}
-        if sorted_for != self._sorted_for or changed - self._own:
-            self._sort(state)
-            self._sorted_for, self._sorted_at, self._own = sorted_for, state.amplitudes, set()
-        listed = (self._order, self._used, state.page, state.exclusions, bool(state.changed_keys))
-        found = {} if listed == self._listed else self._list(state)
-        self._listed = listed
-        return {**found, **self._rows(state)}
+        inputs = (Identity(state.scene), state.seen, tuple(state.positions.items()))
+        gains = self._gains.get(inputs, lambda: _gains(picture, state))
+        ranking = self._rank(state, gains)
+        listed = (ranking.order, ranking.used, bool(state.changed_keys))
+        inputs = (*listed, state.page, state.exclusions)
+        errors = self._list.get(inputs, lambda: _list_html(state, ranking))
+        return {"errors": errors, **self._render_rows(state, ranking, gains)}
 
-    def _effect(self, state: AppState, key: str) -> float:
-        return self._gains.get(key, 0.0) * abs(state.amplitudes[key])
+    def _rank(self, state: AppState, gains: Mapping[str, float]) -> Ranking:
+        """Return the present ranking, or a new one if it is out of date."""
+        ranking, positions = self._ranking, tuple(state.positions.items())
+        inputs = (Identity(state.origin), tuple(state.amplitudes), state.seen, positions)
+        if ranking is not None and ranking.inputs == inputs:
+            before = ranking.amplitudes
+            changed = {key for key, value in state.amplitudes.items() if value != before.get(key)}
+            if changed <= self._edited and (self._edited or ranking.gains is gains):
+                return ranking
+        effects = {key: gains.get(key, 0.0) * abs(at) for key, at in state.amplitudes.items()}
+        order = tuple(sorted(effects, key=lambda key: -effects[key]))
+        largest, used = max(effects.values(), default=0.0) or 1.0, used_keys(state)
+        self._edited = set()
+        ranking = Ranking(inputs, gains, state.amplitudes, order, used, largest, _spans(state))
+        self._ranking = ranking
+        return ranking
 
-    def _sort(self, state: AppState) -> None:
-        effects = {key: self._effect(state, key) for key in state.amplitudes}
-        self._order = tuple(sorted(effects, key=lambda key: -effects[key]))
-        self._used = used_keys(state)
-        self._largest = max(effects.values(), default=0.0) or 1.0
-        self._spans = _spans(state)
-
-    def _list(self, state: AppState) -> dict[str, str]:
-        query, used = state.page.query, self._used
-        found = find_parameters(query, self._order) if query.strip() else used
-        listed = [key for key in self._order if key in found]
-        zero = [] if query.strip() else [key for key in self._order if key not in found]
-        opened = FOLDED in state.page.open or not listed
-        places = _places(listed, state.page.row)
-        if query.strip() and not listed:
-            places = tag("p", "No error goes by this name.", class_="ws-quiet")
-        elif zero:
-            words = tag("div", f"{len(zero)} errors are zero",
-                        data_do="page:fold", data_value=FOLDED, id="ws-error-zero")  # fmt: skip
-            places += tag(
-                "div", words, class_="ws-zero", role="treeitem", aria_labelledby="ws-error-zero",
-                tabindex=-1 if listed else 0, aria_expanded=str(opened).lower(),
-            )  # fmt: skip
-            places += _places(zero, state.page.row) if opened else EMPTY
-        if listed or zero:  # for the keyboard: arrows go along it, Enter unfolds
-            places = tag("div", places, role="tree", aria_label="Errors by effect")
-        left_out: tuple[object, ...] = ()
-        if state.exclusions:
-            count = sum(not state.exclusions.active(key) for key in used)
-            left_out = (f"{count} of {len(used)} errors left out. ",
-                        button("Include all", "page:include", kind="link"))  # fmt: skip
-        find = text_box(
-            "errors:find", query, placeholder="Find an error  /", live=True, label="Find an error",
-            id="ws-find",
-        )  # fmt: skip
-        menu = tag("details", tag("summary", "⋯", aria_label="All errors", title="All errors")
-                   + tag("div", join(button(words, f"page:{word}", kind="quiet", hint=hint)
-                                     for word, (words, hint) in OF_ALL.items())),
-                   class_="ws-menu")  # fmt: skip
-        touched = state.exclusions or state.changed_keys or FOLDED in state.page.open
-        head = tag("div", find + (menu if touched else ""), class_="ws-find")
-        body = tag("div", places, class_="ws-errors", data_leave="errors:sort")
-        return {"errors": head + tag("p", join(left_out), class_="ws-quiet") + body}
-
-    def _rows(self, state: AppState) -> dict[str, str]:
-        pieces: dict[str, str] = {}
-        made_for = (Identity(state.scene), self._gains_for, Identity(self._spans), state.exclusions,
-                    state.page.row, Identity(self._said))  # fmt: skip
-        made = self._made if made_for == self._made_for else {}
-        self._made, self._made_for = state.amplitudes, made_for
-        for key in self._order:
-            value, span = state.amplitudes[key], self._spans[key]
-            if value == made.get(key):
+    def _render_rows(
+        self, state: AppState, ranking: Ranking, gains: Mapping[str, float]
+    ) -> dict[str, str]:
+        inputs = (Identity(state.scene), Identity(ranking), Identity(gains), state.exclusions,
+                  state.page.row, Identity(self._feedback))  # fmt: skip
+        rows_html = self._rows.get(inputs, dict[str, tuple[float, str]])
+        for key in ranking.order:
+            value, span = state.amplitudes[key], ranking.spans[key]
+            if key in rows_html and rows_html[key][0] == value:
                 continue
             if abs(value) > span.high:  # typed
-                span = self._spans[key] = amplitude_span(key, value, None)
-            effect, row = self._effect(state, key), parameter(key)
-            share, active = min(effect / self._largest, 1.0), state.exclusions.active(key)
-            hint = state.curve(key).slider_words(row.axis)
-            html = _row(row, value, span, effect, share, hint, active=active)
-            opened = key == state.page.row
-            curve = curve_html(state, key, self._said.get(key)) if opened else EMPTY
-            pieces[f"error.{key}"] = html + curve
-        return pieces
+                span = ranking.spans[key] = amplitude_span(key, value, None)
+            effect, row = gains.get(key, 0.0) * abs(value), parameter(key)
+            share, active = min(effect / ranking.largest, 1.0), state.exclusions.active(key)
+            html = _row(row, value, span, effect if active else None, share,
+                        state.curve(key).slider_words(row.axis))  # fmt: skip
+            if key == state.page.row:
+                html += curve_html(state, key, self._feedback.get(key))
+            rows_html[key] = value, html
+        return {f"error.{key}": rows_html[key][1] for key in ranking.order}
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        what, _, key = word.partition(".")
-        if what in ("set", "kind", "rows", "own") and key in state.amplitudes:
-            self._own.add(key)
-            if what == "set":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        command, _, key = action.partition(".")
+        if command in ("set", "kind", "rows", "own") and key in state.amplitudes:
+            self._edited.add(key)
+            if command == "set":
                 return put(state, f"amplitudes.{key}", value)
-            state, said = edit_curve(state, what, key, value)
-            self._said = {**self._said, key: said}
-            self.context.act(self.renew)  # also where it is refused
+            state, feedback = edit_curve(state, command, key, value)
+            self._feedback = {**self._feedback, key: feedback}
+            self.context.call_soon(self.rerender)  # also if the edit is refused
             return state
-        if what in ("sort", "find"):
-            self._sorted_for = ()
-        if what == "sort":
-            self.context.act(self.renew)
-        if what == "find":
+        if command in ("sort", "find"):
+            self._ranking = None
+        if command == "sort":
+            self.context.call_soon(self.rerender)
+        if command == "find":
             return replace(state, page=replace(state.page, query=value[:LONGEST_QUERY]))
-        if what == "row":
+        if command == "row":
             row = value if value in state.amplitudes and value != state.page.row else ""
             return replace(state, page=replace(state.page, row=row))
         return state
+
+
+def _list_html(state: AppState, ranking: Ranking) -> str:
+    query, used = state.page.query, ranking.used
+    matches = find_parameters(query, ranking.order) if query.strip() else used
+    listed = [key for key in ranking.order if key in matches]
+    zero = [] if query.strip() else [key for key in ranking.order if key not in matches]
+    is_open = FOLDED in state.page.open or not listed
+    places = _places(listed, state.page.row)
+    if query.strip() and not listed:
+        places = tag("p", "No matching errors.", class_="ws-quiet")
+    elif zero:
+        title = tag("div", f"{len(zero)} errors are zero",
+                    data_do="page:fold", data_value=FOLDED, id="ws-error-zero")  # fmt: skip
+        places += tag(
+            "div", title, class_="ws-zero", role="treeitem", aria_labelledby="ws-error-zero",
+            tabindex=-1 if listed else 0, aria_expanded=str(is_open).lower(),
+        )  # fmt: skip
+        places += _places(zero, state.page.row) if is_open else EMPTY
+    if listed or zero:  # keyboard: arrows move along the list, Enter opens a row
+        places = tag("div", places, role="tree", aria_label="Errors by effect")
+    excluded: tuple[object, ...] = ()
+    if state.exclusions:
+        count = sum(not state.exclusions.active(key) for key in used)
+        excluded = (f"{count} of {len(used)} errors excluded. ",
+                    button("Include all", "page:include", kind="link"))  # fmt: skip
+    find = text_box(
+        "errors:find", query, placeholder="Find an error  /", live=True, label="Find an error",
+        id="ws-find",
+    )  # fmt: skip
+    menu = EMPTY
+    if state.exclusions or state.changed_keys or FOLDED in state.page.open:
+        buttons = join(button(label, f"page:{action}", kind="quiet", hint=hint)
+                       for action, (label, hint) in ALL_ERRORS.items())  # fmt: skip
+        summary = tag("summary", "⋯", aria_label="All errors", title="All errors")
+        menu = tag("details", summary + tag("div", buttons), class_="ws-menu")
+    head = tag("div", find + menu, class_="ws-find")
+    body = tag("div", places, class_="ws-errors", data_leave="errors:sort")
+    return head + tag("p", join(excluded), class_="ws-quiet") + body
 
 
 def _places(keys: list[str], row: str) -> Markup:
@@ -397,47 +433,35 @@ def _places(keys: list[str], row: str) -> Markup:
 
 
 def _row(
-    row: Parameter, value: float, span: Span, effect: float, share: float, hint: str, *,
-    active: bool,
-) -> Markup:  # fmt: skip
-    html = _row_template(row, span, hint, active).format(
-        effect=number(effect) if active else "–", share=f"{100.0 * share:.1f}",
-        value=f"{value:.10g}", typed=spell_typed(value), text=_shown(value),
-    )  # fmt: skip
-    return Markup(html)  # noqa: S704 - escaped there
-
-
-@lru_cache(maxsize=128)
-def _row_template(row: Parameter, span: Span, hint: str, active: bool) -> str:
-    key, name, text = row.key, f"errors:set.{row.key}", Markup("{text}")
-    hint = f"{row.name}: {hint}. Drag, or type a number.".replace("{", "{{").replace("}", "}}")
-    head = fill(
+    row: Parameter, value: float, span: Span, effect: float | None, share: float, hint: str
+) -> Markup:
+    """Render the row of an error; an excluded one has no effect."""
+    key, name, text = row.key, f"errors:set.{row.key}", _short(value)
+    return fill(
         '<div class="{kind}" id="ws-error-{key}" data-do="errors:row" data-value="{key}"'
-        ' title="{symbol}, {words}: {of}"><span>{effect} µm</span><b>{key}</b> {words}</div>',
-        kind="ws-error-head" if active else "ws-error-head off", key=key, symbol=row.symbol,
-        of=row.kind.value, words=row.name, effect=Markup("{effect}"),
-    )  # fmt: skip
-    body = fill(
+        ' title="{symbol}, {title}: {quantity}"><span>{effect} µm</span><b>{key}</b> {title}</div>'
         '<div class="ws-effect"><i style="width:{share}%"></i></div>'
         '<div class="ws-error-set" title="{hint}">{slider}'
         '<span class="ws-edit" id="ws-box-{key}" data-box="{name}" data-text="{typed}"'
         ' data-label="{key} in {unit}">{text}</span><span class="ws-unit">{unit}</span></div>',
-        share=Markup("{share}"), key=key, name=name, typed=Markup("{typed}"), text=text, hint=hint,
-        slider=slider(name, "{value}", span.low, span.high, span.step, twin=f"box-{key}",
+        kind="ws-error-head off" if effect is None else "ws-error-head", key=key, name=name,
+        symbol=row.symbol, quantity=row.kind.value, title=row.name, unit=row.unit,
+        effect="–" if effect is None else number(effect), share=f"{100.0 * share:.1f}",
+        typed=spell_typed(value), text=text,
+        hint=f"{row.name}: {hint}. Drag, or type a number.",
+        slider=slider(name, value, span.low, span.high, span.step, twin=f"box-{key}",
                       label=f"{key} {row.name}", text=f"{text} {row.unit}"),
-        unit=row.unit,
     )  # fmt: skip
-    return f"{head}{body}"
 
 
-def _shown(value: float) -> str:
-    """Spell a value as a row has room for: four digits, and all before the point."""
+def _short(value: float) -> str:
+    """Format a value for a row: four digits, and all before the point."""
     short = float(f"{value:.4g}") if abs(value) < 1000.0 else round(value, 1)
     return spell_typed(short).replace("-", MINUS)
 
 
 def _spans(state: AppState) -> dict[str, Span]:
-    """Give the ranges of sliders: one for all errors of a kind, wider where a value needs it."""
+    """Compute the ranges of sliders: one for all errors of a kind, wider for large values."""
     scene = state.origin
     kinds: dict[ErrorKind, list[Span]] = defaultdict(list)
     for key, start in state.start.items():
@@ -447,15 +471,14 @@ def _spans(state: AppState) -> dict[str, Span]:
 
 
 def _gains(picture: LivePicture, state: AppState) -> dict[str, float]:
-    """Give the RMS effect in the volume of a unit of each error alone, µm."""
+    """Compute the RMS effect of a unit of each error over the volume, µm."""
     basis = grid_basis(state.scene, picture.grid, picture.view)
     squares = np.sum(basis.position**2, axis=-1).reshape(len(basis.keys), -1)
     rms = np.sqrt(squares @ picture.grid.weights.reshape(-1))
     return dict(zip(basis.keys, rms.tolist(), strict=True))
 
 
-# --- Finding error parameters by what people call them --------------------------------------------
-# Key, symbol, plain name, axis, kind.
+# --- Search of error parameters by key, symbol, name, axis and kind -------------------------------
 
 _GREEK = {"δ": "delta", "ε": "epsilon", "α": "alpha", "β": "beta", "γ": "gamma"}
 _FILLER = frozenset({"of", "the", "to", "in", "about", "axis", "error", "errors"})
@@ -463,21 +486,21 @@ _NEAR = 0.75
 
 
 def find_parameters(query: str, keys: Sequence[str]) -> tuple[str, ...]:
-    words = fold(query[:LONGEST_QUERY]).split()
-    tokens = [word for word in words if word not in _FILLER] or words
+    parts = fold(query[:LONGEST_QUERY]).split()
+    tokens = [part for part in parts if part not in _FILLER] or parts
     if not tokens:
         return tuple(keys)
     rows = [parameter(key) for key in keys]
     exact = tuple(row.key for row in rows if all(_fits(token, row) for token in tokens))
     if exact:
         return exact
-    known = list({word for row in rows for word in _words(row) if len(word) > 2})
-    meant = [get_close_matches(token, known, n=1, cutoff=_NEAR) or [token] for token in tokens]
-    return tuple(row.key for row in rows if all(_fits(token, row) for (token,) in meant))
+    terms = list({term for row in rows for term in _terms(row) if len(term) > 2})
+    tokens = [(get_close_matches(t, terms, n=1, cutoff=_NEAR) or [t])[0] for t in tokens]
+    return tuple(row.key for row in rows if all(_fits(token, row) for token in tokens))
 
 
 def fold(text: str) -> str:
-    """Fold case, accents and spelling of Greek letters away; punctuation becomes blanks."""
+    """Normalise case, accents and Greek letters; punctuation becomes blanks."""
     plain = unicodedata.normalize("NFKD", text).casefold()
     for letter, name in _GREEK.items():
         plain = plain.replace(letter, f" {name} ")
@@ -485,23 +508,22 @@ def fold(text: str) -> str:
 
 
 @lru_cache(maxsize=256)
-def _words(row: Parameter) -> tuple[str, ...]:
+def _terms(row: Parameter) -> tuple[str, ...]:
     symbol = fold(row.symbol)
-    said = fold(f"{row.key} {row.name} {row.kind.value} {row.axis} {row.unit}")
-    return (*said.split(), *symbol.split(), symbol.replace(" ", ""))
+    names = fold(f"{row.key} {row.name} {row.kind.value} {row.axis} {row.unit}")
+    return (*names.split(), *symbol.split(), symbol.replace(" ", ""))
 
 
 def _fits(token: str, row: Parameter) -> bool:
-    """Tell whether a word fits a parameter: a single letter its axis, a longer one any beginning.
+    """Check if a token matches a parameter: a single letter its axis, a longer one a prefix.
 
-    A key fits from its second letter as well, so that "c0y" finds EC0Y.
+    A key matches anywhere, so that "c0y" finds EC0Y.
     """
-    words = _words(row)
     if len(token) == 1:
         return token == row.axis.casefold() or token in fold(row.name).split()
-    return any(word.startswith(token) for word in words) or token in row.key.casefold()
+    return any(term.startswith(token) for term in _terms(row)) or token in row.key.casefold()
 
 
 def used_keys(state: AppState) -> tuple[str, ...]:
-    """Give the errors that are not zero now, or were not when the scene was opened."""
+    """List the errors that are not zero now, or were not in the scene."""
     return tuple(key for key, value in state.amplitudes.items() if value or state.start[key])

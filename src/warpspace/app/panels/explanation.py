@@ -1,4 +1,4 @@
-"""Why a point is off, and the volume in numbers."""
+"""Contributions to the error of a point, distances between points, and volume statistics."""
 
 from dataclasses import replace
 
@@ -49,202 +49,210 @@ from warpspace.picture.formatting import (
 from warpspace.scene.model import evaluate_grid
 from warpspace.units import spell_count
 
-FIRST = 3  # contributions in sight at once; all of them stand under Details
-DIFFERENCE = "B − A is a difference: show A or B to see what the error of a point consists of."
+FIRST = 3  # contributions listed at first; Details lists all
+DIFFERENCE = "Contributions are not available for the difference B − A: show A or B."
 ELSEWHERE = (
-    "The largest contribution here may compensate others elsewhere: it is not always the one to"
-    " adjust."
+    "The largest contribution at this point may compensate others elsewhere in the volume; it is"
+    " not necessarily the error to adjust."
 )
 
 
 class WorstPanel(Section):
-    """The error of the worst point, or of the one that was asked about, taken apart."""
+    """The contributions to the error at the worst point, or at a selected one."""
 
     name, task, title = "worst", "understand", "Worst point"
-    sentence = "What the largest error of the volume is made of"
-    _found: tuple[LivePicture, PointExplanation] | None = None
+    sentence = "Contributions to the largest error of the volume"
+    _explanation: tuple[LivePicture, PointExplanation] | None = None
 
     def heading(self, picture: LivePicture) -> str:
         if picture.is_difference:
             return self.title
         kind = self.title if picture.state.picked is None else "This point"
-        found = self._answer(picture)
-        return f"{kind}: why {number(found.length_um)}{length_words(found.uncertainty)} µm"
+        explanation = self._explain(picture)
+        return f"{kind}: {number(explanation.length_um)}{length_words(explanation.uncertainty)} µm"
 
     def body(self, picture: LivePicture) -> Markup:
         if picture.is_difference:
             return tag("p", DIFFERENCE, class_="ws-quiet")
-        found, asked = self._answer(picture), EMPTY
+        explanation, controls = self._explain(picture), EMPTY
         if picture.state.picked is not None:
-            back = button("Worst point", "worst:forget", kind="link",
-                          hint="Back to the worst point")  # fmt: skip
-            pin = button("Pin a note", "notes:pin", kind="link", hint="Pin a note here (N)")
-            asked = tag("p", join((_axes(found), " ", back, " ", pin)))
+            reset = button("Worst point", "worst:forget", kind="link",
+                          hint="Return to the worst point")  # fmt: skip
+            hint = "Pin a note to this point (N)"
+            pin = button("Pin a note", "notes:pin", kind="link", hint=hint)
+            controls = tag("p", join((_axes(explanation), " ", reset, " ", pin)))
         best = tag("div", "", data_piece="best")
         limit = picture.state.specification.limit_um
-        details = tag("summary", "Details") + _details(found, picture.state.lever)
+        details = tag("summary", "Details") + _details(explanation, picture.state.lever)
         details = tag("details", details, class_="ws-details", data_key="worst.details")
-        return asked + _contributions(found) + _uncertainty(found, limit) + best + details
+        return join((
+            controls, _contributions(explanation), _uncertainty(explanation, limit), best, details,
+        ))  # fmt: skip
 
-    def _answer(self, picture: LivePicture) -> PointExplanation:
-        if self._found is None or self._found[0] is not picture:
+    def _explain(self, picture: LivePicture) -> PointExplanation:
+        if self._explanation is None or self._explanation[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
-            self._found = picture, answer(picture.drawn_state, picked, picture.exaggeration)
-        return self._found[1]
+            self._explanation = picture, answer(picture.drawn_state, picked, picture.exaggeration)
+        return self._explanation[1]
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "set.at":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "set.at":
             return put(state, "picked", value)
-        if word == "forget":
+        if action == "forget":
             return with_picked(state, None)
-        if word == "lever" and value in state.amplitudes:
-            shown = self.context.shown
-            if state.picked is None and shown is not None:
-                state = with_picked(state, pick_worst(shown))
+        if action == "lever" and value in state.amplitudes:
+            picture = self.context.picture
+            if state.picked is None and picture is not None:
+                state = with_picked(state, pick_worst(picture))
             return replace(state, lever="" if value == state.lever else value)
-        if word == "back":
-            self.context.act(self._stand_back)
+        if action == "back":
+            self.context.call_soon(self._show_lever)
         return state
 
-    def _stand_back(self) -> None:
-        picture, camera = self.context.shown, self.context.camera.remember()
+    def _show_lever(self) -> None:
+        picture, camera = self.context.picture, self.context.camera.remember()
         if picture is None or picture.state.picked is None or picture.is_difference:
             return
-        found = self._answer(picture)
-        parts = found.explanation.contributions
-        origins = [p.origin_mm + found.shift_mm for p in parts if p.key == picture.state.lever]
+        explanation = self._explain(picture)
+        contributions = explanation.explanation.contributions
+        origins = [c.origin_mm + explanation.shift_mm for c in contributions
+                   if c.key == picture.state.lever]  # fmt: skip
         if origins:
             points = np.concatenate([picture.drawn_mm.reshape(-1, 3), np.stack(origins)])
             room, fov_deg = self.context.camera.room, float(np.rad2deg(camera.fov_rad))
             pose = fit_camera(points, room.aspect, fov_deg=fov_deg, margins=room.margins)
-            self.context.look_from(pose)
+            self.context.move_camera(pose)
 
 
-def _axes(found: PointExplanation) -> str:
-    return spell_axes(found.at).removeprefix("axes ")
+def _axes(explanation: PointExplanation) -> str:
+    return spell_axes(explanation.at).removeprefix("axes ")
 
 
-def _contributions(found: PointExplanation) -> Markup:
-    first, others = found.ranked[:FIRST], len(found.ranked[FIRST:])
-    left = found.length_um - sum(part.along_um for part in first)
-    # their names stand in the column of errors
-    lines = [(tag("b", part.key, title=f"{parameter(part.key).name}: {signed(part.along_um)} µm"),
-              signed(part.along_um)) for part in first]  # fmt: skip
-    if others or abs(left) >= 0.05:
-        words = f"{others} more" if others else "second order"
-        lines.append((tag("span", words, class_="ws-quiet"), signed(left)))
+def _contributions(explanation: PointExplanation) -> Markup:
+    largest, n_others = explanation.ranked[:FIRST], len(explanation.ranked[FIRST:])
+    remainder_um = explanation.length_um - sum(c.along_um for c in largest)
+    lines: list[tuple[Markup, str]] = []
+    for contribution in largest:
+        along = signed(contribution.along_um)
+        hint = f"{parameter(contribution.key).name}: {along} µm"
+        lines.append((tag("b", contribution.key, title=hint), along))
+    if n_others or abs(remainder_um) >= 0.05:
+        label = f"{n_others} more" if n_others else "second order"
+        lines.append((tag("span", label, class_="ws-quiet"), signed(remainder_um)))
     if not lines:
         return tag("p", "No error acts at this point.", class_="ws-quiet")
-    told = EMPTY
-    if found.is_corrected:
-        rest = number(float(np.linalg.norm(found.drawn_um)))
-        told = tag("p", f"The table leaves {rest} µm of it, as drawn.")
-    return rows(lines, "ws-rows ws-causes") + told
+    note = EMPTY
+    if explanation.is_corrected:
+        residual = number(float(np.linalg.norm(explanation.drawn_um)))
+        note = tag("p", f"Residual error after compensation: {residual} µm, as displayed.")
+    return rows(lines, "ws-rows ws-causes") + note
 
 
-def _uncertainty(found: PointExplanation, limit_um: float) -> Markup:
-    """Say what the uncertainty of |E| comes from, the largest share first, and if a limit is kept.
+def _uncertainty(explanation: PointExplanation, limit_um: float) -> Markup:
+    """Render the probability of meeting the limit and the variance shares of |E|, largest first.
 
-    Shares are below zero where correlations make it smaller; all of them add up to 100 %.
+    Negative correlations give negative shares; all shares add up to 100 %.
     """
-    sure = found.uncertainty
-    if sure is None or not sure.errors.is_known:
-        words = [] if sure is None else sure.errors.remarks()
-        return join(tag("p", said, class_="ws-tiny") for said in words)
-    parts = sure.variance_shares(sure.response @ sure.direction)
-    named = [(key, f"{number(100.0 * part, 0)} %") for key, part in parts.items()]
-    named = [(key, share) for key, share in named if share != "0 %"]
-    said = ", ".join(f"{key} {share}" for key, share in named[:FIRST])
-    kept = f"|E| ≤ {limit_um:g} µm with {number(100.0 * float(sure.conformance_probability(limit_um)), 1)} %"
-    words = f"{kept}. U95{length_words(sure)} µm, share of its variance: {said}"
-    rest = rows(named[FIRST:]) if len(named) > FIRST else EMPTY
-    rest = rest and tag("details", tag("summary", "All shares") + rest, class_="ws-details",
+    uncertainty = explanation.uncertainty
+    if uncertainty is None or not uncertainty.errors.is_known:
+        remarks = [] if uncertainty is None else uncertainty.errors.remarks()
+        return join(tag("p", remark, class_="ws-tiny") for remark in remarks)
+    variances = uncertainty.variance_shares(uncertainty.response @ uncertainty.direction)
+    shares = [(key, f"{number(100.0 * share, 0)} %") for key, share in variances.items()]
+    shares = [(key, share) for key, share in shares if share != "0 %"]
+    largest = ", ".join(f"{key} {share}" for key, share in shares[:FIRST])
+    probability = number(100.0 * float(uncertainty.conformance_probability(limit_um)), 1)
+    text = ( f"|E| ≤ {limit_um:g} µm with a probability of {probability} %." f" U95{length_words(uncertainty)} µm; variance shares: {largest}")
+    others = EMPTY if len(shares) > FIRST:
+        others = tag("details", tag("summary", "All shares") + rows(shares[FIRST:]), class_="ws-details",
                         data_key="worst.shares")  # fmt: skip
-    return tag("p", words, class_="ws-tiny") + rest
+    return tag("p", text, class_="ws-tiny") + others
 
 
-def _details(found: PointExplanation, lever: str) -> Markup:
-    explained, parts = found.explanation, found.ranked
+def _details(explanation: PointExplanation, lever: str) -> Markup:
+    point, ranked = explanation.explanation, explanation.ranked
     lines: list[tuple[object, ...]] = [
-        (button(part.key, "worst:lever", part.key, kind="link", pressed=part.key == lever,
-                hint=f"{parameter(part.key).name}: draw its axis and lever"),
-         part.along_um, *part.error_um)
-        for part in parts
+        (button(c.key, "worst:lever", c.key, kind="link", pressed=c.key == lever,
+                hint=f"{parameter(c.key).name}: draw its axis and lever arm"),
+         c.along_um, *c.error_um)
+        for c in ranked
     ]  # fmt: skip
-    lines.append(("second order", None, *explained.remainder_um))
-    lines.append(("sum", found.length_um, *explained.error_um))
+    lines.append(("second order", None, *point.remainder_um))
+    lines.append(("sum", explanation.length_um, *point.error_um))
     columns = (Column("µm"), *number_columns(("along E", "x", "y", "z"), "+z.1f"))
     copied = "\n".join(
-        "\t".join((part.key, f"{part.along_um:.3f}", *(f"{v:.3f}" for v in part.error_um)))
-        for part in parts
+        "\t".join((c.key, f"{c.along_um:.3f}", *(f"{v:.3f}" for v in c.error_um))) for c in ranked
     )
-    where = spell_in_r(explained.nominal_mm + found.shift_mm)
-    tilt = number(float(np.linalg.norm(explained.orientation_urad)))
+    place = spell_in_r(point.nominal_mm + explanation.shift_mm)
+    tilt = number(float(np.linalg.norm(point.orientation_urad)))
+    loop = LOOP_WORDS[explanation.loop]
+    box = text_box("worst:set.at", _axes(explanation), placeholder=EXAMPLE)
     return tag("div", join((
-        field("Point", text_box("worst:set.at", _axes(found), placeholder=EXAMPLE), "worst:set.at",
-              hint="Positions of the axes; or click a point of the map or of a trace"),
-        tag("p", f"{where} mm · {LOOP_WORDS[found.loop]} · tilt {tilt} µrad", class_="ws-tiny"),
-        block_html(Table(columns, lines)), *(_lever(one) for one in parts if one.key == lever),
+        field("Point", box, "worst:set.at",
+              hint="Axis positions; or click a point of the map or of a trace"),
+        tag("p", f"{place} mm · {loop} · tilt {tilt} µrad", class_="ws-tiny"),
+        block_html(Table(columns, lines)), *(_lever(c) for c in ranked if c.key == lever),
         tag("p", ELSEWHERE, class_="ws-tiny"),
         button("Copy", "worst:copied", kind="quiet", data_copy=f"key\talong\tx\ty\tz\n{copied}",
-               hint="Copy the table, to be pasted into a spreadsheet"),
+               hint="Copy the table for a spreadsheet"),
     )))  # fmt: skip
 
 
-def _lever(part: PointContribution) -> Markup:
-    row, how = parameter(part.key), "along the direction drawn"
+def _lever(contribution: PointContribution) -> Markup:
+    row, effect = parameter(contribution.key), "along the direction shown"
     if row.is_rotation:
-        arm = float(np.linalg.norm(np.cross(part.direction, part.lever_mm)))
-        how = f"× {number(arm, 0)} mm across the axis"
-    look = button("Show the whole lever", "worst:back", kind="link",
-                  hint="Move the camera back until axis, lever and box are in view")  # fmt: skip
-    return tag("p", join((f"{part.key}: {signed(part.value)} {row.unit} {how} ", look)))
+        arm = float(np.linalg.norm(np.cross(contribution.direction, contribution.lever_mm)))
+        effect = f"× {number(arm, 0)} mm lever arm"
+    show = button("Show the whole lever arm", "worst:back", kind="link",
+                  hint="Move the camera until axis, lever arm and volume are in view")  # fmt: skip
+    text = f"{contribution.key}: {signed(contribution.value)} {row.unit} {effect} "
+    return tag("p", join((text, show)))
 
 
 class DistancePanel(AnalysisPanel):
-    """Distance and angle between points that are picked on the map."""
+    """Distance and angle between points picked on the map."""
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().concerns(picture), id(picture))
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), id(picture))
 
     def before_result(self, state: AppState) -> Markup:
-        point, drawn = awaited(state), self.context.shown and measured(self.context.shown)
-        hint = "Click two points of the map, and a third for an angle"
+        point, drawn = awaited(state), self.context.picture and measured(self.context.picture)
+        hint = "Click two points of the map; a third one gives an angle"
         buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
         if point:
             buttons = [button("Stop", f"{self.name}:stop")]
         if any(map(state.forms.get, POINTS)):
             buttons.append(button("Clear", f"{self.name}:clear", kind="quiet",
-                                  hint="Take the points out of the drawing"))  # fmt: skip
+                                  hint="Remove the points"))  # fmt: skip
         if drawn:
             buttons.append(button("Pin", "notes:pin", "\n".join(drawn[0].lines()),
-                                  hint="Write a note with these numbers"))  # fmt: skip
-        said = tag("p", POINTS[point], role="status") if point else EMPTY
-        return actions(*buttons) + said + tag("p", without_words(state), class_="ws-tiny")
+                                  hint="Pin a note with these numbers"))  # fmt: skip
+        status = tag("p", POINTS[point], role="status") if point else EMPTY
+        return actions(*buttons) + status + tag("p", without_words(state), class_="ws-tiny")
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word not in ("pick", "stop", "clear"):
-            return super().take(state, word, value)
-        picked = {one: text for one in POINTS if (text := state.forms.get(one))}
-        points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[word]
-        others = {one: text for one, text in state.forms.items() if one not in POINTS}
-        return replace(state, forms={**others, **points})
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action not in ("pick", "stop", "clear"):
+            return super().handle(state, action, value)
+        picked = {name: state.forms[name] for name in POINTS if state.forms.get(name)}
+        points = {"pick": dict.fromkeys(POINTS, ""), "stop": picked, "clear": {}}[action]
+        other_forms = {name: text for name, text in state.forms.items() if name not in POINTS}
+        return replace(state, forms={**other_forms, **points})
 
 
 class VolumePanel(Section):
     """Mean, RMS, P95 and max of the position error, and the tilt of the tool."""
 
-    name, task, title = "volume", "understand", "Volume in numbers"
+    name, task, title = "volume", "understand", "Volume statistics"
     sentence = "Mean, RMS, P95 and max of the position error, and of the tilt of the tool axis"
 
     def body(self, picture: LivePicture) -> Markup:
-        found, state = picture.statistics, picture.drawn_state
+        statistics, state = picture.statistics, picture.drawn_state
         u95 = {} if picture.uncertainty is None else picture.uncertainty.statistics()
-        sure = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
-        lines = [(name, f"{number(value, 2)}{sure.get(name, '')} µm")
-                 for name, value in zip(NAMES.values(), found.four, strict=True)]  # fmt: skip
+        intervals = {NAMES[key]: u95_behind(value) for key, value in u95.items()}
+        lines = [(name, f"{number(value, 2)}{intervals.get(name, '')} µm")
+                 for name, value in zip(NAMES.values(), statistics.four, strict=True)]  # fmt: skip
         if not picture.is_difference:
-            # the picture has it only where it is coloured
+            # the picture holds it only if the map is coloured by it
             errors = evaluate_grid(state.active_scene(), picture.grid, picture.view)
             tilt = volume_statistics(errors.tilts, picture.grid)
             lines += [("tilt, mean", f"{number(tilt.mean_um)} µrad"),
@@ -255,6 +263,6 @@ class VolumePanel(Section):
             ("volume", f"{size} mm"),
             ("loop", ", ".join((LOOP_WORDS[state.loop], *placed_words(state.view())))),
         ]
-        at = spell_axes(found.max_at_axes).removeprefix("axes ")
-        where = f"max at {at} · {spell_in_r(found.max_at_mm)} mm"
+        at = spell_axes(statistics.max_at_axes).removeprefix("axes ")
+        where = f"max at {at} · {spell_in_r(statistics.max_at_mm)} mm"
         return rows(lines) + tag("p", where, class_="ws-tiny")

@@ -1,4 +1,4 @@
-"""Files of a page: scenes and data that are opened; scenes, links, pictures, exports, reports."""
+"""Dialogs that open and save files: scenes, measured data, links, pictures, exports, reports."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,7 +17,7 @@ from warpspace.app.evaluation.compare import drawn_tables, without_table
 from warpspace.app.evaluation.live_model import LiveModel
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Job, Jobs, Window, actions
+from warpspace.app.panels.panel import Context, Dialog, Job, Jobs, actions
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.exceptions import OptionError
 from warpspace.formats.registry import formats
@@ -26,97 +26,97 @@ from warpspace.scene.notes import story
 RENDER_TIMEOUT_S = 30.0
 VIEW_PX = 64, 4096
 CHANGED = (
-    "Somebody has changed it since it was opened here, and what is saved does not hold that change."
-    " Save it beside that file, not over it; “warpspace merge” unites the notes of both."
+    "The file on the server has changed since this scene was opened; the saved copy does not"
+    " contain that change. Save it under another name; “warpspace merge” combines the notes."
 )
 Write = Callable[[LivePicture, Job], bytes]
-PLAIN = LiveModel()  # evaluates what files show, for all tabs and beside their sessions
+PLAIN = LiveModel()  # evaluates the contents of files, for all tabs
 
 
 def accepted_endings() -> str:
-    """List the endings of files that can be given to the page."""
-    own = (".toml", ".urdf", *(end for ends in transfers.IN_BOX.values() for end in ends))
-    endings = dict.fromkeys((*own, *(end for one in formats() for end in one.endings)))
+    """List the extensions of files that the page opens."""
+    scene_endings = (".toml", ".urdf", *(end for ends in transfers.IN_BOX.values() for end in ends))
+    file_formats = (end for file_format in formats() for end in file_format.endings)
+    endings = dict.fromkeys((*scene_endings, *file_formats))
     return ",".join((*endings, *(end.upper() for end in endings if end in (".com", ".cma"))))
 
 
-class JobDialog(Window):
-    """A window that makes files, one at a time, with its progress and a way to cancel."""
+class JobDialog(Dialog):
+    """A dialog that writes files, one at a time, with progress and cancellation."""
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._jobs = Jobs(self, self.renew, context.page.report)
+        self._jobs = Jobs(self, self.rerender, context.page.report)
 
     def make(self, name: str, ending: str, write: Write, *, as_drawn: bool = False) -> None:
-        """Make a file of what is drawn beside the session, and have the browser save it."""
-        drawn = self.context.shown
-        if drawn is None:
+        """Write a file of the current picture in a job, and have the browser save it."""
+        current = self.context.picture
+        if current is None:
             return
 
         def work(job: Job) -> None:
-            picture = drawn if as_drawn else without_tables(drawn)
+            picture = current if as_drawn else without_tables(current)
             content = write(picture, job)
             if not job.is_set():
                 self.context.save_file(f"{transfers.file_stem(picture)}{ending}", content)
 
         if not self._jobs.start(name, work):
-            self.context.notify(
-                "One file at a time", "Wait for the other one, or cancel it", "warning"
-            )
+            text = "Another file is being written: wait for it, or cancel it"
+            self.context.notify("Busy", text, "warning")
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "cancel":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "cancel":
             self._jobs.cancel()
         return state
 
 
 class FilesDialog(JobDialog):
-    """Save and export; opening files and links goes this way too."""
+    """Save and export; it also opens files and links."""
 
     name, title = "files", "Save and export"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._uploads = Jobs(self, self.renew, context.page.report)
+        self._uploads = Jobs(self, self.rerender, context.page.report)
 
     def body(self, picture: LivePicture) -> Markup:
         services = self.context.services
-        figures = {"": "as the drawing is coloured"}
-        figures |= {one: one.replace("-", " ") for one, _ in services.figures}
+        figures = {"": "map as displayed"}
+        figures |= {name: name.replace("-", " ") for name, _ in services.figures}
         kinds = choice("state:set.page.figure", picture.state.page.figure, figures)
         exports = (
-            button(f"{end[1:].upper()}", "files:export", end, hint=words)
-            for end, words in services.exports
+            button(f"{end[1:].upper()}", "files:export", end, hint=hint)
+            for end, hint in services.exports
         )
         link = (
             tag("h3", "Link"),
-            tag("p", "This app asks for a token. A link without it opens for those who have the"
-                " token; a link with it lets whoever has the link use this app."),
+            tag("p", "This server requires a token. A link without the token works only for people"
+                " who have it; a link with the token gives everyone who has the link access."),
             actions(button("Copy link", "files:share", "plain"),
                     button("Copy link with token", "files:share", "token")),
         )  # fmt: skip
         return join((
             tag("h3", "Scene"),
-            tag("p", "Errors, tolerances and machine as they are now, with view and camera."),
+            tag("p", "Current errors, tolerances and machine, with display settings and camera."),
             actions(button("Save scene (TOML)", "files:save", kind="main", hint="Ctrl+S")),
             *(link if services.token else ()),
             tag("h3", "Picture"), tag("p", transfers.exported_words(picture), class_="ws-quiet"),
-            actions(button("Save what is on the screen (PNG)", "files:view")),
+            actions(button("Save current view (PNG)", "files:view")),
             field("Figure", kinds, "state:set.page.figure"),
             actions(button("Save figure (PNG)", "files:figure")),
             tag("h3", "Export"),
             actions(button("Interactive page (HTML)", "files:page",
-                           hint="One file that needs no network"),
-                    *((button("Story (HTML)", "files:story", hint="Its steps in such a file"),)
+                           hint="A single file that works offline"),
+                    *((button("Story (HTML)", "files:story", hint="Its steps in a single file"),)
                       if story(picture.state.review) else ()), *exports),
             self._jobs.html(),
         ))  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         services = self.context.services
-        if word == "share" and services.token and not value:
+        if action == "share" and services.token and not value:
             return replace(state, page=replace(state.page, window=self.name))
-        doing: dict[str, Callable[[], None]] = {
+        commands: dict[str, Callable[[], None]] = {
             "file": partial(self._open, value),
             "save": self._save,
             "share": partial(self._share, with_token=value == "token"),
@@ -127,23 +127,22 @@ class FilesDialog(JobDialog):
             "story": self._story,
             "export": partial(self._export, value),
         }
-        if word in doing:
-            self.context.act(doing[word])
-        return super().take(state, word, value)
+        if action in commands:
+            self.context.call_soon(commands[action])
+        return super().handle(state, action, value)
 
-    # --- what is opened --------------------------------------------------------------------------
+    # --- open ------------------------------------------------------------------------------------
 
     def _open(self, value: str) -> None:
-        told = value.partition("\n")[2].partition("\n")[0].lower()
-        if part := next(
-            (part for part, ends in transfers.IN_BOX.items() if told.endswith(ends)), ""
-        ):
-            self.context.send(f"{part}:file", value)
-            return
+        name = value.partition("\n")[2].partition("\n")[0].lower()
+        for panel, endings in transfers.IN_BOX.items():
+            if name.endswith(endings):
+                self.context.send(f"{panel}:file", value)
+                return
         self._uploads.queue("Opening", partial(self._parse, value))
 
     def _parse(self, value: str, job: Job) -> None:
-        """Parse a file beside the session."""
+        """Parse a file in a job."""
         name, content = transfers.read_upload(value)
         notes, is_robot = list[str](), b"<robot" in content[:4096]
         if is_robot:
@@ -151,26 +150,28 @@ class FilesDialog(JobDialog):
         elif name.lower().endswith(".toml"):
             text = transfers.upload_text(content, name)
         else:
-            self.context.act(partial(self.context.offer_import, name, content))
+            self.context.call_soon(partial(self.context.offer_import, name, content))
             return
         opened, camera = scene_file.open_text(text, transfers.safe_name(name), name)
-        whole = is_robot or scene_file.settings_of(text) != ""
+        replaces_all = is_robot or scene_file.settings_of(text) != ""
         if not job.is_set():
-            self.context.act(partial(self.context.show_opened, opened, camera, whole=whole))
+            self.context.call_soon(
+                partial(self.context.show_opened, opened, camera, keeps_comparison=not replaces_all)
+            )
             self.context.notify("Opened", "\n".join((name, *notes)), "stays" if notes else "done")
 
-    def _follow(self, word: str) -> None:
-        opened = scene_file.open_link(transfers.unpack(word), self.context.scenes.fixed)
+    def _follow(self, link: str) -> None:
+        opened = scene_file.open_link(transfers.unpack(link), self.context.scenes.fixed)
         self.context.show_opened(*opened)
 
-    # --- what is saved ---------------------------------------------------------------------------
+    # --- save ------------------------------------------------------------------------------------
 
     def _save(self) -> None:
         state, camera = self.context.state, self.context.camera.remember()
-        text = self._alone_if_large(lambda one: scene_file.state_to_toml(one, camera))
+        text = self._alone_if_large(lambda state: scene_file.state_to_toml(state, camera))
         self.context.save_file(f"{transfers.safe_name(state.scene.name)}.toml", text)
         if not self.context.services.is_current(state.origin):
-            self.context.notify("The file of this scene has changed", CHANGED, "stays")
+            self.context.notify("Scene file changed on the server", CHANGED, "stays")
 
     def _share(self, *, with_token: bool) -> None:
         context = self.context
@@ -182,9 +183,9 @@ class FilesDialog(JobDialog):
             except OptionError as error:
                 if not state.review:
                     raise
-                # notes are in the scene file; what is on the screen is what a link is for
+                # a link is for the view; the scene file holds the notes
                 link = scene_file.state_to_link(replace(state, review=()), camera, scenes)
-                context.notify("Without the notes", str(error), "warning")
+                context.notify("Notes not included", str(error), "warning")
                 return link
 
         link = self._alone_if_large(write)
@@ -192,9 +193,9 @@ class FilesDialog(JobDialog):
         edited = len(context.state.changed_keys)
         edits = f" {edited} changed error{'s' if edited > 1 else ''}," if edited else ""
         compared = " the comparison," if context.state.comparison.b is not None else ""
-        held = f"the scene {context.state.scene.title},{edits}{compared} view and camera"
-        warned = " Whoever has it can use this app." if token else ""
-        context.page.call("share", transfers.pack(link), token, f"It holds {held}.{warned}")
+        contents = f"the scene {context.state.scene.title},{edits}{compared} view and camera"
+        warning = " Everyone who has it can use this app." if token else ""
+        context.page.call("share", transfers.pack(link), token, f"Contains {contents}.{warning}")
         context.client.flush()
 
     def _alone_if_large(self, write: Callable[[AppState], str]) -> str:
@@ -205,7 +206,7 @@ class FilesDialog(JobDialog):
             if state.comparison == Comparison():
                 raise
             text = write(replace(state, comparison=Comparison()))
-            self.context.notify("Without the comparison", str(error), "warning")
+            self.context.notify("Comparison not included", str(error), "warning")
             return text
 
     def _draw(self) -> None:
@@ -218,14 +219,15 @@ class FilesDialog(JobDialog):
         client, camera = self.context.client, self.context.camera
 
         def draw(picture: LivePicture, job: Job) -> bytes:
-            seen = client.camera
-            height, width = np.clip((seen.image_height, seen.image_width), *VIEW_PX).tolist()
+            view_camera = client.camera
+            size = view_camera.image_height, view_camera.image_width
+            size_px = np.clip(size, *VIEW_PX).tolist()
             pixels: Any = client.get_render(
-                height, width, transport_format="png", timeout=RENDER_TIMEOUT_S
+                *size_px, transport_format="png", timeout=RENDER_TIMEOUT_S
             )
             return self.context.services.draw_view(picture, pixels, camera.remember(), job)
 
-        self.make("Picture of the screen", "_view.png", draw, as_drawn=True)
+        self.make("Current view", "_view.png", draw, as_drawn=True)
 
     def _page(self) -> None:
         toml = {"scene_toml": self._alone_if_large(scene_file.state_to_toml)}
@@ -246,7 +248,7 @@ class FilesDialog(JobDialog):
 
 
 def without_tables(picture: LivePicture) -> LivePicture:
-    """Give a picture without the tables of a controller, which files do not hold."""
+    """Return a picture without compensation tables, which files do not contain."""
     if not drawn_tables(picture.state):
         return picture
     return PLAIN.evaluate(without_table(picture.state))
@@ -255,11 +257,11 @@ def without_tables(picture: LivePicture) -> LivePicture:
 # --- The report -----------------------------------------------------------------------------------
 
 ALWAYS = (
-    "the verdict with the limit, and the error map",
+    "verdict for the limit, and error map",
     "statistics, sections and slices of the volume",
-    "the contribution of each error at the worst point",
-    "the adjustments that help most",
-    "errors, tolerances, and the errors that the tolerances allow",
+    "contribution of each error at the worst point",
+    "most effective adjustments",
+    "errors, tolerances, and errors permitted by the tolerances",
     "error gains, conventions, provenance",
 )
 
@@ -268,47 +270,46 @@ class ReportDialog(JobDialog):
     name, title = "report", "Report"
 
     def body(self, picture: LivePicture) -> Markup:
-        found = picture.compared
-        subject = (
-            f"It compares A, {found.titles[0]}, with B, {found.titles[1]}."
-            if found is not None and transfers.has_sheet(picture)
-            else f"It is about {picture.title}, as drawn now."
-        )
+        compared = picture.compared
+        subject = f"Subject: {picture.title}, as displayed."
+        if compared is not None and transfers.has_sheet(picture):
+            a, b = compared.titles
+            subject = f"Comparison of A, {a}, with B, {b}."
         limit = f"{picture.state.specification.limit_um:g} µm"
-        put = [
-            tag("li", join((f"{title} ", button("remove", "report:remove", index, kind="link"))))
-            for index, (title, _) in enumerate(self.context.reported)
+        added = [
+            tag("li", join((f"{title} ", button("Remove", "report:remove", index, kind="link"))))
+            for index, (title, _) in enumerate(self.context.report_results)
         ]
-        # the notes beside it may ask for the same name
+        # the list of notes may hold a box for the same name
         author = text_box("state:set.page.author", picture.state.page.author, id="ws-report-author")
-        hint = "More results are added with the button “Add to report” below each of them."
+        hint = "To add more results, use “Add to report” below a result."
         return join((
             tag("p", f"{subject} Limit: {limit}."),
             field("Author", author, "report.author"),
             setting(picture.state, "page.questions"),
             actions(button("Write HTML", "report:write", ".html", kind="main",
-                           hint="One page with a rotatable view; needs no network"),
-                    button("Write PDF", "report:write", ".pdf", hint="For paper")),
+                           hint="A single page with a 3-D view; works offline"),
+                    button("Write PDF", "report:write", ".pdf", hint="For printing")),
             self._jobs.html(),
             tag("h3", "Contents"),
-            tag("ul", join((*(tag("li", words) for words in ALWAYS), *put))),
+            tag("ul", join((*(tag("li", chapter) for chapter in ALWAYS), *added))),
             tag("p", hint, class_="ws-quiet"),
         ))  # fmt: skip
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "remove":
-            index = index_of(value, len(self.context.reported))
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "remove":
+            index = index_of(value, len(self.context.report_results))
             if index is not None:
-                del self.context.reported[index]
-                self.context.act(self.renew)
-        elif word == "write" and value in (".html", ".pdf"):
-            self.context.act(partial(self._write, value))
-        return super().take(state, word, value)
+                del self.context.report_results[index]
+                self.context.call_soon(self.rerender)
+        elif action == "write" and value in (".html", ".pdf"):
+            self.context.call_soon(partial(self._write, value))
+        return super().handle(state, action, value)
 
     def _write(self, ending: str) -> None:
         results: dict[str, Result] = {}
-        for index, (title, found) in enumerate(self.context.reported):
-            results[f"{title} ({index + 1})" if title in results else title] = found
+        for index, (title, added) in enumerate(self.context.report_results):
+            results[f"{title} ({index + 1})" if title in results else title] = added
         page = self.context.state.page
         questions = tuple(filter(None, map(str.strip, page.questions.splitlines())))
         about = page.author.strip(), questions, results, ending

@@ -1,4 +1,4 @@
-"""Import of measured errors: what files bring and replace, and the error before and after."""
+"""Import of measured errors: the errors that files add and replace, with the effect on the map."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -37,110 +37,116 @@ from warpspace.scene.model import Scene
 from warpspace.units import Array
 
 NAME = "import"
-MOST_FILES = 16  # that are read together
+MOST_FILES = 16  # read together
 MOST_CURVES, MOST_POINTS = 12, 400
 SIGNS = {
-    "error": "errors, which the controller subtracts",
-    "correction": "corrections, which the controller adds",
+    "error": "errors (subtracted by the controller)",
+    "correction": "corrections (added by the controller)",
 }
-WAYS = {FORWARD: "forward", BACKWARD: "backward", UNDIRECTED: "mean"}
+DIRECTIONS = {FORWARD: "forward", BACKWARD: "backward", UNDIRECTED: "mean"}
 OPTIONS = {"--axis": "“Axis”", "--sign": "“Sign”", "--variant": "“Variant”", "--format": "“Format”"}
-OFFERED = (
-    "Measured errors or a controller's table; what changes is shown before it is applied."
-    " Files can also be dropped on the page."
+INTRODUCTION = (
+    "Measured errors or compensation tables of a controller. Changes are previewed before they are"
+    " applied. Files can also be dropped on the page."
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Import(Analysis):
-    """Read measured errors, or a controller's table, into SCENE."""
+    """Import measured errors, or a compensation table of a controller, into SCENE."""
 
     name = NAME
     task = "measure"
     doing = "reading"
     makes_scenes = True
-    format: str | None = option(None, "To be chosen if it is recognised wrongly or not at all")
+    format: str | None = option(None, "File format, if it is not recognised correctly")
     axis: Annotated[str, Grammar("X, or AX1=X AX2=Y", typed_word)] = option(
         "",
-        "X: the axis, if the files name none. AX1=X: what a name in the files means; several"
-        " separated by blanks",
+        "X: the axis, if the files do not name it. AX1=X: the axis that a name in the files stands"
+        " for; separate several with blanks",
     )
     sign: Literal["error", "correction"] | None = option(
         None,
-        "Whether a table holds errors or corrections",
-        unset="as the manual says",
+        "Errors or corrections in the table",
+        unset="according to the manual",
         choice_labels=SIGNS,
     )
-    variant: str | None = option(None, "Published variant of the format", unset="usual one")
+    variant: str | None = option(None, "Published variant of the format", unset="default")
     sources: tuple[Source, ...] = ()
 
     def run(self, scene: Scene, _watch: ProgressCallback, /) -> "ImportResult":
         axis, names = registry.parse_axis_options(
-            [word for word in re.split(r"[\s,;]+", self.axis) if word]
+            [text for text in re.split(r"[\s,;]+", self.axis) if text]
         )
         options = registry.ReadOptions(
             scene.machine, axis, names, self.sign or "", self.variant or ""
         )
         reading = registry.read_errors(self.sources, options, self.format or "")
         files = ", ".join(source.name for source in self.sources)
-        made = build_imported_scene(reading, scene, scene.title, files)
-        return ImportResult(files=files, before=scene, reading=reading, made=made)
+        imported = build_imported_scene(reading, scene, scene.title, files)
+        return ImportResult(files=files, before=scene, reading=reading, imported=imported)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ImportResult(Result):
-    """What files bring."""
+    """Errors read from files, and the scene with them."""
 
     files: str
     before: Scene
     reading: registry.Reading
-    made: ImportedScene
+    imported: ImportedScene
 
     def changes(self) -> Sequence[Change]:
-        return (Change(self.files, self.made.scene),)
+        return (Change(self.files, self.imported.scene),)
 
     def blocks(self) -> Iterator[Block]:
-        found = self.reading.imported
-        units = ", ".join(found.units).replace("um", "µm").replace("urad", "µrad")
+        errors = self.reading.imported
+        units = ", ".join(errors.units).replace("um", "µm").replace("urad", "µrad")
         yield f"{self.reading.format.title} from {self.files}, in {units}."
-        old = [key for key in found.keys if self.before.errors.amplitude(key)]
-        new = [key for key in found.keys if key not in old]
-        said = [f"replaces {', '.join(old)}"] if old else []
-        said += [f"adds {', '.join(new)}"] if new else []
-        yield f"It {' and '.join(said) or 'holds no errors'}."
-        yield summary_table(found)
-        for one in found.series[:MOST_CURVES]:
-            row, place = parameter(one.key), "mm" if is_linear(parameter(one.key).axis) else "°"
-            title, curves = f"{one.key} {row.name}", tuple(_curves(one))
-            yield Lines("lines", title, f"{row.axis} [{place}]", f"[{row.unit}]", curves)
+        replaced = [key for key in errors.keys if self.before.errors.amplitude(key)]
+        added = [key for key in errors.keys if key not in replaced]
+        effects = [f"replaces {', '.join(replaced)}"] if replaced else []
+        effects += [f"adds {', '.join(added)}"] if added else []
+        yield f"The import {' and '.join(effects) or 'contains no errors'}."
+        yield summary_table(errors)
+        for series in errors.series[:MOST_CURVES]:
+            row = parameter(series.key)
+            unit = "mm" if is_linear(row.axis) else "°"
+            title, curves = f"{series.key} {row.name}", tuple(_curves(series))
+            yield Lines("lines", title, f"{row.axis} [{unit}]", f"[{row.unit}]", curves)
 
     def caveats(self) -> Iterator[str]:
-        found, kept = self.reading.imported, f"kept from {self.before.name}:"
-        for one in (*found.assumed, *found.notes, *self.made.notes):
-            if not one.startswith("replaced: "):
-                yield _without_options(one.replace(kept, "unchanged:"))
-        if (left := len(found.series) - MOST_CURVES) > 0:
-            yield f"{left} more curves are not drawn"
+        errors, unchanged = self.reading.imported, f"kept from {self.before.name}:"
+        for note in (*errors.assumed, *errors.notes, *self.imported.notes):
+            if not note.startswith("replaced: "):
+                yield _without_options(note.replace(unchanged, "unchanged:"))
+        n_hidden= len(errors.series) - MOST_CURVES
+        if n_hidden > 0:
+            yield f"{n_hidden} more curves are not displayed"
 
 
-def _curves(one: ErrorSeries) -> Iterator[Curve]:
-    at = np.array(one.positions)
+def _curves(series: ErrorSeries) -> Iterator[Curve]:
+    at = np.array(series.positions)
     thin = slice(None, None, max(1, len(at) // MOST_POINTS))
 
-    def curve(words: str, values: Array, way: int, style: Style) -> Curve:
-        held = np.isfinite(values)
-        return Curve(words, at[held][thin], values[held][thin], list(WAYS).index(way), style)
+    def curve(name: str, readings: Array, direction: int, style: Style) -> Curve:
+        is_finite, colour = np.isfinite(readings), list(DIRECTIONS).index(direction)
+        return Curve(name, at[is_finite][thin], readings[is_finite][thin], colour, style)
 
-    means = [(way, mean) for way in WAYS if (mean := one.mean(way)) is not None]
-    yield from (curve(WAYS[way], mean, way, "line") for way, mean in means)
-    if len(one.runs) > len(means):
-        yield from (curve("", np.array(run.values), run.direction, "dots") for run in one.runs)
+    n_means = 0
+    for direction, name in DIRECTIONS.items():
+        mean = series.mean(direction)
+        if mean is not None:
+            n_means += 1
+            yield curve(name, mean, direction, "line")
+    if len(series.runs) > n_means:
+        yield from (curve("", np.array(run.values), run.direction, "dots") for run in series.runs)
 
 
 def _without_options(text: str) -> str:
-    """Name the controls of the page in place of the options of a command."""
-    for flag, words in OPTIONS.items():
-        text = text.replace(flag, words)
+    """Replace names of command options by labels of the page."""
+    for flag, label in OPTIONS.items():
+        text = text.replace(flag, label)
     return text
 
 
@@ -148,99 +154,89 @@ def _without_options(text: str) -> str:
 
 
 class ImportPanel(FilesPanel):
-    """Files that are read together, what they do not say, and what they bring."""
+    """Files that are read together, their options, and the imported errors."""
 
     def __init__(self, context: Context) -> None:
-        words = "Measured errors, or a controller's table"
-        super().__init__(context, Entry(NAME, "measure", words, f"{__name__}:Import"))
+        sentence = "Measured errors, or a compensation table of a controller"
+        super().__init__(context, Entry(NAME, "measure", sentence, f"{__name__}:Import"))
         context.offer_import = lambda name, content: self.receive(lambda: (name, content))
 
     def shown_options(self, state: AppState) -> Sequence[Option]:
-        return self._options(state, self._files)
+        return self._options(state, self.files)
 
     def _options(self, state: AppState, files: Sequence[UploadedFile]) -> Sequence[Option]:
-        """Leave out what the format has no choice of."""
+        """List the options of the format."""
         if not files:
             return ()
-        found = {one.name: one for one in self.options()}
-        names = {one.name: one.title for one in registry.formats()}
-        own = _recognised(files)
-        first = own.title if own is not None else "none, choose one"
-        found["format"] = replace(
-            found["format"], choices=tuple(names), choice_labels=names, unset=f"recognised: {first}"
+        options = {option.name: option for option in self.options()}
+        names = {option.name: option.title for option in registry.formats()}
+        recognised = _recognised(files)
+        first = recognised.title if recognised is not None else "none, select one"
+        options["format"] = replace(
+            options["format"], choices=tuple(names), choice_labels=names, unset=f"recognised: {first}"
         )
         chosen = self.values(state).get("format")
-        kind = registry.find_format(chosen) if chosen in names else own
+        kind = registry.find_format(chosen) if chosen in names else recognised
         if kind is None or kind.tables is None:
-            del found["sign"]
+            del options["sign"]
         if kind is None or not kind.variants:
-            del found["variant"]
+            del options["variant"]
         else:
-            found["variant"] = replace(found["variant"], choices=kind.variants)
-        return list(found.values())
+            options["variant"] = replace(options["variant"], choices=kind.variants)
+        return list(options.values())
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        return self._ask(state, self._files, values, scenes[0])
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis = read_form(Import, self._options(state, self.files), values, scene)
+        return replace(analysis, sources=tuple(file.content for file in self.files))
 
-    def _ask(
-        self,
-        state: AppState,
-        files: Sequence[UploadedFile],
-        values: Mapping[str, str],
-        scene: Scene,
-    ) -> Analysis:
-        asked = read_form(Import, self._options(state, files), values, scene)
-        return replace(asked, sources=tuple(one.content for one in files))
-
-    def is_quick(self, state: AppState) -> bool:
+    def is_automatic(self, state: AppState) -> bool:
         return True
 
     def before_result(self, state: AppState) -> Markup:
-        kind = "" if self._files else "main"
+        kind = "" if self.files else "main"
         upload = upload_button(
             "Import a file", "files", MAX_UPLOAD_BYTES, accepted_endings(), kind=kind,
-            hint="Several that belong together may follow each other",
+            hint="Files that belong together can be added one after the other",
         )  # fmt: skip
-        words = EMPTY if self._files else tag("p", OFFERED)
-        return words + self.files_html() + tag("div", upload, class_="ws-actions")
+        introduction = EMPTY if self.files else tag("p", INTRODUCTION)
+        return introduction + self.files_html() + tag("div", upload, class_="ws-actions")
 
-    def result_html(self, found: Result) -> Markup:
-        return details_html(one for one in found.blocks() if not isinstance(one, str))
+    def result_html(self, result: Result) -> Markup:
+        return details_html(block for block in result.blocks() if not isinstance(block, str))
 
-    def actions(self, found: Result, *, stale: bool) -> Markup:
+    def actions(self, result: Result, *, stale: bool) -> Markup:
         return EMPTY
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse a file, with those that are there where they belong together.
+        """Parse a file, together with the present ones if they belong together.
 
-        Alone it is kept also where it cannot be read yet: the section asks for what it does not
-        say, or another file comes to it.
+        A single file is accepted even if it cannot be read yet: the section offers the missing
+        options, or another file completes it.
         """
-        own, before, problem = (
-            UploadedFile(name, registry.open_upload(name, content)),
-            self._files,
-            None,
-        )
-        is_applied = self._applied[-1:] == (before,)
-        held = () if is_applied else tuple(one for one in before if one.name != name)
-        state, keeps, files = self.context.state, False, before
+        uploaded = UploadedFile(name, registry.open_upload(name, content))
+        present, problem = self.files, None
+        is_applied = self._applied_key[-1:] == (present,)
+        joined = () if is_applied else tuple(file for file in present if file.name != name)
+        state, is_joined, files = self.context.state, False, present
         scene = state.active_scene()
-        for keeps in (True, False) if 0 < len(held) < MOST_FILES else (False,):
-            files = (*held, own) if keeps else (own,)
+        for is_joined in (True, False) if 0 < len(joined) < MOST_FILES else (False,):
+            files = (*joined, uploaded) if is_joined else (uploaded,)
             try:
-                values = self.values(state) if keeps else {}
-                self._ask(state, files, values, scene).run(scene, ignore_progress)
+                values = self.values(state) if is_joined else {}
+                analysis = read_form(Import, self._options(state, files), values, scene)
+                sources = tuple(file.content for file in files)
+                replace(analysis, sources=sources).run(scene, ignore_progress)
                 break
             except WarpspaceError as error:
                 problem = error
         else:
-            if held and problem is not None:
+            if joined and problem is not None:
                 raise problem
-        return partial(self._show, files, keeps=keeps)
+        return partial(self._show, files, is_joined=is_joined)
 
-    def _show(self, files: tuple[UploadedFile, ...], *, keeps: bool) -> None:
-        self._hold(files)
-        self.context.post(partial(_unfolded, keeps=keeps))
+    def _show(self, files: tuple[UploadedFile, ...], *, is_joined: bool) -> None:
+        self.set_files(files)
+        self.context.post(partial(_unfolded, keeps_forms=is_joined))
 
     def problem_html(self, state: AppState) -> Markup:
         return Markup(_without_options(super().problem_html(state)))  # noqa: S704 - escaped before
@@ -248,13 +244,13 @@ class ImportPanel(FilesPanel):
 
 def _recognised(files: Sequence[UploadedFile]) -> registry.Format | None:
     try:
-        return registry.recognise([one.content for one in files])
-    except WarpspaceError:  # none that is known, or several
+        return registry.recognise([file.content for file in files])
+    except WarpspaceError:  # no format, or several
         return None
 
 
-def _unfolded(state: AppState, *, keeps: bool) -> AppState:
-    """Show the section; what was said of other files is forgotten."""
+def _unfolded(state: AppState, *, keeps_forms: bool) -> AppState:
+    """Open the section; options for other files are reset."""
     page = replace(state.page, task="measure", open=state.page.open | {NAME}, window="")
-    forms = {k: v for k, v in state.forms.items() if keeps or not k.startswith(f"{NAME}.")}
+    forms = {k: v for k, v in state.forms.items() if keeps_forms or not k.startswith(f"{NAME}.")}
     return replace(state, page=page, forms=forms)

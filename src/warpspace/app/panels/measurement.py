@@ -1,4 +1,4 @@
-"""Measuring: standard tests that follow the errors, and calibrations out of uploaded readings."""
+"""The task "Measure": standard tests on the model, and calibration from uploaded readings."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -32,7 +32,7 @@ from warpspace.app.drawing.around import residuals
 from warpspace.app.drawing.shapes import Nodes, Shapes
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import chosen_test, plan_test
-from warpspace.app.panels.analysis_panel import AnalysisPanel, Question
+from warpspace.app.panels.analysis_panel import AnalysisPanel, ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.panel import Context, Job, Jobs
 from warpspace.app.state import edits
@@ -54,84 +54,84 @@ WHAT = "CSV file of readings"
 
 @dataclass(frozen=True, slots=True)
 class UploadedFile:
-    """A file that a page has sent."""
+    """A file uploaded by the page."""
 
     name: str  # never a path
-    content: Any = field(repr=False)  # its text, or what was made of it
-    words: str = ""  # what it was read as
-    kind: str | None = None  # as chosen; None for what its columns tell
+    content: Any = field(repr=False)  # its text, or an object read from it
+    description: str = ""  # kind and number of readings
+    kind: str | None = None  # as selected; None: recognised by its columns
     count: int = 0  # readings
 
 
 class FilesPanel(AnalysisPanel):
-    """An analysis of files that a page has sent."""
+    """An analysis of uploaded files."""
 
     most_bytes, what = MOST_BYTES, WHAT
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
-        self._files: tuple[UploadedFile, ...] = ()
-        self._trouble = ""
-        self._uploads = Jobs(self, self.renew, self._refuse)
+        self.files: tuple[UploadedFile, ...] = ()
+        self._upload_problem = ""
+        self._uploads = Jobs(self, self.rerender, self._refuse)
 
-    def question(self, state: AppState) -> Question:
-        return (*super().question(state), self._files)
+    def result_key(self, state: AppState) -> ResultKey:
+        return (*super().result_key(state), self.files)
 
     def is_ready(self, state: AppState) -> bool:
-        return bool(self._files)
+        return bool(self.files)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse a file beside the session; return what the session does with it."""
+        """Parse a file in a job; return a callback for the session."""
         raise NotImplementedError
 
-    def _hold(self, files: tuple[UploadedFile, ...]) -> None:
-        self._files = files
+    def set_files(self, files: tuple[UploadedFile, ...]) -> None:
+        self.files = files
 
     def files_html(self) -> Markup:
-        """List the files, and say why the last one is not among them."""
-        lines = [
-            (tag("span", one.name) + tag("small", f" {one.words}"),
-             button("✕", f"{self.name}:remove", at, kind="link", aria_label=f"Remove {one.name}"))
-            for at, one in enumerate(self._files)
-        ]  # fmt: skip
-        problem = tag("p", self._trouble, class_="ws-problem", role="alert")
-        found = rows(lines) if lines else EMPTY
-        return join((problem if self._trouble else EMPTY, found, self._uploads.html()))
+        """Render the list of files, and the error of the last upload."""
+        lines: list[tuple[Markup, Markup]] = []
+        for index, file in enumerate(self.files):
+            remove = button("✕", f"{self.name}:remove", index, kind="link",
+                            aria_label=f"Remove {file.name}")  # fmt: skip
+            lines.append((tag("span", file.name) + tag("small", f" {file.description}"), remove))
+        problem = tag("p", self._upload_problem, class_="ws-problem", role="alert")
+        table = rows(lines) if lines else EMPTY
+        return join((problem if self._upload_problem else EMPTY, table, self._uploads.html()))
 
-    def upload_html(self, words: str) -> Markup:
+    def upload_html(self, label: str) -> Markup:
         hint = f"A CSV file with a header, at most {MOST_BYTES >> 20} MB"
-        upload = upload_button(words, self.name, MOST_BYTES, ".csv", hint=hint)
+        upload = upload_button(label, self.name, MOST_BYTES, ".csv", hint=hint)
         return tag("div", upload, class_="ws-actions")
 
     def receive(self, read: Callable[[], tuple[str, bytes]]) -> None:
-        """Parse a file beside the session, one after the other; errors stand above the files."""
+        """Parse files in jobs, one after the other; errors are shown above the files."""
 
         def work(job: Job) -> None:
-            take_in = self.parse(*read())
+            accept = self.parse(*read())
             if not job.is_set():
-                self.context.act(partial(self._take_in, take_in))
+                self.context.call_soon(partial(self._accept, accept))
 
         self._uploads.queue("Reading", work)
 
-    def _take_in(self, take_in: Callable[[], None]) -> None:
-        self._trouble = ""
-        take_in()
-        self.renew()
+    def _accept(self, accept: Callable[[], None]) -> None:
+        self._upload_problem = ""
+        accept()
+        self.rerender()
 
     def _refuse(self, error: Exception) -> None:
-        self._trouble = error_words(error)
-        self.renew()
+        self._upload_problem = error_words(error)
+        self.rerender()
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "file":
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "file":
             self.receive(partial(read_upload, value, self.most_bytes, self.what))
-        elif word == "remove" and (at := index_of(value, len(self._files))) is not None:
-            self._files = (*self._files[:at], *self._files[at + 1 :])
-            self.context.act(self.renew)
+        elif action == "remove" and (index := index_of(value, len(self.files))) is not None:
+            self.files = (*self.files[:index], *self.files[index + 1 :])
+            self.context.call_soon(self.rerender)
         else:
-            if word == "cancel":
+            if action == "cancel":
                 self._uploads.cancel()
-            return super().take(state, word, value)
+            return super().handle(state, action, value)
         return state
 
 
@@ -139,236 +139,240 @@ class FilesPanel(AnalysisPanel):
 
 
 class TestsPanel(FilesPanel):
-    """A standard test on the model as it would be on the machine, its path drawn in the box."""
+    """A standard test simulated on the model, with its path in the drawing."""
 
     __test__ = False
-    at_once = True
+    runs_on_open = True
 
     def __init__(self, context: Context) -> None:
-        words = "A test by its standard, on the model as it would be on the machine"
-        super().__init__(context, Entry(TEST, "measure", words))
+        sentence = "A standard test, simulated on the model of the machine"
+        super().__init__(context, Entry(TEST, "measure", sentence))
         self.title = "Standard tests"
 
     @property
     def kind(self) -> type[BenchTest]:
         return chosen_test(self.context.state) or BenchTest
 
-    def question(self, state: AppState) -> Question:
-        return (*super().question(state), state.forms.get(TEST))
+    def result_key(self, state: AppState) -> ResultKey:
+        return (*super().result_key(state), state.forms.get(TEST))
 
     def is_ready(self, state: AppState) -> bool:
         return chosen_test(state) is not None
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (self.question(picture.drawn_state), picture.is_difference)
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (self.result_key(picture.drawn_state), picture.is_difference)
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        plan_test(asked, scenes[0])
-        for one in self._files:
-            table = parse_test(one.content, asked.data_columns(scenes[0]), one.name)
-            asked = replace(asked, data=table)
-        return asked
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
+        plan_test(analysis, scene)
+        for file in self.files:
+            table = parse_test(file.content, analysis.data_columns(scene), file.name)
+            analysis = replace(analysis, data=table)
+        return analysis
 
     def body(self, picture: LivePicture) -> Markup:
         state, kind = picture.drawn_state, chosen_test(picture.drawn_state)
         tests = [find_test(name) for name in bench_names()]
-        names = {"": "Choose a test …"} | {
-            one.name: f"{one.title} ({one.standard})" for one in tests
-        }
-        chosen = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
+        names = {"": "Select a test …"}
+        names |= {test.name: f"{test.title} ({test.standard})" for test in tests}
+        chooser = choice("test:choose", state.forms.get(TEST, ""), names, label="Standard test")
         if kind is None:
-            return chosen
-        told = tag("p", "A difference of two machines cannot be tested: show A or B.",
-                   class_="ws-problem", role="alert")  # fmt: skip
+            return chooser
+        test = self._body(state)
+        if picture.is_difference:
+            test = tag("p", "Not available for the difference of two machines: show A or B.",
+                       class_="ws-problem", role="alert")  # fmt: skip
         columns = ",".join(column.name for column in kind.columns)
-        about = join(tag("p", one) for one in (kind.description, f"Columns of a file: {columns}"))
+        about = tag("p", kind.description) + tag("p", f"Columns of a file: {columns}")
         return join((
-            chosen, told if picture.is_difference else self._body(state), self.files_html(),
-            EMPTY if self._files else self.upload_html("Measured readings …"),
-            switch("test:path", "Path in the box", on=state.forms.get("test.path") != "0",
-                   hint="Nominal in grey, actual in colour, exaggerated as the box is"),
+            chooser, test, self.files_html(),
+            EMPTY if self.files else self.upload_html("Measured readings …"),
+            switch("test:path", "Show test path", on=state.forms.get("test.path") != "0",
+                   hint="Nominal grey, actual coloured, with the exaggeration of the map"),
             tag("details", tag("summary", "Procedure") + tag("div", about), class_="ws-details",
                 data_key="test.procedure"),
         ))  # fmt: skip
 
-    def headline(self, found: Result) -> Markup:
-        assert isinstance(found, BenchResult)  # noqa: S101 - of a test
-        rms = found.rms_difference
-        apart = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
-        return apart + tag("p", found.model.plan.place, class_="ws-tiny")
+    def headline(self, result: Result) -> Markup:
+        assert isinstance(result, BenchResult)  # noqa: S101 - of a test
+        rms = result.rms_difference
+        difference = EMPTY if rms is None else tag("p", f"RMS of measured − model: {number(rms)}")
+        return difference + tag("p", result.model.plan.place, class_="ws-tiny")
 
-    def result_html(self, found: Result) -> Markup:
-        return join(map(block_html, (*found.blocks_of(Lines), *found.blocks_of(Table))))
+    def result_html(self, result: Result) -> Markup:
+        return join(map(block_html, (*result.blocks_of(Lines), *result.blocks_of(Table))))
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "choose" and value in ("", *bench_names()):
-            self._answer, self._files, self._trouble = None, (), ""
-            kept = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
-            state = replace(state, forms=kept | ({TEST: value} if value else {}))
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "choose" and value in ("", *bench_names()):
+            self.outcome, self.files, self._upload_problem = None, (), ""
+            other_forms = {k: v for k, v in state.forms.items() if k.partition(".")[0] != TEST}
+            state = replace(state, forms=other_forms | ({TEST: value} if value else {}))
             return edits.with_sight(state, inside=bool(value))
-        if word == "path":
+        if action == "path":
             return with_form(state, "test.path", value)
-        return super().take(state, word, value)
+        return super().handle(state, action, value)
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        return partial(self._hold, (UploadedFile(name, upload_text(content, name, WHAT)),))
+        return partial(self.set_files, (UploadedFile(name, upload_text(content, name, WHAT)),))
 
 
 # --- Calibration ----------------------------------------------------------------------------------
 
-MOST_FILES, MOST_READINGS = 6, 5_000
-"""Files of a page, and readings in all of them: what a fit needs of memory goes with it."""
+MOST_FILES, MOST_READINGS = 6, 5_000  # per page; they limit the memory of a fit
 LONGEST_KIND = 200
-MOST_NAMED = 12  # doubtful errors and notes that are listed
+MOST_NAMED = 12  # errors and notes that are listed
 ARROWS = {"": "none", "before": "before", "after": "after"}
-TURNED = "No arrows: a rotary axis carries the workpiece, which the box does not turn with."
-DOUBTS = (
-    (Estimability.CONFOUNDED, "Confounded with others"),
+ROTATED = "No arrows: a rotary axis carries the workpiece, and the drawing does not rotate with it."
+ESTIMABILITY = (
+    (Estimability.CONFOUNDED, "Confounded"),
     (Estimability.NOT_ESTIMABLE, "Not estimable, unchanged"),
 )
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrateTexts(Calibrate):
-    """A calibration out of texts of files."""
+    """A calibration from uploaded texts."""
 
     files: tuple[UploadedFile, ...] = ()
 
     def run(self, scene: Scene, watch: ProgressCallback, /) -> Calibration:
-        sets = [
-            parse_readings(one.content, one.name, scene, one.kind, self.frame) for one in self.files
+        reading_sets = [
+            parse_readings(file.content, file.name, scene, file.kind, self.frame)
+            for file in self.files
         ]
-        return self.fit_readings(scene, sets, (), lambda: watch(0.0))
+        return self.fit_readings(scene, reading_sets, (), lambda: watch(0.0))
 
 
-def take_file(
-    scene: Scene, text: str, name: str, kind: str | None, others: Sequence[UploadedFile]
+def read_uploaded(
+    scene: Scene, text: str, name: str, kind: str | None, present: Sequence[UploadedFile]
 ) -> UploadedFile:
-    """Take in the text of a file beside those that are there."""
-    if len(others) >= MOST_FILES:
+    """Read the text of a file; its name is made unique among the present files."""
+    if len(present) >= MOST_FILES:
         raise OptionError(f"{name}: expected at most {MOST_FILES} files; remove one first")
-    known = {one.name for one in others}
+    present_names = {file.name for file in present}
     numbered = (f"{name} {count}" for count in range(2, MOST_FILES + 2))
-    unlike = next(one for one in (name, *numbered) if one not in known)
+    unique_name = next(text for text in (name, *numbered) if text not in present_names)
     lines = text.count("\n")
     if kind is None or kind in KINDS:
-        lines = len(parse_reading_table(text, unlike))
-    if lines > MOST_READINGS - sum(one.count for one in others):
+        lines = len(parse_reading_table(text, unique_name))
+    if lines > MOST_READINGS - sum(file.count for file in present):
         raise OptionError(
             f"{name} has {lines:,} readings; expected at most {MOST_READINGS:,} in all files"
         )
-    readings = parse_readings(text, unlike, scene, kind)
-    words = f"{_kind_words(readings.kind)}, {len(readings)}"
-    return UploadedFile(unlike, text, words, kind, len(readings))
+    readings = parse_readings(text, unique_name, scene, kind)
+    description = f"{_kind_words(readings.kind)}, {len(readings)}"
+    return UploadedFile(unique_name, text, description, kind, len(readings))
 
 
 class CalibratePanel(FilesPanel):
-    """Readings of a page, what is fitted, and residuals as arrows in the box."""
+    """Uploaded readings, fitted errors, and residuals as arrows in the drawing."""
 
     def __init__(self, context: Context, entry: Entry) -> None:
         super().__init__(context, entry)
-        self._kind_of_next, self._arrows = "", ""
+        self._next_kind, self._arrows = "", ""
         self._drawn: Nodes | None = None
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name != "kinds"]  # each file has its own
+        return [option for option in super().options() if option.name != "kinds"]  # set per file
 
     def defaults(self, state: AppState) -> Mapping[str, str]:
         return {**super().defaults(state), "next_count": "3"}
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked = read_form(CalibrateTexts, self.options(), values, scenes[0])
-        return replace(asked, files=self._files)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis = read_form(CalibrateTexts, self.options(), values, scene)
+        return replace(analysis, files=self.files)
 
     def before_result(self, state: AppState) -> Markup:
-        words = "CSV files of readings give the errors of this machine."
+        introduction = "Errors of this machine are fitted to readings in CSV files."
         bundled = {"": "Bundled readings …"} | {name: name for name in bundled_data()}
-        kinds = {"": "recognised from its columns"}
+        kinds = {"": "recognised by its columns"}
         kinds |= {name: _kind_words(name) for name in (*KINDS, *bench_names())}
-        name, _, options = self._kind_of_next.partition(":")
+        name, _, options = self._next_kind.partition(":")
         return join((
-            self.files_html(), EMPTY if self._files else tag("p", words, class_="ws-quiet"),
+            self.files_html(), EMPTY if self.files else tag("p", introduction, class_="ws-quiet"),
             self.upload_html("Add readings …"),
             choice("calibrate:bundled", "", bundled, label="Bundled readings"),
             labelled("Kind", choice("calibrate:kind", name, kinds), "calibrate:kind",
-                     hint="Kind of readings that are added next"),
-            text_box("calibrate:test-options", options, label="Options of the test",
+                     hint="Kind of the readings to be added"),
+            text_box("calibrate:test-options", options, label="Test options",
                      placeholder="plane=XZ:radius=150") if name in bench_names() else EMPTY,
         ))  # fmt: skip
 
-    def headline(self, found: Result) -> Markup:
-        assert isinstance(found, Calibration)  # noqa: S101 - of this analysis
-        before, after = UM_PER_MM * found.rms_before_mm, UM_PER_MM * found.rms_after_mm
-        count = sum(len(one.readings) for one in found.fitted)
+    def headline(self, result: Result) -> Markup:
+        assert isinstance(result, Calibration)  # noqa: S101 - of this analysis
+        before, after = UM_PER_MM * result.rms_before_mm, UM_PER_MM * result.rms_after_mm
+        count = sum(len(group.readings) for group in result.fitted)
         parts = [tag("p", join((f"RMS of {count} residuals: {number(before)} → ",
                                 tag("b", f"{number(after)} µm"))))]  # fmt: skip
-        for status, words in DOUBTS:
-            keys = [one.key for one in found.parameters if one.estimable is status]
+        for status, title in ESTIMABILITY:
+            keys = [p.key for p in result.parameters if p.estimable is status]
             if keys:
-                more = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
+                omitted = f" and {len(keys) - MOST_NAMED} more" if len(keys) > MOST_NAMED else ""
                 names = ", ".join(keys[:MOST_NAMED])
-                parts.append(tag("p", f"{words}: {names}{more}", class_="ws-quiet"))
-        notes = (note.replace("--", "") for note in found.notes[:MOST_NAMED])
-        return join((*parts, *(tag("p", note, class_="ws-doubt") for note in notes)))
+                parts.append(tag("p", f"{title}: {names}{omitted}", class_="ws-quiet"))
+        notes = (note.replace("--", "") for note in result.notes[:MOST_NAMED])
+        return join((*parts, *(tag("p", note, class_="ws-caveat") for note in notes)))
 
-    def result_html(self, found: Result) -> Markup:
-        blocks = list(found.blocks())
-        shown = [next(one for one in blocks if isinstance(one, Lines))]
-        shown += [one for one in blocks if isinstance(one, Table) and len(one.columns) == 4]
-        arrows = labelled("Arrows in the box", choice("calibrate:arrows", self._arrows, ARROWS),
+    def result_html(self, result: Result) -> Markup:
+        blocks = list(result.blocks())
+        visible = [next(block for block in blocks if isinstance(block, Lines))]
+        visible += [b for b in blocks if isinstance(b, Table) and len(b.columns) == 4]
+        arrows = labelled("Residual arrows", choice("calibrate:arrows", self._arrows, ARROWS),
                           "calibrate:arrows",
                           hint="Observed − predicted at each reading, exaggerated")  # fmt: skip
-        words = tag("p", self._arrow_words(), class_="ws-tiny")
-        rest = details_html(one for one in blocks if one not in shown)
-        return join((arrows, words, *map(block_html, shown), rest))
+        status = tag("p", self._draw_arrows(), class_="ws-tiny")
+        folded = details_html(block for block in blocks if block not in visible)
+        return join((arrows, status, *map(block_html, visible), folded))
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "kind":
-            self._kind_of_next = value if value in (*KINDS, *bench_names()) else ""
-        elif word == "test-options":
-            name = self._kind_of_next.partition(":")[0]
-            self._kind_of_next = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
-        elif word == "bundled" and value in bundled_data():
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "kind":
+            self._next_kind = value if value in (*KINDS, *bench_names()) else ""
+        elif action == "test-options":
+            name = self._next_kind.partition(":")[0]
+            self._next_kind = f"{name}:{value.strip()[:LONGEST_KIND]}".strip(":")
+        elif action == "bundled" and value in bundled_data():
             self.receive(lambda: (value, find_data(value).read_bytes()))
-        elif word == "arrows":
+        elif action == "arrows":
             self._arrows = value if value in ARROWS else ""
             state = edits.with_sight(state, inside=bool(self._arrows))
         else:
-            return super().take(state, word, value)
-        self.context.act(self.renew)
+            return super().handle(state, action, value)
+        self.context.call_soon(self.rerender)
         return state
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         text = upload_text(content, name, WHAT)
-        scene, kind, files = self.context.state.active_scene(), self._kind_of_next, self._files
-        return partial(self._hold, (*files, take_file(scene, text, name, kind or None, files)))
+        scene, kind, files = self.context.state.active_scene(), self._next_kind, self.files
+        uploaded = read_uploaded(scene, text, name, kind or None, files)
+        return partial(self.set_files, (*files, uploaded))
 
     # --- arrows ----------------------------------------------------------------------------------
 
-    def _arrow_words(self) -> str:
-        picture, found, words = self.context.shown, None, ""
+    def _draw_arrows(self) -> str:
+        """Draw the residuals of a current result; return a status."""
+        picture, calibration, text = self.context.picture, None, ""
         shapes: Shapes = {}
-        if self._answer and self.question(self.context.state) in (self._answer[0], self._applied):
-            found = self._answer[1]
-        if self._arrows and picture is not None and isinstance(found, Calibration):
-            words, before = TURNED, self._arrows == "before"
-            if all(axis.is_linear for axis in found.scene.machine.branch("workpiece")):
-                feet, vectors = arrows_of(found, before=before)
+        key = self.result_key(self.context.state)
+        if self.outcome and key in (self.outcome.key, self._applied_key):
+            calibration = self.outcome.result
+        if self._arrows and picture is not None and isinstance(calibration, Calibration):
+            text, before = ROTATED, self._arrows == "before"
+            if all(axis.is_linear for axis in calibration.scene.machine.branch("workpiece")):
+                feet, vectors = arrows_of(calibration, before=before)
                 shapes, factor = residuals(feet, vectors, picture.size_mm, before=before)
-                words = f"Residuals {self._arrows}, drawn × {factor:g}"
-                words = words if factor else "No arrows: none of these readings is a vector."
+                text = f"Residuals {self._arrows} calibration, exaggerated × {factor:g}"
+                text = text if factor else "No arrows: none of the readings is a vector."
         if shapes or self._drawn is not None:
             self._drawn = self._drawn or Nodes(self.context.client.scene)
             self._drawn.draw(shapes)
-        return words
+        return text
 
 
-def arrows_of(found: Calibration, *, before: bool) -> tuple[Array, Array]:
-    """Give foot and residual of each reading that is a vector, [n, 3] mm and [n, 3] mm."""
+def arrows_of(calibration: Calibration, *, before: bool) -> tuple[Array, Array]:
+    """Return position and residual of each vector reading, [n, 3] mm and [n, 3] mm."""
     feet: list[Array] = [np.zeros((0, 3))]
     vectors: list[Array] = [np.zeros((0, 3))]
-    for group in found.fitted:
+    for group in calibration.fitted:
         lines = group.before_mm if before else group.after_mm
         if lines.shape[1] == 3:
             feet.append(group.readings.nominal_mm)

@@ -1,4 +1,4 @@
-"""Review notes on the page: listed beside the drawing, and told as a story."""
+"""Review notes: the list beside the drawing, and the story."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import answer, pick_worst, with_picked
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Panel, actions
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -32,95 +32,97 @@ from warpspace.scene.text_files import one_line
 from warpspace.units import spell_short
 
 LIST, NEW = "list", "new"
-"""What `PageLook.notes` says beside the identity of the note that is edited."""
+"""Values of `PageLook.notes` beside the id of an edited note."""
 MOST_AUTHOR = 100  # characters of a name, as in a file
-AMPLITUDES = "amplitudes."  # before the key of an error, in a path of the state
-SAME = 1e-6  # µm or µrad; a value that a decision has set is still there
+AMPLITUDES = "amplitudes."  # prefix of the key of an error in a path of the state
+SAME = 1e-6  # µm or µrad; tolerance for values that a decision has set
 
 
 def clean(text: str) -> str:
-    """Give what somebody has typed without signs that a file cannot hold."""
+    """Remove characters that a file cannot contain."""
     lines = text.replace("\r\n", "\n").strip()
     return "".join(sign for sign in lines if sign in "\n\t" or sign.isprintable())
 
 
 class NotesPanel(Panel):
-    """The list of notes, in the column of the tasks."""
+    """The list of notes, in place of the tasks."""
 
     name = "notes"
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._decided: AppState | None = None  # before the decision that is being written
-        # the words of the bar over what is shown again, the note, and where one was before
-        self._again: tuple[str, str, AppState, CameraMemory] | None = None
+        self._before_decision: AppState | None = None  # of the decision that is being written
+        # the restored view of a note: title, id of the note, state and camera before it
+        self._restored: tuple[str, str, AppState, CameraMemory] | None = None
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         state, bar = picture.state, EMPTY
-        if again := self._shown_again(state):
-            words, own, *_ = again
-            back = button("Back", "notes:back", kind="chip", hint="Back to where you were before")
-            changed = tag("span", "", class_="ws-changed", data_piece=f"note.{own}.bar")
-            bar = tag("p", join((words, back, changed)), role="status", class_="ws-reopened")
-        return {"notes": _panel(state) if state.page.notes else EMPTY, "reopened": bar}
+        restored = self._restored_view(state)
+        if restored is not None:
+            title, note_id, *_ = restored
+            leave = button("Back", "notes:back", kind="chip", hint="Return to the previous view")
+            changed = tag("span", "", class_="ws-changed", data_piece=f"note.{note_id}.bar")
+            bar = tag("p", join((title, leave, changed)), role="status", class_="ws-reopened")
+        return {"notes": _list_html(state) if state.page.notes else EMPTY, "reopened": bar}
 
-    def _shown_again(self, state: AppState) -> tuple[str, str, AppState, CameraMemory] | None:
-        """Give what is shown again; none after that has been undone."""
-        if self._again and state.amplitudes is self._again[2].amplitudes:
-            self._again = None
-        return self._again
+    def _restored_view(self, state: AppState) -> tuple[str, str, AppState, CameraMemory] | None:
+        """Return the restored view; None after it has been undone."""
+        if self._restored and state.amplitudes is self._restored[2].amplitudes:
+            self._restored = None
+        return self._restored
 
     # --- events ----------------------------------------------------------------------------------
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        do, _, own = word.partition(".")
-        match do, next((one for one in state.review if one.id == own), None):
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        command, _, note_id = action.partition(".")
+        match command, next((n for n in state.review if n.id == note_id), None):
             case "open" | "close", None:
-                return _opened(state, LIST if do == "open" else "")
+                return _opened(state, LIST if command == "open" else "")
             case "pin" | "decide", None:
-                return self._begun(state, value, decided=do == "decide")
+                return self._start_note(state, value, is_decision=command == "decide")
             case "keep", edited:
-                return self._kept(state, edited)
-            case "back", None if self._again:
-                (*_, before, camera), self._again = self._again, None
-                self.context.look_from(camera)
+                return self._save_note(state, edited)
+            case "back", None if self._restored:
+                (*_, before, camera), self._restored = self._restored, None
+                self.context.move_camera(camera)
                 return replace(before, review=state.review, page=state.page, forms=state.forms)
             case "at", None if index := index_of(value, len(state.review) + 1):
                 self.context.page.call("reveal", f"note-{state.review[index - 1].id}")
                 return _opened(state, LIST)
             case "show", note if note:
-                return self._reopened(state, note)
+                return self._restore_view(state, note)
             case _, None:
                 return state
             case _, note:
-                return _about(state, note, do, value)
+                return _update_note(state, note, command, value)
 
-    def _begun(self, state: AppState, text: str, *, decided: bool) -> AppState:
-        """Open the form; for a decision filled in with what has just been applied."""
-        self._decided, words = (self.context.decided if decided else None) or (None, "")
-        if words:
-            return _opened(state, NEW, "decision", "whole", f"{words}\nReason: ")
-        # what somebody has measured, say, is about the whole
+    def _start_note(self, state: AppState, text: str, *, is_decision: bool) -> AppState:
+        """Open the form; for a decision, with a description of the last applied change."""
+        self._before_decision = None
+        if is_decision and self.context.last_decision is not None:
+            self._before_decision, description = self.context.last_decision
+            return _opened(state, NEW, "decision", "whole", f"{description}\nReason: ")
+        # a given text, such as a measured distance, refers to the whole volume
         return _opened(state, NEW, place="whole" if text else "point", text=text)
 
-    def _kept(self, state: AppState, edited: Note | None) -> AppState:
-        """Keep an edit; or a note of what is on the screen, with the numbers that it rests on."""
+    def _save_note(self, state: AppState, edited: Note | None) -> AppState:
+        """Save an edit; or a new note with the current view and its numbers."""
         text, kind = clean(state.page.note_text), state.page.note_kind
         if not 0 < len(text) <= MAX_NOTE_TEXT:
-            return state.noted(f"a note needs a text, of at most {MAX_NOTE_TEXT} characters")
+            return state.noted(f"a note needs a text of 1 to {MAX_NOTE_TEXT} characters")
         note = edited and edited.edited(kind=kind, text=text)
         if note is None:
             (at, on), view = self._place(state), view_of(state, self.context.camera.remember())
             note = Note(kind=kind, text=text, author=_author(state), at=at, on=on, view=view,
                         loop=state.loop.value)  # fmt: skip
-            if self._decided is not None and kind == "decision":
-                before = note_numbers(self._decided.resulting_scene(), [note])[0]
-                note = replace(note, before=before, change=_changed(self._decided, state))
+            if self._before_decision is not None and kind == "decision":
+                before = note_numbers(self._before_decision.resulting_scene(), [note])[0]
+                note = replace(note, before=before, change=_changes(self._before_decision, state))
             note = replace(note, numbers=note_numbers(state.resulting_scene(), [note])[0])
         return _opened(replace(state, review=with_note(state.review, note)), LIST)
 
     def _place(self, state: AppState) -> tuple[Mapping[str, float], NoteAnchor | None]:
-        picture, place = self.context.shown, state.page.note_place
+        picture, place = self.context.picture, state.page.note_place
         if place in state.scene.machine.axes:
             return {}, NoteAnchor(body=place)
         if place != "point" or picture is None or picture.is_difference:
@@ -130,27 +132,27 @@ class NotesPanel(Panel):
         on = picked.point_mm and NoteAnchor(str(picked.loop or state.loop), picked.point_mm)
         return at, on or None
 
-    def _reopened(self, state: AppState, note: Note) -> AppState:
+    def _restore_view(self, state: AppState, note: Note) -> AppState:
         if not note.view:
             return with_picked(state, Picked.of_note(note))
-        found, camera = reopened(state, note, self.context.scenes.fixed)
-        here = "", "", state, self.context.camera.remember()
-        *_, before, at = self._shown_again(state) or here
+        reopened_state, camera = reopened(state, note, self.context.scenes.fixed)
+        present = "", "", state, self.context.camera.remember()
+        *_, before, before_camera = self._restored_view(state) or present
         number = state.review.index(note) + 1
-        words = f"{note.kind.capitalize()} {number} as it was on {note.date:%d %b %Y} "
-        self._again = words, note.id, before, at
+        title = f"{note.kind.capitalize()} {number}, state of {note.date:%d %b %Y} "
+        self._restored = title, note.id, before, before_camera
         if camera is not None:
-            self.context.look_from(camera)
-        return found
+            self.context.move_camera(camera)
+        return reopened_state
 
 
-# --- What is done with a note ---------------------------------------------------------------------
+# --- Changes of a note ----------------------------------------------------------------------------
 
 
 def _opened(
-    state: AppState, what: str, kind: str = "note", place: str = "point", text: str = ""
+    state: AppState, notes: str, kind: str = "note", place: str = "point", text: str = ""
 ) -> AppState:
-    page = replace(state.page, notes=what, note_kind=kind, note_place=place, note_text=text)
+    page = replace(state.page, notes=notes, note_kind=kind, note_place=place, note_text=text)
     return replace(state, page=page)
 
 
@@ -158,22 +160,22 @@ def _author(state: AppState) -> str:
     return one_line(clean(state.page.author))[:MOST_AUTHOR]
 
 
-def _about(state: AppState, note: Note, do: str, value: str) -> AppState:
-    heads, changed = (note, *note.versions), note
-    match do:
+def _update_note(state: AppState, note: Note, command: str, value: str) -> AppState:
+    versions, changed = (note, *note.versions), note
+    match command:
         case "delete":
-            return replace(state, review=tuple(one for one in state.review if one is not note))
+            return replace(state, review=tuple(n for n in state.review if n is not note))
         case "edit":
             return _opened(state, note.id, note.kind, text=note.text)
         case "take-back":
-            return _taken_back(state, note)
+            return _revert_decision(state, note)
         case "step":
-            return _in_order(state, note, value)
+            return _move_step(state, note, value)
         case "status":
             changed = note.edited(status="done" if note.status == "open" else "open")
-        case "choose" if (index := index_of(value, len(heads))) is not None:
-            known = note.edited().replaces
-            changed = replace(heads[index], replaces=known, versions=(), replies=note.replies)
+        case "choose" if (index := index_of(value, len(versions))) is not None:
+            replaced_ids, replies = note.edited().replaces, note.replies
+            changed = replace(versions[index], replaces=replaced_ids, versions=(), replies=replies)
         case "reply" if text := clean(value):
             changed = note.answered(Reply(text[:MAX_NOTE_TEXT], _author(state)))
         case _:
@@ -181,66 +183,69 @@ def _about(state: AppState, note: Note, do: str, value: str) -> AppState:
     return replace(state, review=with_note(state.review, changed))
 
 
-def _in_order(state: AppState, note: Note, way: str) -> AppState:
+def _move_step(state: AppState, note: Note, move: str) -> AppState:
     """Move a note "up" or "down" in the story, "add" it at the end, or take it "out"."""
     order = story(state.review)
-    if any(one.versions for one in (note, *order)):
-        return state.noted("choose first which of the versions side by side is to stay")
+    if any(n.versions for n in (note, *order)):
+        return state.noted("resolve the conflicting versions of the note first")
     place = order.index(note) if note.step else len(order)
-    order = [one for one in order if one is not note]
-    if way != "out":
-        order.insert(max(place + {"up": -1, "down": 1}.get(way, 0), 0), note)
-    steps = {one.id: number for number, one in enumerate(order, 1)}
-    for one in state.review:
-        if one.step != (step := steps.get(one.id, 0)):
-            state = replace(state, review=with_note(state.review, one.edited(step=step)))
+    order = [n for n in order if n is not note]
+    if move != "out":
+        order.insert(max(place + {"up": -1, "down": 1}.get(move, 0), 0), note)
+    steps = {n.id: number for number, n in enumerate(order, 1)}
+    for other in state.review:
+        step = steps.get(other.id, 0)
+        if other.step != step:
+            state = replace(state, review=with_note(state.review, other.edited(step=step)))
     return state
 
 
-def _taken_back(state: AppState, note: Note) -> AppState:
-    """Set what a decision changed back, where it is still as decided."""
-    stayed, known = list[str](), leaves(state)
+def _revert_decision(state: AppState, note: Note) -> AppState:
+    """Restore the values that a decision changed, unless they were changed again."""
+    unchanged, paths = list[str](), leaves(state)
     for key, (old, new) in note.change.items():
         name = key.removeprefix(TOLERANCES)
         path = AMPLITUDES + key if name == key else key
         now = stored(state, path)
-        if path not in known:
-            stayed.append(f"{name} is not there any more")
+        if path not in paths:
+            unchanged.append(f"{name} no longer exists")
         elif math.isclose(now, new, abs_tol=SAME):
-            state = set_leaf(state, known[path], repr(old))
+            state = set_leaf(state, paths[path], repr(old))
         else:
-            stayed.append(f"{name} is {spell_short(now)} now, not {spell_short(new)}: it stays")
-    if len(stayed) < len(note.change):
+            unchanged.append(
+                f"{name} not reverted: now {spell_short(now)} instead of {spell_short(new)}"
+            )
+    if len(unchanged) < len(note.change):
         note = note.edited(status="open")
         if len(note.replies) < MAX_REPLIES:
-            words = "; ".join(("Taken back", *stayed))[:MAX_NOTE_TEXT]
-            note = note.answered(Reply(words, _author(state)))
-    return replace(state, review=with_note(state.review, note)).noted(*stayed)
+            reply = "; ".join(("Reverted", *unchanged))[:MAX_NOTE_TEXT]
+            note = note.answered(Reply(reply, _author(state)))
+    return replace(state, review=with_note(state.review, note)).noted(*unchanged)
 
 
-def _changed(before: AppState, after: AppState) -> dict[str, Pair]:
-    found = {
+def _changes(before: AppState, after: AppState) -> dict[str, Pair]:
+    pairs = {
         path.removeprefix(AMPLITUDES): (stored(before, path) or 0.0, stored(after, path))
         for path in leaves(after)
         if path.startswith((AMPLITUDES, TOLERANCES))
     }
-    return {key: pair for key, pair in found.items() if pair[0] != pair[1]}
+    return {key: pair for key, pair in pairs.items() if pair[0] != pair[1]}
 
 
 # --- The list -------------------------------------------------------------------------------------
 
 
-def _panel(state: AppState) -> Markup:
-    cross = button("✕", "notes:close", kind="quiet", hint="Close (Esc)",
+def _list_html(state: AppState) -> Markup:
+    close = button("✕", "notes:close", kind="quiet", hint="Close (Esc)",
                    aria_label="Close the notes", data_go="[data-do='notes:open']")  # fmt: skip
     pin = button("Pin a note", "notes:pin", kind="main", hint="Pin a note (N)")
     edited, steps = state.page.notes, story(state.review)
     return join((
-        tag("header", join((tag("h2", "Notes"), pin, cross))),
+        tag("header", join((tag("h2", "Notes"), pin, close))),
         setting(state, "page.author"),
-        button("Tell the story", "story:start") if steps else EMPTY,
+        button("Play the story", "story:start") if steps else EMPTY,
         _form(state, "") if edited == NEW else EMPTY,
-        *(_form(state, edited) if note.id == edited else _entry(number, note, steps)
+        *(_form(state, edited) if note.id == edited else _note_html(number, note, steps)
           for number, note in enumerate(state.review, 1)),
         EMPTY if state.review else tag("p", "No notes yet.", class_="ws-quiet"),
     ))  # fmt: skip
@@ -250,30 +255,34 @@ def _form(state: AppState, edited: str) -> Markup:
     names = ("kind", "text") if edited else ("kind", "place", "text")
     return tag("div", join((
         *(setting(state, f"page.note_{name}") for name in names),
-        actions(button("Keep", f"notes:keep.{edited}", kind="main"),
+        actions(button("Save note", f"notes:keep.{edited}", kind="main"),
                 button("Cancel", "notes:open", kind="quiet")),
     )), class_="ws-card", data_key=f"note-{edited or NEW}")  # fmt: skip
 
 
-def _said(one: Note | Reply) -> Markup:
-    lines = (tag("p", linked(line)) for line in one.text.splitlines() if line.strip())
-    by = f"{one.author or 'somebody'}, {one.date:%d %b %Y}"
+def _message_html(message: Note | Reply) -> Markup:
+    lines = (tag("p", linked(line)) for line in message.text.splitlines() if line.strip())
+    by = f"{message.author or 'anonymous'}, {message.date:%d %b %Y}"
     return join((*lines, tag("small", by, class_="ws-quiet")))
 
 
-def _entry(number: int, note: Note, steps: Sequence[Note]) -> Markup:
-    facts, texts = [spell_place(note), spell_numbers(note), spell_change(note)], [_said(note)]
+def _note_html(number: int, note: Note, steps: Sequence[Note]) -> Markup:
+    facts, texts = (
+        [spell_place(note), spell_numbers(note), spell_change(note)],
+        [_message_html(note)],
+    )
     if note.versions:
-        texts = [tag("p", "Edited by several: which is to stay?", class_="ws-stale")]
-        texts += [_said(one) + actions(button("Keep this one", f"notes:choose.{note.id}", index))
-                  for index, one in enumerate((note, *note.versions))]  # fmt: skip
+        texts = [tag("p", "Conflicting edits: select one version.", class_="ws-stale")]
+        for index, version in enumerate((note, *note.versions)):
+            select = button("Use this version", f"notes:choose.{note.id}", index)
+            texts.append(_message_html(version) + actions(select))
     reply = f"notes:set.reply.{note.id}"
     place = f" · step {steps.index(note) + 1}" if note.step else ""
     return tag("article", join((
         tag("h3", f"{number} · {note.kind}{place}"), *texts,
         tag("p", " · ".join(filter(None, facts)), class_="ws-tiny"),
         tag("p", "", class_="ws-changed", data_piece=f"note.{note.id}"),
-        *(tag("blockquote", _said(one)) for one in note.replies),
+        *(tag("blockquote", _message_html(answer)) for answer in note.replies),
         text_box(reply, "", label=f"Reply to note {number}", placeholder="Reply",
                  data_enter=f"notes:reply.{note.id}", maxlength=MAX_NOTE_TEXT),
         _buttons(note, steps),
@@ -282,107 +291,116 @@ def _entry(number: int, note: Note, steps: Sequence[Note]) -> Markup:
 
 
 def _buttons(note: Note, steps: Sequence[Note]) -> Markup:
-    """Give what can be done with a note; while versions stand side by side, nothing changes it."""
+    """Render the buttons of a note; a note with conflicting versions cannot be edited."""
     is_done, free = note.status == "done", not note.versions
     place = steps.index(note) if note.step else 0
     rows = (
         ("Done", "status", "", "Mark as open" if is_done else "Mark as done", free),
-        ("Show", "show", "", "As it was on the screen, errors and camera too", True),
+        ("Show", "show", "", "Restore view, errors and camera of the note", True),
         ("Edit", "edit", "", "", free),
-        ("Delete", "delete", "", "Undo brings it back", True),
-        ("Take back", "take-back", "", "Set what it changed back", free and note.change),
-        ("Add to the story", "step", "add", "", free and not note.step),
+        ("Delete", "delete", "", "", True),
+        (
+            "Revert",
+            "take-back",
+            "",
+            "Restore the values before this decision",
+            free and note.change,
+        ),
+        ("Add to story", "step", "add", "", free and not note.step),
         ("↑", "step", "up", "Earlier in the story", free and place > 0),
         ("↓", "step", "down", "Later in the story", free and note.step and note != steps[-1]),
-        ("Take out of the story", "step", "out", "", free and note.step),
+        ("Remove from story", "step", "out", "", free and note.step),
     )
     return actions(*(
-        button(words, f"notes:{do}.{note.id}", value, hint=hint,
-               kind="" if do == "status" else "link",
-               pressed=is_done if do == "status" else None,
-               aria_label=hint if words in "↑↓" else None)
-        for words, do, value, hint, can_be_done in rows if can_be_done
+        button(label, f"notes:{command}.{note.id}", value, hint=hint,
+               kind="" if command == "status" else "link",
+               pressed=is_done if command == "status" else None,
+               aria_label=hint if label in "↑↓" else None)
+        for label, command, value, hint, is_enabled in rows if is_enabled
     ))  # fmt: skip
 
 
 class NoteNumbersPanel(Panel):
-    """What the numbers of notes have become."""
+    """Remarks on notes whose numbers have changed."""
 
     name = "note-numbers"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
-    def is_seen(self, state: AppState) -> bool:
+    def is_visible(self, state: AppState) -> bool:
         return bool(state.review)
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         state = picture.state
         return (Identity(state.review), Identity(state.scene), tuple(state.amplitudes.items()),
                 tuple(state.positions.items()), state.placed)  # fmt: skip
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         review, scene = picture.state.review, picture.state.resulting_scene()
-        said = [*map(stale_remark, review, note_numbers(scene, review))]
-        stale = [str(number) for number, words in enumerate(said, 1) if words]
-        self.context.page.call("room.show", {"stale": stale})
+        remarks = [*map(stale_remark, review, note_numbers(scene, review))]
+        stale = [str(number) for number, remark in enumerate(remarks, 1) if remark]
+        self.context.page.call("overlay.show", {"stale": stale})
         return {
-            f"note.{note.id}{place}": fill("{}", words)
-            for note, words in zip(review, said, strict=True)
+            f"note.{note.id}{place}": fill("{}", remark)
+            for note, remark in zip(review, remarks, strict=True)
             for place in ("", ".bar")
         }
 
 
-# --- A story: note after note with what was on the screen, and back to before ---------------------
+# --- The story: the views of the notes, one after the other ---------------------------------------
 
 GLIDE_MS = 600  # from step to step
 
 
 class StoryPanel(Panel):
-    """Tells the story of a scene's notes; the state is not changed by it, only what is shown."""
+    """The player of a story; it changes the displayed state only."""
 
     name = "story"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._number, self._words = 0, EMPTY  # of the step that is told; empty while none is
-        self._camera = context.camera.remember()  # before it
+        self._number, self._step_html = 0, EMPTY  # of the present step; empty while none is played
+        self._camera = context.camera.remember()  # before the story
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        return {"story": self._words}
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        return {"story": self._step_html}
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
         context, notes = self.context, story(state.review)
-        to = self._number + {"on": 1, "back": -1}.get(word, len(notes))
-        if word == "start" and not notes:
-            context.notify("No story yet", "Give notes a place in the story first")
-        elif word == "start" and not self._words:
+        to = self._number + {"on": 1, "back": -1}.get(action, len(notes))
+        if action == "start" and not notes:
+            context.notify("No story", "Add notes to the story first")
+        elif action == "start" and not self._step_html:
             self._camera = context.camera.remember()
             context.page.call("story", True)
-            self._tell(state, notes, 0)
-        elif self._words and word == "end":
-            self._words, context.telling = EMPTY, None
+            self._show_step(state, notes, 0)
+        elif self._step_html and action == "end":
+            self._step_html, context.story_state = EMPTY, None
             context.page.call("story", False)
             context.fly(self._camera, 0)
-        elif self._words and 0 <= to < len(notes):
-            self._tell(state, notes, to)
+        elif self._step_html and 0 <= to < len(notes):
+            self._show_step(state, notes, to)
         return state
 
-    def _tell(self, now: AppState, notes: Sequence[Note], number: int) -> None:
+    def _show_step(self, now: AppState, notes: Sequence[Note], number: int) -> None:
         context, note, camera, problem = self.context, notes[number], None, ""
-        # the page stays the same thing, so that little is written anew
-        found, before = now, context.telling or replace(now, page=replace(now.page, window=""))
+        # the page look is the same in all steps, so that little is rendered again
+        before = context.story_state or replace(now, page=replace(now.page, window=""))
+        story_state = now
         try:
             if note.view:
-                found, camera = reopened(now, note, context.scenes.fixed)
+                story_state, camera = reopened(now, note, context.scenes.fixed)
         except WarpspaceError as error:
-            found, problem = before, str(error)
-        context.notes += found.notes
-        context.telling = replace(found.without_notes(), page=before.page)
+            story_state, problem = before, str(error)
+        context.notes += story_state.notes
+        context.story_state = replace(story_state.without_notes(), page=before.page)
         self._number = number
-        self._words = step_words(now.resulting_scene(), notes, number, problem) + actions(
-            button("←", "story:back", hint="Back (←)", aria_label="Back", disabled=number == 0),
-            button("→", "story:on", kind="main", hint="On (→)", aria_label="On",
+        text = step_words(now.resulting_scene(), notes, number, problem)
+        self._step_html = text + actions(
+            button("←", "story:back", hint="Previous step (←)", aria_label="Previous step",
+                   disabled=number == 0),
+            button("→", "story:on", kind="main", hint="Next step (→)", aria_label="Next step",
                    disabled=number == len(notes) - 1),
-            button("End", "story:end", hint="Back to what was shown before (Esc)"),
+            button("End", "story:end", hint="Return to the previous view (Esc)"),
         )  # fmt: skip
         context.fly(camera, GLIDE_MS)

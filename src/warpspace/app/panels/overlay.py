@@ -1,4 +1,4 @@
-"""What lies over the drawing: heading, colour bar, words and scale bars, pointers of other tabs."""
+"""The overlay of the drawing: heading, colour bar, labels, scale bars, pointers of other tabs."""
 
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -25,7 +25,7 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Panel
+from warpspace.app.panels.panel import Context, Panel, Refresh
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.geometry.surfaces import corners
@@ -36,99 +36,100 @@ from warpspace.units import Array, spell_short
 
 
 class HeadPanel(Panel):
-    """Mean and max with the place of the latter."""
+    """Mean and maximum error, and the place of the maximum."""
 
     name = "head"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        words, place = subject_words(picture), place_words(picture)
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        subjects, place = subject_words(picture), place_words(picture)
         head = fill(
             '<div data-piece="reopened"></div><h1>{numbers}</h1>'
             '<div>{place}<span data-piece="head.kept"></span>'
             '<span data-piece="head.allowed"></span></div>{words}'
             '<div data-piece="head.order"></div>',
             numbers=numbers_words(picture), place=place,
-            words=(tag("p", " · ".join(words), class_="ws-subject") if words else EMPTY)
+            words=(tag("p", " · ".join(subjects), class_="ws-subject") if subjects else EMPTY)
             + part_html(picture),
         )  # fmt: skip
         return {"head": head}
 
 
 class LegendPanel(Panel):
-    """The colour bar, and how much of the volume keeps the limit."""
+    """The colour bar, and the share of the volume within the limit."""
 
     name = "legend"
-    follows = "often"
+    refresh = Refresh.THROTTLED
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (picture.scale, id(picture))
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        kept = EMPTY
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        limit_menu = EMPTY
         if not picture.is_difference:
-            (words, is_kept), limit = kept_words(picture), picture.state.specification.limit_um
+            (share, is_pass), limit = kept_words(picture), picture.state.specification.limit_um
             box = text_box("state:set.specification.limit_um", f"{limit:g}", size="short",
                            label="Limit", id="ws-limit")  # fmt: skip
             body = tag("div", join(("Limit ", box, " µm")), class_="ws-field")
-            kept = menu(words, body, key="limit", hint="Change the limit",
-                        kind="ws-pass" if is_kept else "ws-fail")  # fmt: skip
-            kept = Markup(" · ") + kept if place_words(picture) else kept
-        return {"head.kept": kept, "legend": legend_html(picture)}
+            limit_menu = menu(share, body, key="limit", hint="Change the limit",
+                        kind="ws-pass" if is_pass else "ws-fail")  # fmt: skip
+            limit_menu = Markup(" · ") + limit_menu if place_words(picture) else limit_menu
+        return {"head.kept": limit_menu, "legend": legend_html(picture)}
 
 
 class OrderPanel(Panel):
-    """What machines within tolerance reach, what the first order leaves out, errors left behind.
+    """The errors permitted by the tolerances, second-order remainder, and replaced errors.
 
-    All but the last are too slow for every move.
+    They are too slow to follow a drag.
     """
 
     name = "order"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        words, left = [*order_conditions(picture)], picture.state.left_behind
-        words += [f"with its own errors; those of “{left}” are left behind"] if left else []
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        conditions, scene = [*order_conditions(picture)], picture.state.left_behind
+        if scene:
+            conditions.append(f"with the errors of this machine; those of “{scene}” are not used")
         allowed = "" if picture.is_difference else allowed_words(picture.drawn_state)
-        return {"head.order": tag("p", " · ".join(words)) if words else EMPTY,
+        return {"head.order": tag("p", " · ".join(conditions)) if conditions else EMPTY,
                 "head.allowed": f" · {allowed}" if allowed else ""}  # fmt: skip
 
 
-class RoomPanel(Panel):
-    """What the page places by itself as the camera moves, and how large the drawing is."""
+class OverlayPanel(Panel):
+    """Labels and scale bars, placed by the page as the camera moves; the size of the drawing."""
 
-    name = "room"
-    follows = "at once"
+    name = "overlay"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._sent: dict[str, Any] = {}
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         facts = _facts(picture)
         changes = {name: value for name, value in facts.items() if self._sent.get(name) != value}
         if changes:
-            self.context.page.call("room.show", changes)
+            self.context.page.call("overlay.show", changes)
         self._sent = facts
         return {}
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        room, context = read_room(value) if word == "size" else None, self.context
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        room, context = read_room(value) if action == "size" else None, self.context
         if room is not None:
-            context.act(lambda: context.camera.take_room(room, context.shown))
+            context.call_soon(lambda: context.camera.take_room(room, context.picture))
         return state
 
 
 def _facts(picture: LivePicture) -> dict[str, Any]:
     look, grid = picture.state.look, picture.grid
     isolines = look.isolines and look.surface != "grid"
-    bounds = [one.grid.bounds_mm for one in picture.slices]
+    bounds = [piece.grid.bounds_mm for piece in picture.slices]
     return {
-        "axes": _words(Identity(axis_labels(picture))),
+        "axes": _labels_json(Identity(axis_labels(picture))),
         "triad": [
             {"name": name if name and is_linear(name) else "xyz"[k],
-             "way": [float(k == i) * way for i in range(3)]}
-            for k, (name, way) in enumerate(zip(grid.axes, grid.directions.tolist(), strict=True))
+             "way": [float(k == i) * sign for i in range(3)]}
+            for k, (name, sign) in enumerate(zip(grid.axes, grid.directions.tolist(), strict=True))
         ],
         "perMm": SCENE_PER_MM,
         "centre": _scene(grid.bounds_mm.mean(axis=0)),
@@ -137,7 +138,7 @@ def _facts(picture: LivePicture) -> dict[str, Any]:
         "factor": picture.exaggeration,
         "spelt": spell_factor(picture.exaggeration),
         "corners": [_scene(at) for at in picture.drawn_mm.reshape(-1, 3)[corners(picture.shape)]],
-        "marks": list(map(_word, (*point_labels(picture), *note_labels(picture)))),
+        "marks": list(map(_label_json, (*point_labels(picture), *note_labels(picture)))),
         "labels": [
             {"at": _scene(label.at_mm), "out": label.outward.tolist(),
              "text": f"{spell_short(label.value)} {picture.scale.unit}"}
@@ -156,27 +157,27 @@ def _scene(point_mm: Array) -> list[float]:
 
 
 @lru_cache(maxsize=32)
-def _words(labels: Identity) -> list[dict[str, Any]]:
-    return list(map(_word, labels.thing))
+def _labels_json(labels: Identity) -> list[dict[str, Any]]:
+    return list(map(_label_json, labels.thing))
 
 
-def _word(label: Label) -> dict[str, Any]:
-    found = {"text": label.text, "at": _scene(label.at_mm), "kind": label.kind}
+def _label_json(label: Label) -> dict[str, Any]:
+    entry = {"text": label.text, "at": _scene(label.at_mm), "kind": label.kind}
     if label.from_mm is not None:
-        found |= {"from": _scene(label.from_mm), "axis": label.axis}
-    return found
+        entry |= {"from": _scene(label.from_mm), "axis": label.axis}
+    return entry
 
 
-# --- A shared review: each tab sees where the others point ----------------------------------------
+# --- Shared review: pointers of other tabs --------------------------------------------------------
 
-OFTEN_S = 0.08  # between two places of one pointer; a page sends one each tenth of a second
+INTERVAL_S = 0.08  # between two positions of a pointer; a page sends one each tenth of a second
 LONGEST_NAME, LONGEST_RAY = 24, 200  # characters
-MOST_QUEUED = 8  # messages that wait for a page; one that takes none is sent no pointers
+MOST_QUEUED = 8  # messages waiting for a page; beyond that it is sent no pointers
 Tabs = Callable[[], Iterable[Context]]
 
 
 class PointerPanel(Panel):
-    """Takes where the mouse is over the map: ``pointer:at``, a name, then a ray of six numbers."""
+    """Pointer events: ``pointer:at`` with a ray of six numbers and a name."""
 
     name = "pointer"
 
@@ -185,21 +186,23 @@ class PointerPanel(Panel):
         self._tabs, self._last = tabs, 0.0
         context.page.call("together")
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        now, picture, at = time.monotonic(), self.context.shown, None
-        spelt, _, name = value.partition("\n")
-        if word == "at":
-            if len(spelt) > LONGEST_RAY or now - self._last < OFTEN_S or self.context.telling:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        now, picture, at = time.monotonic(), self.context.picture, None
+        numbers, _, name = value.partition("\n")
+        if action == "at":
+            is_early = now - self._last < INTERVAL_S
+            if len(numbers) > LONGEST_RAY or is_early or self.context.story_state:
                 return state
             try:
-                ray = np.array([float(one) for one in spelt.split(",")]).reshape(2, 3)
-            except ValueError:  # not six numbers; what is not finite or too far meets nothing
+                ray = np.array([float(text) for text in numbers.split(",")]).reshape(2, 3)
+            except ValueError:  # not six numbers; a ray that is not finite meets nothing
                 return state
             self._last = now
-            found = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
-            at = found and (found[1] * SCENE_PER_MM).round(4).tolist()
-        for one in self._tabs():
-            if one is not self.context and not one.telling and queued(one.client) <= MOST_QUEUED:
-                said = " ".join(name[:LONGEST_NAME].split())
-                one.page.call("pointer", self.context.client.client_id, said, at)
+            picked = picture and pick(picture, ray[0] / SCENE_PER_MM, ray[1])
+            at = picked and (picked[1] * SCENE_PER_MM).round(4).tolist()
+        label = " ".join(name[:LONGEST_NAME].split())
+        for tab in self._tabs():
+            is_free = tab.story_state is None and queued(tab.client) <= MOST_QUEUED
+            if tab is not self.context and is_free:
+                tab.page.call("pointer", self.context.client.client_id, label, at)
         return state

@@ -1,4 +1,4 @@
-"""The parts that a page consists of, in the order in which they are written."""
+"""The panels of the page, in the order of rendering."""
 
 from collections.abc import Iterable, Mapping
 
@@ -14,7 +14,7 @@ from warpspace.app.panels.error_list import ErrorsPanel
 from warpspace.app.panels.explanation import DistancePanel, VolumePanel, WorstPanel
 from warpspace.app.panels.file_dialogs import FilesDialog, ReportDialog
 from warpspace.app.panels.import_panel import ImportPanel
-from warpspace.app.panels.improve import BestPanel, CompensatePanel, RepairPanel
+from warpspace.app.panels.improve import AdjustPanel, BestPanel, CompensatePanel
 from warpspace.app.panels.machine_editor import (
     EditorSection,
     MachinesDialog,
@@ -23,50 +23,43 @@ from warpspace.app.panels.machine_editor import (
 )
 from warpspace.app.panels.measurement import CalibratePanel, TestsPanel
 from warpspace.app.panels.note_panels import NoteNumbersPanel, NotesPanel, StoryPanel
-from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel, RoomPanel
+from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel, OverlayPanel
 from warpspace.app.panels.panel import Context, Panel, Section
 from warpspace.app.panels.part_panels import PartPanel, ProgramPanel
 from warpspace.app.panels.toolbar import ComparePanel, ControlsPanel
 from warpspace.app.panels.top_bar import HelpDialog, PagePanel, ScenesDialog, StatePanel, TopPanel
 from warpspace.app.state.app_state import TASKS
 
-HOOKS: dict[str, type[AnalysisPanel]] = {
-    "calibrate": CalibratePanel, "adjust": RepairPanel, "compensate": CompensatePanel,
+PANELS: dict[str, type[AnalysisPanel]] = {
+    "calibrate": CalibratePanel, "adjust": AdjustPanel, "compensate": CompensatePanel,
     "allocate": TolerancesPanel, "concepts": ConceptsPanel, "distance": DistancePanel,
     "part": PartPanel, "program": ProgramPanel,
 }  # fmt: skip
-"""Parts of analyses that do more than their description says, by name."""
-FIRST = ("compensate", "concepts", "allocate")
-"""Sections that stand first in their task, short ones before long ones."""
-RARE = frozenset(
-    {
-        "volume",
-        "gains",
-        "line",
-        "distance",
-        "conformance",
-        "uncertainty",
-        "form",
-        "convert",
-        "contributions",
-    }
-)
-"""Sections that stand under "More analyses", so that a task is calm at first sight."""
+"""Panels with features beyond the description of the analysis, by name of the analysis."""
+FIRST = ("compensate", "concepts", "allocate")  # sections at the top of their task
+RARE = frozenset({
+    "volume", "gains", "line", "distance", "conformance", "uncertainty", "form", "convert",
+    "contributions",
+})  # fmt: skip
+"""Sections under "More analyses"."""
 
 
 class TasksPanel(Panel):
-    """The column at the right: five tasks, one open, each a list of sections that unfold."""
+    """The column at the right: tabs of five tasks, each a list of sections."""
 
     name = "tasks"
 
-    def __init__(self, context: Context, found: Iterable[Section]) -> None:
+    def __init__(self, context: Context, sections: Iterable[Section]) -> None:
         super().__init__(context)
-        names = {one.name: one.task for one in found}
+        names = {section.name: section.task for section in sections}
         names = {name: names[name] for name in (*FIRST, *names)}
-        self.sections = {task: [name for name, of in names.items() if of == task] for task in TASKS}
+        self.sections = {
+            task: [name for name, section_task in names.items() if section_task == task]
+            for task in TASKS
+        }
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
-        """Write the tabs, and an empty place for each section."""
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
+        """Render the tabs, and an empty place for each section."""
         task = picture.state.page.task
         tabs = join(
             tag(
@@ -78,7 +71,8 @@ class TasksPanel(Panel):
         )  # fmt: skip
         names = self.sections.get(task, ())
         places = _places(name for name in names if name not in RARE)
-        if rare := _places(name for name in names if name in RARE):
+        rare = _places(name for name in names if name in RARE)
+        if rare:
             places += tag("details", tag("summary", "More analyses") + rare, class_="ws-more",
                           data_key=f"more.{task}")  # fmt: skip
         return {
@@ -93,18 +87,18 @@ def _places(names: Iterable[str]) -> Markup:
     return join(tag("div", "", data_piece=f"section.{name}") for name in names)
 
 
-def build_parts(context: Context) -> list[Panel]:
+def build_panels(context: Context) -> list[Panel]:
     of_tasks = (WorstPanel, VolumePanel, ImportPanel, TestsPanel)
     of_machine = (PositionsSection, ConventionsSection, RotarySection, EditorSection)
-    found: list[Section] = [
+    sections: list[Section] = [
         *(kind(context) for kind in of_tasks),
-        *(HOOKS.get(one.name, AnalysisPanel)(context, one) for one in entries()),
+        *(PANELS.get(entry.name, AnalysisPanel)(context, entry) for entry in entries()),
         *(kind(context) for kind in of_machine),
     ]
     kinds = (
         TopPanel, HeadPanel, LegendPanel, OrderPanel, ControlsPanel, ComparePanel, ErrorsPanel,
-        RoomPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
+        OverlayPanel, StatePanel, PagePanel, NotesPanel, NoteNumbersPanel, ScenesDialog,
         MachinesDialog, FilesDialog, ReportDialog, HelpDialog, StoryPanel,
     )  # fmt: skip
-    others = [kind(context) for kind in kinds]
-    return [*others, TasksPanel(context, found), *found, BestPanel(context)]
+    panels = [kind(context) for kind in kinds]
+    return [*panels, TasksPanel(context, sections), *sections, BestPanel(context)]

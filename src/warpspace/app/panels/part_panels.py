@@ -1,4 +1,4 @@
-"""A part in the box, where it is clamped, what an inspector would measure; and a program."""
+"""The workpiece in the working volume: placement and inspection; and the NC program."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +17,7 @@ from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.transfers import IN_BOX, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_in_box
-from warpspace.app.panels.analysis_panel import Question
+from warpspace.app.panels.analysis_panel import ResultKey
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.panels.measurement import MOST_BYTES, FilesPanel, UploadedFile
@@ -30,147 +30,155 @@ from warpspace.machine.limits import MAX_SCENE_BYTES, MAX_UPLOAD_BYTES
 from warpspace.parts.workpiece import load_workpiece, place_workpiece
 from warpspace.scene.model import Scene
 
-MOST_LETTERS = 200  # of a line that is shown
+MOST_LETTERS = 200  # of a displayed line
 
 
-class InBoxPanel(FilesPanel):
-    """Something to be made, which a page has sent: it stands in the box."""
+class SceneOverlayPanel(FilesPanel):
+    """An uploaded file that is drawn in the working volume: a workpiece or a program."""
 
-    at_once = True
+    runs_on_open = True
     most_bytes, what = MAX_UPLOAD_BYTES, "mesh or program"
-    holds = ("", "")  # fields of `PartLook`: what is there, if anything, and the name of its file
+    part_fields = ("", "")  # fields of `PartLook`: content and name of the file
 
     def about(self, state: AppState) -> Markup:
-        """Say what is to be known of it, and set."""
+        """Render details and settings of the content."""
         raise NotImplementedError
 
-    def question(self, state: AppState) -> Question:
-        made = replace(state.part, shown=True, normal=False, moved=False)
-        return (*super().question(state), made)
+    def result_key(self, state: AppState) -> ResultKey:
+        part = replace(state.part, shown=True, normal=False, moved=False)
+        return (*super().result_key(state), part)
 
-    def concerns(self, picture: LivePicture) -> tuple[object, ...]:
-        return (*super().concerns(picture), picture.state.part)
+    def body_dependencies(self, picture: LivePicture) -> tuple[object, ...]:
+        return (*super().body_dependencies(picture), picture.state.part)
 
     def is_ready(self, state: AppState) -> bool:
-        return getattr(state.part, self.holds[0]) is not None
+        return getattr(state.part, self.part_fields[0]) is not None
 
     def before_result(self, state: AppState) -> Markup:
-        held, name = (getattr(state.part, field) for field in self.holds)
+        content, name = (getattr(state.part, field) for field in self.part_fields)
         upload = html.upload_button(
-            f"Another {self.name} …" if held else f"{self.title} …", self.name, self.most_bytes,
-            ",".join(IN_BOX[self.name]), kind="" if held else "main",
+            f"Another {self.name} …" if content else f"{self.title} …", self.name, self.most_bytes,
+            ",".join(IN_BOX[self.name]), kind="" if content else "main",
             hint=f"At most {self.most_bytes >> 20} MB; files can also be dropped on the page",
         )  # fmt: skip
-        missing = f"{name} is not here: links and saved scenes hold only its name."
+        missing = (
+            f"{name} is not loaded: links and saved scenes store only its name. Open it again."
+        )
         about = tag("p", missing, class_="ws-quiet") if name else EMPTY
-        if held:
+        if content:
             remove = button("✕", f"{self.name}:remove", kind="link", aria_label=f"Remove {name}")
             about = tag("p", join((tag("b", name), " ", remove))) + self.about(state)
         return join((about, self.files_html(), actions(upload)))
 
-    def show(self, held: object, name: str, **more: Any) -> None:
-        """Take something in, and unfold the section."""
+    def show(self, content: object, name: str, **changes: Any) -> None:
+        """Draw a content, and open the section."""
 
-        def shown(state: AppState) -> AppState:
+        def update(state: AppState) -> AppState:
             opened = state.page.open | {self.name}
             page = replace(state.page, task=self.task, open=opened, window="")
-            return self.hold(replace(state, page=page), held, name, shown=True, **more)
+            state = replace(state, page=page)
+            return self.with_content(state, content, name, shown=True, **changes)
 
-        self.context.post(shown)
+        self.context.post(update)
 
-    def hold(self, state: AppState, held: object, name: str, **more: Any) -> AppState:
-        """Put something into the box, or nothing, and see it through the box."""
-        self._answer = None
-        part = replace(state.part, **dict(zip(self.holds, (held, name), strict=True)), **more)
+    def with_content(self, state: AppState, content: object, name: str, **changes: Any) -> AppState:
+        """Set or remove the content; the map becomes transparent for it."""
+        self.outcome = None
+        fields = dict(zip(self.part_fields, (content, name), strict=True))
+        part = replace(state.part, **fields, **changes)
         return edits.with_sight(replace(state, part=part), inside=not part.is_empty)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        is_removed = word == "remove" and not value
-        return self.hold(state, None, "") if is_removed else super().take(state, word, value)
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "remove" and not value:
+            return self.with_content(state, None, "")
+        return super().handle(state, action, value)
 
 
-class PartPanel(InBoxPanel):
-    """A part: clamped, and measured as it is cut."""
+class PartPanel(SceneOverlayPanel):
+    """A workpiece: its placement, and an inspection of it as machined."""
 
-    holds = ("mesh", "name")
+    part_fields = ("mesh", "name")
     _sent: tuple[str, bytes] | None = None  # read again with another unit
 
     def options(self) -> Sequence[Option]:
-        return [one for one in super().options() if one.name not in ("place", "predistorted")]
+        return [o for o in super().options() if o.name not in ("place", "predistorted")]
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        (own, _), part = PartLook.of_scene(state.scene), state.part
-        beside = state.scene.part.path("features") if part.mesh is own.mesh else None
-        told = next(((one.name, one.content) for one in self._files), None)
-        return replace(asked, place=part.place, mesh=part.mesh, features=beside, tolerances=told)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
+        (scene_part, _), part = PartLook.of_scene(state.scene), state.part
+        features = state.scene.part.path("features") if part.mesh is scene_part.mesh else None
+        tolerances = next(((file.name, file.content) for file in self.files), None)
+        files = {"features": features, "tolerances": tolerances}
+        return replace(analysis, place=part.place, mesh=part.mesh, **files)
 
     def about(self, state: AppState) -> Markup:
         turns = (button(f"{axis} 90°", f"{self.name}:turn", axis, kind="choice",
-                        hint=f"Turn it about {axis} of the workpiece, in place")
+                        hint=f"Rotate by 90° about the workpiece axis {axis}, in place")
                  for axis in "xyz")  # fmt: skip
         return join((
-            actions(tag("span", "Turn about"), *turns),
-            *(setting(state, f"part.{one}") for one in ("place", "shown", "normal", "moved")),
+            actions(tag("span", "Rotate about"), *turns),
+            *(setting(state, f"part.{name}") for name in ("place", "shown", "normal", "moved")),
             html.upload_button("Tolerances …", self.name, MAX_SCENE_BYTES, ".toml",
-                               hint="Names and tolerances of its features"),
+                               hint="Names and tolerances of the features"),
         ))  # fmt: skip
 
-    def result_html(self, found: Result) -> Markup:
-        *_, features = (one for one in found.blocks() if isinstance(one, Table))
-        judged = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
-        return html.rows(judged) + super().result_html(found)
+    def result_html(self, result: Result) -> Markup:
+        *_, features = (block for block in result.blocks() if isinstance(block, Table))
+        verdicts = [(name, verdict) for name, *_, verdict, _ in features.rows if verdict]
+        return html.rows(verdicts) + super().result_html(result)
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        part = part_in_box(state) if action == "turn" and value in ("x", "y", "z") else None
+        if part is not None:
             turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
             return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
-        found = super().take(state, word, value)
-        if word == "set.unit" and state.part.mesh and self._sent:
+        updated = super().handle(state, action, value)
+        if action == "set.unit" and state.part.mesh and self._sent:
             sent = self._sent
             self.receive(lambda: sent)
-        return found
+        return updated
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
-        """Parse tolerances, or a mesh: of another name it is clamped in the middle."""
+        """Parse tolerances, or a mesh; a mesh of another name is placed at the centre."""
         if name.lower().endswith(".toml"):
-            text = upload_text(content, name, "file of tolerances")
-            return partial(self._hold, (UploadedFile(name, text),))
+            text = upload_text(content, name, "tolerance file")
+            return partial(self.set_files, (UploadedFile(name, text),))
         self._sent, state = (name, content), self.context.state
         mesh = load_workpiece(name, option_values(state, self.name).get("unit") or None, content)
-        kept = state.part.place if name == state.part.name else None
-        place = np.round(place_workpiece(mesh, state.standing, kept).place, 3)
+        present_place = state.part.place if name == state.part.name else None
+        place = np.round(place_workpiece(mesh, state.standing, present_place).place, 3)
         return partial(self.show, mesh, name, place=tuple(place.tolist()))
 
 
-class ProgramPanel(InBoxPanel):
-    """A program: a line and its place in the drawing find each other."""
+class ProgramPanel(SceneOverlayPanel):
+    """A program: its lines and its path in the drawing are linked."""
 
-    most_bytes = MOST_BYTES  # longer ones would hold up other tabs
-    holds = ("program", "program_name")
+    most_bytes = MOST_BYTES  # longer programs would delay other tabs
+    part_fields = ("program", "program_name")
 
-    def ask(self, state: AppState, values: Mapping[str, str], scenes: Sequence[Scene]) -> Analysis:
-        asked: Any = super().ask(state, values, scenes)
-        return replace(asked, file=state.part.program_name, text=state.part.program)
+    def build_analysis(self, state: AppState, values: Mapping[str, str], scene: Scene) -> Analysis:
+        analysis: Any = super().build_analysis(state, values, scene)
+        return replace(analysis, file=state.part.program_name, text=state.part.program)
 
     def about(self, state: AppState) -> Markup:
         line, text = state.forms.get(AT_LINE, ""), (state.part.program or "").splitlines()
-        if not (at := index_of(line, len(text) + 1)):
+        at = index_of(line, len(text) + 1)
+        if not at:
             return EMPTY
         return tag("p", join((tag("b", line), " ", tag("code", text[at - 1][:MOST_LETTERS]))))
 
-    def result_html(self, found: Result) -> Markup:
+    def result_html(self, result: Result) -> Markup:
         def link(line: int) -> Markup:
-            words = "Show it in the drawing; a click on the path finds its line"
-            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=words)
+            hint = "Show this line in the drawing; a click on the path selects its line"
+            return button(line, f"{self.name}:set.at_line", line, kind="link", hint=hint)
 
-        *rest, worst = (one for one in found.blocks() if isinstance(one, Table))
-        line, *others = worst.columns
-        others = (
-            replace(one, shows=one.heading in ("|E|", "largest contributions")) for one in others
+        *tables, worst = (block for block in result.blocks() if isinstance(block, Table))
+        line, *columns = worst.columns
+        columns = (
+            replace(block, shows=block.heading in ("|E|", "largest contributions")) for block in columns
         )
-        narrow = replace(worst, columns=(replace(line, form=link), *others))
-        return block_html(narrow) + details_html((*rest, worst))
+        narrow = replace(worst, columns=(replace(line, form=link), *columns))
+        return block_html(narrow) + details_html((*tables, worst))
 
     def parse(self, name: str, content: bytes) -> Callable[[], None]:
         return partial(self.show, content.decode("utf-8-sig", "replace"), name)

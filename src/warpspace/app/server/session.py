@@ -36,8 +36,8 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick, pick_line, with_clicked
 from warpspace.app.panels.note_panels import StoryPanel
 from warpspace.app.panels.overlay import PointerPanel, Tabs
-from warpspace.app.panels.page_panels import build_parts
-from warpspace.app.panels.panel import PAUSE_S, Context, Panel, Window
+from warpspace.app.panels.page_panels import build_panels
+from warpspace.app.panels.panel import PAUSE_S, Context, Dialog, Panel, Refresh
 from warpspace.app.server.tab_keeper import TabKeeper, TabRecord, new_token
 from warpspace.app.state.app_state import AppState, Comparison, PageLook, PartLook
 from warpspace.app.state.look import Look
@@ -56,8 +56,8 @@ class Display:
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        context.renew, context.closed = self._renew, self._closed
-        context.rest_again = self._rest_again
+        context.rerender, context.dialog_closed = self._renew, self._closed
+        context.restart_idle = self._restart_idle
         self.layers: tuple[BoxLayer | MovingLayer, ...] = ()
         self.parts: dict[str, Panel] = {}
         self._shown: dict[Panel, object] = {}
@@ -78,7 +78,9 @@ class Display:
         """Add what has just been built, and write its pieces."""
         self.layers = (*self.layers, *layers)
         self.parts |= {part.name: part for part in parts}
-        self._following = [p for p in self.parts.values() if p.follows in ("at once", "often")]
+        self._following = [
+            p for p in self.parts.values() if p.refresh in (Refresh.IMMEDIATE, Refresh.THROTTLED)
+        ]
         self._write(parts, picture)
         self._note(picture)
 
@@ -89,7 +91,7 @@ class Display:
         if anew:
             self._shown.clear()
         # what is in sight changes with what is open on the page
-        known = self._context.shown
+        known = self._context.picture
         same = known is not None and known.state.page is picture.state.page and not anew
         parts = self._following if same else self.parts.values()
         self._write([one for one in parts if self._is_due(one, picture)], picture)
@@ -97,33 +99,33 @@ class Display:
 
     def _is_due(self, part: Panel, picture: LivePicture) -> bool:
         # a part that has just come into sight is not kept waiting, nor is one that has left it
-        if part.is_seen(picture.state) != (self._shown.get(part) is not None):
+        if part.is_visible(picture.state) != (self._shown.get(part) is not None):
             return True
-        if part.follows != "often":
-            return part.follows == "at once"
-        now, urgent = time.monotonic(), part.depends(picture)[0]
+        if part.refresh != Refresh.THROTTLED:
+            return part.refresh == Refresh.IMMEDIATE
+        now, urgent = time.monotonic(), part.dependencies(picture)[0]
         at, before = self._often.get(part, (0.0, None))
         is_due = now - at >= OFTEN_S or urgent != before
         self._often[part] = (now, urgent) if is_due else (at, before)
         return is_due
 
     def _note(self, picture: LivePicture) -> None:
-        self._context.shown = picture
-        self._rest_again()
+        self._context.picture = picture
+        self._restart_idle()
         self._changed_at = self._changed_at or self._noted_at
 
-    def _rest_again(self, *parts: Panel) -> None:
+    def _restart_idle(self, *parts: Panel) -> None:
         self._noted_at, self._is_to_rest = time.monotonic(), True
         self._late.update(parts)
 
     def _renew(self, part: Panel) -> None:
-        if self._context.shown is not None:
+        if self._context.picture is not None:
             self._shown[part] = None  # whatever it depends on
-            self._write([part], self._context.shown)
+            self._write([part], self._context.picture)
 
     def _closed(self) -> None:
         self._context.page.forget("window")
-        windows = [part for part in self.parts.values() if isinstance(part, Window)]
+        windows = [part for part in self.parts.values() if isinstance(part, Dialog)]
         self._shown |= dict.fromkeys(windows)
 
     def _write(self, parts: Iterable[Panel], picture: LivePicture) -> None:
@@ -133,7 +135,7 @@ class Display:
             if key != self._shown.get(part):
                 self._shown[part] = key
                 if key is not None:
-                    pieces |= part.pieces(picture)
+                    pieces |= part.render(picture)
         self._context.page.put(pieces)
 
     @property
@@ -152,8 +154,12 @@ class Display:
     def settle(self, picture: LivePicture, guarded: Guarded) -> None:
         """Bring the next part up to date; one at a time, so that a slider never waits for all."""
         if not self._waiting:
-            follows = ("at rest",) if self._changed_at is None else ("often", "in a pause")
-            self._waiting.extend(p for p in self.parts.values() if p.follows in follows)
+            follows = (
+                (Refresh.IDLE,)
+                if self._changed_at is None
+                else (Refresh.THROTTLED, Refresh.DEBOUNCED)
+            )
+            self._waiting.extend(p for p in self.parts.values() if p.refresh in follows)
             if self._changed_at is None:
                 self._is_to_rest = False
                 self._waiting.extend(self._late)
@@ -171,7 +177,7 @@ class Display:
 
 
 def _key(part: Panel, picture: LivePicture) -> object:
-    return part.depends(picture) if part.is_seen(picture.state) else None
+    return part.dependencies(picture) if part.is_visible(picture.state) else None
 
 
 logger = logging.getLogger(__name__)
@@ -253,7 +259,7 @@ class Session:
         for job in tuple(self.context.jobs):
             job.set()
         self.context.wake()
-        self.context.store.unsubscribe(self.context.changed)
+        self.context.store.unsubscribe(self.context.mark_changed)
 
     def rename(self, token: str) -> None:
         self.token = token
@@ -263,9 +269,9 @@ class Session:
         return TabRecord(self.context.store, self.context.camera.remember())
 
     def use(self, store: StateStore) -> None:
-        self.context.store.unsubscribe(self.context.changed)
-        self.context.store, self.context.unfolded = store, store.state.page
-        store.subscribe(self.context.changed)
+        self.context.store.unsubscribe(self.context.mark_changed)
+        self.context.store, self.context.page_look = store, store.state.page
+        store.subscribe(self.context.mark_changed)
 
     def _run(self) -> None:
         self.use(self.context.store)
@@ -274,9 +280,9 @@ class Session:
             while not self._stopped.is_set():
                 self._turn()
         finally:
-            self.context.store.unsubscribe(self.context.changed)
+            self.context.store.unsubscribe(self.context.mark_changed)
             if pointer := self.display.parts.get(PointerPanel.name):
-                pointer.take(self.state, "gone", "")
+                pointer.handle(self.state, "gone", "")
 
     def _turn(self) -> None:
         left = None if self._around_at is None else max(0.0, self._around_at - time.monotonic())
@@ -288,7 +294,7 @@ class Session:
             pass  # pictures that a page does not take would fill the memory
         if changed and not self._stopped.is_set():
             self._guarded(self._follow)
-        picture = self.context.shown
+        picture = self.context.picture
         if picture is None:
             return
         if self._around_at is not None and time.monotonic() >= self._around_at:
@@ -313,20 +319,22 @@ class Session:
             tab.page.report(error, **title)
 
     def _good(self) -> Good:
-        return Good(self.context.store.mark(), self.context.unfolded)
+        return Good(self.context.store.mark(), self.context.page_look)
 
     def _go_back(self, error: Exception, failed: Good, good: Good) -> bool:
         """Replace a state that cannot be evaluated, with a message; tell whether that helps."""
         context, tabs = self.context, self._tabs
-        if context.telling is not None:
+        if context.story_state is not None:
             tabs = [context]
-            self._guarded(partial(self.display.parts[StoryPanel.name].take, self.state, "end", ""))
+            self._guarded(
+                partial(self.display.parts[StoryPanel.name].handle, self.state, "end", "")
+            )
         elif failed.mark.state is good.mark.state and failed.page is good.page:
             return False
         elif failed.mark.state is not context.store.state:
             return True  # another tab has replaced it
         else:
-            context.unfolded = good.page
+            context.page_look = good.page
             if not context.store.back_to(good.mark, failed.mark.state):
                 return True
         self._report(error, tabs, title="The change was reverted")
@@ -371,7 +379,7 @@ class Session:
             context.page.call("stage", "opening")
             layers = [BoxLayer(self._client.scene, context.page, picture)]
             pointer = [PointerPanel(context, self._others)] if self._others else []
-            self.display.add(picture, layers, [*build_parts(context), self._keeper, *pointer])
+            self.display.add(picture, layers, [*build_panels(context), self._keeper, *pointer])
             context.page.call("drawn")
         self._around_at = time.monotonic() + ANSWER_S
 
@@ -392,11 +400,11 @@ class Session:
 
         @self._client.scene.on_click()
         def _(event: Any) -> None:
-            context.act(partial(self._clicked, event.ray_origin, event.ray_direction))
+            context.call_soon(partial(self._clicked, event.ray_origin, event.ray_direction))
 
     def _clicked(self, origin: object, direction: object) -> None:
-        context, picture = self.context, self.context.shown
-        if picture is None or context.telling is not None:
+        context, picture = self.context, self.context.picture
+        if picture is None or context.story_state is not None:
             return
         ray = np.array([origin, direction], dtype=float)
         if line := pick_line(picture, ray[0] / SCENE_PER_MM, ray[1]):
@@ -424,12 +432,12 @@ class Session:
             if event.part == TAB:
                 self._hear(event)
             elif (part := self.display.parts.get(event.part)) is not None:
-                take = partial(part.take, word=event.word, value=event.value)
+                take = partial(part.handle, action=event.word, value=event.value)
                 self._guarded(partial(context.apply, take))
         while context.actions:
             self._guarded(context.actions.popleft())
         notes, context.notes = context.notes, []
-        now, state, shown = self._good(), self.state, context.shown
+        now, state, shown = self._good(), self.state, context.picture
         if shown is None:  # it could not be built
             return
         if context.camera.wanted and focus(shown.state) == focus(state):

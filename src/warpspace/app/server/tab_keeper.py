@@ -29,7 +29,7 @@ from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Panel
+from warpspace.app.panels.panel import Context, Panel, Refresh
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -166,7 +166,7 @@ class TabKeeper(Panel):
     """Has the page keep what it shows, and takes it back."""
 
     name = "keeper"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
     def __init__(self, context: Context, *, shared: bool) -> None:
         super().__init__(context)
@@ -175,32 +175,32 @@ class TabKeeper(Panel):
 
         @context.client.camera.on_update
         async def _(_: object) -> None:
-            context.act(context.rest_again)
+            context.call_soon(context.restart_idle)
 
         context.page.call("server.watch")
 
     def begin(self, *, known: bool) -> None:
         """Find out what the page has kept, once the server knows whether it knows the tab."""
         self._may_keep, self._asked = True, not known
-        self.context.rest_again()
+        self.context.restart_idle()
         self.context.page.call("server.back", known)
 
-    def is_seen(self, state: AppState) -> bool:  # noqa: ARG002
-        return self._may_keep and self.context.telling is None
+    def is_visible(self, state: AppState) -> bool:  # noqa: ARG002
+        return self._may_keep and self.context.story_state is None
 
-    def depends(self, picture: LivePicture) -> tuple[object, ...]:
+    def dependencies(self, picture: LivePicture) -> tuple[object, ...]:
         return (id(picture.state), self.context.camera.remember())
 
-    def pieces(self, picture: LivePicture) -> Mapping[str, str]:
+    def render(self, picture: LivePicture) -> Mapping[str, str]:
         context = self.context
         text = kept_text(picture.state, context.camera.remember(), context.scenes.fixed)
         context.page.call("server.keep", text)
         return {}
 
-    def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "kept" and self._asked:
+    def handle(self, state: AppState, action: str, value: str) -> AppState:
+        if action == "kept" and self._asked:
             self._asked = False
-            self.context.act(partial(self._restore, value))
+            self.context.call_soon(partial(self._restore, value))
         return state
 
     def _restore(self, text: str) -> None:

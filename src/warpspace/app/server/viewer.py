@@ -302,7 +302,7 @@ class Viewer:
         session = Session(context, self._live, self._claim, others=others)
         with self._lock:
             self._sessions[client.client_id] = session
-        connection.listen(context.take)
+        connection.listen(context.receive)
         session.start()
 
     def _claim(self, session: Session, token: str) -> TabRecord | None:

@@ -1,12 +1,12 @@
-// What lies over the drawing and follows the camera: scale bars, values on isolines, words beside
-// points with their leaders, numbers and names of the axes, the triad. The camera is read, never moved.
+// The overlay of the drawing: scale bars, values of isolines, labels of points with their leaders,
+// numbers and names of the axes, the triad. They follow the camera, which is never moved here.
 (() => {
-  if (window.warpspaceRoom) return;
+  if (window.warpspaceOverlay) return;
   const MOST_LABELS = 12, LABEL_APART = 52, BAR_PX = 130, BAR_PART = 0.22;
   const SETTLED_MS = 160, LEAST_FACING = 0.12, PLATE_MS = 250;
   const state = { labels: [], slices: [], axes: [], marks: [], corners: [], triad: [], stale: [],
     centre: [0, 0, 0], factor: 1, perMm: 0.01 };
-  let told = "", seen = "", plates = 0, timer = 0;
+  let sentSize = "", drawnLayout = "", plates = 0, timer = 0;
 
   const root = warpspacePage.over;
   const part = name => root.querySelector(`.ws-${name}`);
@@ -23,7 +23,7 @@
   const through = (m, [x, y, z]) => [0, 1, 2, 3].map(
     i => m[i] * x + m[4 + i] * y + m[8 + i] * z + m[12 + i]);
 
-  // where a point of the drawing is on the screen: pixels from the left top of the room, and depth
+  // position of a point on the screen: pixels from the top left of the drawing, and depth
   const project = (camera, world, rect, point) => {
     const eye = through(camera.matrixWorldInverse.elements, through(world, point));
     const clip = through(camera.projectionMatrix.elements, eye);
@@ -45,7 +45,7 @@
       data-length="${length}"><i style="width:${width.toFixed(2)}px"></i>${text}</div>`).join("");
   };
 
-  // what the eye meets first, of slices: does one of them lie before the point
+  // true if a slice hides the point
   const behindSlice = (eye, point) => state.slices.some(({ axis, at, low, high }) => {
     const t = (at - eye[axis]) / (point[axis] - eye[axis]);
     if (!(t > 0 && t < 0.99)) return false;
@@ -58,7 +58,7 @@
   const drawLabels = (camera, world, rect) => {
     const labels = part("labels");
     if (!state.labels.length) { if (labels.firstChild) labels.replaceChildren(); return; }
-    // the eye in the drawing's own axes; the world only turns them
+    // the eye in the axes of the drawing, which the world rotates
     const c = camera.matrixWorld.elements;
     const eye = [0, 1, 2].map(i => world[4 * i] * c[12] + world[4 * i + 1] * c[13]
       + world[4 * i + 2] * c[14]);
@@ -67,7 +67,7 @@
       if (placed.length === MOST_LABELS) break;
       const to = eye.map((e, k) => e - at[k]), long = Math.hypot(...to);
       const facing = (out[0] * to[0] + out[1] * to[1] + out[2] * to[2]) / long;
-      // a face that looks away hides its lines; a slice is seen from both sides
+      // a face that looks away hides its lines; a slice is visible from both sides
       if ((state.slices.length ? Math.abs(facing) : facing) < LEAST_FACING) continue;
       if (behindSlice(eye, at)) continue;
       const { x, y, depth } = project(camera, world, rect, at);
@@ -83,7 +83,7 @@
     });
   };
 
-  // --- words beside points: away from the volume, with a leader, over nothing else ------------------
+  // --- labels of points: outside the volume, with a leader, without overlaps -----------------------
   const canvasContext = document.createElement("canvas").getContext("2d");
   const widths = new Map();
   const widthOf = (text, bold) => {
@@ -100,16 +100,16 @@
   const outline = points => {
     const sorted = [...points].sort((a, b) => a.x - b.x || a.y - b.y);
     const half = list => {
-      const kept = [];
+      const hull = [];
       for (const p of list) {
-        while (kept.length > 1) {
-          const [a, b] = kept.slice(-2);
+        while (hull.length > 1) {
+          const [a, b] = hull.slice(-2);
           if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > 0) break;
-          kept.pop();
+          hull.pop();
         }
-        kept.push(p);
+        hull.push(p);
       }
-      return kept.slice(0, -1);
+      return hull.slice(0, -1);
     };
     return [...half(sorted), ...half(sorted.reverse())];
   };
@@ -119,29 +119,29 @@
   });
   const touches = (shape, { x, y, w, h }) => [[0, 0], [1, 0], [0, 1], [1, 1], [.5, .5], [.5, 0], [.5, 1]]
     .some(([u, v]) => within(shape, x + u * w, y + v * h));
-  const taken = () => ["head", "legend", "controls", "bars", "triad", "compared"].map(part)
+  const occupied = () => ["head", "legend", "controls", "bars", "triad", "compared"].map(part)
     .filter(node => node?.offsetWidth)
     .map(node => {
       let x = 0, y = 0;
       for (let up = node; up && up !== root; up = up.offsetParent) { x += up.offsetLeft; y += up.offsetTop; }
       return { x, y, w: node.offsetWidth, h: node.offsetHeight };
     });
-  const WAYS = [0, 25, -25, 50, -50, 80, -80, 120, -120].map(degrees => degrees * Math.PI / 180);
+  const ANGLES = [0, 25, -25, 50, -50, 80, -80, 120, -120].map(degrees => degrees * Math.PI / 180);
   const FAR = [20, 34, 52, 76], BESIDE = [...FAR, 110, 150, 200, 260];
 
-  const drawWords = (camera, world, rect) => {
+  const drawPointLabels = (camera, world, rect) => {
     const home = part("words"), lines = part("leaders");
     const at = point => project(camera, world, rect, point);
     const shape = state.corners.length ? outline(state.corners.map(at)) : [];
     const middle = { x: shape.reduce((sum, p) => sum + p.x, 0) / (shape.length || 1),
       y: shape.reduce((sum, p) => sum + p.y, 0) / (shape.length || 1) };
-    const used = taken(), placed = [], leaders = [];
+    const used = occupied(), placed = [], leaders = [];
     const room = { x: 2, y: 2, w: rect.width - 4, h: rect.height - 4 };
     const fits = box => box.x >= room.x && box.y >= room.y && box.x + box.w <= room.x + room.w
       && box.y + box.h <= room.y + room.h;
     const put = (label, box) => { used.push(box); placed.push({ ...label, ...box }); };
     const beyond = new Map();
-    // along an axis: numbers beyond the ends of their ticks, the name beyond the numbers
+    // along an axis: numbers outside the ends of their ticks, the name outside the numbers
     for (const { text, at: end, from, kind, axis } of state.axes) {
       const p = at(end), foot = at(from);
       if (p.depth <= 0) continue;
@@ -151,30 +151,30 @@
       const reach = Math.abs(u) * w / 2 + Math.abs(v) * h / 2;
       const away = 3 + reach + (kind === "axis" ? beyond.get(axis) ?? 0 : 0);
       if (kind === "tick") beyond.set(axis, Math.max(beyond.get(axis) ?? 0, 2 * reach + 2));
-      // a name that would lie on something is moved along its axis and further out
+      // a name that would overlap is moved along its axis and outwards
       for (const along of kind === "axis" ? [0, 20, -20, 40, -40, 60, -60, 80, -80] : [0])
-        for (const more of kind === "axis" ? [0, 14] : [0]) {
-          const box = { x: p.x + u * (away + more) - v * along - w / 2,
-            y: p.y + v * (away + more) + u * along - h / 2, w, h };
+        for (const outwards of kind === "axis" ? [0, 14] : [0]) {
+          const box = { x: p.x + u * (away + outwards) - v * along - w / 2,
+            y: p.y + v * (away + outwards) + u * along - h / 2, w, h };
           if (placed.at(-1)?.label === text + axis) continue;
           if (fits(box) && !used.some(other => overlaps(box, other)) && !touches(shape, box))
             put({ text, kind, label: text + axis }, box);
         }
     }
-    const deep = state.corners.reduce((sum, one) => sum + at(one).depth, 0) / (state.corners.length || 1);
-    for (const { text: words, at: point, kind } of state.marks) {
+    const depth = state.corners.reduce((sum, corner) => sum + at(corner).depth, 0) / (state.corners.length || 1);
+    for (const { text: label, at: point, kind } of state.marks) {
       const p = at(point);
       if (p.depth <= 0 || p.x < 0 || p.y < 0 || p.x > rect.width || p.y > rect.height) continue;
-      // what the box itself hides
-      const behind = state.solid && p.depth > deep && within(shape, p.x, p.y);
+      // hidden by the box itself
+      const behind = state.solid && p.depth > depth && within(shape, p.x, p.y);
       if (behind && kind === "corner") continue;
-      const text = behind && kind === "worst" ? `${words}, at the back` : words;
+      const text = behind && kind === "worst" ? `${label} (behind)` : label;
       const w = widthOf(text, kind === "worst"), h = 17;
-      const own = Math.atan2(p.y - middle.y, p.x - middle.x);
+      const outwards = Math.atan2(p.y - middle.y, p.x - middle.x);
       let best = null;
-      // the name of a path or a measured length within the box would hide the map there
-      for (const far of ["name", "measured"].includes(kind) ? BESIDE : FAR) for (const turn of WAYS) {
-        const u = Math.cos(own + turn), v = Math.sin(own + turn);
+      // the name of a path or a measured length inside the box would hide the map
+      for (const far of ["name", "measured"].includes(kind) ? BESIDE : FAR) for (const turn of ANGLES) {
+        const u = Math.cos(outwards + turn), v = Math.sin(outwards + turn);
         const box = { x: p.x + u * (far + w / 2) - w / 2, y: p.y + v * (far + h / 2) - h / 2, w, h };
         let cost = far + 12 * Math.abs(turn);
         if (!fits(box)) cost += 2000;
@@ -205,7 +205,7 @@
       `<path data-kind="${kind}" d="M${a.toFixed(1)} ${b.toFixed(1)}L${c.toFixed(1)} ${d.toFixed(1)}"/>`).join("");
   };
 
-  // which axis is which: the three of the machine, seen as the camera sees them
+  // the triad: directions of the three axes, in the orientation of the camera
   const drawTriad = (camera, world) => {
     const place = document.querySelector(".ws-triad svg");
     if (!place) return;
@@ -221,7 +221,7 @@
       <text x="${(36 * x).toFixed(1)}" y="${(36 * y).toFixed(1)}">${name}</text></g>`).join("");
   };
 
-  // the ghost of the machine is drawn before all else and hides nothing: the map keeps its colours
+  // the ghost of the machine is drawn first and hides nothing, so that the colours of the map are true
   const GHOST = { transparent: false, depthWrite: false, blending: 5, blendSrc: 204, blendDst: 205,
     blendSrcAlpha: 201, blendDstAlpha: 205 };
   const holdBackGhost = () => {
@@ -236,7 +236,7 @@
     if (changed) view().requestRender?.();
   };
 
-  // the trace that is looked at and what is measured are seen whole, also where the box lies before them
+  // the selected trace and measured distances are never hidden by the box
   const FORWARD = ["/traces/actual", "/traces/nominal", "/measured/nominal", "/measured/actual", "/measured/points"];
   const bringForward = () => {
     for (const name of FORWARD)
@@ -248,17 +248,17 @@
       });
   };
 
-  // how large the drawing is, and how much of it lies under what is written at its edges
-  const tell = rect => {
+  // size of the drawing, and of the text at its edges
+  const sendSize = rect => {
     const size = [rect.width, rect.height].map(Math.round).join();
     clearTimeout(timer);
-    if (size === told || !part("head").firstChild) return;
+    if (size === sentSize || !part("head").firstChild) return;
     timer = setTimeout(() => {
-      told = size;
+      sentSize = size;
       const z = zoom(), head = part("head"), foot = part("foot"), legend = part("legend");
       const top = z * (head.offsetTop + head.offsetHeight), bottom = rect.height - z * foot.offsetTop;
       const right = rect.width - z * legend.offsetLeft;
-      warpspacePage.send("room:size",
+      warpspacePage.send("overlay:size",
         [performance.now(), rect.width, rect.height, top, bottom, right].map(Math.round).join());
     }, SETTLED_MS);
   };
@@ -274,26 +274,26 @@
     if (now > plates) { plates = now + PLATE_MS; holdBackGhost(); bringForward(); }
     const layout = `${rect.x},${rect.y},${rect.width},${rect.height}`;
     const looks = camera.matrixWorld.elements.join() + camera.projectionMatrix.elements.join();
-    if (layout + looks === seen) return;
-    seen = layout + looks;
+    if (layout + looks === drawnLayout) return;
+    drawnLayout = layout + looks;
     if (pending !== layout) {
       pending = layout;
-      tell(rect);
+      sendSize(rect);
     }
     camera.updateMatrixWorld();
-    // in pixels of what lies over the drawing, which a very large page shows larger
-    const own = { width: rect.width / zoom(), height: rect.height / zoom() };
-    drawBars(camera, world, own);
-    drawLabels(camera, world, own);
-    drawWords(camera, world, own);
+    // in pixels of the overlay, which a very large page magnifies
+    const size = { width: rect.width / zoom(), height: rect.height / zoom() };
+    drawBars(camera, world, size);
+    drawLabels(camera, world, size);
+    drawPointLabels(camera, world, size);
     drawTriad(camera, world);
   };
 
-  window.warpspaceRoom = {
-    // whatever has changed: what bars and labels follow from
+  window.warpspaceOverlay = {
+    // changed inputs of bars and labels
     show(changes) {
       Object.assign(state, changes);
-      seen = pending = "";
+      drawnLayout = pending = "";
       plates = 0;
     },
   };
