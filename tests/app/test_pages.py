@@ -231,9 +231,13 @@ def test_one_piece_of_work_waits_for_another_and_may_be_given_up():
     def give_up():
         raise CancelledError
 
-    with cache.taken_turn(lambda: None), pytest.raises(CancelledError), cache.taken_turn(give_up):
+    with (
+        cache.exclusive_work(lambda: None),
+        pytest.raises(CancelledError),
+        cache.exclusive_work(give_up),
+    ):
         raise AssertionError
-    with cache.taken_turn(give_up):  # free again
+    with cache.exclusive_work(give_up):  # free again
         pass
 
 

@@ -217,7 +217,7 @@ def test_a_drag_is_one_step_and_a_pause_or_another_slider_begins_another():
     pushed(store, "EAX", 2.0, 2.0)
     pushed(store, "EAX", 3.0, 2.1 + SAME_STEP_S)
     pushed(store, "EBX", 1.0, 2.1 + SAME_STEP_S)
-    assert [step.words for step in store.past] == [*["roll of X"] * 3, "pitch of X"]
+    assert [step.label for step in store.past] == [*["roll of X"] * 3, "pitch of X"]
 
 
 def test_a_change_after_undo_forgets_the_future_and_none_is_no_step():

@@ -10,11 +10,11 @@ from collections import Counter
 from contextlib import contextmanager
 
 import pytest
+from warpspace.thesis import rows
 
 from warpspace.analysis.blocks import Column, number_columns
 from warpspace.cli import tables as module
 from warpspace.cli.tables import print_table, print_text, progress
-from warpspace.thesis import rows
 
 AT = ("--at", "X=0,Y=-225,Z=-480", "--at", "X=10.5,B=-30.123456")
 COMMANDS = {

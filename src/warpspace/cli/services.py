@@ -106,13 +106,13 @@ def draw_view(
     cancelled: threading.Event,
 ) -> bytes:
     """Draw what a page has drawn as a PNG that says what it shows."""
-    from warpspace.app.documents.legend import look_words, marked, seen_words
+    from warpspace.app.documents.legend import look_words, marked, projected_labels
     from warpspace.outputs.view import draw_view as draw
     from warpspace.units import spell
 
     found = picture.statistics
     numbers = {"mean": found.mean_um, "P95": found.p95_um, "max": found.max_um}
-    words, px_per_mm = seen_words(picture, camera, *pixels.shape[:2])
+    words, px_per_mm = projected_labels(picture, camera, *pixels.shape[:2])
     given = (
         pixels, picture.title, look_words(picture), picture.scale, marked(picture),
         [(f"{n} {picture.length_words}", f"{spell(v)} µm") for n, v in numbers.items()],
@@ -214,7 +214,7 @@ def write_report(
     cancelled: threading.Event,
 ) -> tuple[bytes, tuple[str, ...]]:
     """Write a report; give the file, and which figures are missing."""
-    from warpspace.app.documents.scene_file import kept_views
+    from warpspace.app.documents.scene_file import file_notes
     from warpspace.app.documents.transfers import shown_sides
     from warpspace.outputs.file_output import temporary_folder
     from warpspace.outputs.report import ReportSettings
@@ -226,7 +226,7 @@ def write_report(
         spec_um=state.specification.limit_um, author=author, questions=tuple(questions),
     )  # fmt: skip
     alike = [one for one in sides if one.loop == sides[0].loop]
-    scenes = [replace(one.active_scene(), review=kept_views(one)) for one in alike]
+    scenes = [replace(one.active_scene(), review=file_notes(one)) for one in alike]
     with _turn(cancelled), temporary_folder() as folder:
         target = folder / f"report{ending}"
         written = write(

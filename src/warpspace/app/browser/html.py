@@ -51,7 +51,7 @@ def tag(name: str, body: object = "", **values: object) -> Markup:
 
 
 def button(
-    words: object,
+    label: object,
     do: str,
     value: object = None,
     *,
@@ -59,22 +59,22 @@ def button(
     hint: str = "",
     pressed: bool | None = None,
     disabled: bool = False,
-    **more: object,
+    **extra: object,
 ) -> Markup:
     """Give a button that sends an event; `kind` is "", "main", "quiet" or "link"."""
     state = None if pressed is None else str(pressed).lower()
     return tag(
-        "button", words, type="button", class_=f"ws-button {kind}".strip(), data_do=do,
-        data_value=value, title=hint or None, aria_pressed=state, disabled=disabled, **more,
+        "button", label, type="button", class_=f"ws-button {kind}".strip(), data_do=do,
+        data_value=value, title=hint or None, aria_pressed=state, disabled=disabled, **extra,
     )  # fmt: skip
 
 
 def upload_button(
-    words: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
+    label: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
 ) -> Markup:
     """Give a button that opens a chooser of files, which come as events ``part:file``."""
     return tag(
-        "button", words, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
+        "button", label, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
         data_most=most_bytes, data_accept=endings, title=hint,
     )  # fmt: skip
 
@@ -101,9 +101,9 @@ def lowered(text: str) -> Markup:
 _LINK = re.compile(r"(https?://[^\s<>\"']+[^\s<>\"'.,;:!?)\]])")
 
 
-def linked(words: str) -> Markup:
+def linked(source: str) -> Markup:
     """Give what somebody has written, with links made of addresses of http and https alone."""
-    parts = _LINK.split(words)
+    parts = _LINK.split(source)
     return join(
         tag("a", part, href=part, target="_blank", rel="noopener noreferrer") if i % 2 else part
         for i, part in enumerate(parts)
@@ -132,12 +132,12 @@ def _input(**values: object) -> Markup:
 
 
 def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False,
-             label: str = "", size: str = "", **more: object) -> Markup:  # fmt: skip
+             label: str = "", size: str = "", **extra: object) -> Markup:  # fmt: skip
     """Give a box that sends what was typed on Enter or when it is left; `live` with each letter."""
     return _input(
-        type="text", id=more.pop("id", ident(name)), class_=f"ws-box {size}".strip(), value=value,
+        type="text", id=extra.pop("id", ident(name)), class_=f"ws-box {size}".strip(), value=value,
         data_set=name, data_live=name if live else None, placeholder=placeholder or None,
-        aria_label=label or None, autocomplete="off", spellcheck="false", **more,
+        aria_label=label or None, autocomplete="off", spellcheck="false", **extra,
     )  # fmt: skip
 
 
@@ -153,9 +153,9 @@ def slider(name: str, value: float | str, low: float, high: float, step: float, 
     )  # fmt: skip
 
 
-def choice(name: str, value: str, words: Mapping[str, str], *, label: str = "") -> Markup:
+def choice(name: str, value: str, labels: Mapping[str, str], *, label: str = "") -> Markup:
     options = join(
-        tag("option", said, value=key, selected=key == value) for key, said in words.items()
+        tag("option", said, value=key, selected=key == value) for key, said in labels.items()
     )
     return tag(
         "select", options, id=ident(name), class_="ws-box", data_set=name, aria_label=label or None
@@ -180,13 +180,13 @@ def fold(
     return tag("details", head + inner, data_key=key, class_="ws-section", open=open_)
 
 
-def menu(words: object, body: object, *, key: str, kind: str = "", hint: str = "",
+def menu(heading: object, body: object, *, key: str, kind: str = "", hint: str = "",
          label: str = "") -> Markup:  # fmt: skip
     """Give a menu that opens over what is around it; `kind` "up" opens it upwards."""
     return fill(
         '<details class="ws-pop {kind}" data-key="menu-{key}"{title}><summary{label}>{words}'
         '</summary><div class="ws-sheet">{body}</div></details>',
-        kind=kind, key=key, title=attributes(title=hint or None), words=words, body=body,
+        kind=kind, key=key, title=attributes(title=hint or None), words=heading, body=body,
         label=attributes(aria_label=label or None),
     )  # fmt: skip
 

@@ -26,7 +26,7 @@ class Page:
         send_at_once(client)
 
     @contextmanager
-    def as_one(self) -> Generator[None]:
+    def batch(self) -> Generator[None]:
         """Send what is drawn and written meanwhile in one go; for the session."""
         with self._client.atomic():
             self._held = []

@@ -32,7 +32,7 @@ class LegendMark(NamedTuple):
     """What is named beside the colour bar; heights are parts of its own."""
 
     name: str  # empty at the ends
-    words: str
+    text: str
     at: float
     name_at: float  # away from others
 
@@ -76,7 +76,7 @@ def legend_html(picture: LivePicture) -> Markup:
     """Draw the colour bar with unit, ends, limit, mean, P95 and max."""
     scale, named = picture.scale, marks(picture)
     names = join(
-        tag("i", mark.words, style=f"bottom:{100.0 * mark.name_at:.2f}%",
+        tag("i", mark.text, style=f"bottom:{100.0 * mark.name_at:.2f}%",
             class_="ws-mark" if mark.name else "ws-tick", data_mark=mark.name or None)
         for mark in named
     )  # fmt: skip
@@ -92,7 +92,7 @@ def legend_html(picture: LivePicture) -> Markup:
         faded=join(tag("p", lowered(said), class_="ws-tiny") for said in faded_words(picture)),
         label=lowered(scale.label), unit=scale.unit, leads=leads, names=names,
         words=f"Colours from {spell_short(scale.low)} to {spell_short(scale.high)} {scale.unit}: "
-        + ", ".join(mark.words for mark in named if mark.name),
+        + ", ".join(mark.text for mark in named if mark.name),
         colours=_stops(scale),
     )  # fmt: skip
 
@@ -156,7 +156,7 @@ def place_words(picture: LivePicture) -> str:
     return f"at {formatting.list_axes(axes)}" if axes else ""
 
 
-def kept_words(picture: LivePicture) -> tuple[str, bool]:
+def within_limit_words(picture: LivePicture) -> tuple[str, bool]:
     """Say which part of the volume keeps the limit, and whether all of it does; see `share_below`.
 
     What is not kept everywhere is never said to be, however little is missing.
@@ -243,7 +243,7 @@ def range_conditions(picture: LivePicture) -> tuple[str, ...]:
 
 def look_words(picture: LivePicture) -> list[str]:
     """Say what is looked at, and how; of a difference for both sides."""
-    machine, both = picture.drawn_state.scene.machine, picture.both_words
+    machine, both = picture.drawn_state.scene.machine, picture.describe_sides
     size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
     nodes = spell_count(picture.field.norm_um.size)
     return [
@@ -259,7 +259,7 @@ def look_words(picture: LivePicture) -> list[str]:
     ]
 
 
-def seen_words(
+def projected_labels(
     picture: LivePicture, camera: CameraMemory, height: int, width: int
 ) -> tuple[list[tuple[str, Array]], float | None]:
     """Give words and where a camera saw their points, px from the left bottom; and its scale.

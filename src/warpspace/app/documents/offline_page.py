@@ -25,8 +25,8 @@ from warpspace.analysis.note_tables import note_numbers, said_stale, spell_numbe
 from warpspace.app.browser.html import EMPTY, join, linked, lowered, number, rows, tag
 from warpspace.app.browser.page import script_source
 from warpspace.app.documents import legend
-from warpspace.app.documents.scene_file import Known, reopened
-from warpspace.app.drawing.around import ACCENT, ASKED, around, words
+from warpspace.app.documents.scene_file import KnownScenes, reopened
+from warpspace.app.drawing.around import ACCENT, POINT_MARKER, draw_labels, draw_surroundings
 from warpspace.app.drawing.box import box, line_facts, packed
 from warpspace.app.drawing.camera import CameraMemory, fit_camera
 from warpspace.app.drawing.colours import colour_levels, level_colours
@@ -52,7 +52,7 @@ POLICY = (
     " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
 )
 """What the browser may load: what is in the file, and nothing else."""
-FEW = 12  # errors that are listed at once
+MAX_UNFOLDED = 12  # errors that are listed at once
 ASPECT = 1.5
 PARTS = 50_000  # of the longest edge, that points of a step are rounded to
 AWAY_MM = (0.0, 0.0, 1e6)  # where the marker of a step without a point stands: out of sight
@@ -74,11 +74,11 @@ class PageStep:
 
 
 def offline_picture(
-    scene: Scene, *, nodes: int, largest: float | None = None, **shown: Any
+    scene: Scene, *, nodes: int, largest: float | None = None, **changes: Any
 ) -> LivePicture:
     """Evaluate a scene for a page; `largest` is where its colours end, for several alike."""
     # callers count the nodes of a grid, and a point has one
-    state = replace(start_state(scene), nodes=max(nodes, MIN_NODES), **shown)
+    state = replace(start_state(scene), nodes=max(nodes, MIN_NODES), **changes)
     picture = LiveModel().evaluate(state)
     colours = None if largest is None else choose_scale([np.array(largest)], state.component)
     return replace(picture, colours=colours or picture.colours)
@@ -90,21 +90,23 @@ def build_offline_html(
     """Build the page: the interactive scene with its colour bar, numbers and factor."""
     conditions = list(legend.picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
-    shapes = {**box(picture), **around(picture), **words(picture)}
+    shapes = {**box(picture), **draw_surroundings(picture), **draw_labels(picture)}
     steps = [PageStep(picture, camera or _usual_camera(picture))]
     return _build_page(picture.title, steps, shapes, about)
 
 
-def build_story_html(state: AppState, provenance: About = None, known: Known = None) -> str:
+def build_story_html(
+    state: AppState, provenance: About = None, known_scenes: KnownScenes = None
+) -> str:
     """Build the page of the story that the notes of a state tell."""
-    steps = _story_steps(state, known)
+    steps = _story_steps(state, known_scenes)
     first, grid = steps[0].picture, steps[0].picture.grid.nominal_mm
     alike = all(np.array_equal(step.picture.grid.nominal_mm, grid) for step in steps)
     # what follows no step stays away
     kept = ("/box", "/ghost", "/axes", "/words/axis", "/words/tick") if alike else ("/box",)
-    found = {**box(first), **around(first), **words(first)}
+    found = {**box(first), **draw_surroundings(first), **draw_labels(first)}
     shapes = {name: shape for name, shape in found.items() if name.startswith(kept)}
-    shapes["/story/point"] = ball(steps[0].point_mm, ASKED * first.size_mm, ACCENT)
+    shapes["/story/point"] = ball(steps[0].point_mm, POINT_MARKER * first.size_mm, ACCENT)
     return _build_page(state.scene.title, steps, shapes, provenance or {})
 
 
@@ -147,16 +149,16 @@ def _export(step: PageStep, shapes: Shapes) -> str:
             server.stop()
 
 
-def _story_steps(state: AppState, known: Known) -> list[PageStep]:
+def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
     notes, scene, live = story(state.review), state.resulting_scene(), LiveModel()
     if not notes:
         raise OptionError("no note of this scene has a step of a story")
-    picture, camera, steps = live.evaluate(_whole(state, state)), None, list[PageStep]()
+    picture, camera, steps = live.evaluate(_story_view(state, state)), None, list[PageStep]()
     for index, note in enumerate(notes):
         problem = ""
         try:
-            shown, seen = reopened(state, note, known) if note.view else (state, None)
-            found = live.evaluate(_whole(shown, state, note))
+            shown, seen = reopened(state, note, known_scenes) if note.view else (state, None)
+            found = live.evaluate(_story_view(shown, state, note))
             if steps and found.shape != picture.shape:
                 raise OptionError("its machine has another volume")
             picture, camera = found, seen
@@ -167,7 +169,7 @@ def _story_steps(state: AppState, known: Known) -> list[PageStep]:
     return steps
 
 
-def _whole(shown: AppState, like: AppState, *notes: Note) -> AppState:
+def _story_view(shown: AppState, like: AppState, *notes: Note) -> AppState:
     """Give what the steps have in common: the whole surface of the box, on the same ground."""
     look, machine = replace(shown.look, surface="surface", isolines=False), shown.machine
     ground, machine = replace(shown.shown, dark=like.shown.dark), replace(machine, shown=False)
@@ -227,7 +229,7 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
 
 def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
     picture, errors = step.picture, _error_rows(step.picture)
-    kept = "" if picture.is_difference else f" · {legend.kept_words(picture)[0]}"
+    kept = "" if picture.is_difference else f" · {legend.within_limit_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)
     seen = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{kept} · {factor}"
     subjects = [one for one in (picture.title, *legend.subject_words(picture)) if one != title]
@@ -245,7 +247,7 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
         rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
         tag("p", " · ".join(asked)),
         tag("details", tag("summary", summary) + tag("table", listed),
-            open=len(errors) <= FEW and not step.note),
+            open=len(errors) <= MAX_UNFOLDED and not step.note),
     )  # fmt: skip
     return (
         join(tag("p", one) for one in (seen, *subjects)),

@@ -44,13 +44,13 @@ SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
 # what was compared had a line of its own in files of earlier versions
 _LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
-Known = Sequence[Scene] | None
+KnownScenes = Sequence[Scene] | None
 """Scenes that whoever opens a file or a link also has; None for those of the program."""
 Opened = tuple[AppState, CameraMemory | None]
 
 
 def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
-    scene = replace(state.resulting_scene(), review=kept_views(state))
+    scene = replace(state.resulting_scene(), review=file_notes(state))
     line = settings_line(replace(state, scene=scene, loaded=None), camera)
     if len(line) > MAX_LINE:
         raise OptionError("what is compared is too large to be stored with the scene")
@@ -58,11 +58,13 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
     return f"{head}\n{MARK}{line}\n\n{scene_to_toml(scene)}"
 
 
-def open_text(text: str, name: str, source: str, *, alone: bool = False) -> Opened:
+def open_text(text: str, name: str, source: str, *, without_comparison: bool = False) -> Opened:
     """Build the state of a scene file that somebody has uploaded; `alone` with no comparison."""
     scene = _recognised(parse_scene(text, name, source, folder=None))
     line = settings_of(text)
-    return with_settings(start_state(scene), line, alone=alone), camera_of(line)
+    return with_settings(
+        start_state(scene), line, without_comparison=without_comparison
+    ), camera_of(line)
 
 
 def settings_of(text: str) -> str:
@@ -71,32 +73,35 @@ def settings_of(text: str) -> str:
     return "&".join(filter(None, _LINES.findall(head[0] if head else "")))
 
 
-def _find(name: str, known: Known) -> Scene | None:
-    if known is None:
+def _find(name: str, known_scenes: KnownScenes) -> Scene | None:
+    if known_scenes is None:
         return load_scene(name) if name in scene_names() else None
-    return next((scene for scene in known if scene.name == name), None)
+    return next((scene for scene in known_scenes if scene.name == name), None)
 
 
 def _recognised(scene: Scene) -> Scene:
     """Give a machine written inline its bodies back where only its axes' ends and ways differ."""
     machine = scene.machine
-    known = known_alike(machine)
-    if known is None:
+    library_machine = known_alike(machine)
+    if library_machine is None:
         return scene
-    bodies, gantries = machine.bodies or known.bodies, machine.gantries or known.gantries
-    same = replace(known, axes=machine.axes, bodies=bodies, gantries=gantries)
+    bodies, gantries = (
+        machine.bodies or library_machine.bodies,
+        machine.gantries or library_machine.gantries,
+    )
+    same = replace(library_machine, axes=machine.axes, bodies=bodies, gantries=gantries)
     return replace(scene, model=replace(scene.model, machine=same))
 
 
-def state_to_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
-    link = _spell(state, camera, known)
+def state_to_link(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
+    link = _spell(state, camera, known_scenes)
     if len(link) > MAX_LINK:
         raise OptionError("this is too large for a link; save it as a file instead")
     return link
 
 
-def _spell(state: AppState, camera: CameraMemory | None, known: Known) -> str:
-    return named_link(state, camera, known) or _packed(state, camera)
+def _spell(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
+    return named_link(state, camera, known_scenes) or _packed(state, camera)
 
 
 def _packed(state: AppState, camera: CameraMemory | None) -> str:
@@ -105,13 +110,13 @@ def _packed(state: AppState, camera: CameraMemory | None) -> str:
     return urlencode({NAME: state.scene.name, PACKED: word})
 
 
-def named_link(state: AppState, camera: CameraMemory | None, known: Known) -> str:
+def named_link(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
     """Spell a state of a scene that others have as a link of any length; any other as nothing."""
     scene = state.scene
     plain = _is_plain(state) and state.review == scene.review
-    if not plain or _find(scene.name, known) != scene:
+    if not plain or _find(scene.name, known_scenes) != scene:
         return ""
-    line = settings_line(state, camera, known)
+    line = settings_line(state, camera, known_scenes)
     return "&".join(filter(None, (urlencode({SCENE: scene.name}), line)))
 
 
@@ -120,25 +125,32 @@ def _is_plain(state: AppState) -> bool:
     return state.loaded is None and state.tolerances == state.scene.tolerances
 
 
-def open_link(link: str, known: Known) -> Opened:
+def open_link(link: str, known_scenes: KnownScenes) -> Opened:
     if len(link) > MAX_LINK:
         raise OptionError(
             f"the link is {len(link):,} characters long; expected at most {MAX_LINK:,}"
         )
-    return _read_link(link, known)
+    return _read_link(link, known_scenes)
 
 
-def _read_link(link: str, known: Known, *, alone: bool = False) -> Opened:
+def _read_link(link: str, known_scenes: KnownScenes, *, without_comparison: bool = False) -> Opened:
     pairs = dict(_pairs(link))
     if PACKED in pairs:
         name = safe_name(pairs.get(NAME, ""), "link")
-        return open_text(_unpack(pairs[PACKED]), name, "the scene in the link", alone=alone)
+        return open_text(
+            _unpack(pairs[PACKED]),
+            name,
+            "the scene in the link",
+            without_comparison=without_comparison,
+        )
     name = pairs.pop(SCENE, "")
-    scene = _find(name, known)
+    scene = _find(name, known_scenes)
     if scene is None:
         raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
     line = urlencode(pairs)
-    return with_settings(start_state(scene), line, known, alone=alone), camera_of(line)
+    return with_settings(
+        start_state(scene), line, known_scenes, without_comparison=without_comparison
+    ), camera_of(line)
 
 
 def _unpack(packed: str) -> str:
@@ -157,10 +169,14 @@ def _unpack(packed: str) -> str:
 
 
 def settings_line(
-    state: AppState, camera: CameraMemory | None = None, known: Known = None, *, rest: bool = False
+    state: AppState,
+    camera: CameraMemory | None = None,
+    known_scenes: KnownScenes = None,
+    *,
+    at_rest: bool = False,
 ) -> str:
     """Spell what differs from the scene as opened; `rest` from that scene at rest."""
-    opened = start_state(state.scene).at_rest() if rest else start_state(state.scene)
+    opened = start_state(state.scene).at_rest() if at_rest else start_state(state.scene)
     pairs = [
         (leaf.linked, spell_value(leaf, now))
         for leaf in leaves(state).values()
@@ -169,15 +185,21 @@ def settings_line(
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
         pairs.append((CAMERA, ",".join(f"{number:.9g}" for number in numbers)))
-    return urlencode([*pairs, *linked_forms(state), *_sides(state, known)])
+    return urlencode([*pairs, *linked_forms(state), *_sides(state, known_scenes)])
 
 
 def with_settings(
-    state: AppState, line: str, known: Known = None, *, alone: bool = False
+    state: AppState,
+    line: str,
+    known_scenes: KnownScenes = None,
+    *,
+    without_comparison: bool = False,
 ) -> AppState:
     """Apply a line of settings to a state; `alone` without a comparison."""
-    pairs = [pair for pair in _pairs(line) if not (alone and pair[0].startswith(PREFIX))]
-    state, unread = _with_sides(state, dict(pairs), known), list[str]()
+    pairs = [
+        pair for pair in _pairs(line) if not (without_comparison and pair[0].startswith(PREFIX))
+    ]
+    state, unread = _with_sides(state, dict(pairs), known_scenes), list[str]()
     for name, text in pairs:
         if name == CAMERA or name in SIDES:
             continue
@@ -233,10 +255,10 @@ def view_of(state: AppState, camera: CameraMemory | None) -> str:
     link = "" if _is_plain(state) else _packed(shown, camera)
     # curves of thousands of points are left to the scene
     fits = 0 < len(link) <= MAX_NOTE_VIEW
-    return link if fits else settings_line(shown, camera, rest=True)
+    return link if fits else settings_line(shown, camera, at_rest=True)
 
 
-def kept_views(state: AppState) -> tuple[Note, ...]:
+def file_notes(state: AppState) -> tuple[Note, ...]:
     """Give the notes as a file keeps them, whose scene may differ from the one as opened."""
     opened = start_state(replace(state.origin, review=()))
 
@@ -249,18 +271,18 @@ def kept_views(state: AppState) -> tuple[Note, ...]:
     return state.review if _is_plain(state) else tuple(map(kept, state.review))
 
 
-def reopened(state: AppState, note: Note, known: Known = None) -> Opened:
+def reopened(state: AppState, note: Note, known_scenes: KnownScenes = None) -> Opened:
     """Give what was on the screen when a note was made; what cannot be restored is named."""
     if not note.view:
         return state, None
     origin = state.origin
     if PACKED in dict(_pairs(note.view)):
-        found, camera = _read_link(note.view, known)
+        found, camera = _read_link(note.view, known_scenes)
         same = found.scene.machine.axes == origin.machine.axes
         found = replace(found, loaded=None if found.scene == origin else origin,
                         start=state.start if same else found.start)  # fmt: skip
     else:
-        found = with_settings(start_state(origin).at_rest(), note.view, known)
+        found = with_settings(start_state(origin).at_rest(), note.view, known_scenes)
         camera = camera_of(note.view)
     return replace(found, review=state.review, page=state.page, forms=state.forms), camera
 
@@ -274,7 +296,7 @@ LONGEST_TITLE = 200
 SIDES = [PREFIX + name for name in ("pinned", "a", "b", "pinned.title", "a.title", "b.title")]
 
 
-def _sides(state: AppState, known: Known) -> Iterator[tuple[str, str]]:
+def _sides(state: AppState, known_scenes: KnownScenes) -> Iterator[tuple[str, str]]:
     chosen = state.comparison
     for name, side in (("pinned", chosen.pinned), ("a", chosen.a), ("b", chosen.b)):
         if side is None or (name == "a" and side.state is None):
@@ -284,14 +306,14 @@ def _sides(state: AppState, known: Known) -> Iterator[tuple[str, str]]:
         elif name != PINNED and not side.is_scene:
             text, usual = PINNED, side.title
         else:
-            text = _spell(side.state, None, known)
+            text = _spell(side.state, None, known_scenes)
             usual = scene_side(side.state.scene).title if side.is_scene else ""
         yield PREFIX + name, text
         if side.title != usual:
             yield f"{PREFIX}{name}.title", side.title
 
 
-def _with_sides(state: AppState, given: Mapping[str, str], known: Known) -> AppState:
+def _with_sides(state: AppState, given: Mapping[str, str], known_scenes: KnownScenes) -> AppState:
     sides: dict[str, Side | None] = {PINNED: None}
     for name in (PINNED, "a", "b"):
         text = given.get(PREFIX + name)
@@ -302,7 +324,7 @@ def _with_sides(state: AppState, given: Mapping[str, str], known: Known) -> AppS
             if sides[PINNED] is None:
                 raise OptionError("the comparison is with a pinned state, but holds none")
         else:
-            found, _ = _read_link(text, known, alone=True)
+            found, _ = _read_link(text, known_scenes, without_comparison=True)
             if name == PINNED:
                 state = state.noted(*(f"{BEFORE}: {note}" for note in found.notes))
                 side = pinned_side(plain_state(found.without_notes()))
@@ -330,8 +352,8 @@ class SceneList(dict[str, Scene]):
 
     def add(self, scene: Scene) -> tuple[str, str]:
         """Take in an opened scene; give its title, and that of one that has left for it."""
-        for title, known in self.items():
-            if known is scene or known == scene:
+        for title, known_scenes in self.items():
+            if known_scenes is scene or known_scenes == scene:
                 return title, ""
         own = title = scene.title or scene.name
         number = 2

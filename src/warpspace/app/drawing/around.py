@@ -21,7 +21,7 @@ from warpspace.app.drawing.shapes import (
 )
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import chosen_trace, points_on_traces
-from warpspace.app.evaluation.point_explanation import answer, measured
+from warpspace.app.evaluation.point_explanation import explain_point, measure_distance
 from warpspace.app.evaluation.scene_overlays import AT_LINE
 from warpspace.formats.source import MAX_LINES
 from warpspace.geometry.surfaces import corners, round_down
@@ -33,7 +33,7 @@ from warpspace.units import MM_PER_UM, Array
 HEAD, BALL = 0.034, 0.009  # of an arrow, and the marker of the worst point
 APART = 0.002  # distance from which nominal and actual trace are both drawn
 TURNED = 0.014  # diameter of a traced point while the table turns
-ASKED, AXIS_HALF, DASH = 0.011, 0.32, 0.02
+POINT_MARKER, AXIS_HALF, DASH = 0.011, 0.32, 0.02
 """Marker of the point that was asked about, half the axis that turns it, dash of its lever."""
 RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
 MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # points beyond the travel that are marked, and their size
@@ -49,9 +49,9 @@ HEAD_PART = 0.7  # longest head, as a part of its arrow
 STROKES, SLANT = 12, 0.3  # lines of a head, and how far they slant, as a part of its length
 
 
-def around(picture: LivePicture) -> Shapes:
+def draw_surroundings(picture: LivePicture) -> Shapes:
     """Draw all that follows the picture beside the box and the machine."""
-    draws = (_axes, _traces, _path, _part, _program, _other_side, _asked, _measured, _marks,
+    draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _measured, _marks,
              _uncertainty)  # fmt: skip
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
 
@@ -130,7 +130,7 @@ def _program(picture: LivePicture) -> Shapes:
     linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # viser wants lines so
     colours = (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
     asked = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
-    marker = dots(drawn[path.of.line == asked][-1:], ASKED * picture.size_mm, ACCENT)
+    marker = dots(drawn[path.of.line == asked][-1:], POINT_MARKER * picture.size_mm, ACCENT)
     pair = _pair(picture, "/program", path.nominal_mm[path.at], drawn[path.at])
     return {**pair, "/program/actual": lines(drawn[path.at], colours, 3.0), "/program/line": marker}
 
@@ -143,14 +143,14 @@ def _other_side(picture: LivePicture) -> Shapes:
     return {"/compare/other": lines(edges, colour(picture, "edge"), 2.0)}
 
 
-def _asked(picture: LivePicture) -> Shapes:
+def _point(picture: LivePicture) -> Shapes:
     picked, size = picture.state.picked, picture.size_mm
     if picked is None or picture.is_difference:
         return {}
-    found = answer(picture.drawn_state, picked, picture.exaggeration)
+    found = explain_point(picture.drawn_state, picked, picture.exaggeration)
     point = found.explanation.nominal_mm + found.shift_mm
     shapes = {
-        "/why/marker": ball(found.drawn_mm, ASKED * size, ACCENT),
+        "/why/marker": ball(found.drawn_mm, POINT_MARKER * size, ACCENT),
         "/why/vector": lines(np.stack([point, found.drawn_mm])[None], ACCENT, 3.0),
     }
     for part in found.explanation.contributions:
@@ -163,7 +163,7 @@ def _asked(picture: LivePicture) -> Shapes:
 
 
 def _measured(picture: LivePicture) -> Shapes:
-    found = measured(picture)
+    found = measure_distance(picture)
     if found is None:
         return {}
     _, nominal, actual = found
@@ -171,7 +171,7 @@ def _measured(picture: LivePicture) -> Shapes:
     return {
         "/measured/nominal": lines(nominal[ends], colour(picture, "edge"), 1.5),
         "/measured/actual": lines(actual[ends], ACCENT, 3.0),
-        "/measured/points": dots(actual, ASKED * picture.size_mm, ACCENT),
+        "/measured/points": dots(actual, POINT_MARKER * picture.size_mm, ACCENT),
     }
 
 
@@ -210,7 +210,7 @@ def _uncertainty(picture: LivePicture) -> Shapes:
     at = [*picture.drawn_mm.reshape(-1, 3)[chosen]]
     covariances = [*found.expanded_um2.reshape(-1, 3, 3)[chosen]]
     if picked is not None:
-        asked = answer(picture.drawn_state, picked, picture.exaggeration)
+        asked = explain_point(picture.drawn_state, picked, picture.exaggeration)
         if asked.uncertainty is not None:
             at.append(asked.drawn_mm)
             covariances.append(asked.uncertainty.expanded_um2)
@@ -267,7 +267,7 @@ def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
     return np.concatenate([np.stack([start_mm, end_mm], axis=1), strokes])
 
 
-def words(picture: LivePicture) -> Shapes:
+def draw_labels(picture: LivePicture) -> Shapes:
     """Draw all words in 3-D, for a page that cannot place them."""
     away, middle = 0.03 * picture.size_mm, picture.grid.bounds_mm.mean(axis=0)
     shapes: dict[str, SceneNode | None] = {}

@@ -120,7 +120,7 @@ class BoxLayer:
         )
         self._behind = True
 
-    def rest(self, picture: LivePicture) -> None:
+    def synchronise(self, picture: LivePicture) -> None:
         """Have viser hold what is drawn."""
         if self._behind:
             self._show_all(picture)

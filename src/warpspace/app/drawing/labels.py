@@ -11,7 +11,7 @@ import numpy as np
 
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.machine_bodies import chosen_trace, drawn_bodies, tool_point
-from warpspace.app.evaluation.point_explanation import answer, drawn_places, measured
+from warpspace.app.evaluation.point_explanation import drawn_places, explain_point, measure_distance
 from warpspace.app.state.app_state import Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.field.grid import Grid
@@ -64,7 +64,7 @@ def axes(picture: LivePicture) -> tuple[AxisLabels, ...]:
 
 @lru_cache(maxsize=32)
 def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
-    grid: Grid = of.thing
+    grid: Grid = of.target
     low, high = grid.bounds_mm
     frames = (
         (np.array([0.0, low[1] - away, low[2]]), np.array([0.0, -1.0, 0.0])),
@@ -130,7 +130,7 @@ def _spell(value: float, unit: str = MICROMETRE, plus_minus: str = "") -> str:
 
 def point_labels(picture: LivePicture) -> list[Label]:
     """Give what is written beside points of the volume, what matters most first."""
-    worst, asked = [*_worst(picture)], [*_asked(picture)]
+    worst, asked = [*_worst(picture)], [*_point(picture)]
     for one, other in zip(worst, asked, strict=False):
         apart = np.linalg.norm(one.at_mm - other.at_mm)
         if apart < TICK * picture.size_mm and other.text.startswith(one.text.removeprefix("max ")):
@@ -161,11 +161,11 @@ def _corners(picture: LivePicture) -> Iterator[Label]:
             yield Label(text, picture.drawn_mm.reshape(-1, 3)[node], "corner")
 
 
-def _asked(picture: LivePicture) -> Iterator[Label]:
+def _point(picture: LivePicture) -> Iterator[Label]:
     picked, state = picture.state.picked, picture.drawn_state
     if picked is None or picture.is_difference:
         return
-    found = answer(state, picked, picture.exaggeration)
+    found = explain_point(state, picked, picture.exaggeration)
     length = float(np.linalg.norm(found.drawn_um))
     where = list_axes(own_axes(state.scene, found.at))
     words = f"{length:.1f}{length_words(found.uncertainty)} µm at {where}"
@@ -182,7 +182,7 @@ def _asked(picture: LivePicture) -> Iterator[Label]:
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:
-    if (drawn := measured(picture)) is not None:
+    if (drawn := measure_distance(picture)) is not None:
         found, _, (start, end, *corner) = drawn
         places = (*[(start + end) / 2.0] * 2, *corner)
         for words, at in zip(found.words(), places, strict=True):
@@ -220,7 +220,9 @@ def note_labels(picture: LivePicture) -> list[Label]:
     for number, note in enumerate(picture.state.review, 1):
         words, picked = f"⚑ {number}", Picked.of_note(note)
         if picked and picked.point_mm:
-            found.append(Label(words, answer(state, picked, picture.exaggeration).drawn_mm, "note"))
+            found.append(
+                Label(words, explain_point(state, picked, picture.exaggeration).drawn_mm, "note")
+            )
         elif picked:
             own[words] = picked.at
         elif own_mm := [b.vertices_mm for b in bodies if note.on and b.body.frame == note.on.body]:

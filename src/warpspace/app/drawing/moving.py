@@ -9,7 +9,7 @@ from viser import ClientHandle
 from viser.transforms import SO3
 
 from warpspace.app.browser.page import Page
-from warpspace.app.drawing.around import GIZMO, around, turned_points
+from warpspace.app.drawing.around import GIZMO, draw_surroundings, turned_points
 from warpspace.app.drawing.colours import Rgb, colour
 from warpspace.app.drawing.shapes import SCENE_PER_MM, Nodes, SceneNode, Shapes, ball, lines, mesh
 from warpspace.app.evaluation.live_picture import LivePicture
@@ -86,7 +86,7 @@ class MovingLayer:
         if not same or before.positions != now.positions:
             self._turned_at, self._turned_deg = None, 0.0
             self._stand({})
-        self._around.draw({**self._gizmo(picture), **around(picture)})
+        self._around.draw({**self._gizmo(picture), **draw_surroundings(picture)})
         self._draw_ghost(picture)
         self._draw_turning()
 
@@ -112,7 +112,7 @@ class MovingLayer:
         state = picture.state
         on = state.machine.ghost and not state.machine.shown
         of = on and (
-            Identity(state.scene), state.seen, state.shown.dark,
+            Identity(state.scene), state.view_key, state.shown.dark,
             Identity(state.machine.linear_mm), Identity(state.positions),
         )  # fmt: skip
         if of != self._ghost_of:

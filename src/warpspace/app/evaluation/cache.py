@@ -39,7 +39,7 @@ _TURN = threading.Lock()
 
 
 @contextmanager
-def taken_turn(watch: Callable[[], object]) -> Generator[None]:
+def exclusive_work(watch: Callable[[], object]) -> Generator[None]:
     """Wait until nothing else is worked on; `watch` raises where nobody waits any more."""
     while not _TURN.acquire(timeout=POLL_S):
         watch()

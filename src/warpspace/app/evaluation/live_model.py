@@ -29,7 +29,7 @@ from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 
 CACHE_BYTES = 400_000_000
-KEPT = 0.27  # place of the colour of what keeps the limit, on the scale of signed values
+WITHIN_LIMIT = 0.27  # place of the colour of what keeps the limit, on the scale of signed values
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
 T = TypeVar("T")
 Responding: TypeAlias = tuple[T, ErrorBasis]
@@ -143,7 +143,7 @@ class LiveModel:
             return basis.evaluate(amplitudes, orientation=state.look.tilts and not on_trace)
         loop, point_mm = (of.loop, of.nominal_mm) if on_trace else (state.loop, None)
         held = tuple((scene.reference or {}).items()), tuple(state.positions.items())
-        key = Identity(controller), Identity(of), Identity(scene.model), held, loop, state.seen
+        key = Identity(controller), Identity(of), Identity(scene.model), held, loop, state.view_key
         now = state.active_scene()
         kept = self._kept.get(
             key,
@@ -154,7 +154,7 @@ class LiveModel:
 
 
 def _place(state: AppState) -> tuple[object, ...]:
-    return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.seen
+    return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.view_key
 
 
 def _size(held: Response) -> int:
@@ -182,7 +182,7 @@ class PassFail(ColourScale):
     limit: float = 0.0
 
     def fraction(self, values: Array) -> Array:
-        return np.where(np.asarray(values) > self.limit, 1.0 - KEPT, KEPT)
+        return np.where(np.asarray(values) > self.limit, 1.0 - WITHIN_LIMIT, WITHIN_LIMIT)
 
     @property
     def ticks(self) -> tuple[float, ...]:

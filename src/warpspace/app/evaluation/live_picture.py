@@ -11,9 +11,9 @@ from warpspace.analysis.statistics import Statistics
 from warpspace.app.evaluation.scene_overlays import (
     SceneOverlay,
     T,
-    bench_in_box,
-    part_in_box,
-    path_in_box,
+    bench_overlay,
+    part_overlay,
+    path_overlay,
 )
 from warpspace.app.state.app_state import AppState
 from warpspace.bench.base import BenchTest
@@ -66,15 +66,15 @@ class LivePicture(Picture):
     @cached_property
     def bench(self) -> SceneOverlay[type[BenchTest]] | None:
         """The path of the standard test that is run; None where none is, or cannot be."""
-        return None if self.is_difference else bench_in_box(self.drawn_state)
+        return None if self.is_difference else bench_overlay(self.drawn_state)
 
     @cached_property
     def part(self) -> SceneOverlay[PartMesh] | None:
-        return self._in_box(part_in_box)
+        return self._in_box(part_overlay)
 
     @cached_property
     def path(self) -> SceneOverlay[ToolPath] | None:
-        return self._in_box(path_in_box)
+        return self._in_box(path_overlay)
 
     def _in_box(self, find: Callable[[AppState], SceneOverlay[T] | None]) -> SceneOverlay[T] | None:
         """Find a part or a path; of a difference its change; None where none is, or cannot be."""
@@ -117,7 +117,7 @@ class LivePicture(Picture):
         """Name of what is drawn: the scene, or a side of a comparison, or the difference."""
         return self.state.scene.title if self.compared is None else self.compared.title
 
-    def both_words(self, word: Callable[[AppState], str]) -> str:
+    def describe_sides(self, word: Callable[[AppState], str]) -> str:
         """Say something of what is drawn; of a difference for both sides where they differ."""
         if self.compared is None or not self.is_difference:
             return word(self.drawn_state)

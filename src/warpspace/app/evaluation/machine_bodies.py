@@ -14,10 +14,12 @@ from warpspace.kinematics.chain import nominal_point
 from warpspace.kinematics.model import Loop, complete_coordinates
 from warpspace.units import Array
 
-HERE: Mapping[str, float] = {}
+NO_POSITIONS: Mapping[str, float] = {}
 
 
-def standing(state: AppState, at: Mapping[str, float] = HERE) -> tuple[dict[str, float], Array]:
+def standing(
+    state: AppState, at: Mapping[str, float] = NO_POSITIONS
+) -> tuple[dict[str, float], Array]:
     """Tell where all axes stand, mm and degrees, some of them elsewhere; and the tool point."""
     scene = state.scene
     linear = linear_positions(scene, state.machine)
@@ -28,7 +30,7 @@ def standing(state: AppState, at: Mapping[str, float] = HERE) -> tuple[dict[str,
 
 
 def drawn_bodies(
-    picture: LivePicture, turned: Mapping[str, float] = HERE, *, nominal: bool = False
+    picture: LivePicture, turned: Mapping[str, float] = NO_POSITIONS, *, nominal: bool = False
 ) -> tuple[PlacedBody, ...]:
     """Place the bodies of a picture's machine, bent where that is chosen.
 

@@ -43,7 +43,7 @@ NOUNS = {"span": "gantry", "mesh": "body"}
 START_SPAN_MM = 1000.0  # of guides where no travel across says how far apart they are
 MOST_CHAIN_TEXT = 101  # characters of a chain that are read: one more than in a file
 FRAME = "F"
-SHOWN = 30  # characters of what was typed that a message repeats
+MAX_QUOTED = 30  # characters of what was typed that a message repeats
 
 
 def tables_of(scene: Scene) -> Tables:
@@ -121,7 +121,7 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
 def read_number(what: str, typed: str, unit: str) -> float:
     value = read_typed(typed, unit)
     if value is None:
-        text = typed if len(typed) <= SHOWN else f"{typed[:SHOWN]}…"
+        text = typed if len(typed) <= MAX_QUOTED else f"{typed[:MAX_QUOTED]}…"
         raise OptionError(f"{what} = “{text}”; expected a number in {unit}")
     return value
 

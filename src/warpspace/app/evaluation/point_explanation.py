@@ -140,7 +140,7 @@ def _denser(samples: Array) -> Array:
     return samples[:, first] * (1.0 - part) + samples[:, first + 1] * part
 
 
-def answer(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
+def explain_point(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
     """Explain the error of a picked point."""
     scene, model = state.active_scene(), state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
@@ -206,7 +206,7 @@ POINTS = {
 """What asks for the points of a distance, by form, in turn; an empty form waits for a click."""
 
 
-def awaited(state: AppState) -> str:
+def awaited_form(state: AppState) -> str:
     """Give the form of the point that the next click sets; empty where a click asks why."""
     page = state.page
     is_open = Distance.name in page.open and page.task == Distance.task and not page.notes
@@ -215,7 +215,7 @@ def awaited(state: AppState) -> str:
 
 def with_clicked(state: AppState, picked: Picked) -> AppState:
     """Take a click on the drawing: a point that is waited for, else one that is asked about."""
-    point = awaited(state)
+    point = awaited_form(state)
     if not point:
         return with_picked(state, picked)
     if picked.point_mm is not None:
@@ -223,17 +223,17 @@ def with_clicked(state: AppState, picked: Picked) -> AppState:
     return with_form(state, point, spell_at(picked.at))
 
 
-def measured(picture: LivePicture) -> tuple[DistanceResult, Array, Array] | None:
+def measure_distance(picture: LivePicture) -> tuple[DistanceResult, Array, Array] | None:
     """Measure between the points that were chosen; None where there are not two.
 
     With the result where start, end and corner are drawn, [n, 3], without errors and displaced.
     """
-    return None if picture.is_difference else _measured(Identity(picture))
+    return None if picture.is_difference else _measure_distance(Identity(picture))
 
 
 @lru_cache(maxsize=1)  # lines and words of one picture ask; it keeps the picture
-def _measured(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
-    picture: LivePicture = of.thing
+def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
+    picture: LivePicture = of.target
     state, told = picture.drawn_state, option_values(picture.state, Distance.name)
     scene = state.active_scene()
     try:

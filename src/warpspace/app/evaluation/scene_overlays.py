@@ -32,7 +32,7 @@ MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app dr
 MOST_SITES = 20_000  # places of one test
 PIECE = 20_000  # points that are worked on at once: what lies between needs memory, too
 T = TypeVar("T")
-_KEPT: Cache[Any] = Cache(400_000_000)
+_CACHE: Cache[Any] = Cache(400_000_000)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class SceneOverlay(Generic[T]):
         if controller is None:
             amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
             return replace(self, error_um=(amplitudes @ self.response).reshape(-1, 3))
-        kept = _KEPT.get(
+        kept = _CACHE.get(
             (Identity(controller), Identity(self)),
             lambda: controller.at(self.coordinates, point, scene, Loop.RELATIVE, point),
             lambda found: found.nbytes,
@@ -69,13 +69,13 @@ class SceneOverlay(Generic[T]):
         return replace(self, error_um=error.astype(np.float32))
 
 
-def _in_box(
+def _cached_overlay(
     state: AppState, own: tuple[Hashable, ...], build: Callable[[Scene], SceneOverlay[T]]
 ) -> SceneOverlay[T] | None:
     """Give something with the errors of a state; None where it cannot be made."""
     key = Identity(state.scene), tuple(state.positions.items()), state.placed, own
     try:
-        found: SceneOverlay[T] = _KEPT.get(
+        found: SceneOverlay[T] = _CACHE.get(
             key, lambda: build(state.standing), lambda found: found.response.nbytes
         )
         return found.with_errors(state)
@@ -104,7 +104,7 @@ def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> SceneOverlay[
 # --- A part ---------------------------------------------------------------------------------------
 
 
-def part_in_box(state: AppState) -> SceneOverlay[PartMesh] | None:
+def part_overlay(state: AppState) -> SceneOverlay[PartMesh] | None:
     """Give the part as it is cut; None where there is none, or it cannot be clamped."""
     mesh, wanted = state.part.mesh, state.part.place
     if mesh is None or not state.part.shown:
@@ -114,7 +114,7 @@ def part_in_box(state: AppState) -> SceneOverlay[PartMesh] | None:
         part = place_part(mesh, scene, wanted)
         return _respond(scene, part, make_points(scene, part.vertices_mm), part.corners.corner_of)
 
-    return _in_box(state, (Identity(mesh), wanted), clamp)
+    return _cached_overlay(state, (Identity(mesh), wanted), clamp)
 
 
 def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
@@ -128,7 +128,7 @@ def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
 # --- Paths ----------------------------------------------------------------------------------------
 
 
-def path_in_box(state: AppState) -> SceneOverlay[ToolPath] | None:
+def path_overlay(state: AppState) -> SceneOverlay[ToolPath] | None:
     """Give the path of the program; None where there is none, or it cannot be followed."""
     text, told = state.part.program, option_values(state, Program.name) | {"at_line": ""}
     if text is None:
@@ -142,7 +142,7 @@ def path_in_box(state: AppState) -> SceneOverlay[ToolPath] | None:
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return _respond(scene, path, made, np.stack([ends - 1, ends], axis=1))
 
-    return _in_box(state, (text, *sorted(told.items())), trace)
+    return _cached_overlay(state, (text, *sorted(told.items())), trace)
 
 
 def chosen_test(state: AppState) -> type[BenchTest] | None:
@@ -160,7 +160,7 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
     return plan
 
 
-def bench_in_box(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
+def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
     """Give the path of the chosen test; None where none is drawn, or it cannot be run."""
     kind, told = chosen_test(state), option_values(state, TEST)
     if kind is None or told.get("path") == "0":
@@ -178,4 +178,4 @@ def bench_in_box(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
         )
 
     without = replace(state, controller=None)  # a test is of the machine as it is
-    return _in_box(without, (kind, *sorted(told.items())), lay)
+    return _cached_overlay(without, (kind, *sorted(told.items())), lay)

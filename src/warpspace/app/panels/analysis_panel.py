@@ -21,7 +21,7 @@ from warpspace.analysis.registry import Entry
 from warpspace.app.browser.html import EMPTY, button, join, number, rows, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.browser.page import error_words
-from warpspace.app.evaluation.cache import taken_turn
+from warpspace.app.evaluation.cache import exclusive_work
 from warpspace.app.evaluation.compare import (
     applied,
     plain_state,
@@ -107,7 +107,7 @@ class AnalysisPanel(Section):
     def defaults(self, state: AppState) -> Mapping[str, str]:
         """Give what the state says of options that nobody has set."""
         found = {"loop": str(state.loop), "limit_um": f"{state.specification.limit_um:g}"}
-        found["placed"] = str(int(state.seen[1]))
+        found["placed"] = str(int(state.view_key[1]))
         if state.picked is not None:
             found["at"] = spell_at(state.picked.at)
         return {one.name: found[one.name] for one in self.options() if one.name in found}
@@ -273,7 +273,7 @@ class AnalysisPanel(Section):
             return
 
         def answer(job: Job) -> AnalysisOutcome:
-            with taken_turn(lambda: job.tell(job.share)):
+            with exclusive_work(lambda: job.tell(job.share)):
                 started = time.monotonic()
                 found = asked.run_all(scenes, job.tell)
                 took_s = time.monotonic() - started

@@ -211,7 +211,7 @@ def _row(state: AppState, key: str, share: float, longest: float) -> Markup:
 def _sampled(state: AppState) -> Question:
     wanted = state.specification
     moving = tuple(state.positions.items()) if state.loop is Loop.RELATIVE else ()
-    return (Identity(state.scene), state.seen, wanted.over, wanted.distribution, moving)
+    return (Identity(state.scene), state.view_key, wanted.over, wanted.distribution, moving)
 
 
 def sample_machines(state: AppState) -> Ensemble:

@@ -281,7 +281,7 @@ class ErrorsPanel(Panel):
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         state = picture.state
-        made_for = (Identity(state.scene), state.seen, tuple(state.positions.items()))
+        made_for = (Identity(state.scene), state.view_key, tuple(state.positions.items()))
         if made_for != self._gains_for:
             self._gains, self._gains_for = _gains(picture, state), made_for
             self._sorted_for = self._sorted_for if self._own else ()

@@ -26,9 +26,9 @@ from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import (
     POINTS,
     PointExplanation,
-    answer,
-    awaited,
-    measured,
+    awaited_form,
+    explain_point,
+    measure_distance,
     pick_worst,
     with_picked,
 )
@@ -89,7 +89,7 @@ class WorstPanel(Section):
     def _answer(self, picture: LivePicture) -> PointExplanation:
         if self._found is None or self._found[0] is not picture:
             picked = picture.state.picked or pick_worst(picture)
-            self._found = picture, answer(picture.drawn_state, picked, picture.exaggeration)
+            self._found = picture, explain_point(picture.drawn_state, picked, picture.exaggeration)
         return self._found[1]
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
@@ -208,7 +208,10 @@ class DistancePanel(AnalysisPanel):
         return (*super().concerns(picture), id(picture))
 
     def before_result(self, state: AppState) -> Markup:
-        point, drawn = awaited(state), self.context.shown and measured(self.context.shown)
+        point, drawn = (
+            awaited_form(state),
+            self.context.shown and measure_distance(self.context.shown),
+        )
         hint = "Click two points of the map, and a third for an angle"
         buttons = [button("Pick points", f"{self.name}:pick", kind="main", hint=hint)]
         if point:

@@ -16,7 +16,7 @@ from warpspace.app.browser.html import EMPTY, button, join, tag
 from warpspace.app.browser.incoming import index_of
 from warpspace.app.documents.transfers import IN_BOX, upload_text
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_in_box
+from warpspace.app.evaluation.scene_overlays import AT_LINE, moved_place, part_overlay
 from warpspace.app.panels.analysis_panel import Question
 from warpspace.app.panels.block_html import block_html, details_html
 from warpspace.app.panels.form_controls import setting
@@ -122,7 +122,7 @@ class PartPanel(InBoxPanel):
         return html.rows(judged) + super().result_html(found)
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "turn" and value in ("x", "y", "z") and (part := part_in_box(state)):
+        if word == "turn" and value in ("x", "y", "z") and (part := part_overlay(state)):
             turn = transforms.placed(part.of.middle_mm, 90.0 * np.eye(3)["xyz".index(value)])
             return replace(state, part=replace(state.part, place=moved_place(part.of, turn)))
         found = super().take(state, word, value)

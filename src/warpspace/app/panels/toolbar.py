@@ -26,7 +26,7 @@ from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.form_controls import setting
 from warpspace.app.panels.panel import Panel
-from warpspace.app.state.app_state import COMPONENT_NAMES, NOBODY, SHOWN, AppState, Side
+from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
 from warpspace.app.state.tree import leaves, put, spell
@@ -197,7 +197,7 @@ class ComparePanel(Panel):
                            hint="What is changed from then on is B"))  # fmt: skip
         if found is not None:
             body += [setting(state, "comparison.ghost"), comparison_html(found)]
-        words = "compare" if found is None else SHOWN[found.shown]
+        words = "compare" if found is None else COMPARISON_VIEWS[found.shown]
         return {"compared": "" if found is None else _sides(found),
                 "compare": menu(words, join(body), key="compare", kind="up wide",
                                 hint="Two scenes, or the errors before and after")}  # fmt: skip
@@ -230,7 +230,7 @@ def _sides(found: Compared) -> Markup:
     choices = (
         button(words, "state:set.comparison.shown", key, kind="chip", hint=hints[key],
                pressed=found.shown == key, disabled=bool(found.refused) and key == "difference")
-        for key, words in SHOWN.items()
+        for key, words in COMPARISON_VIEWS.items()
     )  # fmt: skip
     leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",
                    aria_label="End the comparison")  # fmt: skip

@@ -109,9 +109,9 @@ class RequestPolicy:
         self._cookie = f"{COOKIE}{port}"
         self._pass = hmac.new((token or "").encode(), b"warpspace cookie", "sha256").hexdigest()
 
-    def check(self, asked: Request, arrived_at: str) -> Refusal | None:
+    def check(self, request: Request, arrived_at: str) -> Refusal | None:
         """Tell why a request that came in by an address is refused; None where it is answered."""
-        hosts, origins = (asked.headers.get_all(name) for name in ("Host", "Origin"))
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
         place = read_place(hosts[0]) if len(hosts) == 1 else None
         served = place is not None and (
             place.host in self._hosts or (self._everywhere and place.host == arrived_at)
@@ -129,11 +129,11 @@ class RequestPolicy:
                 f"Only the app's own page may use it, not one of {origins[0][:200]!r}. If a"
                 " proxy serves the app there, start it with --allow-host NAME.",
             )
-        if not all(self._is_own(url, place) for url in _words(asked, *_ELSEWHERE)):
+        if not all(self._is_own(url, place) for url in _query_values(request, *_ELSEWHERE)):
             return Refusal(
                 "elsewhere", "The link leads the page to another server; leave that out."
             )
-        if not (self._has_token(asked) or self._has_cookie(asked)):
+        if not (self._has_token(request) or self._has_cookie(request)):
             return Refusal(
                 "token",
                 "This app asks for a token: open the link that was printed where it was started"
@@ -141,20 +141,20 @@ class RequestPolicy:
             )
         return None
 
-    def cookie(self, asked: Request) -> str | None:
+    def cookie(self, request: Request) -> str | None:
         """Give the cookie that spares a page the token from now on; its websocket has no other."""
-        if self._token is None or not self._has_token(asked):
+        if self._token is None or not self._has_token(request):
             return None
         return f"{self._cookie}={self._pass}; Path=/; HttpOnly; SameSite=Strict"
 
-    def _has_token(self, asked: Request) -> bool:
+    def _has_token(self, request: Request) -> bool:
         token = self._token
-        return token is None or any(_is(word, token) for word in _words(asked, "token"))
+        return token is None or any(_is(word, token) for word in _query_values(request, "token"))
 
-    def _has_cookie(self, asked: Request) -> bool:
+    def _has_cookie(self, request: Request) -> bool:
         pairs = (
             pair.strip().partition("=")
-            for header in asked.headers.get_all("Cookie")
+            for header in request.headers.get_all("Cookie")
             for pair in header.split(";")
         )
         return any(_is(value, self._pass) for name, _, value in pairs if name.startswith(COOKIE))
@@ -168,8 +168,8 @@ class RequestPolicy:
         return own.usual(scheme) in {at.usual(scheme) for at in (place, *self._allowed)}
 
 
-def _words(asked: Request, *names: str) -> list[str]:
-    query = asked.path.partition("?")[2]
+def _query_values(request: Request, *names: str) -> list[str]:
+    query = request.path.partition("?")[2]
     return [value for key, value in parse_qsl(query, keep_blank_values=True) if key in names]
 
 

@@ -82,15 +82,15 @@ class Display:
         self._write(parts, picture)
         self._note(picture)
 
-    def show(self, picture: LivePicture, *, anew: bool = False) -> None:
+    def show(self, picture: LivePicture, *, force: bool = False) -> None:
         """Show a picture; what is slow follows when changes pause."""
         for layer in self.layers:
             layer.show(picture)
-        if anew:
+        if force:
             self._shown.clear()
         # what is in sight changes with what is open on the page
         known = self._context.shown
-        same = known is not None and known.state.page is picture.state.page and not anew
+        same = known is not None and known.state.page is picture.state.page and not force
         parts = self._following if same else self.parts.values()
         self._write([one for one in parts if self._is_due(one, picture)], picture)
         self._note(picture)
@@ -161,7 +161,7 @@ class Display:
                 self._late.clear()
                 for layer in self.layers:
                     if isinstance(layer, BoxLayer):
-                        guarded(layer, partial(layer.rest, picture))
+                        guarded(layer, partial(layer.synchronise, picture))
             self._changed_at = None
         while self._waiting:
             part = self._waiting.popleft()
@@ -218,13 +218,13 @@ class Session:
         live: LiveModel,
         claim: "Callable[[Session, str], TabRecord | None]",
         *,
-        others: Tabs | None = None,  # the tabs of a shared review
+        review_tabs: Tabs | None = None,  # the tabs of a shared review
     ) -> None:
         self.context, self._live, self._claim = context, live, claim
         self._client = context.client
         self.token = new_token()
-        self._others = others
-        self._keeper = TabKeeper(context, shared=others is not None)
+        self._others = review_tabs
+        self._keeper = TabKeeper(context, shared=review_tabs is not None)
         self.display = Display(context)
         # what was evaluated last without an exception: of the map, and of all that follows it
         self._shown = self._settled = self._good()
@@ -364,7 +364,7 @@ class Session:
     def _open(self, picture: LivePicture) -> None:
         context = self.context
         self._shown = self._settled = self._good()
-        with context.page.as_one():
+        with context.page.batch():
             self._darken(picture)
             context.page.call("title", picture.state.scene.title)
             context.camera.place(picture)
@@ -379,7 +379,7 @@ class Session:
         self._around_at = None
         context = self.context
         try:
-            with context.page.as_one():
+            with context.page.batch():
                 context.stage = MovingLayer(self._client, context.page, picture)
                 context.stage.clamp = partial(context.send, "state:set.part.place")
                 self.display.add(picture, [context.stage])
@@ -437,20 +437,20 @@ class Session:
         if notes or state is not shown.state:
             try:
                 with turn():
-                    self._show(self._live.evaluate(state), shown, anew=bool(notes))
+                    self._show(self._live.evaluate(state), shown, force=bool(notes))
             except Exception as error:
                 if not self._go_back(error, now, self._shown):
                     raise
-                self._guarded(partial(self._show, shown, shown, anew=True))
+                self._guarded(partial(self._show, shown, shown, force=True))
                 return
             self._shown = now
         if notes:
             context.notify("Please note", "\n".join(notes), "warning")
 
-    def _show(self, picture: LivePicture, before: LivePicture, *, anew: bool) -> None:
+    def _show(self, picture: LivePicture, before: LivePicture, *, force: bool) -> None:
         context = self.context
-        with context.page.as_one():
-            self.display.show(picture, anew=anew)
+        with context.page.batch():
+            self.display.show(picture, force=force)
             if focus(before.state) != focus(picture.state):
                 context.page.call("title", picture.state.scene.title)
                 context.camera.place(picture)
@@ -463,7 +463,7 @@ class Session:
         self.context.page.call("dark", dark)
 
     def _settle(self, picture: LivePicture) -> None:
-        with turn(), self.context.page.as_one():
+        with turn(), self.context.page.batch():
             self.display.settle(picture, self._follow_picture)
         if self.display.due_in_s is None:
             self._settled = self._shown

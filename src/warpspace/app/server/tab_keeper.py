@@ -38,9 +38,9 @@ from warpspace.scene.model import Scene
 
 # --- In the server --------------------------------------------------------------------------------
 
-KEPT_SECONDS = 600.0
-KEPT_TABS = 64
-KEPT_BYTES = 256 * 2**20  # held by the histories of all of them
+RETENTION_S = 600.0
+MAX_CLOSED_TABS = 64
+MAX_HISTORY_BYTES = 256 * 2**20  # held by the histories of all of them
 _TOKEN = re.compile(r"[0-9a-f]{32}")
 
 
@@ -69,7 +69,7 @@ class TabMemory:
 
     def keep(self, token: str, left: TabRecord) -> None:
         self._left.pop(token, None)
-        self._left[token] = (self._clock() + KEPT_SECONDS, left)
+        self._left[token] = (self._clock() + RETENTION_S, left)
         self.forget()
 
     def forget(self) -> None:
@@ -78,7 +78,7 @@ class TabMemory:
         size = sum(left.store.size_bytes for _, left in self._left.values())
         while self._left:
             until, oldest = next(iter(self._left.values()))
-            if until >= now and len(self._left) <= KEPT_TABS and size <= KEPT_BYTES:
+            if until >= now and len(self._left) <= MAX_CLOSED_TABS and size <= MAX_HISTORY_BYTES:
                 break
             size -= oldest.store.size_bytes
             self._left.popitem(last=False)
@@ -91,7 +91,7 @@ class TabMemory:
 
 # --- In the page ----------------------------------------------------------------------------------
 
-NEVER_KEPT = (
+NEVER_RESTORED = (
     "what Undo and Redo could go back to",
     "other scenes that were opened in this tab",
     "which error's curve was shown",
@@ -102,14 +102,14 @@ NO_TABLE = "the table of compensation that the box was drawn with, and its compa
 START_VALUES = "the values that Reset goes back to: it goes back to those restored"
 
 
-class Kept(msgspec.Struct, omit_defaults=True):
+class PageCopy(msgspec.Struct, omit_defaults=True):
     file: str = ""
     name: str = ""
     link: str = ""  # where there is one: it knows what Reset goes back to
     missing: tuple[str, ...] = ()  # what was left out, in words
 
 
-def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
+def page_copy_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
     """Spell a state for its page to keep."""
     bare = without_table(state)
     missing = () if bare is state else (NO_TABLE,)
@@ -119,22 +119,22 @@ def kept_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scen
             file, link = state_to_toml(whole, camera), named_link(whole, camera, known)
             left_out = missing if whole is bare else (*missing, COMPARISON)
             short = link if link and len(link) <= MAX_LINK else ""
-            kept = Kept(file, whole.scene.name, short, left_out)
+            kept = PageCopy(file, whole.scene.name, short, left_out)
             text = msgspec.json.encode(kept).decode()
             if len(text) <= MAX_KEPT_TEXT:
                 return text
     return ""
 
 
-def read_kept(
+def read_page_copy(
     text: str, known: Sequence[Scene]
 ) -> tuple[AppState, CameraMemory | None, tuple[str, ...]]:
     """Build what a page has kept; with what has not come back, in words."""
     try:
-        kept = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=Kept)
+        kept = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=PageCopy)
     except (ValueError, RecursionError):
         raise OptionError("what this tab has kept cannot be read") from None
-    missing = (*NEVER_KEPT, *kept.missing)
+    missing = (*NEVER_RESTORED, *kept.missing)
     with suppress(WarpspaceError):
         state, camera = open_link(kept.link, known)
         if state_to_toml(state, camera) == kept.file:
@@ -193,7 +193,7 @@ class TabKeeper(Panel):
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         context = self.context
-        text = kept_text(picture.state, context.camera.remember(), context.scenes.fixed)
+        text = page_copy_text(picture.state, context.camera.remember(), context.scenes.fixed)
         context.page.call("server.keep", text)
         return {}
 
@@ -209,7 +209,7 @@ class TabKeeper(Panel):
             say(JOINED_TITLE, [JOINED])
             return
         try:
-            state, camera, missing = read_kept(text, context.scenes.fixed)
+            state, camera, missing = read_page_copy(text, context.scenes.fixed)
         except WarpspaceError as error:
             say(REFUSED_TITLE, [REFUSED.format(error)])
             return

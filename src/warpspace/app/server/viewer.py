@@ -31,7 +31,7 @@ from warpspace.app.panels.panel import Context
 from warpspace.app.server.connection_guard import Guard, TabConnection
 from warpspace.app.server.request_policy import Access, RequestPolicy, plain_address
 from warpspace.app.server.session import Session
-from warpspace.app.server.tab_keeper import KEPT_SECONDS, TabMemory, TabRecord, is_token, new_token
+from warpspace.app.server.tab_keeper import RETENTION_S, TabMemory, TabRecord, is_token, new_token
 from warpspace.app.state.app_state import AppState, start_state
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError
@@ -299,7 +299,7 @@ class Viewer:
         context = Context(self._server, client, store, scenes, self._services)
         context.notes += self._notes
         others = (lambda: [one.context for one in self.sessions]) if self._shared else None
-        session = Session(context, self._live, self._claim, others=others)
+        session = Session(context, self._live, self._claim, review_tabs=others)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.take)
@@ -331,7 +331,7 @@ class Viewer:
                 self._memory.keep(session.token, session.record())
             finally:
                 session.stop()
-        asyncio.get_running_loop().call_later(KEPT_SECONDS + 1.0, self._forget)
+        asyncio.get_running_loop().call_later(RETENTION_S + 1.0, self._forget)
 
     def _forget(self) -> None:
         with self._lock:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpspace.app.state.leaf import Span, described, error_names, said
+from warpspace.app.state.leaf import Span, described, error_names, leaf_metadata
 from warpspace.app.state.look import (
     Look,
     MachineLook,
@@ -61,9 +61,9 @@ LOOP_NAMES = {
     Loop.WORKPIECE.value: "workpiece point",
     Loop.RELATIVE.value: "tool relative to workpiece",
 }
-KEPT = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
+KEPT_FIELDS = ("component", "nodes", "shown", "look", "machine", "part", "forms", "page")
 """What stays when another scene is shown."""
-SHOWN = {"a": "A", "b": "B", "difference": "B − A"}
+COMPARISON_VIEWS = {"a": "A", "b": "B", "difference": "B − A"}
 """What can be drawn of a comparison; the difference is the change from A to B."""
 PRESENT, NOBODY = "present errors", "nothing"
 """Names of what is steered, and of no other side."""
@@ -71,7 +71,7 @@ _load_part = lru_cache(maxsize=4)(load_part)
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class DisplayOptions:
     traces: bool = described(
         True, "Rotary traces", hint="Circles and arcs of the table: nominal light, actual dark."
     )
@@ -90,7 +90,7 @@ class Exclusions:
     excluded: frozenset[str] = described(
         frozenset[str](),
         "Excluded errors",
-        one="Exclusion of {}",
+        entry_label="Exclusion of {}",
         choices=error_names,
         linked="excluded",
     )
@@ -98,7 +98,7 @@ class Exclusions:
     only: frozenset[str] = described(
         frozenset[str](),
         "Errors drawn alone",
-        one="Only {}",
+        entry_label="Only {}",
         choices=error_names,
         linked="only",
     )
@@ -137,7 +137,10 @@ class Specification:
     percent: float = described(95.0, "Probability wanted", span=PERCENT, unit="%")
     # tolerances that are neither allocated nor scaled
     fixed: frozenset[str] = described(
-        frozenset[str](), "Fixed tolerances", one="Fixed tolerance of {}", choices=error_names
+        frozenset[str](),
+        "Fixed tolerances",
+        entry_label="Fixed tolerance of {}",
+        choices=error_names,
     )
     costs: str = described(
         "",
@@ -173,7 +176,7 @@ class PartLook:
     """The part that stands in the box, in place of the scene's own."""
 
     # mesh and text of the program are never saved or linked
-    mesh: PartMesh | None = field(default=None, metadata=said("Mesh of the part"))
+    mesh: PartMesh | None = field(default=None, metadata=leaf_metadata("Mesh of the part"))
     name: str = described("", "Part", linked="part")
     place: tuple[float, ...] | None = described(
         None,
@@ -184,8 +187,8 @@ class PartLook:
         hint="Where the part is clamped, in the workpiece frame: x, y, z in mm, and turns in"
         " degrees about the fixed x, y and z, in that order; empty for the usual place.",
     )
-    program: str | None = field(default=None, metadata=said("Program"))
-    program_name: str = field(default="", metadata=said("Program"))
+    program: str | None = field(default=None, metadata=leaf_metadata("Program"))
+    program_name: str = field(default="", metadata=leaf_metadata("Program"))
     shown: bool = described(
         True, "Part in the box", hint="As this machine cuts it, and lines of the nominal part."
     )
@@ -260,7 +263,9 @@ class Side:
 class Comparison:
     a: Side = field(default_factory=Side)
     b: Side | None = None  # none while nothing is compared
-    shown: str = described("a", "Side that is drawn", choices=SHOWN, linked="compare.shown")
+    shown: str = described(
+        "a", "Side that is drawn", choices=COMPARISON_VIEWS, linked="compare.shown"
+    )
     # whether the other side is drawn too, as a wireframe
     ghost: bool = described(True, "Other side as a wireframe", linked="compare.ghost")
     pinned: Side | None = None  # what was pinned last: the state before, or a proposal
@@ -275,10 +280,10 @@ class AppState:
     """All that a picture depends on."""
 
     # machine, curves of the errors, working volume; its amplitudes are where reset goes
-    scene: Scene = field(metadata=said("Scene"))
+    scene: Scene = field(metadata=leaf_metadata("Scene"))
     # µm or µrad; amplitude of every parameter of the scene
     amplitudes: Mapping[str, float] = field(
-        metadata=said(
+        metadata=leaf_metadata(
             "Errors",
             kind="number",
             each=lambda state: dict.fromkeys(state.amplitudes, AMPLITUDE),
@@ -287,10 +292,10 @@ class AppState:
     )
     # degrees; where the rotary axes stand
     positions: Mapping[str, float] = field(
-        metadata=said(
+        metadata=leaf_metadata(
             "Rotary positions",
             kind="number",
-            one="Position of {}",
+            entry_label="Position of {}",
             each=lambda state: state.position_spans,
             linked="{key}",
             hint="Position while the working volume is evaluated.",
@@ -323,16 +328,16 @@ class AppState:
         unit="nodes",
         hint="Nodes along X, Y and Z at which the error is computed.",
     )
-    shown: Shown = field(default_factory=Shown)
+    shown: DisplayOptions = field(default_factory=DisplayOptions)
     # parameters that do not take part, or alone do
     exclusions: Exclusions = field(default_factory=Exclusions)
     # what machines are sampled from: the scene's, as far as they have not been moved
     tolerances: ToleranceSet = field(
         default_factory=ToleranceSet,
-        metadata=said(
+        metadata=leaf_metadata(
             "Tolerances",
             kind="number",
-            one="Tolerance of {}",
+            entry_label="Tolerance of {}",
             each=lambda state: dict.fromkeys(state.amplitudes),
             linked="",
         ),
@@ -340,23 +345,25 @@ class AppState:
     # what the tolerances are held against
     specification: Specification = field(default_factory=Specification)
     # the scene as it was opened, where curves of `scene` have been edited since
-    loaded: Scene | None = field(default=None, metadata=said("Scene"))
+    loaded: Scene | None = field(default=None, metadata=leaf_metadata("Scene"))
     # title of the scene whose errors a machine chosen from the library left behind; empty for none,
     # and after the next change of scene
-    left_behind: str = field(default="", metadata=said("Scene"))
+    left_behind: str = field(default="", metadata=leaf_metadata("Scene"))
     # what is shown of the field and of the schematic machine, and traced
     look: Look = field(default_factory=Look)
     machine: MachineLook = field(default_factory=MachineLook)
     rotary: RotaryLook = field(default_factory=RotaryLook)
     part: PartLook = field(default_factory=PartLook)
     # the point whose error is explained, and the error whose axis and lever are drawn
-    picked: Picked | None = field(default=None, metadata=said("Point"))
+    picked: Picked | None = field(default=None, metadata=leaf_metadata("Point"))
     lever: str = described("", "Lever", choices=lambda state: {"": "none", **error_names(state)})
-    comparison: Comparison = field(default_factory=Comparison, metadata=said("Comparison"))
+    comparison: Comparison = field(default_factory=Comparison, metadata=leaf_metadata("Comparison"))
     # whose table corrects the machine that is drawn; never saved or linked
-    controller: "Controller | None" = field(default=None, metadata=said("Table of compensation"))
+    controller: "Controller | None" = field(
+        default=None, metadata=leaf_metadata("Table of compensation")
+    )
     # notes of reviewers; beside the scene, which is a key of what has been computed of it
-    review: tuple[Note, ...] = field(default=(), metadata=said("Notes"))
+    review: tuple[Note, ...] = field(default=(), metadata=leaf_metadata("Notes"))
     # what of the page is open, and what its forms were told (`state/forms.py`); undo leaves both
     page: PageLook = field(default_factory=PageLook, compare=False)
     forms: Mapping[str, str] = field(default_factory=dict[str, str], compare=False)
@@ -397,7 +404,7 @@ class AppState:
         return tuple(key for key, value in self.amplitudes.items() if value != self.start[key])
 
     @property
-    def seen(self) -> tuple[Loop, bool]:
+    def view_key(self) -> tuple[Loop, bool]:
         """The loop, and whether the placement of the workpiece is left out: a key to keep by."""
         return self.loop, self.placed and self.loop is Loop.RELATIVE
 
@@ -453,7 +460,7 @@ class AppState:
 
     def with_scene(self, scene: Scene) -> "AppState":
         """Show another scene, in its own loop; component, density and switches stay."""
-        fresh, kept = start_state(scene), {name: getattr(self, name) for name in KEPT}
+        fresh, kept = start_state(scene), {name: getattr(self, name) for name in KEPT_FIELDS}
         if not fresh.part.is_empty:
             kept["part"], kept["look"] = fresh.part, replace(self.look, surface="grid")
             kept["forms"] = {**self.forms, **fresh.forms}

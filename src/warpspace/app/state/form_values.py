@@ -17,7 +17,7 @@ from warpspace.scene.model import Scene
 
 A = TypeVar("A", bound=Analysis)
 TEST = "test"  # the standard test that is run; its options begin with it, as those of an analysis
-MOST, LONGEST = 100, 1000  # entries, and characters of one
+MAX_ENTRIES, LONGEST = 100, 1000  # entries, and characters of one
 _OPTION = re.compile(r"[a-z_]{1,40}")
 
 
@@ -30,8 +30,8 @@ def with_form(state: AppState, name: str, text: str) -> AppState:
     """Take what somebody typed, or a link says; raises `Unreadable`."""
     if not _is_known(name) or (name == TEST and text not in bench_names()):
         raise Unreadable("expected an option of an analysis, or the name of a test")
-    if len(state.forms) >= MOST:
-        raise Unreadable(f"expected at most {MOST} options")
+    if len(state.forms) >= MAX_ENTRIES:
+        raise Unreadable(f"expected at most {MAX_ENTRIES} options")
     return replace(state, forms={**state.forms, name: text[:LONGEST]})
 
 

@@ -25,13 +25,13 @@ class Identity:
     """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
 
     def __init__(self, thing: Any) -> None:
-        self.thing = thing
+        self.target = thing
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Identity) and other.thing is self.thing
+        return isinstance(other, Identity) and other.target is self.target
 
     def __hash__(self) -> int:
-        return id(self.thing)
+        return id(self.target)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +47,10 @@ class Span:
         kept = min(max(value, self.low), self.high)
         return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
 
-    def clamped_words(self, value: float, kept: float, what: str, unit: str) -> str:
+    def clamped_words(self, value: float, clamped: float, name: str, unit: str) -> str:
         allowed = f"{self.low:g} to {self.high:g} {unit}".rstrip()
-        shown = f"{kept:g} {unit}".rstrip()
-        return f"{what} = {value:g} is outside {allowed}; clamped to {shown}"
+        shown = f"{clamped:g} {unit}".rstrip()
+        return f"{name} = {value:g} is outside {allowed}; clamped to {shown}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +69,13 @@ class Leaf:
     unit: str = ""
     hint: str = ""
     linked: str = ""  # name in links and files; empty where it stands in none
-    one: str = "{}"  # label of one entry or member; ``{}`` is its name
+    entry_label: str = "{}"  # label of one entry or member; ``{}`` is its name
     # of a field whose choices, or whose entries with their ranges, depend on the state
     choose: Callable[[Any], Choices] | None = None
     each: Callable[[Any], Mapping[str, Span | None]] | None = None
 
 
-def said(
+def leaf_metadata(
     label: str, *, choices: Choices | Callable[[Any], Choices] | None = None, **words: Any
 ) -> dict[str, Leaf]:
     """Give the metadata of a field; in `linked`, ``{path}`` and ``{key}`` (of an entry) are put."""
@@ -97,7 +97,7 @@ def described(default: T, label: str, **words: Any) -> T:
     else:
         kind = "text" if isinstance(default, str) else "number"
     words = {"kind": kind, **words}
-    return field(default_factory=lambda: default, metadata=said(label, **words))
+    return field(default_factory=lambda: default, metadata=leaf_metadata(label, **words))
 
 
 def description(entry: "Field[Any]") -> Leaf | None:

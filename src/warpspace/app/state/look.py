@@ -70,7 +70,7 @@ class Look:
     slices_mm: Mapping[str, float] = described(
         dict[str, float](),
         "Slices",
-        one="Slice across {}",
+        entry_label="Slice across {}",
         each=lambda state: slice_spans(state.scene),
     )
     follow: bool = described(
@@ -101,7 +101,7 @@ class MachineLook:
     linear_mm: Mapping[str, float] = described(
         dict[str, float](),
         "Positions of the machine",
-        one="Machine {}",
+        entry_label="Machine {}",
         each=lambda state: linear_spans(state.scene),
         hint="Position of the axis; moves the bodies and the tool point.",
     )
@@ -134,7 +134,7 @@ class RotaryLook:
         dict[str, tuple[float, ...]](),
         "Positions that rotary axes are held at",
         kind="numbers",
-        one="{} held at",
+        entry_label="{} held at",
         each=lambda state: state.position_spans,
         hint="Positions while the other rotary axis turns, separated by commas; empty for a few"
         " around the present one.",

@@ -16,7 +16,13 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from warpspace.app.state.app_state import AppState, Exclusions, PartLook, Shown, Specification
+from warpspace.app.state.app_state import (
+    AppState,
+    DisplayOptions,
+    Exclusions,
+    PartLook,
+    Specification,
+)
 from warpspace.app.state.leaf import description, lowered, name_of
 from warpspace.app.state.look import Look, MachineLook, RotaryLook
 from warpspace.app.state.tree import leaves, stored
@@ -63,7 +69,7 @@ def _leaf_changes(old: AppState, new: AppState, group: str) -> Iterator[tuple[st
         if isinstance(before, frozenset) and isinstance(after, frozenset):
             for name in sorted(before ^ after):
                 sign = "+" if name in after else "-"
-                yield f"{path}.{sign}{name}", lowered(leaf.one.format(name_of(name)))
+                yield f"{path}.{sign}{name}", lowered(leaf.entry_label.format(name_of(name)))
         elif not _equal(before, after):
             yield path, lowered(leaf.label)
 
@@ -77,7 +83,16 @@ def _equal(old: object, new: object) -> bool:
 
 # --- A change of one state applied to another -----------------------------------------------------
 
-_MERGED = (Exclusions, Look, MachineLook, PartLook, RotaryLook, Shown, Specification, ToleranceSet)
+_MERGED = (
+    Exclusions,
+    Look,
+    MachineLook,
+    PartLook,
+    RotaryLook,
+    DisplayOptions,
+    Specification,
+    ToleranceSet,
+)
 """What two users may change at once, field by field; a scene is changed as a whole."""
 _MISSING = object()
 
@@ -153,15 +168,15 @@ def _size_bytes(before: AppState, after: AppState) -> int:
 class UndoStep:
     before: AppState
     after: AppState
-    what: Mapping[str, str]
+    changed: Mapping[str, str]
     size_bytes: int
 
     @property
-    def words(self) -> str:
-        found = list(dict.fromkeys(self.what.values()))
-        if "scene" in self.what:  # its curves change with an error
-            errors = {said for path, said in self.what.items() if path.startswith("amplitudes.")}
-            found = list(errors) if len(errors) == 1 else [self.what["scene"]]
+    def label(self) -> str:
+        found = list(dict.fromkeys(self.changed.values()))
+        if "scene" in self.changed:  # its curves change with an error
+            errors = {said for path, said in self.changed.items() if path.startswith("amplitudes.")}
+            found = list(errors) if len(errors) == 1 else [self.changed["scene"]]
         return found[0] if len(found) == 1 else f"{found[0]} and {len(found) - 1} more"
 
 
@@ -229,11 +244,11 @@ class StateStore:
     @property
     def undoes(self) -> str:
         """What undo would take back, in words; empty where there is nothing."""
-        return self.past[-1].words if self.past else ""
+        return self.past[-1].label if self.past else ""
 
     @property
     def redoes(self) -> str:
-        return self.future[-1].words if self.future else ""
+        return self.future[-1].label if self.future else ""
 
     def apply(
         self, update: Update, by: Listener | None = None, at: float | None = None
@@ -254,7 +269,7 @@ class StateStore:
             document.state = _on_page(before, state)
             return
         steps, alone = self.past, {"scene", "review"} & what.keys()
-        same = steps and not self.future and steps[-1].what == what and not alone
+        same = steps and not self.future and steps[-1].changed == what and not alone
         if same and at - self._changed_at < SAME_STEP_S:
             with suppress(OptionError):  # with what others have changed meanwhile
                 before, steps = carried(steps[-1].after, steps[-1].before, before), steps[:-1]
@@ -285,13 +300,13 @@ class StateStore:
             try:
                 self._document.state = carried(*sides, self.state)
             except OptionError as error:
-                raise OptionError(f"{step.words}: {error}") from None
+                raise OptionError(f"{step.label}: {error}") from None
             if back:
                 self.future = (*self.future, step)
             else:
                 self.past = (*self.past, step)
         self._notify(None)
-        return step.words
+        return step.label
 
     def mark(self) -> Mark:
         """Return what `back_to` goes back to."""

@@ -32,7 +32,7 @@ from warpspace.machine.axes import axis_order, parameter
 from warpspace.machine.limits import COST, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 
 LONGEST = 4000  # characters that are read
-SHOWN = 40  # characters of a text that a note shows
+MAX_QUOTED = 40  # characters of a text that a note shows
 
 # --- The leaves of a state ------------------------------------------------------------------------
 
@@ -44,7 +44,7 @@ def leaves(state: AppState) -> Mapping[str, Leaf]:
 
 @lru_cache(maxsize=32)
 def _leaves(scene: Identity, quantity: str) -> Mapping[str, Leaf]:
-    state = start_state(scene.thing)
+    state = start_state(scene.target)
     state = replace(state, look=replace(state.look, quantity=quantity))
     found = [leaf for entry in fields(AppState) for leaf in _described(state, entry)]
     return {leaf.path: leaf for leaf in (*found, *_picked_leaves(state))}
@@ -62,7 +62,10 @@ def _described(state: AppState, entry: "Field[Any]", prefix: str = "") -> Iterat
     else:
         for key, span in leaf.each(state).items():
             at = f"{path}.{key}"
-            label, linked = leaf.one.format(name_of(key)), leaf.linked.format(path=at, key=key)
+            label, linked = (
+                leaf.entry_label.format(name_of(key)),
+                leaf.linked.format(path=at, key=key),
+            )
             unit = _unit(state, key)
             yield replace(leaf, path=at, label=label, span=span, unit=unit, linked=linked)
 
@@ -144,11 +147,13 @@ def put(state: AppState, path: str, text: str) -> AppState:
     """Set a leaf to what somebody has typed, clicked or sent; notes say what was not taken."""
     leaf = leaves(state).get(path)
     if leaf is None:
-        return state.noted(f"{path[:SHOWN]!r}: nothing on this page goes by this name")
+        return state.noted(f"{path[:MAX_QUOTED]!r}: nothing on this page goes by this name")
     try:
         state = set_leaf(state, leaf, text)
     except Unreadable as problem:
-        return state.noted(f"{words_of(leaf)} = {text[:SHOWN]!r}; {problem}, it stays as it was")
+        return state.noted(
+            f"{words_of(leaf)} = {text[:MAX_QUOTED]!r}; {problem}, it stays as it was"
+        )
     after = AFTER.get(path) or AFTER.get(path.rpartition(".")[0])
     return state if after is None else after(state)
 
@@ -167,7 +172,7 @@ AFTER: Mapping[str, Callable[[AppState], AppState]] = {
 def set_leaf(state: AppState, leaf: Leaf, text: str) -> AppState:
     """Set a leaf to what a text says and to nothing else; raises `Unreadable`."""
     text = text[:LONGEST].encode("utf-8", "replace").decode()
-    own = OWN.get(leaf.path) or OWN.get(leaf.path.rpartition(".")[0])
+    own = SETTERS.get(leaf.path) or SETTERS.get(leaf.path.rpartition(".")[0])
     if own is not None:
         return own(state, leaf, text)
     found, note = read_value(leaf, text, stored(state, leaf.path))
@@ -246,7 +251,7 @@ def _with_asked(state: AppState, leaf: Leaf, text: str) -> AppState:
     return replace(state, picked=replace(picked, at={**picked.at, axis: at})).noted(note)
 
 
-OWN: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
+SETTERS: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
     "tolerances": _with_half_width,
     "specification.costs": _with_costs,
     "picked": _with_point,

@@ -12,7 +12,7 @@ from warpspace.picture.formatting import IN_R
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _SIGNS = str.maketrans({"−": "-", "–": "-", "\u00a0": " ", "\u202f": " "})
 """Signs and blanks that programs write in place of the plain ones."""
-_SHOWN = 40  # characters of a line that a message shows
+_MAX_QUOTED = 40  # characters of a line that a message shows
 
 
 def read_typed(text: str, unit: str = "") -> float | None:
@@ -37,7 +37,7 @@ def read_rows(text: str) -> tuple[list[tuple[float, ...]], tuple[str, ...]]:
     numbered = [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
     remarks: tuple[str, ...] = ()
     if len(numbered) > 1 and _is_heading(numbered[0][1]):
-        heading = " ".join(numbered[0][1].split())[:_SHOWN]
+        heading = " ".join(numbered[0][1].split())[:_MAX_QUOTED]
         remarks = (f"Heading left out: “{heading}”.",)
         del numbered[0]
     return [_numbers(number, line) for number, line in numbered], remarks
@@ -73,7 +73,7 @@ def _numbers(number: int, line: str) -> tuple[float, ...]:
     found = tuple(value for value in values if value is not None)
     if len(found) != len(values):
         raise OptionError(
-            f"row {number}: {line[:_SHOWN]!r} holds what is no number; expected finite numbers"
+            f"row {number}: {line[:_MAX_QUOTED]!r} holds what is no number; expected finite numbers"
         )
     return found
 
