@@ -206,7 +206,7 @@ def test_interrupted_connection_says_that_all_is_there_and_a_lost_state_that_it_
             tab.until(lambda value=value: tab.state.amplitudes["EXX"] == value)
         # what a page has kept may be anything; the server lets it keep what is shown at each rest
         page.evaluate("warpspacePage.server.keep = () => {}")
-        viewer._memory._left.clear()
+        viewer._memory._records.clear()
         page.evaluate("sessionStorage.setItem('warpspace-tab', 'f'.repeat(32))")
         page.evaluate(
             "text => sessionStorage.setItem('warpspace-kept', JSON.stringify({at: 0, text}))",

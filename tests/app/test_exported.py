@@ -154,7 +154,7 @@ def test_volumes_that_differ_export_the_side_that_is_drawn():
     picture = picture_of("difference", with_sides(START, Side(), scene_side(other)))
     assert picture.compared.refused
     assert picture.compared.difference is None
-    assert picture.compared.shown == "b"
+    assert picture.compared.view == "b"
     assert len(shown_sides(picture, sheet=True)) == 1
     assert file_stem(picture) == "B_other"
     assert "sheet" not in exported_words(picture)

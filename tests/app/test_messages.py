@@ -125,7 +125,7 @@ def test_only_what_viser_is_to_know_reaches_it(monkeypatch):
 
 def test_events_that_no_page_sends_are_refused_in_words_and_the_page_goes_on(caplog):
     with opened(load_scene("dvf5000_first"), services=build_services()) as (wire, session):
-        sent = events(sorted(session.display.parts))
+        sent = events(sorted(session.display.panels))
         for at in range(0, len(sent), MOST_EVENTS):
             wire.send(said(*sent[at : at + MOST_EVENTS]))
             time.sleep(0.01)  # no faster than a page may

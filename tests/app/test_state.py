@@ -224,7 +224,7 @@ def test_a_change_after_undo_forgets_the_future_and_none_is_no_step():
     store = StateStore(FIRST)
     store.apply(replace, at=1.0)
     assert store.state is FIRST
-    assert (store.past, store.undo(), store.redo()) == ((), "", "")
+    assert (store.past, store.undo(), store.redo()) == ([], "", "")
     pushed(store, "EAX", 1.0, 1.0)
     store.undo()
     assert store.redoes == "roll of X"

@@ -122,7 +122,7 @@ def test_colours_fade_where_the_error_is_within_its_uncertainty():
     assert faded_words(faded) == (f"grey: |E| ≤ U95, {percent} % of the volume",)
     assert faded_words(faded)[0] in legend_html(faded)
     assert faded_words(plain) == ()
-    assert box(faded)["/box/surface"].follows != box(plain)["/box/surface"].follows
+    assert box(faded)["/box/surface"].assigned != box(plain)["/box/surface"].assigned
     # slices fade by their own numbers
     cut = LIVE.evaluate(put(faded.state, "look.surface", "slices"))
     assert all(one.faded is not None and one.faded.shape == one.shape for one in cut.slices)
@@ -166,7 +166,7 @@ def test_ellipsoids_reach_along_each_direction_as_far_as_u95():
 def test_what_was_never_measured_is_said_and_dotted():
     picture = LIVE.evaluate(state_of())
     assert "never measured: Z below −50" in subject_words(picture)
-    dotted = draw_surroundings(picture)["/uncertainty/unmeasured"].follows["points"]
+    dotted = draw_surroundings(picture)["/uncertainty/unmeasured"].assigned["points"]
     assert len(dotted) == 25  # the nodes at Z −100; those at −50 were reached
     off = LIVE.evaluate(state_of(look__unmeasured="0"))
     assert "/uncertainty/unmeasured" not in draw_surroundings(off)

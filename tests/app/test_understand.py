@@ -310,9 +310,9 @@ def test_a_measured_distance_is_drawn_between_the_displaced_points_with_its_six_
     assert words[1].count("Δ") == 3
     shapes = draw_surroundings(picture)
     drawn = [explain_point(state, Picked(at), picture.exaggeration).drawn_mm for at in found.at]
-    ends = shapes["/measured/actual"].follows["points"]
+    ends = shapes["/measured/actual"].assigned["points"]
     np.testing.assert_allclose(ends[0], drawn[:2], atol=1e-3)
-    assert len(ends) == len(shapes["/measured/nominal"].follows["points"]) == 3
+    assert len(ends) == len(shapes["/measured/nominal"].assigned["points"]) == 3
 
 
 @pytest.mark.parametrize("text", ["", "Q=1", "X=200,Y=0", "X=1e99", "<b>"])

@@ -62,8 +62,8 @@ def end_work(viewer: Viewer) -> None:
     for session in sessions:
         session.stop()
     for session in sessions:
-        session._worker._started.wait(60.0)  # a page may have come just now
-        session._worker.join(60.0)
+        session.worker._started.wait(60.0)  # a page may have come just now
+        session.worker.join(60.0)
 
 
 @contextmanager

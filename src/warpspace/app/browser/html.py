@@ -23,8 +23,8 @@ def text(value: object) -> str:
 
 def fill(template: str, /, *values: object, **named: object) -> Markup:
     """Fill in a template; every value that is no `Markup` is escaped."""
-    said = {name: text(value) for name, value in named.items()}
-    return Markup(template.format(*map(text, values), **said))  # noqa: S704
+    escaped = {name: text(value) for name, value in named.items()}
+    return Markup(template.format(*map(text, values), **escaped))  # noqa: S704
 
 
 def join(parts: Iterable[object]) -> Markup:
@@ -33,12 +33,12 @@ def join(parts: Iterable[object]) -> Markup:
 
 def attributes(**values: object) -> Markup:
     """Spell attributes; None and False leave one out, True needs no value, ``_`` becomes ``-``."""
-    found = "".join(
+    markup = "".join(
         f" {_spelt(name)}" if value is True else f' {_spelt(name)}="{text(value)}"'
         for name, value in values.items()
         if value is not None and value is not False
     )
-    return Markup(found)  # noqa: S704 - escaped here
+    return Markup(markup)  # noqa: S704 - escaped here
 
 
 @lru_cache(maxsize=256)

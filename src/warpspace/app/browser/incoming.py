@@ -135,5 +135,5 @@ def event_of(name: str, value: str) -> Event:
 
 def index_of(value: str, count: int) -> int | None:
     """Read which of so many things an event means; None where it is none of them."""
-    known = value.isdecimal() and len(value) < LONGEST_INDEX and int(value) < count
-    return int(value) if known else None
+    is_valid = value.isdecimal() and len(value) < LONGEST_INDEX and int(value) < count
+    return int(value) if is_valid else None

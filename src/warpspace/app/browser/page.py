@@ -34,9 +34,9 @@ class Page:
                 yield
             finally:
                 with self._lock:
-                    held, self._held = self._held, None
-                if held:
-                    send_script(self._client, "\n".join(held))
+                    scripts, self._held = self._held, None
+                if scripts:
+                    send_script(self._client, "\n".join(scripts))
 
     def put(self, pieces: Mapping[str, str]) -> None:
         """Write pieces of HTML by the name of their place; what stands there is not sent again."""

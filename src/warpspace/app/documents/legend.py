@@ -110,23 +110,23 @@ def _stops(scale: ColourScale) -> str:
 
 def part_html(picture: LivePicture) -> Markup:
     """Say how far part and program are off where they are drawn, and what that leaves out."""
-    part, look, said = picture.part, picture.state.part, list[Markup]()
+    part, look, lines = picture.part, picture.state.part, list[Markup]()
     change = "changes " if picture.is_difference else ""
     named = (f"Part {look.name}", part), (f"Program {look.program_name}", picture.path)
-    for what, found in named:
-        if found is not None:
-            most = number(float(component_values(found.error_um, "norm").max()))
-            out = int(found.outside.sum())
-            more = f", {spell_count(out)} points beyond the travel" if out else ""
-            said.append(join([f"{what} {change}up to {most} µm{more}"]))
+    for subject, overlay in named:
+        if overlay is not None:
+            largest = number(float(component_values(overlay.error_um, "norm").max()))
+            out = int(overlay.outside.sum())
+            beyond = f", {spell_count(out)} points beyond the travel" if out else ""
+            lines.append(join([f"{subject} {change}up to {largest} µm{beyond}"]))
     if part is not None and look.normal:
         scale = picture.coloured(part)[1]
         shades = f"background:linear-gradient(to right,{_stops(scale)})"
         low, high = map(spell_short, (scale.low, scale.high))
         bar = tag("i", "", class_="ws-strip", style=shades)
-        said.append(join((f"Along its normal {low} ", bar, f" {high} µm")))
-    words = Markup("<br>").join((*said, GEOMETRY_ONLY))
-    return tag("p", words, class_="ws-part") if said else EMPTY
+        lines.append(join((f"Along its normal {low} ", bar, f" {high} µm")))
+    body = Markup("<br>").join((*lines, GEOMETRY_ONLY))
+    return tag("p", body, class_="ws-part") if lines else EMPTY
 
 
 # --- The heading ----------------------------------------------------------------------------------
@@ -136,13 +136,13 @@ def numbers_words(picture: LivePicture) -> str:
     """Say mean and max: ``mean 30.9 µm · max 51.7 µm``; ± U95 where the scene states it."""
     norm, change = picture.field.norm_um, "change: " if picture.is_difference else ""
     numbers = {"mean": volume_mean(norm, picture.grid), "max": float(norm.max())}
-    found, sure, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
-    if found is not None:
-        u95 = found.statistics()
-        sure = {name: formatting.u95_behind(u95[f"{name}_um"]) for name in numbers}
-        factor = f" (k = {found.errors.factor:.3g})"
-    said = (f"{name} {number(value)}{sure[name]} µm" for name, value in numbers.items())
-    return f"{change}{' · '.join(said)}{factor}"
+    uncertainty, u95_texts, factor = picture.uncertainty, dict.fromkeys(numbers, ""), ""
+    if uncertainty is not None:
+        u95 = uncertainty.statistics()
+        u95_texts = {name: formatting.u95_behind(u95[f"{name}_um"]) for name in numbers}
+        factor = f" (k = {uncertainty.errors.factor:.3g})"
+    terms = (f"{name} {number(value)}{u95_texts[name]} µm" for name, value in numbers.items())
+    return f"{change}{' · '.join(terms)}{factor}"
 
 
 def place_words(picture: LivePicture) -> str:
@@ -163,24 +163,24 @@ def within_limit_words(picture: LivePicture) -> tuple[str, bool]:
     """
     limit = picture.state.specification.limit_um
     percent = 100.0 * share_below(picture.field, limit)
-    kept = float(picture.field.norm_um.max()) <= limit
-    shown = number(min(percent, 99.9), 0 if percent < 99.0 else 1)
-    return f"{'all' if kept else f'{shown} %'} of the volume within {limit:g} µm", kept
+    is_within = float(picture.field.norm_um.max()) <= limit
+    share = number(min(percent, 99.9), 0 if percent < 99.0 else 1)
+    return f"{'all' if is_within else f'{share} %'} of the volume within {limit:g} µm", is_within
 
 
 def subject_words(picture: LivePicture) -> list[str]:
     """Say what is drawn beside the scene: side of a comparison, table, changes, exclusions."""
     state = picture.drawn_state
-    found = [] if picture.compared is None else [picture.compared.title]
+    subjects = [] if picture.compared is None else [picture.compared.title]
     table = "" if picture.is_difference else table_words(state)
-    if table and not (found and table in found[0]):
-        found.append(table)
+    if table and not (subjects and table in subjects[0]):
+        subjects.append(table)
     if edited := len(state.changed_keys):
-        found.append(f"{edited} error{'s' if edited > 1 else ''} changed")
+        subjects.append(f"{edited} error{'s' if edited > 1 else ''} changed")
     if excluded := len(_left_out(state)):
-        found.append(f"{excluded} excluded")
+        subjects.append(f"{excluded} excluded")
     beyond = formatting.beyond_words(state.active_scene(), state.loop)
-    return [*found, *formatting.direction_words(state.scene), *filter(None, [beyond])]
+    return [*subjects, *formatting.direction_words(state.scene), *filter(None, [beyond])]
 
 
 # --- Conditions: what a reader must know who takes a picture for all of its scene -----------------
@@ -204,8 +204,8 @@ def state_conditions(state: AppState) -> tuple[str, ...]:
 
 def order_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Say where the first order is not enough; with a table the exact chain is drawn."""
-    both = picture.compared.sides if picture.compared and picture.is_difference else ()
-    states = [one for one in both or (picture.drawn_state,) if one.controller is None]
+    sides = picture.compared.sides if picture.compared and picture.is_difference else ()
+    states = [one for one in sides or (picture.drawn_state,) if one.controller is None]
     return second_order_words(*(second_order(one.active_scene(), one.loop) for one in states))
 
 
@@ -214,14 +214,19 @@ def picture_conditions(picture: LivePicture) -> tuple[str, ...]:
 
     def of(state: AppState) -> tuple[str, ...]:
         view = (*formatting.direction_words(state.scene), *placed_words(state.view()))
-        more = table_words(state), formatting.beyond_words(state.active_scene(), state.loop)
-        return (*view, *state_conditions(state), *filter(None, more))
+        remarks = table_words(state), formatting.beyond_words(state.active_scene(), state.loop)
+        return (*view, *state_conditions(state), *filter(None, remarks))
 
     if picture.is_difference and picture.compared is not None:
-        found = conditions_of_both(*map(of, picture.compared.sides))
+        conditions = conditions_of_both(*map(of, picture.compared.sides))
     else:
-        found = of(picture.drawn_state)
-    return (*found, *order_conditions(picture), *range_conditions(picture), *faded_words(picture))
+        conditions = of(picture.drawn_state)
+    return (
+        *conditions,
+        *order_conditions(picture),
+        *range_conditions(picture),
+        *faded_words(picture),
+    )
 
 
 def faded_words(picture: LivePicture) -> tuple[str, ...]:
@@ -243,18 +248,18 @@ def range_conditions(picture: LivePicture) -> tuple[str, ...]:
 
 def look_words(picture: LivePicture) -> list[str]:
     """Say what is looked at, and how; of a difference for both sides."""
-    machine, both = picture.drawn_state.scene.machine, picture.describe_sides
+    machine, describe = picture.drawn_state.scene.machine, picture.describe_sides
     size = " × ".join(f"{edge:.0f}" for edge in picture.grid.extent_mm)
     nodes = spell_count(picture.field.norm_um.size)
     return [
         f"exaggeration {formatting.spell_factor(picture.exaggeration)}",
-        f"{both(lambda state: state.loop.value)} loop",
-        both(lambda state: formatting.reference_words(state.scene)),
+        f"{describe(lambda state: state.loop.value)} loop",
+        describe(lambda state: formatting.reference_words(state.scene)),
         *picture_conditions(picture),
         f"{machine.title}, chain {machine.chain}",
         f"{size} mm, {nodes} nodes",
-        both(lambda state: formatting.convention_words(state.scene)),
-        both(lambda state: "exact chain" if state.controller else "first-order model"),
+        describe(lambda state: formatting.convention_words(state.scene)),
+        describe(lambda state: "exact chain" if state.controller else "first-order model"),
         "error = actual − nominal",
     ]
 
@@ -273,11 +278,11 @@ def projected_labels(
     forth = forth / np.linalg.norm(forth)
     right = np.cross(forth, camera.up)
     right = right / np.linalg.norm(right)
-    way = np.stack([right, np.cross(right, forth), forth], axis=1)
-    across, up, away = ((points * SCENE_PER_MM - position) @ way).T
+    rotation = np.stack([right, np.cross(right, forth), forth], axis=1)
+    across, up, away = ((points * SCENE_PER_MM - position) @ rotation).T
     px = height / 2.0 / np.tan(camera.fov_rad / 2.0) / away
     spots = np.stack([width / 2.0 + across * px, height / 2.0 + up * px], axis=-1)
     inside = (away > 0.0) & (spots > 0.0).all(axis=-1) & (spots < (width, height)).all(axis=-1)
-    seen = [(label.text, spots[k]) for k, label in enumerate(labels) if inside[k]]
+    visible = [(label.text, spots[k]) for k, label in enumerate(labels) if inside[k]]
     has_bars = picture.state.look.bars and away[-1] > 0.0
-    return seen, float(px[-1]) * SCENE_PER_MM if has_bars else None
+    return visible, float(px[-1]) * SCENE_PER_MM if has_bars else None

@@ -103,9 +103,9 @@ def build_story_html(
     first, grid = steps[0].picture, steps[0].picture.grid.nominal_mm
     alike = all(np.array_equal(step.picture.grid.nominal_mm, grid) for step in steps)
     # what follows no step stays away
-    kept = ("/box", "/ghost", "/axes", "/words/axis", "/words/tick") if alike else ("/box",)
-    found = {**box(first), **draw_surroundings(first), **draw_labels(first)}
-    shapes = {name: shape for name, shape in found.items() if name.startswith(kept)}
+    prefixes = ("/box", "/ghost", "/axes", "/words/axis", "/words/tick") if alike else ("/box",)
+    nodes = {**box(first), **draw_surroundings(first), **draw_labels(first)}
+    shapes = {name: shape for name, shape in nodes.items() if name.startswith(prefixes)}
     shapes["/story/point"] = ball(steps[0].point_mm, POINT_MARKER * first.size_mm, ACCENT)
     return _build_page(state.scene.title, steps, shapes, provenance or {})
 
@@ -141,9 +141,9 @@ def _export(step: PageStep, shapes: Shapes) -> str:
         try:
             light_scene(server.scene)
             Nodes(server.scene).draw(shapes)
-            first, kept = server.initial_camera, step.camera
-            first.up, first.fov = kept.up, kept.fov_rad
-            first.position, first.look_at = kept.position, kept.look_at
+            first, camera = server.initial_camera, step.camera
+            first.up, first.fov = camera.up, camera.fov_rad
+            first.position, first.look_at = camera.position, camera.look_at
             return server.scene.as_html(dark_mode=step.picture.state.shown.dark)
         finally:
             server.stop()
@@ -157,33 +157,37 @@ def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
     for index, note in enumerate(notes):
         problem = ""
         try:
-            shown, seen = reopened(state, note, known_scenes) if note.view else (state, None)
-            found = live.evaluate(_story_view(shown, state, note))
-            if steps and found.shape != picture.shape:
+            step_state, step_camera = (
+                reopened(state, note, known_scenes) if note.view else (state, None)
+            )
+            evaluated = live.evaluate(_story_view(step_state, state, note))
+            if steps and evaluated.shape != picture.shape:
                 raise OptionError("its machine has another volume")
-            picture, camera = found, seen
+            picture, camera = evaluated, step_camera
         except WarpspaceError as error:
             problem = str(error)
-        said = step_words(scene, notes, index, problem)
-        steps.append(PageStep(picture, camera or _usual_camera(picture), said))
+        text = step_words(scene, notes, index, problem)
+        steps.append(PageStep(picture, camera or _usual_camera(picture), text))
     return steps
 
 
-def _story_view(shown: AppState, like: AppState, *notes: Note) -> AppState:
+def _story_view(step_state: AppState, like: AppState, *notes: Note) -> AppState:
     """Give what the steps have in common: the whole surface of the box, on the same ground."""
-    look, machine = replace(shown.look, surface="surface", isolines=False), shown.machine
-    ground, machine = replace(shown.shown, dark=like.shown.dark), replace(machine, shown=False)
-    return replace(shown, look=look, shown=ground, machine=machine, nodes=like.nodes, review=notes)
+    look, machine = replace(step_state.look, surface="surface", isolines=False), step_state.machine
+    ground, machine = replace(step_state.shown, dark=like.shown.dark), replace(machine, shown=False)
+    return replace(
+        step_state, look=look, shown=ground, machine=machine, nodes=like.nodes, review=notes
+    )
 
 
 def _packed_steps(steps: Sequence[PageStep]) -> str:
     """Pack what the page draws steps by; points as whole shifts from those of the first."""
-    first, told = steps[0].picture, [{"camera": asdict(step.camera)} for step in steps]
-    found: dict[str, object] = {"steps": told}
+    first, step_views = steps[0].picture, [{"camera": asdict(step.camera)} for step in steps]
+    content: dict[str, object] = {"steps": step_views}
     if len(steps) > 1:
         start, unit = map_mesh(first).vertices_mm, first.size_mm / PARTS
-        found |= {"start": packed(start.astype("<f4")), "unit": unit, **line_facts(first, start)}
-        for step, entries in zip(steps, told, strict=True):
+        content |= {"start": packed(start.astype("<f4")), "unit": unit, **line_facts(first, start)}
+        for step, entries in zip(steps, step_views, strict=True):
             mesh, scale = map_mesh(step.picture), step.picture.scale
             entries |= {
                 "point": (step.point_mm * SCENE_PER_MM).round(4).tolist(),
@@ -191,7 +195,7 @@ def _packed_steps(steps: Sequence[PageStep]) -> str:
                 "levels": packed(colour_levels(scale, mesh.values)),
                 "palette": packed(level_colours(diverging=scale.diverging)),
             }
-    text = json.dumps(found, allow_nan=False).encode()
+    text = json.dumps(content, allow_nan=False).encode()
     return b64encode(zlib.compress(text, 9)).decode("ascii")
 
 
@@ -205,7 +209,7 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
     remarks = ("drag to turn, wheel to zoom", f"warpspace {__version__}")
     if steps[0].note:
         remarks = (LEFT_OUT, "→ goes on, ← goes back", *remarks)
-    heading, beside, below = (
+    heading, column, below = (
         join(tag("div", one, data_step=i, hidden=i > 0) for i, one in enumerate(said))
         for said in zip(*(_step_pieces(step, title) for step in steps), strict=True)
     )
@@ -218,7 +222,7 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
         # a page in an attribute: only these two characters would end or change it
         scene=scene.replace("&", "&amp;").replace('"', "&quot;"),
         buttons="" if len(steps) > 1 else "hidden",
-        beside=beside,
+        beside=column,
         remarks=below + join(tag("span", one) for one in remarks),
         # no text in a script may end it
         provenance=json.dumps(about, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c"),
@@ -229,42 +233,47 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
 
 def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
     picture, errors = step.picture, _error_rows(step.picture)
-    kept = "" if picture.is_difference else f" · {legend.within_limit_words(picture)[0]}"
+    within = "" if picture.is_difference else f" · {legend.within_limit_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)
-    seen = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{kept} · {factor}"
+    headline = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{within} · {factor}"
     subjects = [one for one in (picture.title, *legend.subject_words(picture)) if one != title]
-    found = picture.statistics
-    numbers = {"mean": found.mean_um, "RMS": found.rms_um, "P95": found.p95_um, "max": found.max_um}
-    asked = [label.text for label in point_labels(picture) if label.kind == "asked"]
+    statistics = picture.statistics
+    numbers = {
+        "mean": statistics.mean_um,
+        "RMS": statistics.rms_um,
+        "P95": statistics.p95_um,
+        "max": statistics.max_um,
+    }
+    point_texts = [label.text for label in point_labels(picture) if label.kind == "asked"]
     counted = "unlike in A and B" if picture.is_difference else "not zero"
     summary = f"{len(errors)} error{'' if len(errors) == 1 else 's'} {counted}"
     listed = join(tag("tr", join(tag("td", cell) for cell in row)) for row in errors)
-    beside = (
+    column = (
         step.note,
         *(tag("p", one, class_="ws-warn") for one in picture.state.notes),
         legend.legend_html(picture),
         tag("b", lowered(f"{picture.length_words} over the volume")),
         rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
-        tag("p", " · ".join(asked)),
+        tag("p", " · ".join(point_texts)),
         tag("details", tag("summary", summary) + tag("table", listed),
             open=len(errors) <= MAX_UNFOLDED and not step.note),
     )  # fmt: skip
     return (
-        join(tag("p", one) for one in (seen, *subjects)),
-        join(beside),
+        join(tag("p", one) for one in (headline, *subjects)),
+        join(column),
         join(tag("span", one) for one in looks),
     )
 
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
     """Spell the errors that are not zero, or unlike in A and B: key, plain name, value and unit."""
-    both = picture.compared.sides if picture.compared and picture.is_difference else ()
-    sides = [one.active_scene().errors.functions for one in both or (picture.drawn_state,)]
-    found: list[tuple[str, str, str]] = []
+    compared = picture.compared.sides if picture.compared and picture.is_difference else ()
+    sides = [one.active_scene().errors.functions for one in compared or (picture.drawn_state,)]
+    error_rows: list[tuple[str, str, str]] = []
     for row in map(parameter, dict.fromkeys(key for side in sides for key in side)):
-        given = [side.get(row.key) for side in sides]
-        spelt = [f"{one.amplitude:+g}" if one and one.amplitude else "0" for one in given]
-        value = f"A {spelt[0]}, B {spelt[1]}" if both else spelt[0]
-        if (given[0] != given[1]) if both else value != "0":
-            found.append((row.key, row.name, f"{value} {row.unit}".replace("-", "−")))
-    return found
+        functions = [side.get(row.key) for side in sides]
+        spelt = [f"{one.amplitude:+g}" if one and one.amplitude else "0" for one in functions]
+        value = f"A {spelt[0]}, B {spelt[1]}" if compared else spelt[0]
+        if (functions[0] != functions[1]) if compared else value != "0":
+            error_rows.append((row.key, row.name, f"{value} {row.unit}".replace("-", "−")))
+    return error_rows

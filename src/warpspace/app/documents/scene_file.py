@@ -210,9 +210,9 @@ def with_settings(
         except Unreadable:
             unread.append(f"{name}={text}"[:60])
     if unread:
-        more = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
+        suffix = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
         named = ", ".join(unread[:4])
-        return state.noted(f"settings left out, since they mean nothing here: {named}{more}")
+        return state.noted(f"settings left out, since they mean nothing here: {named}{suffix}")
     return state
 
 
@@ -251,24 +251,24 @@ def camera_of(line: str) -> CameraMemory | None:
 
 def view_of(state: AppState, camera: CameraMemory | None) -> str:
     """Spell what is on the screen, for a note: relative to the scene as opened where that does."""
-    shown = replace(state, review=())
-    link = "" if _is_plain(state) else _packed(shown, camera)
+    viewed = replace(state, review=())
+    link = "" if _is_plain(state) else _packed(viewed, camera)
     # curves of thousands of points are left to the scene
     fits = 0 < len(link) <= MAX_NOTE_VIEW
-    return link if fits else settings_line(shown, camera, at_rest=True)
+    return link if fits else settings_line(viewed, camera, at_rest=True)
 
 
 def file_notes(state: AppState) -> tuple[Note, ...]:
     """Give the notes as a file keeps them, whose scene may differ from the one as opened."""
     opened = start_state(replace(state.origin, review=()))
 
-    def kept(note: Note) -> Note:
+    def with_packed_view(note: Note) -> Note:
         if not note.view or PACKED in dict(_pairs(note.view)):
             return note
         link = _packed(*reopened(opened, note))
         return replace(note, view=link) if len(link) <= MAX_NOTE_VIEW else note
 
-    return state.review if _is_plain(state) else tuple(map(kept, state.review))
+    return state.review if _is_plain(state) else tuple(map(with_packed_view, state.review))
 
 
 def reopened(state: AppState, note: Note, known_scenes: KnownScenes = None) -> Opened:
@@ -277,14 +277,14 @@ def reopened(state: AppState, note: Note, known_scenes: KnownScenes = None) -> O
         return state, None
     origin = state.origin
     if PACKED in dict(_pairs(note.view)):
-        found, camera = _read_link(note.view, known_scenes)
-        same = found.scene.machine.axes == origin.machine.axes
-        found = replace(found, loaded=None if found.scene == origin else origin,
-                        start=state.start if same else found.start)  # fmt: skip
+        viewed, camera = _read_link(note.view, known_scenes)
+        same = viewed.scene.machine.axes == origin.machine.axes
+        viewed = replace(viewed, loaded=None if viewed.scene == origin else origin,
+                        start=state.start if same else viewed.start)  # fmt: skip
     else:
-        found = with_settings(start_state(origin).at_rest(), note.view, known_scenes)
+        viewed = with_settings(start_state(origin).at_rest(), note.view, known_scenes)
         camera = camera_of(note.view)
-    return replace(found, review=state.review, page=state.page, forms=state.forms), camera
+    return replace(viewed, review=state.review, page=state.page, forms=state.forms), camera
 
 
 # --- The sides of a comparison in it --------------------------------------------------------------
@@ -313,10 +313,12 @@ def _sides(state: AppState, known_scenes: KnownScenes) -> Iterator[tuple[str, st
             yield f"{PREFIX}{name}.title", side.title
 
 
-def _with_sides(state: AppState, given: Mapping[str, str], known_scenes: KnownScenes) -> AppState:
+def _with_sides(
+    state: AppState, settings: Mapping[str, str], known_scenes: KnownScenes
+) -> AppState:
     sides: dict[str, Side | None] = {PINNED: None}
     for name in (PINNED, "a", "b"):
-        text = given.get(PREFIX + name)
+        text = settings.get(PREFIX + name)
         if text is None or text == NOW:
             sides[name] = None if text is None else Side()
         elif text == PINNED:
@@ -324,13 +326,13 @@ def _with_sides(state: AppState, given: Mapping[str, str], known_scenes: KnownSc
             if sides[PINNED] is None:
                 raise OptionError("the comparison is with a pinned state, but holds none")
         else:
-            found, _ = _read_link(text, known_scenes, without_comparison=True)
+            opened, _ = _read_link(text, known_scenes, without_comparison=True)
             if name == PINNED:
-                state = state.noted(*(f"{BEFORE}: {note}" for note in found.notes))
-                side = pinned_side(plain_state(found.without_notes()))
+                state = state.noted(*(f"{BEFORE}: {note}" for note in opened.notes))
+                side = pinned_side(plain_state(opened.without_notes()))
             else:
-                side = scene_side(found.scene)
-            title = given.get(f"{PREFIX}{name}.title", "")[:LONGEST_TITLE]
+                side = scene_side(opened.scene)
+            title = settings.get(f"{PREFIX}{name}.title", "")[:LONGEST_TITLE]
             usual = title in (NOW, PRESENT, NOBODY, "")
             sides[name] = side if usual else replace(side, title=title)
     compared = replace(state.comparison, a=sides["a"] or Side(), b=sides["b"], pinned=sides[PINNED])
@@ -352,13 +354,13 @@ class SceneList(dict[str, Scene]):
 
     def add(self, scene: Scene) -> tuple[str, str]:
         """Take in an opened scene; give its title, and that of one that has left for it."""
-        for title, known_scenes in self.items():
-            if known_scenes is scene or known_scenes == scene:
+        for title, listed in self.items():
+            if listed is scene or listed == scene:
                 return title, ""
-        own = title = scene.title or scene.name
+        base = title = scene.title or scene.name
         number = 2
         while title in self or title in (PRESENT, NOBODY):
-            title, number = f"{own} ({number})", number + 1
+            title, number = f"{base} ({number})", number + 1
         self[title] = scene
         if len(self) <= len(self.fixed) + MOST_OPENED:
             return title, ""

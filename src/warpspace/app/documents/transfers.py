@@ -61,12 +61,12 @@ def read_upload(
     value: str, most_bytes: int = MAX_SCENE_BYTES, what: str = "scene file"
 ) -> tuple[str, bytes]:
     """Give name and bytes of a file that a page has sent; it sends none of one too large."""
-    told, _, rest = value.partition("\n")
-    name, _, coded = rest.rpartition("\n")
+    size_text, _, payload = value.partition("\n")
+    name, _, coded = payload.rpartition("\n")
     name = safe_file_name(name)
     try:
         content = base64.b64decode(coded)
-        size = max(int(told[:LONGEST_SIZE]), len(content))
+        size = max(int(size_text[:LONGEST_SIZE]), len(content))
     except ValueError:
         raise OptionError(f"{name} has not arrived whole; try again") from None
     if size > most_bytes:
@@ -96,10 +96,10 @@ def robot_text(name: str, content: bytes) -> tuple[str, list[str]]:
     with TemporaryDirectory() as folder:
         path = Path(folder) / safe_file_name(name)
         path.write_bytes(content)
-        robot, others = read_robot(path)
-    found = place_robot(robot, name)
-    notes = [*found.notes, *left_out(robot, others, found.frame_of)]
-    return imported_text(found.machine, safe_file_name(name), notes, {}), notes[:MOST_NOTES]
+        robot, unplaced = read_robot(path)
+    placed = place_robot(robot, name)
+    notes = [*placed.notes, *left_out(robot, unplaced, placed.frame_of)]
+    return imported_text(placed.machine, safe_file_name(name), notes, {}), notes[:MOST_NOTES]
 
 
 # --- What files show while two states are compared: what is drawn, under its own name -------------
@@ -109,28 +109,32 @@ AS_DRAWN = "View and HTML show what is drawn."
 
 def shown_sides(picture: LivePicture, *, sheet: bool = False) -> list[AppState]:
     """Give the state that is drawn; A and B of a difference, on a sheet of any comparison."""
-    found = picture.compared
-    if found is None:
+    compared = picture.compared
+    if compared is None:
         return [picture.drawn_state]
-    both = [
+    sides = [
         replace(side, scene=replace(side.scene, name=f"{letter}: {title}", title=title))
-        for letter, title, side in zip("AB", found.titles, found.sides, strict=True)
+        for letter, title, side in zip("AB", compared.titles, compared.sides, strict=True)
     ]
-    if found.shown == "difference" or (sheet and has_sheet(picture)):
-        return both
-    return [both["ab".index(found.shown)]]
+    if compared.view == "difference" or (sheet and has_sheet(picture)):
+        return sides
+    return [sides["ab".index(compared.view)]]
 
 
 def has_sheet(picture: LivePicture) -> bool:
     """Tell whether two machines are compared that fit on one sheet, with their difference."""
-    found = picture.compared
-    return found is not None and not found.refused and found.sides[0].loop == found.sides[1].loop
+    compared = picture.compared
+    return (
+        compared is not None
+        and not compared.refused
+        and compared.sides[0].loop == compared.sides[1].loop
+    )
 
 
 def file_stem(picture: LivePicture) -> str:
     """Name the files of a picture, without an ending; of one with a table say so."""
-    found, chosen = picture.compared, picture.state.comparison
-    if found is None or drawn_tables(picture.state):
+    compared, chosen = picture.compared, picture.state.comparison
+    if compared is None or drawn_tables(picture.state):
         tail = "_with_table" if drawn_tables(picture.state) else ""
         return safe_name(picture.state.scene.name) + tail
     before = chosen.a.state is not None and not chosen.a.is_scene
@@ -140,16 +144,16 @@ def file_stem(picture: LivePicture) -> str:
         else "present"
         for side, word in ((chosen.a, BEFORE), (chosen.b or Side(), AFTER))
     )  # fmt: skip
-    return safe_name({"a": f"A_{a}", "b": f"B_{b}"}.get(found.shown, f"{b}_minus_{a}"))
+    return safe_name({"a": f"A_{a}", "b": f"B_{b}"}.get(compared.view, f"{b}_minus_{a}"))
 
 
 def exported_words(picture: LivePicture) -> str:
     """Say what pictures and exports show, where that is not simply what is steered."""
-    found, tilts = picture.compared, picture.state.look.tilts
+    compared, tilts = picture.compared, picture.state.look.tilts
     if without := without_words(picture.state):
         return f"Figure, exports, Save and Link: {without[0].lower()}{without[1:]} {AS_DRAWN}"
-    if found is None:
+    if compared is None:
         return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""
     what = "the position errors of " if tilts else ""
     sheet = f" The figure shows {what}A, B and B − A on one sheet." if has_sheet(picture) else ""
-    return f"Pictures and exports show {found.title}.{sheet} Save and Link keep the comparison."
+    return f"Pictures and exports show {compared.title}.{sheet} Save and Link keep the comparison."

@@ -79,8 +79,8 @@ def _traces(picture: LivePicture) -> Shapes:
     if not moved:
         return {}
     name = chosen_trace(picture)
-    others = [line.actual_mm for other, line in moved.items() if other != name]
-    faint = lines(polylines(others), colour(picture, "trace_elsewhere"), 1.0)
+    other_traces = [line.actual_mm for other, line in moved.items() if other != name]
+    faint = lines(polylines(other_traces), colour(picture, "trace_elsewhere"), 1.0)
     if not name:
         return {"/traces/others": faint}
     nominal, actual = (polylines([at]) for at in (moved[name].nominal_mm, moved[name].actual_mm))
@@ -90,11 +90,11 @@ def _traces(picture: LivePicture) -> Shapes:
 
 
 def _path(picture: LivePicture) -> Shapes:
-    found = picture.bench
-    if found is None:
+    overlay = picture.bench
+    if overlay is None:
         return {}
-    actual = found.drawn_mm(picture.exaggeration)[found.at]
-    return _pair(picture, "/test", found.nominal_mm[found.at], actual)
+    actual = overlay.drawn_mm(picture.exaggeration)[overlay.at]
+    return _pair(picture, "/test", overlay.nominal_mm[overlay.at], actual)
 
 
 def _pair(picture: LivePicture, root: str, nominal: Array, actual: Array) -> Shapes:
@@ -129,8 +129,8 @@ def _program(picture: LivePicture) -> Shapes:
     drawn, (values, scale) = path.drawn_mm(picture.exaggeration), picture.coloured(path)
     linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # viser wants lines so
     colours = (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
-    asked = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
-    marker = dots(drawn[path.of.line == asked][-1:], POINT_MARKER * picture.size_mm, ACCENT)
+    line = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
+    marker = dots(drawn[path.of.line == line][-1:], POINT_MARKER * picture.size_mm, ACCENT)
     pair = _pair(picture, "/program", path.nominal_mm[path.at], drawn[path.at])
     return {**pair, "/program/actual": lines(drawn[path.at], colours, 3.0), "/program/line": marker}
 
@@ -147,15 +147,15 @@ def _point(picture: LivePicture) -> Shapes:
     picked, size = picture.state.picked, picture.size_mm
     if picked is None or picture.is_difference:
         return {}
-    found = explain_point(picture.drawn_state, picked, picture.exaggeration)
-    point = found.explanation.nominal_mm + found.shift_mm
+    explained = explain_point(picture.drawn_state, picked, picture.exaggeration)
+    point = explained.explanation.nominal_mm + explained.shift_mm
     shapes = {
-        "/why/marker": ball(found.drawn_mm, POINT_MARKER * size, ACCENT),
-        "/why/vector": lines(np.stack([point, found.drawn_mm])[None], ACCENT, 3.0),
+        "/why/marker": ball(explained.drawn_mm, POINT_MARKER * size, ACCENT),
+        "/why/vector": lines(np.stack([point, explained.drawn_mm])[None], ACCENT, 3.0),
     }
-    for part in found.explanation.contributions:
+    for part in explained.explanation.contributions:
         if part.key == picture.state.lever:
-            origin, half = part.origin_mm + found.shift_mm, AXIS_HALF * size * part.direction
+            origin, half = part.origin_mm + explained.shift_mm, AXIS_HALF * size * part.direction
             axis, lever = np.array([[origin - half, origin + half], [origin, point]])[:, None]
             shapes["/why/axis"] = lines(axis, ACCENT, 3.5)
             shapes["/why/lever"] = lines(dashes(lever, DASH * size, 0.6 * DASH * size), ACCENT, 2.0)
@@ -163,10 +163,10 @@ def _point(picture: LivePicture) -> Shapes:
 
 
 def _measured(picture: LivePicture) -> Shapes:
-    found = measure_distance(picture)
-    if found is None:
+    distance = measure_distance(picture)
+    if distance is None:
         return {}
-    _, nominal, actual = found
+    _, nominal, actual = distance
     ends = [[0, 1], [2, 0], [2, 1]] if len(actual) == 3 else [[0, 1]]  # and edges of the angle
     return {
         "/measured/nominal": lines(nominal[ends], colour(picture, "edge"), 1.5),
@@ -196,24 +196,24 @@ def _uncertainty(picture: LivePicture) -> Shapes:
 
     The extent of an ellipsoid along any direction is U95 of the error along it, exaggerated.
     """
-    found, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
+    uncertainty, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
     shapes: dict[str, SceneNode | None] = {}
-    if found is not None and scene.covariance is not None and look.unmeasured:
+    if uncertainty is not None and scene.covariance is not None and look.unmeasured:
         surface = picture.topology.surface.nodes
         outside = scene.covariance.outside(picture.grid.coordinates, picture.shape)
-        seen = surface[outside.reshape(-1)[surface]]
-        at = picture.drawn_mm.reshape(-1, 3)[seen]
+        unmeasured = surface[outside.reshape(-1)[surface]]
+        at = picture.drawn_mm.reshape(-1, 3)[unmeasured]
         shapes["/uncertainty/unmeasured"] = dots(at, UNMEASURED * picture.size_mm, GREY)
-    if found is None or not found.errors.is_known or not look.ellipsoids:
+    if uncertainty is None or not uncertainty.errors.is_known or not look.ellipsoids:
         return shapes
     chosen, picked = corners(picture.shape), picture.state.picked
     at = [*picture.drawn_mm.reshape(-1, 3)[chosen]]
-    covariances = [*found.expanded_um2.reshape(-1, 3, 3)[chosen]]
+    covariances = [*uncertainty.expanded_um2.reshape(-1, 3, 3)[chosen]]
     if picked is not None:
-        asked = explain_point(picture.drawn_state, picked, picture.exaggeration)
-        if asked.uncertainty is not None:
-            at.append(asked.drawn_mm)
-            covariances.append(asked.uncertainty.expanded_um2)
+        explained = explain_point(picture.drawn_state, picked, picture.exaggeration)
+        if explained.uncertainty is not None:
+            at.append(explained.drawn_mm)
+            covariances.append(explained.uncertainty.expanded_um2)
     factor = picture.exaggeration * MM_PER_UM
     for number, (middle, square) in enumerate(zip(at, covariances, strict=True)):
         body = ellipsoid(middle, factor**2 * square, ACCENT, SEEN_THROUGH)
@@ -240,8 +240,8 @@ def residuals(
 
     Returns with them the factor they are drawn with; 0 where none has a length.
     """
-    every = max(1, -(-len(foot_mm) // MOST_RESIDUALS))
-    foot, vector = foot_mm[::every], vector_mm[::every]
+    stride = max(1, -(-len(foot_mm) // MOST_RESIDUALS))
+    foot, vector = foot_mm[::stride], vector_mm[::stride]
     longest = float(np.linalg.norm(vector, axis=-1).max(initial=0.0))
     if longest <= 0.0:
         return {}, 0.0
@@ -272,8 +272,8 @@ def draw_labels(picture: LivePicture) -> Shapes:
     away, middle = 0.03 * picture.size_mm, picture.grid.bounds_mm.mean(axis=0)
     shapes: dict[str, SceneNode | None] = {}
     for number, label in enumerate((*axis_labels(picture), *point_labels(picture))):
-        way = label.at_mm - (middle if label.from_mm is None else label.from_mm)
-        out = away * way / max(float(np.linalg.norm(way)), 1e-9)
+        outward = label.at_mm - (middle if label.from_mm is None else label.from_mm)
+        out = away * outward / max(float(np.linalg.norm(outward)), 1e-9)
         at = label.at_mm + (5.0 if label.kind == "axis" else 1.0) * out
         looks = {"font_screen_scale": 0.8, "anchor": "center-center"}
         follows = {"text": label.text, "position": at * SCENE_PER_MM}

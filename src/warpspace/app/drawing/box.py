@@ -50,9 +50,9 @@ def ghost_dashes(picture: LivePicture) -> Array:
 
 def surface(picture: LivePicture) -> SceneNode:
     """Draw the coloured map of a picture, or its lines alone."""
-    has_lines, alone = picture.state.look.surface == "grid", picture.state.part.is_empty
+    has_lines, without_part = picture.state.look.surface == "grid", picture.state.part.is_empty
     # lines of the grid would stand before a part
-    mesh = line_mesh(picture, grid=alone) if has_lines else map_mesh(picture)
+    mesh = line_mesh(picture, grid=without_part) if has_lines else map_mesh(picture)
     drawn = mesh.vertices_mm, mesh.triangles, mesh.values
     return coloured_shape(*drawn, picture.scale, mesh.faded)
 
@@ -77,16 +77,16 @@ def coloured_shape(
 
 
 def box(picture: LivePicture) -> Shapes:
-    look, shown = picture.state.look, picture.state.shown
+    look, options = picture.state.look, picture.state.shown
     shapes: dict[str, SceneNode | None] = {SURFACE: surface(picture)}
     if look.surface != "grid":
         shapes["/box/edges"] = lines(edge_pieces(picture), colour(picture, "edge"), 1.8)
-        if shown.grid_lines:
+        if options.grid_lines:
             shapes["/box/grid"] = lines(grid_pieces(picture), colour(picture, "grid"), 0.7)
         if look.isolines or look.pass_fail:
-            seen = ISOLINES[picture.scale.diverging]
-            shapes["/box/isolines"] = lines(isoline_pieces(picture), seen, 1.4)
-    if shown.ghost:
+            rgb = ISOLINES[picture.scale.diverging]
+            shapes["/box/isolines"] = lines(isoline_pieces(picture), rgb, 1.4)
+    if options.ghost:
         shapes["/ghost"] = lines(ghost_dashes(picture), colour(picture, "ghost"), 1.5)
     return shapes
 
@@ -130,13 +130,13 @@ class BoxLayer:
         self._nodes.draw(box(picture))
 
 
-def only_bent(held: LivePicture, picture: LivePicture) -> bool:
+def only_bent(drawn: LivePicture, picture: LivePicture) -> bool:
     """Tell whether pictures differ in points and colours of the surface alone."""
-    before, after = held.state, picture.state
+    before, after = drawn.state, picture.state
     return (
-        not (picture.slices or held.slices or is_thin(picture.shape))
-        and picture.compared is None and held.compared is None
-        and picture.grid.nominal_mm is held.grid.nominal_mm
+        not (picture.slices or drawn.slices or is_thin(picture.shape))
+        and picture.compared is None and drawn.compared is None
+        and picture.grid.nominal_mm is drawn.grid.nominal_mm
         and after.look == before.look and after.shown == before.shown
         and not after.look.isolines and not after.look.pass_fail and picture.faded is None
         and after.look.surface in ("surface", "cut")

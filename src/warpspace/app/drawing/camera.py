@@ -47,11 +47,11 @@ class Room:
     @property
     def margins(self) -> tuple[float, float, float, float]:
         """Parts of width and height that are kept free: left, right, top, bottom."""
-        words = WORDS_PX if self.width > PHONE_PX else PHONE_WORDS_PX
-        right = min((self.right + words / 2.0) / self.width, MOST_SHARE)
-        top = min((self.top + words / 2.0) / self.height, MOST_SHARE)
-        bottom = min((self.bottom + words / 2.0) / self.height, 1.0 - LEAST_SHARE - top)
-        return min(words / self.width, MOST_SHARE), right, top, bottom
+        label_px = WORDS_PX if self.width > PHONE_PX else PHONE_WORDS_PX
+        right = min((self.right + label_px / 2.0) / self.width, MOST_SHARE)
+        top = min((self.top + label_px / 2.0) / self.height, MOST_SHARE)
+        bottom = min((self.bottom + label_px / 2.0) / self.height, 1.0 - LEAST_SHARE - top)
+        return min(label_px / self.width, MOST_SHARE), right, top, bottom
 
 
 def first_room(page_width: float, page_height: float) -> Room:
@@ -64,10 +64,10 @@ def first_room(page_width: float, page_height: float) -> Room:
 
 def read_room(text: str) -> Room | None:
     """Read what a page says of its room; None where it says nothing that can be."""
-    words = text[:LONGEST_WORD].split(",")
-    if len(words) != 6 or not all(word.isascii() and word.isdigit() for word in words):
+    fields = text[:LONGEST_WORD].split(",")
+    if len(fields) != 6 or not all(word.isascii() and word.isdigit() for word in fields):
         return None
-    width, height, top, bottom, right = (float(word[:6]) for word in words[1:])
+    width, height, top, bottom, right = (float(word[:6]) for word in fields[1:])
     if not (LEAST_PX <= width <= MOST_PX and LEAST_PX <= height <= MOST_PX):
         return None
     return Room(width, height, top, bottom, right)
@@ -102,8 +102,8 @@ class CameraMemory:
     def is_near(self, other: "CameraMemory") -> bool:
         """Tell whether nobody has moved it from there by hand."""
         least = MOVED * float(np.linalg.norm(np.subtract(self.position, self.look_at)))
-        one, two = ((*at.position, *at.look_at, at.fov_rad) for at in (self, other))
-        return np.allclose(one, two, rtol=0.0, atol=least)
+        first, second = ((*at.position, *at.look_at, at.fov_rad) for at in (self, other))
+        return np.allclose(first, second, rtol=0.0, atol=least)
 
 
 def fit_camera(
@@ -115,10 +115,10 @@ def fit_camera(
 ) -> CameraMemory:
     """Place a camera so that points fill the picture but its margins: left, right, top, bottom."""
     flat = points_mm.reshape(-1, 3) * SCENE_PER_MM
-    back = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
-    right = np.cross((0.0, 0.0, 1.0), back)
+    backward = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+    right = np.cross((0.0, 0.0, 1.0), backward)
     right = right / np.linalg.norm(right)
-    up = np.cross(back, right)
+    up = np.cross(backward, right)
     half = np.tan(np.deg2rad(fov_deg) / 2.0) * np.array([max(aspect, 0.1), 1.0])
     before, after = np.array([margins[0], margins[3]]), np.array([margins[1], margins[2]])
     # middle and half size of what is to be filled
@@ -126,15 +126,15 @@ def fit_camera(
     target, distance = (flat.min(axis=0) + flat.max(axis=0)) / 2.0, 1.0
     offset = np.zeros(2)
     for _ in range(_ROUNDS):
-        seen = (flat - target) @ np.stack([right, up, back], axis=1)
-        across, towards = seen[:, :2], seen[:, 2]
+        in_view = (flat - target) @ np.stack([right, up, backward], axis=1)
+        across, towards = in_view[:, :2], in_view[:, 2]
         from_middle = np.abs(across - offset + towards[:, None] * middle)
         distance = float(((from_middle / free).max(axis=1) + towards).max())
         at = across / (distance - towards)[:, None]
         shift = (at.min(axis=0) + at.max(axis=0)) / 2.0 - middle
         offset = middle * distance
         target = target + distance * (shift[0] * right + shift[1] * up)
-    position, look_at = (target + distance * back).tolist(), target.tolist()
+    position, look_at = (target + distance * backward).tolist(), target.tolist()
     return CameraMemory(tuple(position), tuple(look_at), (0.0, 0.0, 1.0), np.deg2rad(fov_deg))
 
 
@@ -156,8 +156,10 @@ class TabCamera:
         self._camera = client.camera
         self.wanted: CameraMemory | None = None
         self.view, self.orthographic = "iso", False  # chosen last: a key of `VIEWS`, the telephoto
-        self._told: Room | None = None
-        self._puts: tuple[CameraMemory, ...] = ()  # of late: a page may still tell the one before
+        self._reported_room: Room | None = None
+        self._placements: tuple[
+            CameraMemory, ...
+        ] = ()  # of late: a page may still tell the one before
 
     def choose(
         self, picture: LivePicture, view: str | None = None, lens: bool | None = None
@@ -194,12 +196,12 @@ class TabCamera:
     def room(self) -> Room:
         """The room of the drawing: as the page has said, until then as its panels will leave it."""
         camera = self._camera
-        return self._told or first_room(camera.image_width, camera.image_height)
+        return self._reported_room or first_room(camera.image_width, camera.image_height)
 
     def take_room(self, room: Room, picture: LivePicture | None) -> None:
         """Take note of the drawing's room; a camera that nobody has moved fills it again."""
-        self._told, now = room, self.remember()
-        if picture is not None and any(put.is_near(now) for put in self._puts):
+        self._reported_room, now = room, self.remember()
+        if picture is not None and any(put.is_near(now) for put in self._placements):
             self.fit(picture)
 
     def place(self, picture: LivePicture) -> None:
@@ -214,19 +216,19 @@ class TabCamera:
     def expect(self, memory: CameraMemory) -> None:
         """Get ready for a place that the page itself moves to."""
         telephoto = memory.fov_rad < np.deg2rad(2.0 * TELEPHOTO_DEG)
-        self.orthographic, self._puts = bool(telephoto), ()
+        self.orthographic, self._placements = bool(telephoto), ()
         self._clip(memory, np.array([memory.look_at]) / SCENE_PER_MM)
 
     def fit(self, picture: LivePicture) -> None:
         """Fill the room between the panels with the box, its traces and axes."""
         points, room = self._room_mm(picture), self.room
-        found = fit_camera(
+        fitted = fit_camera(
             points, room.aspect, VIEWS[self.view], self._fov_deg, margins=room.margins
         )
         before = self.remember()
-        self._clip(found, points)
-        self._stand_at(found)
-        self._puts = (*self._puts[-1:], before, self.remember())
+        self._clip(fitted, points)
+        self._stand_at(fitted)
+        self._placements = (*self._placements[-1:], before, self.remember())
 
     def remember(self) -> CameraMemory:
         camera = self._camera

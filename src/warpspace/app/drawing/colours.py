@@ -38,9 +38,9 @@ _C, _D, _E = 0.983729, 0.4329510, 0.238081
 
 def inverse_tone_map(srgb: NDArray[np.uint8]) -> Floats:
     """Find the linear colours that the client turns into given ones."""
-    wanted = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
+    target = srgb_to_linear(srgb.astype(float) / 255.0) @ np.linalg.inv(_OUT).T
     # wanted = (v² + A·v − B) / (C·v² + D·v + E), solved for the positive v
-    a, b, c = 1.0 - _C * wanted, _A - _D * wanted, -(_B + _E * wanted)
+    a, b, c = 1.0 - _C * target, _A - _D * target, -(_B + _E * target)
     v = (-b + np.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
     return ((v / _EXPOSURE) @ np.linalg.inv(_IN).T).astype(np.float32)
 
@@ -59,9 +59,9 @@ def colour_levels(scale: ColourScale, values: Array) -> NDArray[np.uint8]:
 def line_colour(rgb: Rgb) -> NDArray[np.uint8]:
     """Give the bytes for a line that is to arrive in a colour, [3]; near exact below 230."""
     linear = np.clip(inverse_tone_map(np.array(rgb, dtype=np.uint8)), 0.0, 1.0)
-    found = np.rint(linear_to_srgb(linear.astype(float)) * 255.0).astype(np.uint8)
-    found.flags.writeable = False  # the same array each time
-    return found
+    rgb_bytes = np.rint(linear_to_srgb(linear.astype(float)) * 255.0).astype(np.uint8)
+    rgb_bytes.flags.writeable = False  # the same array each time
+    return rgb_bytes
 
 
 # --- Colours of lines, on a light ground and on a dark one ----------------------------------------

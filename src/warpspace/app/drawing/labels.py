@@ -71,25 +71,25 @@ def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
         (np.array([high[0] + away, 0.0, low[2]]), np.array([1.0, 0.0, 0.0])),
         (np.array([low[0] - away, low[1], 0.0]), np.array([-1.0, 0.0, 0.0])),
     )
-    found: list[AxisLabels] = []
+    labels: list[AxisLabels] = []
     for k, (foot, out) in enumerate(frames):
-        along, name, way, shift = np.eye(3)[k], grid.axes[k], 1.0, 0.0
+        along, name, sign, shift = np.eye(3)[k], grid.axes[k], 1.0, 0.0
         if name and is_linear(name):
             # position of the axis = way × (place in R) + shift
-            way = float(grid.ways[k])
-            start = float(low[k] if way > 0.0 else high[k])
-            shift = float(np.min(grid.coordinates[name])) - way * start
+            sign = float(grid.ways[k])
+            start = float(low[k] if sign > 0.0 else high[k])
+            shift = float(np.min(grid.coordinates[name])) - sign * start
         else:
             name = f"{'xyz'[k]} in R"
-        first, last = sorted((way * float(low[k]) + shift, way * float(high[k]) + shift))
+        first, last = sorted((sign * float(low[k]) + shift, sign * float(high[k]) + shift))
         ticks = tuple(
-            (spell_coordinate(value), foot + way * (value - shift) * along)
+            (spell_coordinate(value), foot + sign * (value - shift) * along)
             for value in tick_values(first, last, MAX_TICKS)
         )
-        found.append(
+        labels.append(
             AxisLabels(name, np.stack([foot + low[k] * along, foot + high[k] * along]), out, ticks)
         )
-    return tuple(found)
+    return tuple(labels)
 
 
 def axes_room_mm(picture: LivePicture) -> Array:
@@ -113,12 +113,12 @@ def axis_labels(picture: LivePicture) -> list[Label]:
 
 @lru_cache(maxsize=32)
 def _axis_labels(of: tuple[AxisLabels, ...], tick: float) -> list[Label]:
-    found: list[Label] = []
+    labels: list[Label] = []
     for k, axis in enumerate(of):
-        found += [Label(text, at + tick * axis.out, "tick", at, k) for text, at in axis.ticks]
+        labels += [Label(text, at + tick * axis.out, "tick", at, k) for text, at in axis.ticks]
         middle = axis.ends_mm.mean(axis=0)
-        found.append(Label(f"{axis.name} [mm]", middle + tick * axis.out, "axis", middle, k))
-    return found
+        labels.append(Label(f"{axis.name} [mm]", middle + tick * axis.out, "axis", middle, k))
+    return labels
 
 
 def _spell(value: float, unit: str = MICROMETRE, plus_minus: str = "") -> str:
@@ -130,34 +130,36 @@ def _spell(value: float, unit: str = MICROMETRE, plus_minus: str = "") -> str:
 
 def point_labels(picture: LivePicture) -> list[Label]:
     """Give what is written beside points of the volume, what matters most first."""
-    worst, asked = [*_worst(picture)], [*_point(picture)]
-    for one, other in zip(worst, asked, strict=False):
-        apart = np.linalg.norm(one.at_mm - other.at_mm)
-        if apart < TICK * picture.size_mm and other.text.startswith(one.text.removeprefix("max ")):
+    worst, point = [*_worst(picture)], [*_point(picture)]
+    for label, other in zip(worst, point, strict=False):
+        apart = np.linalg.norm(label.at_mm - other.at_mm)
+        if apart < TICK * picture.size_mm and other.text.startswith(
+            label.text.removeprefix("max ")
+        ):
             worst = []  # one place, said once
-    return [*worst, *asked, *_measured(picture), *_names(picture), *_corners(picture)]
+    return [*worst, *point, *_measured(picture), *_names(picture), *_corners(picture)]
 
 
 def _worst(picture: LivePicture) -> Iterator[Label]:
     worst = picture.worst_node
     value = float(picture.values.flat[worst])
     if picture.state.look.worst and value != 0.0:
-        sure = ""
+        plus_minus = ""
         if picture.uncertainty is not None and picture.quantity == "position":
-            sure = u95_behind(None if picture.u95_um is None else picture.u95_um.item(worst))
-        text = f"max {_spell(value, picture.scale.unit, sure)}"
+            plus_minus = u95_behind(None if picture.u95_um is None else picture.u95_um.item(worst))
+        text = f"max {_spell(value, picture.scale.unit, plus_minus)}"
         yield Label(text, picture.drawn_mm.reshape(-1, 3)[worst], "worst")
 
 
 def _corners(picture: LivePicture) -> Iterator[Label]:
-    look, found = picture.state.look, picture.uncertainty
-    if not look.arrows and not (look.ellipsoids and found):
+    look, uncertainty = picture.state.look, picture.uncertainty
+    if not look.arrows and not (look.ellipsoids and uncertainty):
         return
     is_length = picture.quantity == "position" and picture.component == "norm"
     for node in corners(picture.shape):
         if not (look.worst and is_length and node == picture.worst_node):
-            sure = length_words(found, int(node))
-            text = _spell(float(picture.field.norm_um.flat[node]), plus_minus=sure)
+            plus_minus = length_words(uncertainty, int(node))
+            text = _spell(float(picture.field.norm_um.flat[node]), plus_minus=plus_minus)
             yield Label(text, picture.drawn_mm.reshape(-1, 3)[node], "corner")
 
 
@@ -165,45 +167,45 @@ def _point(picture: LivePicture) -> Iterator[Label]:
     picked, state = picture.state.picked, picture.drawn_state
     if picked is None or picture.is_difference:
         return
-    found = explain_point(state, picked, picture.exaggeration)
-    length = float(np.linalg.norm(found.drawn_um))
-    where = list_axes(own_axes(state.scene, found.at))
-    words = f"{length:.1f}{length_words(found.uncertainty)} µm at {where}"
-    yield Label(words, found.drawn_mm, "asked")
-    for part in found.explanation.contributions:
+    explained = explain_point(state, picked, picture.exaggeration)
+    length = float(np.linalg.norm(explained.drawn_um))
+    where = list_axes(own_axes(state.scene, explained.at))
+    text = f"{length:.1f}{length_words(explained.uncertainty)} µm at {where}"
+    yield Label(text, explained.drawn_mm, "asked")
+    for part in explained.explanation.contributions:
         if part.key != picture.state.lever:
             continue
-        point = found.explanation.nominal_mm + found.shift_mm
-        origin = part.origin_mm + found.shift_mm
-        way = "about" if parameter(part.key).is_rotation else "along"
-        yield Label(f"{part.key} {way} this axis", origin, "asked")
+        point = explained.explanation.nominal_mm + explained.shift_mm
+        origin = part.origin_mm + explained.shift_mm
+        relation = "about" if parameter(part.key).is_rotation else "along"
+        yield Label(f"{part.key} {relation} this axis", origin, "asked")
         lever = float(np.linalg.norm(part.lever_mm))
         yield Label(f"lever {lever:.0f} mm", point + LEVER_AT * (origin - point), "asked")
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:
     if (drawn := measure_distance(picture)) is not None:
-        found, _, (start, end, *corner) = drawn
+        distance, _, (start, end, *corner) = drawn
         places = (*[(start + end) / 2.0] * 2, *corner)
-        for words, at in zip(found.words(), places, strict=True):
-            yield Label(words, at, "measured")
+        for text, at in zip(distance.words(), places, strict=True):
+            yield Label(text, at, "measured")
 
 
 def _names(picture: LivePicture) -> Iterator[Label]:
-    state, found = picture.state, picture.bench
-    if found is not None:
-        ends = found.drawn_mm(picture.exaggeration)[np.unique(found.at)]
-        largest = np.linalg.norm(found.error_um[np.unique(found.at)], axis=-1).max()
-        words = f"{found.of.title}: max {_spell(float(largest))}"
+    state, overlay = picture.state, picture.bench
+    if overlay is not None:
+        ends = overlay.drawn_mm(picture.exaggeration)[np.unique(overlay.at)]
+        largest = np.linalg.norm(overlay.error_um[np.unique(overlay.at)], axis=-1).max()
+        text = f"{overlay.of.title}: max {_spell(float(largest))}"
         factor = spell_factor(picture.exaggeration)
-        yield Label(f"{words}, drawn {factor}", ends[np.argmax(ends[:, 2])])
+        yield Label(f"{text}, drawn {factor}", ends[np.argmax(ends[:, 2])])
     moved = picture.moved_traces
     name = chosen_trace(picture)
     if name:
         lengths = np.linalg.norm(moved[name].error_um, axis=-1)
         worst = int(np.argmax(lengths))
-        words = f"{name}: max {_spell(float(lengths[worst]))}"
-        yield Label(words, moved[name].actual_mm[worst])
+        text = f"{name}: max {_spell(float(lengths[worst]))}"
+        yield Label(text, moved[name].actual_mm[worst])
     if state.machine.shown:
         drawn_mm, error_um = tool_point(picture)
         length = float(np.linalg.norm(error_um))
@@ -216,17 +218,19 @@ def note_labels(picture: LivePicture) -> list[Label]:
         return []
     state, own = picture.drawn_state, dict[str, Mapping[str, float]]()
     bodies = drawn_bodies(picture) if picture.state.machine.shown else ()
-    found: list[Label] = []
+    labels: list[Label] = []
     for number, note in enumerate(picture.state.review, 1):
-        words, picked = f"⚑ {number}", Picked.of_note(note)
+        text, picked = f"⚑ {number}", Picked.of_note(note)
         if picked and picked.point_mm:
-            found.append(
-                Label(words, explain_point(state, picked, picture.exaggeration).drawn_mm, "note")
+            labels.append(
+                Label(text, explain_point(state, picked, picture.exaggeration).drawn_mm, "note")
             )
         elif picked:
-            own[words] = picked.at
-        elif own_mm := [b.vertices_mm for b in bodies if note.on and b.body.frame == note.on.body]:
-            points = np.concatenate(own_mm)
-            found.append(Label(words, (points.min(axis=0) + points.max(axis=0)) / 2.0, "note"))
+            own[text] = picked.at
+        elif vertices_mm := [
+            b.vertices_mm for b in bodies if note.on and b.body.frame == note.on.body
+        ]:
+            points = np.concatenate(vertices_mm)
+            labels.append(Label(text, (points.min(axis=0) + points.max(axis=0)) / 2.0, "note"))
     places = drawn_places(state, [*own.values()], picture.exaggeration) if own else ()
-    return [*found, *(Label(words, at, "note") for words, at in zip(own, places, strict=True))]
+    return [*labels, *(Label(words, at, "note") for words, at in zip(own, places, strict=True))]

@@ -34,12 +34,12 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
     Some axes may stand elsewhere, degrees, while one is turned; its table is then drawn also where
     the machine is not.
     """
-    shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
-    if shown or turned:
+    is_shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
+    if is_shown or turned:
         edge = colour(picture, "body_edge")
         for part in drawn_bodies(picture, turned):
             shapes |= _body("/machine", part, part.body.colour, edge)
-    if shown:
+    if is_shown:
         at, size = tool_point(picture)[0], BALL * picture.size_mm
         shapes["/machine/tool_point"] = ball(at, size, colour(picture, "edge"))
     return shapes
@@ -54,10 +54,10 @@ def ghost_machine(picture: LivePicture) -> Shapes:
     return shapes
 
 
-def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **more: object) -> Shapes:
+def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **options: object) -> Shapes:
     name, triangles = f"{root}/{part.body.name}", part.body.triangles
     return {
-        name: mesh(part.vertices_mm, triangles, rgb, flat_shading=True, **more),
+        name: mesh(part.vertices_mm, triangles, rgb, flat_shading=True, **options),
         f"{name}_edges": lines(part.edges_mm, edge, 0.9),
     }
 

@@ -27,8 +27,8 @@ class SceneNode:
     """One node of the scene."""
 
     add: str  # method of viser's scene that adds it
-    stays: Mapping[str, Any]  # another value adds it anew
-    follows: Mapping[str, Any]  # assigned in place; arrays are not changed afterwards
+    constant: Mapping[str, Any]  # another value adds it anew
+    assigned: Mapping[str, Any]  # assigned in place; arrays are not changed afterwards
     on_update: Callable[[Any], None] | None = None  # told what a user does with it
 
 
@@ -52,27 +52,29 @@ class Nodes:
                 self._drawn[name] = self._handle(name, shape), shape
 
     def _handle(self, name: str, shape: SceneNode) -> Any:
-        known = self._drawn.get(name)
-        if known is None or not _same(known[1].stays, shape.stays):
-            handle = getattr(self._scene, shape.add)(name, **shape.stays, **shape.follows)
+        drawn = self._drawn.get(name)
+        if drawn is None or not _same(drawn[1].constant, shape.constant):
+            handle = getattr(self._scene, shape.add)(name, **shape.constant, **shape.assigned)
             if shape.on_update is not None:
                 handle.on_update(shape.on_update)
             return handle
-        handle, held = known
-        for word, value in shape.follows.items():
+        handle, previous = drawn
+        for word, value in shape.assigned.items():
             if word == "position" and self._page is not None:  # viser takes ten times as long
                 self._page.run_script(f'warpspaceMesh.move("{name}",{value.tolist()});')
-            elif value is not held.follows[word]:
+            elif value is not previous.assigned[word]:
                 setattr(handle, word, value)
         if not handle.visible:
             handle.visible = True
         return handle
 
 
-def _same(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
+def _same(before: Mapping[str, Any], after: Mapping[str, Any]) -> bool:
     return all(
-        np.array_equal(value, held[word]) if isinstance(value, np.ndarray) else value == held[word]
-        for word, value in wanted.items()
+        np.array_equal(value, before[word])
+        if isinstance(value, np.ndarray)
+        else value == before[word]
+        for word, value in after.items()
     )
 
 
@@ -80,23 +82,23 @@ def lines(
     pieces: Array | Pieces, rgb: Rgb | NDArray[np.uint8], width_px: float
 ) -> SceneNode | None:
     """Give pieces of line, [S, 2, 3], in one colour or many, as thick from near and far."""
-    stays = {"thickness": width_px, "thickness_units": "screen", "scale": SCENE_PER_MM}
+    constant = {"thickness": width_px, "thickness_units": "screen", "scale": SCENE_PER_MM}
     colours = line_colour(rgb) if isinstance(rgb, tuple) else rgb
-    follows = {"points": pieces.astype(np.float32), "colors": colours}
-    return SceneNode("add_line_segments", stays, follows) if len(pieces) else None
+    assigned = {"points": pieces.astype(np.float32), "colors": colours}
+    return SceneNode("add_line_segments", constant, assigned) if len(pieces) else None
 
 
-def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **more: object) -> SceneNode:
+def mesh(vertices_mm: Array, triangles: NDArray[Any], rgb: Rgb, **options: object) -> SceneNode:
     """Give a lit body; `more` goes to viser as it is."""
-    stays = {"faces": triangles.astype(np.uint32), **UNLIT, **more}
-    follows = {"vertices": vertices_mm.astype(np.float32), "color": rgb}
-    return SceneNode("add_mesh_simple", stays, follows)
+    constant = {"faces": triangles.astype(np.uint32), **UNLIT, **options}
+    assigned = {"vertices": vertices_mm.astype(np.float32), "color": rgb}
+    return SceneNode("add_mesh_simple", constant, assigned)
 
 
 def ball(at_mm: Array, radius_mm: float, rgb: Rgb) -> SceneNode:
     """Give the marker of a point, [3]."""
-    stays = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
-    return SceneNode("add_icosphere", stays, {"position": at_mm * SCENE_PER_MM, "color": rgb})
+    constant = {**UNLIT, "scale": radius_mm * SCENE_PER_MM}
+    return SceneNode("add_icosphere", constant, {"position": at_mm * SCENE_PER_MM, "color": rgb})
 
 
 def ellipsoid(at_mm: Array, square_mm2: Array, rgb: Rgb, opacity: float) -> SceneNode:
@@ -104,19 +106,19 @@ def ellipsoid(at_mm: Array, square_mm2: Array, rgb: Rgb, opacity: float) -> Scen
     values, axes = np.linalg.eigh(square_mm2)
     axes[:, 0] *= np.linalg.det(axes)  # right-handed
     scale = SCENE_PER_MM * np.sqrt(np.maximum(values, 0.0))
-    follows = {"position": at_mm * SCENE_PER_MM, "wxyz": SO3.from_matrix(axes).wxyz, "color": rgb}
-    stays = {"opacity": opacity, "cast_shadow": False, "receive_shadow": False}
-    return SceneNode("add_icosphere", stays, {**follows, "scale": tuple(scale.tolist())})
+    assigned = {"position": at_mm * SCENE_PER_MM, "wxyz": SO3.from_matrix(axes).wxyz, "color": rgb}
+    constant = {"opacity": opacity, "cast_shadow": False, "receive_shadow": False}
+    return SceneNode("add_icosphere", constant, {**assigned, "scale": tuple(scale.tolist())})
 
 
 def dots(at_mm: Array, size_mm: float, rgb: Rgb) -> SceneNode | None:
     """Give points, [n, 3], as flat circles."""
-    stays = {
+    constant = {
         "point_size": size_mm, "point_shape": "circle", "point_shading": "flat",
         "precision": "float32", "scale": SCENE_PER_MM,
     }  # fmt: skip
-    follows = {"points": at_mm.astype(np.float32), "colors": np.array(rgb, dtype=np.uint8)}
-    return SceneNode("add_point_cloud", stays, follows) if len(at_mm) else None
+    assigned = {"points": at_mm.astype(np.float32), "colors": np.array(rgb, dtype=np.uint8)}
+    return SceneNode("add_point_cloud", constant, assigned) if len(at_mm) else None
 
 
 # --- Pieces of line -------------------------------------------------------------------------------

@@ -19,10 +19,10 @@ class Cache(Generic[T]):
 
     def get(self, key: Hashable, build: Callable[[], T], size: Callable[[T], int]) -> T:
         with self._lock:
-            found = self._items.get(key)
-            if found is not None:
+            cached = self._items.get(key)
+            if cached is not None:
                 self._items.move_to_end(key)
-                return found[0]
+                return cached[0]
         value = build()
         with self._lock:
             self._items[key] = (value, size(value))

@@ -35,13 +35,13 @@ def side_state(now: AppState, side: Side) -> AppState:
         base = replace(base, loop=now.loop, placed=now.placed, positions=at)
     points = base.scene.trace_points_mm == now.scene.trace_points_mm
     turns_alike = points and base.positions.keys() == now.positions.keys()
-    found = replace(
+    viewed = replace(
         base,
         rotary=now.rotary if turns_alike else RotaryLook(),
         comparison=Comparison(),
         **{name: getattr(now, name) for name in LOOKED_AT},
     )
-    return found.within_reach()
+    return viewed.within_reach()
 
 
 def scene_side(scene: Scene) -> Side:
@@ -51,8 +51,8 @@ def scene_side(scene: Scene) -> Side:
 def pinned_side(state: AppState) -> Side:
     """Make the side "before" of what is steered; it holds no comparison of its own."""
     edited = f"{len(state.changed_keys)} changed" if state.changed_keys else ""
-    words = (state.scene.title or state.scene.name, edited, table_words(state))
-    return Side(f"{BEFORE}: {' · '.join(filter(None, words))}", plain_state(state))
+    title_parts = (state.scene.title or state.scene.name, edited, table_words(state))
+    return Side(f"{BEFORE}: {' · '.join(filter(None, title_parts))}", plain_state(state))
 
 
 def plain_state(state: AppState) -> AppState:
@@ -75,11 +75,11 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     refused = "" if same_nodes(a.grid.nominal_mm, b.grid.nominal_mm) else REFUSED
     difference = None if refused else _difference(a, b)
     scale = _shared_scale(state, [a, b])
-    shown = "b" if refused and chosen.shown == "difference" else chosen.shown
-    drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[shown]
+    view = "b" if refused and chosen.shown == "difference" else chosen.shown
+    drawn, other = {"a": (a, b), "b": (b, a), "difference": (difference or b, None)}[view]
     alike = other is not None and other.drawn_mm.shape == drawn.drawn_mm.shape
     compared = Compared(
-        shown,
+        view,
         (_title(state, chosen.a), _title(state, other_side, chosen.a)),
         (a.state, b.state),
         a.statistics,
@@ -96,8 +96,8 @@ def _title(state: AppState, side: Side, before: Side | None = None) -> str:
     if side.state:
         return side.title
     name = AFTER if before and before.state and not before.is_scene else PRESENT
-    words = (state.scene.title or state.scene.name, table_words(state))
-    return f"{name}: {' · '.join(filter(None, words))}"
+    title_parts = (state.scene.title or state.scene.name, table_words(state))
+    return f"{name}: {' · '.join(filter(None, title_parts))}"
 
 
 def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
@@ -119,8 +119,8 @@ def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
     if state.look.range_mode == "fixed":
         return maps[0].scale
     widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
-    held = choose_scale([one.values for one in maps], state.component, maps[0].quantity)
-    return held if held.high > widest.high else widest
+    shared = choose_scale([one.values for one in maps], state.component, maps[0].quantity)
+    return shared if shared.high > widest.high else widest
 
 
 def with_sides(state: AppState, a: Side, b: Side | None) -> AppState:
@@ -142,15 +142,15 @@ def with_before(state: AppState, side: Side) -> AppState:
 
 
 def applied(state: AppState, scene: Scene) -> AppState:
-    own = state.scene
+    present = state.scene
     if (
-        scene.machine.axes != own.machine.axes
-        or scene.workspace.volume_axes != own.workspace.volume_axes
+        scene.machine.axes != present.machine.axes
+        or scene.workspace.volume_axes != present.workspace.volume_axes
     ):
         return state.with_scene(scene)
     fresh = start_state(scene)
     values = {key: round(value, DIGITS) for key, value in fresh.amplitudes.items()}
-    kept = {
+    inactive = {
         key: value
         for key, value in state.amplitudes.items()
         if key in fresh.amplitudes and not state.exclusions.active(key)
@@ -158,9 +158,9 @@ def applied(state: AppState, scene: Scene) -> AppState:
     start = {key: state.start.get(key, 0.0) for key in fresh.amplitudes}
     return replace(
         state,
-        scene=replace(scene, title=own.title, name=own.name),
+        scene=replace(scene, title=present.title, name=present.name),
         loaded=state.origin,
-        amplitudes={**values, **kept},
+        amplitudes={**values, **inactive},
         start=start,
         tolerances=scene.tolerances,
     )

@@ -41,7 +41,7 @@ class LiveModel:
     """Turns states into pictures; one for all sessions, usable from any thread."""
 
     def __init__(self) -> None:
-        self._kept: Cache[Any] = Cache(CACHE_BYTES)
+        self._cache: Cache[Any] = Cache(CACHE_BYTES)
 
     def evaluate(self, state: AppState) -> LivePicture:
         if state.comparison.b is not None:
@@ -51,7 +51,7 @@ class LiveModel:
     def _single(self, state: AppState) -> LivePicture:
         rotary = state.rotary
         key = _place(state), rotary.off, rotary.own_mm, tuple(rotary.held.items())
-        response: Response = self._kept.get(key, lambda: _build(state), _size)
+        response: Response = self._cache.get(key, lambda: _build(state), _size)
         (grid, basis), traces = response
         field = self._field(state, grid, basis)
         size = model.picture_size_mm(state.scene, grid)
@@ -110,12 +110,14 @@ class LiveModel:
             )
 
         key = "uncertainty", Identity(grid), _place(state)
-        found: FieldUncertainty = self._kept.get(key, build, lambda one: 3 * one.response.nbytes)
-        axes, known = loop_axes(scene.model, state.loop), found.errors.keys
-        acting = (key for key, value in state.active.items() if value and key not in known)
-        unknown = [key for key in acting if parameter(key).axis in axes]
-        doubt = replace(found.errors, unknown=tuple(unknown))
-        return replace(found, errors=doubt, error_um=field.error_um, shares=grid.weights)
+        uncertainty: FieldUncertainty = self._cache.get(
+            key, build, lambda one: 3 * one.response.nbytes
+        )
+        axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
+        unstated = (key for key, value in state.active.items() if value and key not in stated)
+        unknown = [key for key in unstated if parameter(key).axis in axes]
+        errors = replace(uncertainty.errors, unknown=tuple(unknown))
+        return replace(uncertainty, errors=errors, error_um=field.error_um, shares=grid.weights)
 
     def _slices(self, state: AppState) -> Iterator[tuple[str, float, Grid, ErrorField]]:
         scene, workspace = state.scene, state.scene.workspace.moved(state.positions)
@@ -127,8 +129,10 @@ class LiveModel:
         if state.look.surface == "slices":
             for axis, at in slice_positions(scene, state.look, state.machine).items():
                 key = _place(state), axis, at
-                held = self._kept.get(key, partial(build, axis, at), lambda one: _size((one, ())))
-                yield axis, at, held[0], self._field(state, *held)
+                cached = self._cache.get(
+                    key, partial(build, axis, at), lambda one: _size((one, ()))
+                )
+                yield axis, at, cached[0], self._field(state, *cached)
 
     def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
         """Evaluate a grid or traces: to first order, or what a table of compensation leaves.
@@ -142,23 +146,32 @@ class LiveModel:
             amplitudes = np.fromiter(state.active.values(), float, len(state.amplitudes))
             return basis.evaluate(amplitudes, orientation=state.look.tilts and not on_trace)
         loop, point_mm = (of.loop, of.nominal_mm) if on_trace else (state.loop, None)
-        held = tuple((scene.reference or {}).items()), tuple(state.positions.items())
-        key = Identity(controller), Identity(of), Identity(scene.model), held, loop, state.view_key
+        positions = tuple((scene.reference or {}).items()), tuple(state.positions.items())
+        key = (
+            Identity(controller),
+            Identity(of),
+            Identity(scene.model),
+            positions,
+            loop,
+            state.view_key,
+        )
         now = state.active_scene()
-        kept = self._kept.get(
+        prepared = self._cache.get(
             key,
             lambda: controller.at(of.coordinates, of.nominal_mm, now, loop, point_mm),
             lambda found: found.nbytes,
         )
-        return kept.field(now.errors)
+        return prepared.field(now.errors)
 
 
 def _place(state: AppState) -> tuple[object, ...]:
     return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.view_key
 
 
-def _size(held: Response) -> int:
-    return sum(one.position.nbytes + one.orientation.nbytes for _, one in (held[0], *held[1]))
+def _size(response: Response) -> int:
+    return sum(
+        one.position.nbytes + one.orientation.nbytes for _, one in (response[0], *response[1])
+    )
 
 
 def _build(state: AppState) -> Response:
@@ -167,9 +180,9 @@ def _build(state: AppState) -> Response:
     positions = {**scene.workspace.positions, **state.positions}
     points = state.rotary.points_mm(scene)
     groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)
-    given = scene.model, scene.errors, scene.parameter_keys
+    arguments = scene.model, scene.errors, scene.parameter_keys
     traces = tuple(
-        (one, build_basis(*given, one.coordinates, state.view(one.loop), one.nominal_mm))
+        (one, build_basis(*arguments, one.coordinates, state.view(one.loop), one.nominal_mm))
         for one in groups
     )
     return (grid, grid_basis(scene, grid, state.view())), traces
@@ -199,8 +212,8 @@ def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
     if look.range_mode == "shared" and quantity != "uncertainty":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
-        both = (model.coloured_error(one, quantity) for one in (field, opened))
-        lengths = [np.linalg.norm(error, axis=-1) for error in both]
+        errors = (model.coloured_error(one, quantity) for one in (field, opened))
+        lengths = [np.linalg.norm(error, axis=-1) for error in errors]
         return model.choose_scale(lengths, component, quantity)
     end = look.range_top if look.range_mode == "fixed" else None
     return model.choose_scale([values], component, quantity, end=end)

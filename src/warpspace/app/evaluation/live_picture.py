@@ -27,7 +27,7 @@ from warpspace.units import Array
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    shown: str  # what is drawn: "a", "b" or "difference"
+    view: str  # what is drawn: "a", "b" or "difference"
     titles: tuple[str, str]  # names of the two sides
     sides: tuple[AppState, AppState]  # what they are, looked at as now
     a: Statistics
@@ -43,8 +43,8 @@ class Compared:
     def title(self) -> str:
         """Name of what is drawn."""
         a, b = self.titles
-        if self.shown != "difference":
-            return f"A: {a}" if self.shown == "a" else f"B: {b}"
+        if self.view != "difference":
+            return f"A: {a}" if self.view == "a" else f"B: {b}"
         a, b = (
             one.partition(": ")[0] if one.startswith(("after", "before")) else one
             for one in self.titles
@@ -85,13 +85,13 @@ class LivePicture(Picture):
             return None
         return replace(b, error_um=b.error_um - a.error_um)
 
-    def coloured(self, found: SceneOverlay[Any]) -> tuple[Array, ColourScale]:
+    def coloured(self, overlay: SceneOverlay[Any]) -> tuple[Array, ColourScale]:
         """Give what is coloured of it, in the colours of the map; along normals in its own."""
-        if self.state.part.normal and isinstance(found.of, PartMesh):
-            normals = found.of.corners.normals @ found.pose[:3, :3].T
-            values = np.einsum("ij,ij->i", found.error_um[found.at], normals)
+        if self.state.part.normal and isinstance(overlay.of, PartMesh):
+            normals = overlay.of.corners.normals @ overlay.pose[:3, :3].T
+            values = np.einsum("ij,ij->i", overlay.error_um[overlay.at], normals)
             return values, choose_scale([values], "x")
-        values = component_values(found.error_um, self.component)[found.at]
+        values = component_values(overlay.error_um, self.component)[overlay.at]
         return values, choose_scale([values], self.component) if self.tilts else self.scale
 
     @cached_property
@@ -109,8 +109,8 @@ class LivePicture(Picture):
     @property
     def drawn_state(self) -> AppState:
         """The state that is drawn: the one steered, or a side of a comparison."""
-        found = self.compared
-        return self.state if found is None else found.sides[found.shown != "a"]
+        compared = self.compared
+        return self.state if compared is None else compared.sides[compared.view != "a"]
 
     @property
     def title(self) -> str:

@@ -88,14 +88,18 @@ def played_position(state: AppState, angle_deg: float) -> dict[str, float]:
 
 def points_on_traces(picture: LivePicture, position: Mapping[str, float]) -> tuple[Array, Array]:
     """Find where the traced points are at a position of the played axis, [n, 3] each, mm."""
-    found: list[Array] = []
+    interpolated: list[Array] = []
     for lines in picture.traces:
         for number, trace in enumerate(lines.group.traces):
             if trace.axis in position:
                 sweep, at = lines.group.coordinates[trace.axis][number], position[trace.axis]
-                both = np.concatenate([lines.nominal_mm[number], lines.actual_mm[number]], axis=1)
-                found.append(np.array([np.interp(at, sweep, column) for column in both.T]))
-    points = np.reshape(found, (-1, 6))
+                columns = np.concatenate(
+                    [lines.nominal_mm[number], lines.actual_mm[number]], axis=1
+                )
+                interpolated.append(
+                    np.array([np.interp(at, sweep, column) for column in columns.T])
+                )
+    points = np.reshape(interpolated, (-1, 6))
     return points[:, :3], points[:, 3:]
 
 

@@ -63,8 +63,12 @@ def tables_of(scene: Scene) -> Tables:
 
 def own_bodies(machine: definition.Machine) -> dict[str, definition.BodySource]:
     """Give the bodies that a description names, without those of its machine in the library."""
-    known = load_machine(machine.name).bodies if machine.name in machine_names() else {}
-    return {frame: source for frame, source in machine.bodies.items() if known.get(frame) != source}
+    library_bodies = load_machine(machine.name).bodies if machine.name in machine_names() else {}
+    return {
+        frame: source
+        for frame, source in machine.bodies.items()
+        if library_bodies.get(frame) != source
+    }
 
 
 def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
@@ -72,12 +76,12 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
 
     A word that is none changes nothing; what a file could not hold is refused.
     """
-    what, _, rest = word.partition(" ")
+    what, _, arguments = word.partition(" ")
     tables, raw, machine = tables_of(scene), _document(scene), scene.machine
     guides, bodies = raw["machine"].setdefault("gantry", {}), dict(machine.bodies)
-    match what, rest.split(" ", maxsplit=2):
+    match what, arguments.split(" ", maxsplit=2):
         case "chain", _:
-            _rearrange(raw, scene, definition.parse_chain(rest[:MOST_CHAIN_TEXT]))
+            _rearrange(raw, scene, definition.parse_chain(arguments[:MOST_CHAIN_TEXT]))
         case "left" | "right" | "side" | "remove", [axis]:
             _rearrange(raw, scene, _moved(machine, what, axis))
         case "turn", [axis]:
@@ -85,17 +89,19 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
         case "gantry", [axis]:
             if guides.pop(axis, None) is None:
                 across = definition.default_across(machine.axis(axis).name)
-                others = [one for one in machine.axes.values() if one.is_linear]
+                linear = [one for one in machine.axes.values() if one.is_linear]
                 spans = [
                     one.travel[1] - one.travel[0]
-                    for one in others
+                    for one in linear
                     if definition.ACROSS[one.index] == across
                 ]
                 guides[axis] = {"span_mm": max(spans, default=START_SPAN_MM), "across": across}
         case "across", [axis]:
             _entry(tables, "span", axis)
-            taken = (guides[axis]["across"], definition.ACROSS[direction_index(axis)])
-            guides[axis]["across"] = next(name for name in definition.ACROSS if name not in taken)
+            directions = (guides[axis]["across"], definition.ACROSS[direction_index(axis)])
+            guides[axis]["across"] = next(
+                name for name in definition.ACROSS if name not in directions
+            )
         case "mesh", [frame]:
             _entry(tables, what, frame)
             del bodies[frame]
@@ -164,8 +170,8 @@ def _rearrange(raw: Tables, scene: Scene, chain: definition.Chain) -> None:
 
 def _with_machine(scene: Scene, other: Scene) -> tuple[Scene, tuple[str, ...]]:
     """Give a scene the machine, the working volume and the points of another one."""
-    taken = _document(other)
-    raw = _document(scene) | {key: taken[key] for key in ("machine", "workspace", "points_mm")}
+    document = _document(other)
+    raw = _document(scene) | {key: document[key] for key in ("machine", "workspace", "points_mm")}
     return _read(scene, raw, other.machine)
 
 
@@ -214,12 +220,12 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
 
 
 def _without(table: Tables, axes: Collection[str]) -> Tables:
-    kept = {
+    remaining = {
         key: _without(value, axes) if isinstance(value, dict) else value
         for key, value in table.items()
         if key not in axes and (key not in PARAMETERS or PARAMETERS[key].axis not in axes)
     }
-    return {key: value for key, value in kept.items() if value != {}}
+    return {key: value for key, value in remaining.items() if value != {}}
 
 
 def _frames(machine: definition.Machine) -> tuple[object, ...]:
@@ -229,8 +235,8 @@ def _frames(machine: definition.Machine) -> tuple[object, ...]:
 
 def known_alike(machine: definition.Machine) -> definition.Machine | None:
     """Find the machine of the library with the same frames, whatever their travels and ways."""
-    known = map(load_machine, machine_names())
-    return next((one for one in known if _frames(one) == _frames(machine)), None)
+    machines = map(load_machine, machine_names())
+    return next((one for one in machines if _frames(one) == _frames(machine)), None)
 
 
 def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
@@ -247,8 +253,8 @@ def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
             "how {} depends on it": [k for k in depend if parameter(k).axis not in gone],
             "its position at the reference": {axis} & (scene.reference or {}).keys(),
         }
-        said = "; ".join(words.format(", ".join(keys)) for words, keys in parts.items() if keys)
-        yield f"axis {axis} left out{f' and with it {said}' if said else ''}"
+        losses = "; ".join(words.format(", ".join(keys)) for words, keys in parts.items() if keys)
+        yield f"axis {axis} left out{f' and with it {losses}' if losses else ''}"
 
 
 # --- The machine of a state: errors and tolerances that were changed stay, undo takes all back ----
@@ -258,15 +264,20 @@ UNCHANGED = "the machine stays as it was"
 
 def with_word(state: AppState, word: str) -> AppState:
     """Change the machine as a page spells it; what cannot be is refused with a note."""
-    what, *rest = word.split(" ", maxsplit=3)
-    gantry = state.scene.machine.gantries.get(rest[0]) if rest else None
+    what, *arguments = word.split(" ", maxsplit=3)
+    gantry = state.scene.machine.gantries.get(arguments[0]) if arguments else None
     try:
         if word == "own":
             return with_own_machine(state)
-        if what == "guide" and gantry is not None and len(rest) == 3 and rest[1] in ("0", "1"):
-            what = f"guide {int(rest[1]) + 1} of {rest[0]}"
-            value = read_number(what, rest[2], MICROMETRE)
-            return with_guide_error(state, gantry, int(rest[1]), value)
+        if (
+            what == "guide"
+            and gantry is not None
+            and len(arguments) == 3
+            and arguments[1] in ("0", "1")
+        ):
+            what = f"guide {int(arguments[1]) + 1} of {arguments[0]}"
+            value = read_number(what, arguments[2], MICROMETRE)
+            return with_guide_error(state, gantry, int(arguments[1]), value)
         scene, notes = edited(state.scene, word)
         changed = state if scene is state.scene else with_changed_scene(state, scene)
     except WarpspaceError as problem:
@@ -283,9 +294,11 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
     before, keys = state.scene, scene.parameter_keys
     was, stands = before.workspace.positions, scene.workspace.positions
     # an axis whose position in the working volume was changed goes there
-    kept = {axis: at for axis, at in state.positions.items() if was.get(axis) == stands.get(axis)}
+    unmoved = {
+        axis: at for axis, at in state.positions.items() if was.get(axis) == stands.get(axis)
+    }
     positions = {
-        axis: span.clamp(kept.get(axis, stands[axis]), span.low)
+        axis: span.clamp(unmoved.get(axis, stands[axis]), span.low)
         for axis, span in position_spans(scene).items()
     }
     tolerances = of_axes(state.tolerances.own, scene.machine.axes)
@@ -320,28 +333,28 @@ def _amplitude(state: AppState, scene: Scene, key: str) -> float:
 
 def with_own_machine(state: AppState) -> AppState:
     """Go back to machine, working volume and points of the scene as it was opened."""
-    own, scene = state.origin, state.scene
-    if own.machine == scene.machine and own.workspace == scene.workspace:
+    original, scene = state.origin, state.scene
+    if original.machine == scene.machine and original.workspace == scene.workspace:
         return state
-    returned = own.machine.axes.keys() - scene.machine.axes.keys()
+    returned = original.machine.axes.keys() - scene.machine.axes.keys()
     # curves that are the scene's own, but for the working volume, become those again
-    known, present = state.own_curves, scene.errors.functions
-    curves = {key: one for key, one in present.items() if known.get(key) != one}
+    original_curves, present = state.own_curves, scene.errors.functions
+    curves = {key: one for key, one in present.items() if original_curves.get(key) != one}
     orders = {
-        axis: (own if axis in returned else scene).model.convention(axis).name
-        for axis in own.machine.axes
+        axis: (original if axis in returned else scene).model.convention(axis).name
+        for axis in original.machine.axes
     }
-    tolerances = {**of_axes(own.tolerances.own, returned), **state.tolerances.own}
+    tolerances = {**of_axes(original.tolerances.own, returned), **state.tolerances.own}
     joined = replace(
         scene,
         model=replace(scene.model, own_component_errors=tuple(orders.items())),
-        errors=ErrorSet({**own.errors.functions, **curves}),
-        reference=scene.reference and {**(own.reference or {}), **scene.reference},
+        errors=ErrorSet({**original.errors.functions, **curves}),
+        reference=scene.reference and {**(original.reference or {}), **scene.reference},
         tolerances=replace(state.tolerances, own=tolerances),
     )
-    back, notes = _with_machine(joined, own)
+    restored, notes = _with_machine(joined, original)
     state = replace(state, tolerances=joined.tolerances)
-    return with_changed_scene(state, back).noted(*notes)
+    return with_changed_scene(state, restored).noted(*notes)
 
 
 # --- The two guides of a gantry: their errors, which the axis has as mean and rotation ------------
@@ -385,11 +398,11 @@ def _curves(state: AppState, gantry: definition.Gantry) -> tuple[ErrorFunction, 
 def _alike(*curves: ErrorFunction) -> bool:
     if any(curve.amplitude == 0.0 for curve in curves):
         return True
-    one, other = (curve.with_amplitude(1.0) for curve in curves)
+    first, second = (curve.with_amplitude(1.0) for curve in curves)
     if any(curve.has_directions or {*curve.arguments} - {OWN} for curve in curves):
-        return one == other
-    at = np.linspace(*one.span, SAMPLES)
-    return bool(np.abs(one.evaluate(at) - other.evaluate(at)).max() <= ALIKE)
+        return first == second
+    at = np.linspace(*first.span, SAMPLES)
+    return bool(np.abs(first.evaluate(at) - second.evaluate(at)).max() <= ALIKE)
 
 
 # --- The machines to start from: those of the bundled scenes, each once ---------------------------
@@ -398,12 +411,12 @@ def _alike(*curves: ErrorFunction) -> bool:
 @cache
 def library() -> Mapping[str, Scene]:
     """Give a scene of each machine, by the machine's name: it brings its volume and points."""
-    found: dict[str, Scene] = {}
+    scenes: dict[str, Scene] = {}
     for name in scene_names():
         with suppress(WarpspaceError):  # a broken scene beside the others hides none of them
             scene = load_scene(name)
-            found.setdefault(scene.machine.name, scene)
-    return found
+            scenes.setdefault(scene.machine.name, scene)
+    return scenes
 
 
 def with_library_scene(state: AppState, scene: Scene) -> AppState:
@@ -413,7 +426,7 @@ def with_library_scene(state: AppState, scene: Scene) -> AppState:
     """
     if state.origin.machine == scene.machine:
         return with_own_machine(state)
-    left = state.scene.title
-    note = f"{scene.title}, with its own errors: those of {left} are left behind"
-    changed = replace(state.with_scene(scene), left_behind=left)
+    previous = state.scene.title
+    note = f"{scene.title}, with its own errors: those of {previous} are left behind"
+    changed = replace(state.with_scene(scene), left_behind=previous)
     return changed.noted(f"{note}; undo brings them back")

@@ -76,29 +76,29 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Pick
         return None
     origin, unit = ray[:3], ray[3:] / length
     traces = _on_traces(picture, origin, unit) if picture.state.shown.traces else ()
-    found = [*traces, *_on_surfaces(picture, origin, unit)]
-    if not found:
+    hits = [*traces, *_on_surfaces(picture, origin, unit)]
+    if not hits:
         return None
-    picked, distance = min(found, key=lambda one: one[1])
+    picked, distance = min(hits, key=lambda one: one[1])
     return picked, origin + distance * unit
 
 
 def pick_worst(picture: LivePicture) -> Picked:
     """Give the node whose position error is largest in what is drawn."""
-    found = picture.statistics.max_at_axes
+    axes = picture.statistics.max_at_axes
     return Picked(
-        {name: at for name, at in found.items() if is_linear(name) or name in picture.grid.axes}
+        {name: at for name, at in axes.items() if is_linear(name) or name in picture.grid.axes}
     )
 
 
 def _on_surfaces(
     picture: LivePicture, origin: Array, unit: Array
 ) -> Iterator[tuple[Picked, float]]:
-    for one in picture.slices or (picture,):
-        points, triangles, node_of = solid_map(one)
+    for mapped in picture.slices or (picture,):
+        points, triangles, node_of = solid_map(mapped)
         hit = pick_surface(origin, unit, points, triangles)
         if hit is not None:
-            nodes, grid = node_of[hit.vertices], one.grid
+            nodes, grid = node_of[hit.vertices], mapped.grid
             at = {
                 name: float(np.broadcast_to(values, grid.shape).reshape(-1)[nodes] @ hit.weights)
                 for name, values in grid.coordinates.items()
@@ -111,16 +111,16 @@ def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tup
     for lines in picture.traces:
         drawn = [number for number, line in enumerate(lines.each()) if is_moved(line)]
         dense = _denser(lines.actual_mm[drawn])
-        found = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
-        if found is None:
+        hit = pick_point(origin, unit, dense.reshape(-1, 3), TOLERANCE_RAD)
+        if hit is None:
             continue
-        row, sample = divmod(found[0], dense.shape[1])
+        row, sample = divmod(hit[0], dense.shape[1])
         number, shape = drawn[row], lines.actual_mm.shape[:2]
         at = {
             name: float(_denser(np.broadcast_to(values, shape)[..., None])[number, sample, 0])
             for name, values in lines.group.coordinates.items()
         }
-        yield Picked(at, lines.group.loop, lines.group.traces[number].point_mm), found[1]
+        yield Picked(at, lines.group.loop, lines.group.traces[number].point_mm), hit[1]
 
 
 def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int | None:
@@ -128,8 +128,8 @@ def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int |
     path = picture.path
     if path is None or not direction.any():
         return None
-    found = pick_point(origin_mm, direction, path.drawn_mm(picture.exaggeration), TOLERANCE_RAD)
-    return None if found is None else int(path.of.line[found[0]])
+    hit = pick_point(origin_mm, direction, path.drawn_mm(picture.exaggeration), TOLERANCE_RAD)
+    return None if hit is None else int(path.of.line[hit[0]])
 
 
 def _denser(samples: Array) -> Array:
@@ -155,14 +155,16 @@ def explain_point(state: AppState, picked: Picked, exaggeration: float) -> Point
         side = "workpiece" if loop is Loop.WORKPIECE else "tool"
         pose = branch_pose(model, side, coordinates)
         point, shift = transforms.apply(pose, np.asarray(picked.point_mm)), np.zeros(3)
-    found = explain(model, scene.errors, coordinates, state.view(loop), point)
-    drawn_um = found.error_um
+    explanation = explain(model, scene.errors, coordinates, state.view(loop), point)
+    drawn_um = explanation.error_um
     if state.controller is not None:
-        nominal = found.nominal_mm
+        nominal = explanation.nominal_mm
         drawn_um = state.controller.field(coordinates, nominal, scene, loop, nominal).error_um
-    drawn, view = deform(found.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
-    sure = field_uncertainty(scene, found.error_um, coordinates, view, found.nominal_mm)
-    return PointExplanation(at, loop, found, shift, drawn, drawn_um, sure)
+    drawn, view = deform(explanation.nominal_mm + shift, drawn_um, exaggeration), state.view(loop)
+    uncertainty = field_uncertainty(
+        scene, explanation.error_um, coordinates, view, explanation.nominal_mm
+    )
+    return PointExplanation(at, loop, explanation, shift, drawn, drawn_um, uncertainty)
 
 
 def drawn_places(
@@ -174,8 +176,8 @@ def drawn_places(
         name: np.array([one.get(name, stands.get(name, 0.0)) for one in points])
         for name in state.scene.machine.axes
     }
-    seen, field = drawn_field(state, at)
-    return deform(seen, field.error_um, exaggeration)
+    drawn_mm, field = drawn_field(state, at)
+    return deform(drawn_mm, field.error_um, exaggeration)
 
 
 def drawn_field(
@@ -184,11 +186,11 @@ def drawn_field(
     """Tell where points of the surface are drawn without errors, and evaluate them in R, [n]."""
     scene, model, loop = state.active_scene(), state.scene.model, state.loop
     nominal = nominal_point(model, Loop.TOOL, at)
-    seen = seen_from_workpiece(model, at, scene.workspace, nominal)
+    drawn_mm = seen_from_workpiece(model, at, scene.workspace, nominal)
     if state.controller is not None:
-        return seen, state.controller.field(at, nominal, scene, loop, nominal)
+        return drawn_mm, state.controller.field(at, nominal, scene, loop, nominal)
     solve = evaluate_exact if exact else evaluate_first_order
-    return seen, solve(model, scene.errors, at, state.view(), nominal)
+    return drawn_mm, solve(model, scene.errors, at, state.view(), nominal)
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
@@ -234,18 +236,20 @@ def measure_distance(picture: LivePicture) -> tuple[DistanceResult, Array, Array
 @lru_cache(maxsize=1)  # lines and words of one picture ask; it keeps the picture
 def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
     picture: LivePicture = of.target
-    state, told = picture.drawn_state, option_values(picture.state, Distance.name)
+    state, option_texts = picture.drawn_state, option_values(picture.state, Distance.name)
     scene = state.active_scene()
     try:
-        asked = replace(read_form(Distance, Distance.options(), told, scene), loop=state.loop)
-        if not (asked.start and asked.end):
+        distance = replace(
+            read_form(Distance, Distance.options(), option_texts, scene), loop=state.loop
+        )
+        if not (distance.start and distance.end):
             return None
-        at = asked.places(scene, asked.corner)
-        seen, field = drawn_field(state, at, exact=asked.exact)
-        found = asked.between(scene, at, field)
+        at = distance.places(scene, distance.corner)
+        drawn_mm, field = drawn_field(state, at, exact=distance.exact)
+        measurement = distance.between(scene, at, field)
     except WarpspaceError:  # said in its section
         return None
-    return found, seen, deform(seen, field.error_um, picture.exaggeration)
+    return measurement, drawn_mm, deform(drawn_mm, field.error_um, picture.exaggeration)
 
 
 # --- Where a ray from the eye meets a surface or passes a line ------------------------------------
@@ -289,7 +293,7 @@ def pick_point(
         return None
     unit, sight = direction / np.linalg.norm(direction), points - origin
     along = sight @ unit
-    aside = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
-    angle = np.where(along > 0.0, np.arctan2(aside, np.maximum(along, PARALLEL)), np.inf)
+    offset = np.linalg.norm(sight - along[:, None] * unit, axis=-1)
+    angle = np.where(along > 0.0, np.arctan2(offset, np.maximum(along, PARALLEL)), np.inf)
     nearest = int(np.argmin(angle))
     return (nearest, float(along[nearest])) if angle[nearest] <= tolerance else None

@@ -60,25 +60,25 @@ class SceneOverlay(Generic[T]):
         if controller is None:
             amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
             return replace(self, error_um=(amplitudes @ self.response).reshape(-1, 3))
-        kept = _CACHE.get(
+        prepared = _CACHE.get(
             (Identity(controller), Identity(self)),
             lambda: controller.at(self.coordinates, point, scene, Loop.RELATIVE, point),
             lambda found: found.nbytes,
         )
-        error = transforms.rotate(self.turn[..., :3, :3], kept.field(scene.errors).error_um)
+        error = transforms.rotate(self.turn[..., :3, :3], prepared.field(scene.errors).error_um)
         return replace(self, error_um=error.astype(np.float32))
 
 
 def _cached_overlay(
-    state: AppState, own: tuple[Hashable, ...], build: Callable[[Scene], SceneOverlay[T]]
+    state: AppState, arguments: tuple[Hashable, ...], build: Callable[[Scene], SceneOverlay[T]]
 ) -> SceneOverlay[T] | None:
     """Give something with the errors of a state; None where it cannot be made."""
-    key = Identity(state.scene), tuple(state.positions.items()), state.placed, own
+    key = Identity(state.scene), tuple(state.positions.items()), state.placed, arguments
     try:
-        found: SceneOverlay[T] = _CACHE.get(
+        overlay: SceneOverlay[T] = _CACHE.get(
             key, lambda: build(state.standing), lambda found: found.response.nbytes
         )
-        return found.with_errors(state)
+        return overlay.with_errors(state)
     except WarpspaceError:  # its section says it
         return None
 
@@ -93,8 +93,8 @@ def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> SceneOverlay[
     for rows in np.array_split(np.arange(count), -(-count // PIECE) or 1):
         response[:, rows] = point_basis(scene, made, rows=rows).position @ pose[:3, :3].T
     nominal = transforms.apply(pose, made.point_mm).astype(np.float32)
-    here = branch_pose(scene.model, "workpiece", made.coordinates)
-    point, turn = transforms.apply(here, made.point_mm), (pose @ transforms.inverse(here))
+    made_pose = branch_pose(scene.model, "workpiece", made.coordinates)
+    point, turn = transforms.apply(made_pose, made.point_mm), (pose @ transforms.inverse(made_pose))
     flat = response.reshape(len(keys), -1)
     return SceneOverlay(
         of, pose, at, made.coordinates, point, made.outside, turn, nominal, flat, nominal
@@ -106,21 +106,21 @@ def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> SceneOverlay[
 
 def part_overlay(state: AppState) -> SceneOverlay[PartMesh] | None:
     """Give the part as it is cut; None where there is none, or it cannot be clamped."""
-    mesh, wanted = state.part.mesh, state.part.place
+    mesh, place = state.part.mesh, state.part.place
     if mesh is None or not state.part.shown:
         return None
 
     def clamp(scene: Scene) -> SceneOverlay[PartMesh]:
-        part = place_part(mesh, scene, wanted)
+        part = place_part(mesh, scene, place)
         return _respond(scene, part, make_points(scene, part.vertices_mm), part.corners.corner_of)
 
-    return _cached_overlay(state, (Identity(mesh), wanted), clamp)
+    return _cached_overlay(state, (Identity(mesh), place), clamp)
 
 
 def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
     """Give the place of a part whose middle is to stand so, [4, 4], in the workpiece frame."""
-    own = transforms.placed(part.place[:3], part.place[3:])
-    pose = stand @ transforms.translation(-part.middle_mm) @ own
+    placement = transforms.placed(part.place[:3], part.place[3:])
+    pose = stand @ transforms.translation(-part.middle_mm) @ placement
     angles = transforms.roll_pitch_yaw_deg(pose[:3, :3])
     return tuple((np.round([*pose[:3, 3], *angles], 3) + 0.0).tolist())
 
@@ -130,19 +130,19 @@ def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
 
 def path_overlay(state: AppState) -> SceneOverlay[ToolPath] | None:
     """Give the path of the program; None where there is none, or it cannot be followed."""
-    text, told = state.part.program, option_values(state, Program.name) | {"at_line": ""}
+    text, option_texts = state.part.program, option_values(state, Program.name) | {"at_line": ""}
     if text is None:
         return None
 
     def trace(scene: Scene) -> SceneOverlay[ToolPath]:
-        asked = read_form(Program, Program.options(), told, scene)
-        read = read_program(scene, text.splitlines(), asked, state.part.program_name)
+        program = read_form(Program, Program.options(), option_texts, scene)
+        read = read_program(scene, text.splitlines(), program, state.part.program_name)
         path = trace_program(read)
         made = Made(path.tip_mm, path.coordinates, path.error_um, path.outside)
         ends = np.flatnonzero(path.step_mm.any(axis=1))
         return _respond(scene, path, made, np.stack([ends - 1, ends], axis=1))
 
-    return _cached_overlay(state, (text, *sorted(told.items())), trace)
+    return _cached_overlay(state, (text, *sorted(option_texts.items())), trace)
 
 
 def chosen_test(state: AppState) -> type[BenchTest] | None:
@@ -162,12 +162,12 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
 
 def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
     """Give the path of the chosen test; None where none is drawn, or it cannot be run."""
-    kind, told = chosen_test(state), option_values(state, TEST)
-    if kind is None or told.get("path") == "0":
+    kind, option_texts = chosen_test(state), option_values(state, TEST)
+    if kind is None or option_texts.get("path") == "0":
         return None
 
     def lay(scene: Scene) -> SceneOverlay[type[BenchTest]]:
-        plan = plan_test(read_form(kind, kind.settings(), told, scene), scene)
+        plan = plan_test(read_form(kind, kind.settings(), option_texts, scene), scene)
         at, point = plan.coordinates, plan.point_mm
         nominal = seen_from_workpiece(scene.model, at, scene.workspace, point)
         response = respond_sites(scene, plan, scene.parameter_keys).reshape(-1, point.size)
@@ -178,4 +178,4 @@ def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
         )
 
     without = replace(state, controller=None)  # a test is of the machine as it is
-    return _cached_overlay(without, (kind, *sorted(told.items())), lay)
+    return _cached_overlay(without, (kind, *sorted(option_texts.items())), lay)

@@ -20,7 +20,7 @@ from warpspace.app.evaluation.compare import pinned_side, with_before, without_t
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.analysis_panel import RECORD, AnalysisPanel, Question
 from warpspace.app.panels.block_html import details_html, result_html
-from warpspace.app.panels.panel import Context
+from warpspace.app.panels.panel import Context, Refresh
 from warpspace.app.state.app_state import AppState
 from warpspace.exceptions import OptionError
 from warpspace.formats.compensation.compensate import Compensation
@@ -93,7 +93,7 @@ class RepairPanel(AnalysisPanel):
 class BestPanel(RepairPanel):
     """The best adjustment of one error for the largest one, below the worst point."""
 
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context, next(one for one in entries() if one.name == Adjust.name))

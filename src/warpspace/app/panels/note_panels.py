@@ -21,7 +21,7 @@ from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import explain_point, pick_worst, with_picked
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Context, Panel, actions
+from warpspace.app.panels.panel import Context, Panel, Refresh, actions
 from warpspace.app.state.app_state import AppState, Picked
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.tree import leaves, set_leaf, stored
@@ -309,7 +309,7 @@ class NoteNumbersPanel(Panel):
     """What the numbers of notes have become."""
 
     name = "note-numbers"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
     def is_seen(self, state: AppState) -> bool:
         return bool(state.review)
@@ -340,7 +340,7 @@ class StoryPanel(Panel):
     """Tells the story of a scene's notes; the state is not changed by it, only what is shown."""
 
     name = "story"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

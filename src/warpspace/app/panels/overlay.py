@@ -25,7 +25,7 @@ from warpspace.app.drawing.shapes import SCENE_PER_MM
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.evaluation.point_explanation import pick
 from warpspace.app.panels.design import allowed_words
-from warpspace.app.panels.panel import Context, Panel
+from warpspace.app.panels.panel import Context, Panel, Refresh
 from warpspace.app.state.app_state import AppState
 from warpspace.app.state.leaf import Identity
 from warpspace.geometry.surfaces import corners
@@ -39,7 +39,7 @@ class HeadPanel(Panel):
     """Mean and max with the place of the latter."""
 
     name = "head"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         words, place = subject_words(picture), place_words(picture)
@@ -59,7 +59,7 @@ class LegendPanel(Panel):
     """The colour bar, and how much of the volume keeps the limit."""
 
     name = "legend"
-    follows = "often"
+    refresh = Refresh.THROTTLED
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         return (picture.scale, id(picture))
@@ -87,7 +87,7 @@ class OrderPanel(Panel):
     """
 
     name = "order"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
     def pieces(self, picture: LivePicture) -> Mapping[str, str]:
         words, left = [*order_conditions(picture)], picture.state.left_behind
@@ -101,7 +101,7 @@ class RoomPanel(Panel):
     """What the page places by itself as the camera moves, and how large the drawing is."""
 
     name = "room"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

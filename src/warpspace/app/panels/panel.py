@@ -15,8 +15,9 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
+from enum import Enum, auto
 from functools import partial
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from markupsafe import Markup
 from viser import ClientHandle, ViserServer
@@ -192,14 +193,19 @@ def _is_file(event: Event) -> bool:
 
 # --- Parts ----------------------------------------------------------------------------------------
 
-Follows = Literal["at once", "often", "in a pause", "at rest"]
-"""With every picture of a drag; a few times a second, and where the first of what they depend on
-has changed; when the hand pauses; when it has left."""
+
+class Refresh(Enum):
+    """When a panel is rendered after a change of the picture."""
+
+    IMMEDIATE = auto()  # with every picture of a drag
+    THROTTLED = auto()  # a few times a second, and when the first of its dependencies changes
+    DEBOUNCED = auto()  # when changes pause
+    IDLE = auto()  # when nothing has happened for a while
 
 
 class Panel:
     name: str = ""  # its events begin with it
-    follows: ClassVar[Follows] = "in a pause"
+    refresh: ClassVar[Refresh] = Refresh.DEBOUNCED
 
     def __init__(self, context: Context) -> None:
         self.context = context

@@ -25,7 +25,7 @@ from warpspace.app.evaluation.compare import scene_side, with_pin, with_sides
 from warpspace.app.evaluation.live_picture import Compared, LivePicture
 from warpspace.app.panels.conventions import with_travel
 from warpspace.app.panels.form_controls import setting
-from warpspace.app.panels.panel import Panel
+from warpspace.app.panels.panel import Panel, Refresh
 from warpspace.app.state.app_state import COMPARISON_VIEWS, COMPONENT_NAMES, NOBODY, AppState, Side
 from warpspace.app.state.leaf import Identity
 from warpspace.app.state.look import QUANTITIES, SURFACES, slice_positions
@@ -175,7 +175,7 @@ class ComparePanel(Panel):
     """Which two are compared and which of them is drawn, and the numbers of both."""
 
     name = "compare"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def depends(self, picture: LivePicture) -> tuple[object, ...]:
         return (Identity(picture.state.comparison), Identity(picture.compared),
@@ -197,7 +197,7 @@ class ComparePanel(Panel):
                            hint="What is changed from then on is B"))  # fmt: skip
         if found is not None:
             body += [setting(state, "comparison.ghost"), comparison_html(found)]
-        words = "compare" if found is None else COMPARISON_VIEWS[found.shown]
+        words = "compare" if found is None else COMPARISON_VIEWS[found.view]
         return {"compared": "" if found is None else _sides(found),
                 "compare": menu(words, join(body), key="compare", kind="up wide",
                                 hint="Two scenes, or the errors before and after")}  # fmt: skip
@@ -229,7 +229,7 @@ def _sides(found: Compared) -> Markup:
     hints = {"a": found.titles[0], "b": found.titles[1], "difference": change}
     choices = (
         button(words, "state:set.comparison.shown", key, kind="chip", hint=hints[key],
-               pressed=found.shown == key, disabled=bool(found.refused) and key == "difference")
+               pressed=found.view == key, disabled=bool(found.refused) and key == "difference")
         for key, words in COMPARISON_VIEWS.items()
     )  # fmt: skip
     leave = button("✕", "compare:leave", kind="chip", hint="End the comparison",

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from warpspace.app.browser.html import EMPTY, button, join, rows, tag, text_box, upload_button
 from warpspace.app.evaluation.live_picture import LivePicture
 from warpspace.app.panels.file_dialogs import accepted_endings
-from warpspace.app.panels.panel import Context, Panel, Window
+from warpspace.app.panels.panel import Context, Panel, Refresh, Window
 from warpspace.app.state.app_state import AppState, Exclusions
 from warpspace.app.state.tree import put, toggled
 from warpspace.exceptions import OptionError
@@ -219,7 +219,7 @@ class PagePanel(Panel):
     """What acts on the page as a whole: tasks, sections, windows, undo, redo, and all errors."""
 
     name = "page"
-    follows = "at once"
+    refresh = Refresh.IMMEDIATE
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)

@@ -70,30 +70,30 @@ class Rate:
 class Guard:
     """Checks each request before viser answers it, and limits each connection."""
 
-    def __init__(self, doors: RequestPolicy, limits: Limits = LIMITS) -> None:
-        self.limits, self._doors = limits, doors
+    def __init__(self, policy: RequestPolicy, limits: Limits = LIMITS) -> None:
+        self.limits, self._policy = limits, policy
         self._logged: set[str] = set()
 
-    def warn(self, kind: str, text: str, who: object) -> None:
+    def warn(self, kind: str, text: str, client: object) -> None:
         """Log a refusal, if it is the first of its kind: nobody can fill the log."""
         if kind not in self._logged:
             self._logged.add(kind)
-            logger.warning("refused %s: %s (further ones are not logged)", who, text)
+            logger.warning("refused %s: %s (further ones are not logged)", client, text)
 
-    def options(self, theirs: dict[str, Any]) -> dict[str, Any]:
+    def options(self, viser_options: dict[str, Any]) -> dict[str, Any]:
         """Give the options that a server of `websockets` starts with, from those viser has."""
 
         def process_request(connection: ServerConnection, request: Request) -> Any:
             refusal = self._check(connection, request)
             if refusal is None:
-                return theirs["process_request"](connection, request)
+                return viser_options["process_request"](connection, request)
             self.warn(refusal.kind, refusal.text, connection.remote_address)
             return connection.respond(refusal.status, refusal.text + "\n")
 
         def process_response(_: ServerConnection, request: Request, response: Response) -> None:
             response.headers.update(HEADERS)
             if response.status_code < HTTPStatus.BAD_REQUEST:
-                cookie = self._doors.cookie(request)
+                cookie = self._policy.cookie(request)
                 if cookie is not None:
                     response.headers["Set-Cookie"] = cookie
 
@@ -103,7 +103,7 @@ class Guard:
             return connection
 
         return {
-            **theirs,
+            **viser_options,
             "process_request": process_request,
             "process_response": process_response,
             "create_connection": create_connection,
@@ -112,13 +112,13 @@ class Guard:
         }
 
     def _check(self, connection: ServerConnection, request: Request) -> Refusal | None:
-        refusal = self._doors.check(request, plain_address(str(connection.local_address[0])))
-        most = self.limits.sessions
-        if refusal is not None or len(connection.server.connections) < most:
+        refusal = self._policy.check(request, plain_address(str(connection.local_address[0])))
+        limit = self.limits.sessions
+        if refusal is not None or len(connection.server.connections) < limit:
             return refusal
         return Refusal(
             "sessions",
-            f"{most} tabs have the app open, which is all it takes at once: close one and try"
+            f"{limit} tabs have the app open, which is all it takes at once: close one and try"
             " again.",
             HTTPStatus.SERVICE_UNAVAILABLE,
         )
@@ -140,8 +140,8 @@ class TabConnection(ServerConnection):
     def listen(self, take: Callable[[Events], None]) -> None:
         """Have somebody take what the page's scripts say, and have said so far."""
         self._take = take
-        for said in self._early:
-            take(said)
+        for events in self._early:
+            take(events)
 
     async def recv(self, decode: bool | None = None) -> Any:
         """Receive the next message for viser."""
@@ -150,15 +150,15 @@ class TabConnection(ServerConnection):
                 raw = await super().recv(decode)
             except ConnectionClosed as closed:
                 if closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG:
-                    words = f"a message too large, {closed.sent}"
-                    self._guard.warn("size", words, self.remote_address)
+                    reason = f"a message too large, {closed.sent}"
+                    self._guard.warn("size", reason, self.remote_address)
                 raise
             if self._closing is not None:
                 continue  # until the other side has closed as well
             if not self._rate.take():
-                words = f"more than {self._guard.limits.messages_per_second:g} messages a second"
-                self._guard.warn("rate", words, self.remote_address)
-                closing = self.close(CloseCode.POLICY_VIOLATION, words)
+                reason = f"more than {self._guard.limits.messages_per_second:g} messages a second"
+                self._guard.warn("rate", reason, self.remote_address)
+                closing = self.close(CloseCode.POLICY_VIOLATION, reason)
                 self._closing = asyncio.ensure_future(closing)
                 continue
             message = read_message(raw)

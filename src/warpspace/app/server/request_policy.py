@@ -57,10 +57,10 @@ class HostPort:
 
 def read_place(text: str) -> HostPort | None:
     """Read `host`, `host:port` or `[address]:port`; None where it is none of them."""
-    found = _AUTHORITY.fullmatch(text)
-    if found is None:
+    match = _AUTHORITY.fullmatch(text)
+    if match is None:
         return None
-    literal, name, port = found.groups()
+    literal, name, port = match.groups()
     try:
         host = plain_address(literal or name)
     except ValueError:
@@ -117,10 +117,10 @@ class RequestPolicy:
             place.host in self._hosts or (self._everywhere and place.host == arrived_at)
         )
         if place is None or not served:
-            found = ", ".join(hosts) or "none"
+            requested = ", ".join(hosts) or "none"
             return Refusal(
                 "host",
-                f"This app does not serve the host {found[:200]!r}. If a proxy does,"
+                f"This app does not serve the host {requested[:200]!r}. If a proxy does,"
                 " start the app with --allow-host NAME.",
             )
         if origins and not (len(origins) == 1 and self._is_own(origins[0], place)):
@@ -160,12 +160,12 @@ class RequestPolicy:
         return any(_is(value, self._pass) for name, _, value in pairs if name.startswith(COOKIE))
 
     def _is_own(self, url: str, place: HostPort) -> bool:
-        found = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
-        own = None if found is None else read_place(found[2].partition("/")[0])
-        if found is None or own is None:
+        match = _ORIGIN.fullmatch(re.sub(r"\Aws", "http", url))
+        origin = None if match is None else read_place(match[2].partition("/")[0])
+        if match is None or origin is None:
             return False
-        scheme = found[1].lower()
-        return own.usual(scheme) in {at.usual(scheme) for at in (place, *self._allowed)}
+        scheme = match[1].lower()
+        return origin.usual(scheme) in {at.usual(scheme) for at in (place, *self._allowed)}
 
 
 def _query_values(request: Request, *names: str) -> list[str]:

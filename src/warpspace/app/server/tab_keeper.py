@@ -29,7 +29,7 @@ from warpspace.app.documents.transfers import safe_name
 from warpspace.app.drawing.camera import CameraMemory
 from warpspace.app.evaluation.compare import without_table
 from warpspace.app.evaluation.live_picture import LivePicture
-from warpspace.app.panels.panel import Context, Panel
+from warpspace.app.panels.panel import Context, Panel, Refresh
 from warpspace.app.state.app_state import AppState, Comparison
 from warpspace.app.state.store import StateStore
 from warpspace.exceptions import OptionError, WarpspaceError
@@ -65,28 +65,28 @@ class TabMemory:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
-        self._left: OrderedDict[str, tuple[float, TabRecord]] = OrderedDict()
+        self._records: OrderedDict[str, tuple[float, TabRecord]] = OrderedDict()
 
-    def keep(self, token: str, left: TabRecord) -> None:
-        self._left.pop(token, None)
-        self._left[token] = (self._clock() + RETENTION_S, left)
+    def keep(self, token: str, record: TabRecord) -> None:
+        self._records.pop(token, None)
+        self._records[token] = (self._clock() + RETENTION_S, record)
         self.forget()
 
     def forget(self) -> None:
         """Forget what is too old, or too much; the oldest first."""
         now = self._clock()
-        size = sum(left.store.size_bytes for _, left in self._left.values())
-        while self._left:
-            until, oldest = next(iter(self._left.values()))
-            if until >= now and len(self._left) <= MAX_CLOSED_TABS and size <= MAX_HISTORY_BYTES:
+        size = sum(left.store.size_bytes for _, left in self._records.values())
+        while self._records:
+            until, oldest = next(iter(self._records.values()))
+            if until >= now and len(self._records) <= MAX_CLOSED_TABS and size <= MAX_HISTORY_BYTES:
                 break
             size -= oldest.store.size_bytes
-            self._left.popitem(last=False)
+            self._records.popitem(last=False)
 
     def take(self, token: str) -> TabRecord | None:
         """Give back what a tab has left behind, once; None where there is nothing."""
         self.forget()
-        return self._left.pop(token, (0.0, None))[1]
+        return self._records.pop(token, (0.0, None))[1]
 
 
 # --- In the page ----------------------------------------------------------------------------------
@@ -109,37 +109,42 @@ class PageCopy(msgspec.Struct, omit_defaults=True):
     missing: tuple[str, ...] = ()  # what was left out, in words
 
 
-def page_copy_text(state: AppState, camera: CameraMemory | None, known: Sequence[Scene]) -> str:
+def page_copy_text(
+    state: AppState, camera: CameraMemory | None, known_scenes: Sequence[Scene]
+) -> str:
     """Spell a state for its page to keep."""
     bare = without_table(state)
     missing = () if bare is state else (NO_TABLE,)
-    alone = replace(bare, comparison=Comparison())
-    for whole in (bare,) if alone == bare else (bare, alone):
+    single = replace(bare, comparison=Comparison())
+    for candidate in (bare,) if single == bare else (bare, single):
         with suppress(OptionError):
-            file, link = state_to_toml(whole, camera), named_link(whole, camera, known)
-            left_out = missing if whole is bare else (*missing, COMPARISON)
+            file, link = (
+                state_to_toml(candidate, camera),
+                named_link(candidate, camera, known_scenes),
+            )
+            left_out = missing if candidate is bare else (*missing, COMPARISON)
             short = link if link and len(link) <= MAX_LINK else ""
-            kept = PageCopy(file, whole.scene.name, short, left_out)
-            text = msgspec.json.encode(kept).decode()
+            copy = PageCopy(file, candidate.scene.name, short, left_out)
+            text = msgspec.json.encode(copy).decode()
             if len(text) <= MAX_KEPT_TEXT:
                 return text
     return ""
 
 
 def read_page_copy(
-    text: str, known: Sequence[Scene]
+    text: str, known_scenes: Sequence[Scene]
 ) -> tuple[AppState, CameraMemory | None, tuple[str, ...]]:
     """Build what a page has kept; with what has not come back, in words."""
     try:
-        kept = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=PageCopy)
+        copy = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=PageCopy)
     except (ValueError, RecursionError):
         raise OptionError("what this tab has kept cannot be read") from None
-    missing = (*NEVER_RESTORED, *kept.missing)
+    missing = (*NEVER_RESTORED, *copy.missing)
     with suppress(WarpspaceError):
-        state, camera = open_link(kept.link, known)
-        if state_to_toml(state, camera) == kept.file:
+        state, camera = open_link(copy.link, known_scenes)
+        if state_to_toml(state, camera) == copy.file:
             return state, camera, missing
-    state, camera = open_text(kept.file, safe_name(kept.name, "kept"), "what this tab has kept")
+    state, camera = open_text(copy.file, safe_name(copy.name, "kept"), "what this tab has kept")
     return state, camera, (*missing, START_VALUES)
 
 
@@ -166,12 +171,12 @@ class TabKeeper(Panel):
     """Has the page keep what it shows, and takes it back."""
 
     name = "keeper"
-    follows = "at rest"
+    refresh = Refresh.IDLE
 
     def __init__(self, context: Context, *, shared: bool) -> None:
         super().__init__(context)
         self._shared = shared
-        self._may_keep, self._asked = False, False
+        self._may_keep, self._awaits_copy = False, False
 
         @context.client.camera.on_update
         async def _(_: object) -> None:
@@ -179,11 +184,11 @@ class TabKeeper(Panel):
 
         context.page.call("server.watch")
 
-    def begin(self, *, known: bool) -> None:
+    def begin(self, *, is_known: bool) -> None:
         """Find out what the page has kept, once the server knows whether it knows the tab."""
-        self._may_keep, self._asked = True, not known
+        self._may_keep, self._awaits_copy = True, not is_known
         self.context.rest_again()
-        self.context.page.call("server.back", known)
+        self.context.page.call("server.back", is_known)
 
     def is_seen(self, state: AppState) -> bool:  # noqa: ARG002
         return self._may_keep and self.context.telling is None
@@ -198,8 +203,8 @@ class TabKeeper(Panel):
         return {}
 
     def take(self, state: AppState, word: str, value: str) -> AppState:
-        if word == "kept" and self._asked:
-            self._asked = False
+        if word == "kept" and self._awaits_copy:
+            self._awaits_copy = False
             self.context.act(partial(self._restore, value))
         return state
 

@@ -46,13 +46,13 @@ LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 def resolve_host(host: str) -> str:
     try:
-        found = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
+        addresses = socket.getaddrinfo(host or " ", None, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError, ValueError):
         raise OptionError(
             f"--host {host!r} cannot be resolved; expected an address of this machine,"
             " for instance 127.0.0.1 (this machine only) or 0.0.0.0 (all networks)"
         ) from None
-    return str(found[0][4][0])
+    return str(addresses[0][4][0])
 
 
 def is_local(address: str) -> bool:
@@ -68,12 +68,12 @@ def served_names(host: str, address: str) -> frozenset[str]:
     names = {host.lower(), plain_address(address)}
     if is_local(address):
         return frozenset(names | LOOPBACK_NAMES)
-    own = socket.gethostname()
+    hostname = socket.gethostname()
     if is_everywhere(address):
-        return frozenset(names | LOOPBACK_NAMES | {own.lower()})
+        return frozenset(names | LOOPBACK_NAMES | {hostname.lower()})
     with contextlib.suppress(OSError, UnicodeError):
-        if address in {str(found[4][0]) for found in socket.getaddrinfo(own, None)}:
-            names.add(own.lower())
+        if address in {str(found[4][0]) for found in socket.getaddrinfo(hostname, None)}:
+            names.add(hostname.lower())
     return frozenset(names)
 
 
@@ -236,7 +236,7 @@ class Viewer:
         self.token = (access := access or Access()).choose_token(local=self.is_local)
         self._services = replace(services or Services(), token=self.token)
         self.port = free_port(self.address, port)
-        doors = RequestPolicy(
+        policy = RequestPolicy(
             served_names(host, self.address),
             self.port,
             everywhere=is_everywhere(self.address),
@@ -251,7 +251,7 @@ class Viewer:
         self._lock = threading.Lock()
         self._memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
-        self._server = _serve(self.address, self.port, Guard(doors))
+        self._server = _serve(self.address, self.port, Guard(policy))
         light_scene(self._server.scene)
         send_script_to_all(self._server, f"{page_script()}\nwarpspacePage.arrive();")
         self._server.on_client_connect(self._connect)
@@ -298,8 +298,8 @@ class Viewer:
         scenes = SceneList(self._scenes)
         context = Context(self._server, client, store, scenes, self._services)
         context.notes += self._notes
-        others = (lambda: [one.context for one in self.sessions]) if self._shared else None
-        session = Session(context, self._live, self._claim, review_tabs=others)
+        review_tabs = (lambda: [one.context for one in self.sessions]) if self._shared else None
+        session = Session(context, self._live, self._claim, review_tabs=review_tabs)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.take)
@@ -312,15 +312,15 @@ class Viewer:
             if session not in self._sessions.values():
                 return None  # its connection is gone already: it must not take what it left
             twins = [s for s in self._sessions.values() if s is not session and s.token == token]
-            left = self._memory.take(token)
+            record = self._memory.take(token)
             if not twins:
                 session.token = token
         if twins:
             # a duplicated tab, or one whose old connection is not yet known to be dead
             twin = twins[0].context.store
-            left = TabRecord(twin.joined() if self._shared else twin.copy(), None)
+            record = TabRecord(twin.joined() if self._shared else twin.copy(), None)
             session.rename(new_token())
-        return left
+        return record
 
     async def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:
@@ -396,13 +396,13 @@ def run_viewer(
     browser: bool,
     say: Callable[[str], None],
     warn: Callable[[str], None],
-    **how: Any,
+    **options: Any,
 ) -> None:
     """Serve the app until it is interrupted; `how` goes to `Viewer`."""
     # a tab may close while something is on its way to it
     warnings.filterwarnings("ignore", message="Queued an? .* on a closed connection")
     limit_log()
-    with Viewer(scene, scenes, **how) as viewer:
+    with Viewer(scene, scenes, **options) as viewer:
         try:
             say(f"{scene.title} is shown at {viewer.link} (Ctrl-C ends it)")
             if not viewer.is_local:
@@ -410,7 +410,7 @@ def run_viewer(
                 if code:
                     say(draw_code(viewer.network_link))
                 if viewer.token is None:
-                    warn(NO_AUTHENTICATION.format(host=how["host"]))
+                    warn(NO_AUTHENTICATION.format(host=options["host"]))
             elif viewer.token is None and has_other_users():
                 warn(OTHER_USERS)
             if browser and not open_browser(viewer.link):

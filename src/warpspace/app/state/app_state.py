@@ -202,17 +202,17 @@ class PartLook:
     @classmethod
     def of_scene(cls, scene: Scene) -> tuple["PartLook", tuple[str, ...]]:
         """Return what a scene names, and why some files cannot be read: only their names."""
-        own, mesh, text, notes = scene.part, None, None, list[str]()
+        part, mesh, text, notes = scene.part, None, None, list[str]()
         try:
-            if path := own.path("program"):
+            if path := part.path("program"):
                 text = "".join(program_lines(path))
-            if path := own.path("file"):
-                mesh = _load_part(path, own.unit or None)
+            if path := part.path("file"):
+                mesh = _load_part(path, part.unit or None)
         except WarpspaceError as error:
             notes.append(str(error))
         except Exception as error:  # noqa: BLE001 - whatever a file holds, the scene opens
             notes.append(f"part of the scene: {error!r}")
-        look = cls(mesh, Path(own.file).name, own.place, text, Path(own.program).name)
+        look = cls(mesh, Path(part.file).name, part.place, text, Path(part.program).name)
         return look, tuple(notes)
 
     @property
@@ -381,15 +381,18 @@ class AppState:
     @property
     def own_curves(self) -> Mapping[str, ErrorFunction]:
         """The curves of the scene as it was opened, over the present working volume."""
-        own, present = self.origin, self.scene
-        if own.workspace == present.workspace and own.machine.axes == present.machine.axes:
-            return own.errors.functions
-        found: dict[str, ErrorFunction] = {}
-        for key, function in own.errors.functions.items():
+        original, present = self.origin, self.scene
+        if (
+            original.workspace == present.workspace
+            and original.machine.axes == present.machine.axes
+        ):
+            return original.errors.functions
+        curves: dict[str, ErrorFunction] = {}
+        for key, function in original.errors.functions.items():
             if parameter(key).axis in present.machine.axes:
                 span = present.axis_span(parameter(key).axis)
-                found[key] = replace(function.for_span(span), span=span)
-        return found
+                curves[key] = replace(function.for_span(span), span=span)
+        return curves
 
     @property
     def active(self) -> Mapping[str, float]:
@@ -419,8 +422,8 @@ class AppState:
         """Give the scene that the state amounts to: what is saved, drawn and exported."""
         scene, limit = self.scene, self.specification.limit_um
         keys = [k for k, at in self.amplitudes.items() if at or k in scene.errors.functions]
-        known = scene.workspace.positions
-        moved = {axis: at for axis, at in self.positions.items() if at != known.get(axis)}
+        scene_positions = scene.workspace.positions
+        moved = {axis: at for axis, at in self.positions.items() if at != scene_positions.get(axis)}
         return replace(
             scene,
             errors=ErrorSet({key: self.curve(key) for key in keys}),
@@ -448,8 +451,8 @@ class AppState:
 
     def noted(self, *notes: str) -> "AppState":
         """Say what could not be taken as it was given; an empty note is none."""
-        found = tuple(filter(None, notes))
-        return replace(self, notes=(*self.notes, *found)) if found else self
+        texts = tuple(filter(None, notes))
+        return replace(self, notes=(*self.notes, *texts)) if texts else self
 
     def without_notes(self) -> "AppState":
         return replace(self, notes=()) if self.notes else self
@@ -460,22 +463,22 @@ class AppState:
 
     def with_scene(self, scene: Scene) -> "AppState":
         """Show another scene, in its own loop; component, density and switches stay."""
-        fresh, kept = start_state(scene), {name: getattr(self, name) for name in KEPT_FIELDS}
+        fresh, unchanged = start_state(scene), {name: getattr(self, name) for name in KEPT_FIELDS}
         if not fresh.part.is_empty:
-            kept["part"], kept["look"] = fresh.part, replace(self.look, surface="grid")
-            kept["forms"] = {**self.forms, **fresh.forms}
-        shown = replace(
+            unchanged["part"], unchanged["look"] = fresh.part, replace(self.look, surface="grid")
+            unchanged["forms"] = {**self.forms, **fresh.forms}
+        changed = replace(
             fresh,
             specification=self.specification if scene.limit_um is None else fresh.specification,
             rotary=replace(self.rotary, off=frozenset()),
-            **kept,
+            **unchanged,
         )
-        return shown.within_reach()
+        return changed.within_reach()
 
     def within_reach(self) -> "AppState":
         """Bring slices, axes and held angles into the scene's ranges; those without axis go."""
         spans, slices = linear_spans(self.scene), slice_spans(self.scene)
-        held = {
+        held_at = {
             axis: tuple(at for at in self.rotary.held.get(axis, ()) if span.low <= at <= span.high)
             for axis, span in self.position_spans.items()
         }
@@ -483,7 +486,7 @@ class AppState:
             self,
             look=replace(self.look, slices_mm=clamped(slices, self.look.slices_mm)),
             machine=replace(self.machine, linear_mm=clamped(spans, self.machine.linear_mm)),
-            rotary=replace(self.rotary, held={axis: at for axis, at in held.items() if at}),
+            rotary=replace(self.rotary, held={axis: at for axis, at in held_at.items() if at}),
         )
 
     def with_edited(self, scene: Scene) -> "AppState":

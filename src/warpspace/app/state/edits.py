@@ -46,8 +46,8 @@ def with_curve(state: AppState, key: str, function: ErrorFunction) -> AppState:
 
 def half_width_of(state: AppState, key: str) -> float:
     """Give the half width of a parameter's tolerance, µm or µrad; 0 where it has none."""
-    found = state.tolerances.get(key)
-    return 0.0 if found is None else found.half_width
+    tolerance = state.tolerances.get(key)
+    return 0.0 if tolerance is None else tolerance.half_width
 
 
 def half_width_span(state: AppState, key: str) -> Span:
@@ -55,16 +55,16 @@ def half_width_span(state: AppState, key: str) -> Span:
 
     It holds the present half width, which an allocation may have made wider.
     """
-    found = state.origin.tolerances.get(key)
-    widest = max(2.0 * (found.half_width if found else 0.0), LEAST_HALF_WIDTH)
+    tolerance = state.origin.tolerances.get(key)
+    widest = max(2.0 * (tolerance.half_width if tolerance else 0.0), LEAST_HALF_WIDTH)
     return _span(0.0, max(widest, half_width_of(state, key)))
 
 
 def with_scene_tolerances(state: AppState) -> AppState:
-    own = state.origin.tolerances
+    original = state.origin.tolerances
     # an edited machine may not have all axes of the scene's
-    kept = {key: own.own[key] for key in own.own if key in state.amplitudes}
-    return replace(state, tolerances=replace(own, own=kept))
+    tolerances = {key: original.own[key] for key in original.own if key in state.amplitudes}
+    return replace(state, tolerances=replace(original, own=tolerances))
 
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:

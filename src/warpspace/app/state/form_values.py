@@ -39,32 +39,32 @@ def _is_known(name: str) -> bool:
     part, dot, option = name.partition(".")
     if not dot:
         return name == TEST
-    known = part == TEST or part in {one.name for one in entries()}
-    return known and _OPTION.fullmatch(option) is not None
+    is_listed = part == TEST or part in {one.name for one in entries()}
+    return is_listed and _OPTION.fullmatch(option) is not None
 
 
 def option_values(state: AppState, name: str) -> dict[str, str]:
     """Give what was told of the options of an analysis."""
-    own = f"{name}."
-    return {k.removeprefix(own): v for k, v in state.forms.items() if k.startswith(own)}
+    prefix = f"{name}."
+    return {k.removeprefix(prefix): v for k, v in state.forms.items() if k.startswith(prefix)}
 
 
 def read_form(
     kind: type[A], options: Sequence[Option], values: Mapping[str, str], scene: Scene
 ) -> A:
     """Build an analysis from what was typed; an `OptionError` names an option as ``{name}``."""
-    given: dict[str, Any] = {}
-    for one in options:
-        text = values.get(one.name)
-        if text is None or (not text.strip() and one.kind is not bool):
+    arguments: dict[str, Any] = {}
+    for option in options:
+        text = values.get(option.name)
+        if text is None or (not text.strip() and option.kind is not bool):
             continue
-        if one.kind is bool:
-            given[one.name] = text == "1"
-        elif one.kind in (int, float) and one.grammar is None:
-            number = read_typed(text, one.unit)
+        if option.kind is bool:
+            arguments[option.name] = text == "1"
+        elif option.kind in (int, float) and option.grammar is None:
+            number = read_typed(text, option.unit)
             if number is None:
-                raise OptionError(f"{{{one.name}}} {text!r}; expected a number")
-            given[one.name] = one.kind(number)
+                raise OptionError(f"{{{option.name}}} {text!r}; expected a number")
+            arguments[option.name] = option.kind(number)
         else:
-            given[one.name] = one.read(text, scene)
-    return kind(**given)
+            arguments[option.name] = option.read(text, scene)
+    return kind(**arguments)

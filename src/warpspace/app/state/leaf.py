@@ -24,8 +24,8 @@ class Unreadable(ValueError):  # noqa: N818 - it is handled where text is read
 class Identity:
     """An object as part of a key, compared by identity (and held, so that its id stays its own)."""
 
-    def __init__(self, thing: Any) -> None:
-        self.target = thing
+    def __init__(self, target: Any) -> None:
+        self.target = target
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Identity) and other.target is self.target
@@ -44,13 +44,13 @@ class Span:
         """Bring a number that may be anything into the range; what is no number falls back."""
         if math.isnan(value):
             return fallback
-        kept = min(max(value, self.low), self.high)
-        return 0.0 if 0.0 < abs(kept) < MIN_NUMBER else kept
+        clamped = min(max(value, self.low), self.high)
+        return 0.0 if 0.0 < abs(clamped) < MIN_NUMBER else clamped
 
     def clamped_words(self, value: float, clamped: float, name: str, unit: str) -> str:
         allowed = f"{self.low:g} to {self.high:g} {unit}".rstrip()
-        shown = f"{clamped:g} {unit}".rstrip()
-        return f"{name} = {value:g} is outside {allowed}; clamped to {shown}"
+        text = f"{clamped:g} {unit}".rstrip()
+        return f"{name} = {value:g} is outside {allowed}; clamped to {text}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,18 +76,18 @@ class Leaf:
 
 
 def leaf_metadata(
-    label: str, *, choices: Choices | Callable[[Any], Choices] | None = None, **words: Any
+    label: str, *, choices: Choices | Callable[[Any], Choices] | None = None, **attributes: Any
 ) -> dict[str, Leaf]:
     """Give the metadata of a field; in `linked`, ``{path}`` and ``{key}`` (of an entry) are put."""
-    words = {"linked": "{path}", **words}
+    attributes = {"linked": "{path}", **attributes}
     if choices is not None:
-        words["choose" if callable(choices) else "choices"] = choices
-    return {DESCRIBED: Leaf("", label, **words)}
+        attributes["choose" if callable(choices) else "choices"] = choices
+    return {DESCRIBED: Leaf("", label, **attributes)}
 
 
-def described(default: T, label: str, **words: Any) -> T:
+def described(default: T, label: str, **attributes: Any) -> T:
     """Give a field with a default; its kind follows from that where none is said."""
-    has_choices = bool(words.get("choices"))
+    has_choices = bool(attributes.get("choices"))
     if isinstance(default, bool):
         kind = "switch"
     elif isinstance(default, frozenset):
@@ -96,8 +96,8 @@ def described(default: T, label: str, **words: Any) -> T:
         kind = "choice"
     else:
         kind = "text" if isinstance(default, str) else "number"
-    words = {"kind": kind, **words}
-    return field(default_factory=lambda: default, metadata=leaf_metadata(label, **words))
+    attributes = {"kind": kind, **attributes}
+    return field(default_factory=lambda: default, metadata=leaf_metadata(label, **attributes))
 
 
 def description(entry: "Field[Any]") -> Leaf | None:

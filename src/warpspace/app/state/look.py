@@ -144,8 +144,8 @@ class RotaryLook:
 
     def points_mm(self, scene: Scene) -> tuple[Vector, ...]:
         """List the points that are traced, mm in the workpiece frame."""
-        found = [p for n, p in enumerate(scene.trace_points_mm) if str(n) not in self.off]
-        return (*found, *(() if self.own_mm is None else (self.own_mm,)))
+        points = [p for n, p in enumerate(scene.trace_points_mm) if str(n) not in self.off]
+        return (*points, *(() if self.own_mm is None else (self.own_mm,)))
 
 
 # --- Where the axes of a scene can stand, and where they do ---------------------------------------
@@ -174,13 +174,13 @@ def linear_spans(scene: Scene) -> dict[str, Span]:
 
 def _spans(scene: Scene, *, within: bool) -> dict[str, Span]:
     """Give the travels of axes, widened where the workspace reaches beyond."""
-    found: dict[str, Span] = {}
+    spans: dict[str, Span] = {}
     for name, axis in scene.machine.axes.items():
         if (axis.is_linear or name in scene.workspace.volume_axes) is within:
             low, high = axis.travel
             first, last = scene.workspace.ranges.get(name, (low, high))
-            found[name] = Span(min(low, first), max(high, last), 1.0)
-    return found
+            spans[name] = Span(min(low, first), max(high, last), 1.0)
+    return spans
 
 
 def clamped(spans: Mapping[str, Span], positions: Mapping[str, float]) -> dict[str, float]:

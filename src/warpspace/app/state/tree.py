@@ -46,8 +46,8 @@ def leaves(state: AppState) -> Mapping[str, Leaf]:
 def _leaves(scene: Identity, quantity: str) -> Mapping[str, Leaf]:
     state = start_state(scene.target)
     state = replace(state, look=replace(state.look, quantity=quantity))
-    found = [leaf for entry in fields(AppState) for leaf in _described(state, entry)]
-    return {leaf.path: leaf for leaf in (*found, *_picked_leaves(state))}
+    described = [leaf for entry in fields(AppState) for leaf in _described(state, entry)]
+    return {leaf.path: leaf for leaf in (*described, *_picked_leaves(state))}
 
 
 def _described(state: AppState, entry: "Field[Any]", prefix: str = "") -> Iterator[Leaf]:
@@ -106,29 +106,29 @@ def stored(state: AppState, path: str) -> Any:
         if picked is None or picked.point_mm is None:
             return None
         return f"{picked.loop},{_spell_numbers(picked.point_mm)}"
-    found: Any = state
+    branch: Any = state
     for name in path.split("."):
-        found = found.get(name) if isinstance(found, Mapping) else getattr(found, name, None)
-    return found
+        branch = branch.get(name) if isinstance(branch, Mapping) else getattr(branch, name, None)
+    return branch
 
 
 def spell(state: AppState, path: str) -> str:
     return spell_value(leaves(state)[path], value(state, path))
 
 
-def spell_value(leaf: Leaf, found: Any) -> str:
+def spell_value(leaf: Leaf, setting: Any) -> str:
     """Spell a value; numbers to the last bit."""
-    if isinstance(found, Picked):
-        return " ".join(f"{axis} {at!r}" for axis, at in found.at.items())
-    if found is None:
+    if isinstance(setting, Picked):
+        return " ".join(f"{axis} {at!r}" for axis, at in setting.at.items())
+    if setting is None:
         return next(iter(leaf.choices), "")
-    if isinstance(found, bool):
-        return "1" if found else "0"
-    if isinstance(found, frozenset):
-        return ",".join(sorted(cast("frozenset[str]", found)))
-    if isinstance(found, tuple):
-        return _spell_numbers(cast("tuple[float, ...]", found))
-    return repr(found) if isinstance(found, float) else str(found)
+    if isinstance(setting, bool):
+        return "1" if setting else "0"
+    if isinstance(setting, frozenset):
+        return ",".join(sorted(cast("frozenset[str]", setting)))
+    if isinstance(setting, tuple):
+        return _spell_numbers(cast("tuple[float, ...]", setting))
+    return repr(setting) if isinstance(setting, float) else str(setting)
 
 
 def _spell_numbers(numbers: Sequence[float]) -> str:
@@ -172,19 +172,21 @@ AFTER: Mapping[str, Callable[[AppState], AppState]] = {
 def set_leaf(state: AppState, leaf: Leaf, text: str) -> AppState:
     """Set a leaf to what a text says and to nothing else; raises `Unreadable`."""
     text = text[:LONGEST].encode("utf-8", "replace").decode()
-    own = SETTERS.get(leaf.path) or SETTERS.get(leaf.path.rpartition(".")[0])
-    if own is not None:
-        return own(state, leaf, text)
-    found, note = read_value(leaf, text, stored(state, leaf.path))
-    return _with(state, leaf.path.split("."), found).noted(note)
+    setter = SETTERS.get(leaf.path) or SETTERS.get(leaf.path.rpartition(".")[0])
+    if setter is not None:
+        return setter(state, leaf, text)
+    setting, note = read_value(leaf, text, stored(state, leaf.path))
+    return _with(state, leaf.path.split("."), setting).noted(note)
 
 
-def _with(thing: Any, names: Sequence[str], found: Any) -> Any:
-    name, *rest = names
-    if isinstance(thing, Mapping):
-        entries = {**cast("Mapping[str, Any]", thing), name: found}
+def _with(branch: Any, names: Sequence[str], setting: Any) -> Any:
+    name, *path = names
+    if isinstance(branch, Mapping):
+        entries = {**cast("Mapping[str, Any]", branch), name: setting}
         return {key: entry for key, entry in entries.items() if entry != ()}
-    return replace(thing, **{name: _with(getattr(thing, name), rest, found) if rest else found})
+    return replace(
+        branch, **{name: _with(getattr(branch, name), path, setting) if path else setting}
+    )
 
 
 # --- Leaves that are set in a way of their own ----------------------------------------------------
@@ -193,9 +195,9 @@ def _with(thing: Any, names: Sequence[str], found: Any) -> Any:
 def _with_half_width(state: AppState, leaf: Leaf, text: str) -> AppState:
     key = leaf.path.rpartition(".")[2]
     widest = max(MAX_HALF_WIDTH, edits.half_width_span(state, key).high)
-    kept, note = _number(replace(leaf, span=Span(0.0, widest, 0.1)), text)
-    kept = 0.0 if kept < MIN_HALF_WIDTH else kept
-    return edits.with_half_widths(state, {key: kept}).noted(note)
+    half_width, note = _number(replace(leaf, span=Span(0.0, widest, 0.1)), text)
+    half_width = 0.0 if half_width < MIN_HALF_WIDTH else half_width
+    return edits.with_half_widths(state, {key: half_width}).noted(note)
 
 
 def _with_costs(state: AppState, _leaf: Leaf, text: str) -> AppState:
@@ -208,8 +210,8 @@ def _with_costs(state: AppState, _leaf: Leaf, text: str) -> AppState:
             raise Unreadable(f"{key}: no parameter of this machine")
         if not COST[0] <= cost <= COST[1]:
             raise Unreadable(f"{key}={cost:g}: expected {COST[0]:g} to {COST[1]:g}")
-    found = ",".join(f"{key}={cost:g}" for key, cost in costs.items() if cost != 1.0)
-    return replace(state, specification=replace(state.specification, costs=found))
+    normalised = ",".join(f"{key}={cost:g}" for key, cost in costs.items() if cost != 1.0)
+    return replace(state, specification=replace(state.specification, costs=normalised))
 
 
 FARTHEST_MM = 1e5  # farthest point of a workpiece that a link may ask about
@@ -220,9 +222,9 @@ def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
     if not text.strip():
         return replace(state, picked=None, lever="")
     typed, spans = read_positions(text), linear_spans(state.scene)
-    known = {*spans, *state.positions}
-    if typed is None or not typed.keys() <= known:
-        expected = f"expected positions of the axes {', '.join(sorted(known, key=axis_order))}"
+    axes = {*spans, *state.positions}
+    if typed is None or not typed.keys() <= axes:
+        expected = f"expected positions of the axes {', '.join(sorted(axes, key=axis_order))}"
         raise Unreadable(f"{expected}, for instance {EXAMPLE}")
     before = {} if state.picked is None else state.picked.at
     stands = {**state.scene.workspace.positions, **before}
@@ -234,8 +236,8 @@ def _with_point(state: AppState, _leaf: Leaf, text: str) -> AppState:
 
 
 def _with_trace(state: AppState, _leaf: Leaf, text: str) -> AppState:
-    loop, _, rest = text.partition(",")
-    point = [read_typed(word) for word in rest.split(",")]
+    loop, _, point_text = text.partition(",")
+    point = [read_typed(word) for word in point_text.split(",")]
     near = [at for at in point if at is not None and abs(at) <= FARTHEST_MM]
     if loop not in [*Loop] or len(point) != 3 or len(near) != 3:
         raise Unreadable("expected a loop and a traced point")
@@ -275,14 +277,14 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
         case "number" if plain in leaf.choices:
             return None, ""
         case "number":
-            kept, note = _number(leaf, text)
+            number, note = _number(leaf, text)
             if isinstance(old, int) and leaf.span is not None:
                 low, step = leaf.span.low, leaf.span.step
-                return int(low + step * math.floor((kept - low) / step + 0.5)), note
-            return kept, note
+                return int(low + step * math.floor((number - low) / step + 0.5)), note
+            return number, note
         case "numbers" if leaf.span is not None:
-            found, note = read_list(text, leaf.span)
-            return found, f"{leaf.label}: {note}" if note else ""
+            numbers, note = read_list(text, leaf.span)
+            return numbers, f"{leaf.label}: {note}" if note else ""
         case "point":
             return _read_point(leaf, text) if plain else (None, "")
         case "switch":
@@ -291,8 +293,8 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
             return SWITCHES[plain], ""
         case "choice":
             if text not in leaf.choices:
-                known = ", ".join(filter(None, leaf.choices))
-                raise Unreadable(f"expected one of {known}"[:LONGEST_NOTE])
+                allowed = ", ".join(filter(None, leaf.choices))
+                raise Unreadable(f"expected one of {allowed}"[:LONGEST_NOTE])
             return (type(old)(text) if isinstance(old, StrEnum) else text), ""
         case "keys" | "names":
             return _read_keys(leaf, text, old)
@@ -304,13 +306,13 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
 
 def _number(leaf: Leaf, text: str) -> tuple[float, str]:
     """Read a number, with or without its unit, and bring it into the range of its leaf."""
-    given = read_typed(text.strip().removeprefix("×"), leaf.unit)
-    if given is None:
+    typed = read_typed(text.strip().removeprefix("×"), leaf.unit)
+    if typed is None:
         raise Unreadable("expected a number")
-    kept = given if leaf.span is None else leaf.span.clamp(given, given)
-    if leaf.span is None or kept == given:
-        return kept, ""
-    return kept, leaf.span.clamped_words(given, kept, words_of(leaf), leaf.unit)
+    clamped = typed if leaf.span is None else leaf.span.clamp(typed, typed)
+    if leaf.span is None or clamped == typed:
+        return clamped, ""
+    return clamped, leaf.span.clamped_words(typed, clamped, words_of(leaf), leaf.unit)
 
 
 def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
@@ -319,24 +321,26 @@ def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
     parts = parts if len(parts) in counts else text.split(",")
     if len(parts) not in counts:
         raise Unreadable(f"expected three numbers{', or six with turns' * (len(counts) > 1)}")
-    found = [_number(leaf, part.strip().rstrip(",")) for part in parts]
-    return tuple(kept for kept, _ in found), "; ".join(filter(None, (note for _, note in found)))
+    numbers = [_number(leaf, part.strip().rstrip(",")) for part in parts]
+    return tuple(kept for kept, _ in numbers), "; ".join(
+        filter(None, (note for _, note in numbers))
+    )
 
 
 def _read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[str], str]:
     """Read a list of words in place of a set, or words with + or - that come to it or leave it."""
-    words = [word.strip()[:LONGEST_NAME] for word in text.split(",") if word.strip()]
+    entries = [word.strip()[:LONGEST_NAME] for word in text.split(",") if word.strip()]
     unknown: list[str] = []
-    changes = bool(words) and all(word[0] in "+-" for word in words)
-    found = set(old) if changes else set[str]()
-    for word in words:
+    changes = bool(entries) and all(word[0] in "+-" for word in entries)
+    names = set(old) if changes else set[str]()
+    for word in entries:
         name = word[1:] if changes else word
         if leaf.kind == "keys" and name not in leaf.choices:
             unknown.append(name)
         elif changes and word[0] == "-":
-            found.discard(name)
+            names.discard(name)
         else:
-            found.add(name)
-    kept = frozenset(sorted(found)[:MOST_NAMES] if leaf.kind == "names" else found)
+            names.add(name)
+    keys = frozenset(sorted(names)[:MOST_NAMES] if leaf.kind == "names" else names)
     note = f"{words_of(leaf)}: {', '.join(unknown[:4])} left out, which mean nothing here"
-    return kept, note if unknown else ""
+    return keys, note if unknown else ""

@@ -70,12 +70,12 @@ def _cells(line: str) -> Sequence[str]:
 
 def _numbers(number: int, line: str) -> tuple[float, ...]:
     values = [read_typed(cell) for cell in _cells(line)]
-    found = tuple(value for value in values if value is not None)
-    if len(found) != len(values):
+    numbers = tuple(value for value in values if value is not None)
+    if len(numbers) != len(values):
         raise OptionError(
             f"row {number}: {line[:_MAX_QUOTED]!r} holds what is no number; expected finite numbers"
         )
-    return found
+    return numbers
 
 
 # --- Positions of axes, and costs of tolerances ---------------------------------------------------
@@ -93,23 +93,27 @@ def read_positions(text: str) -> dict[str, float] | None:
     plain = text[:MOST_TYPED].translate(_SIGNS).partition(IN_R)[0].strip()
     plain = plain.removeprefix("--at").lstrip(" =").removeprefix("axes")
     pairs = _PAIR.findall(plain)
-    found = {name.upper(): float(value.replace(",", ".")) for name, value in pairs}
-    whole = len(found) == len(pairs) and _BETWEEN.fullmatch(_PAIR.sub("", plain))
-    return found if found and whole and all(map(math.isfinite, found.values())) else None
+    positions = {name.upper(): float(value.replace(",", ".")) for name, value in pairs}
+    is_complete = len(positions) == len(pairs) and _BETWEEN.fullmatch(_PAIR.sub("", plain))
+    return (
+        positions
+        if positions and is_complete and all(map(math.isfinite, positions.values()))
+        else None
+    )
 
 
 def read_list(text: str, span: Span) -> tuple[tuple[float, ...], str]:
     """Read positions that an axis is held at, in any order; what is none is left out and named."""
     wrong: list[str] = []
-    found: set[float] = set()
+    positions: set[float] = set()
     for word in filter(None, re.split(r"[\s,;°]+", text[:MOST_TYPED])):
         at = read_typed(word)
         if at is None or not span.low <= at <= span.high:
             wrong.append(word[:20])
         else:
-            found.add(at)
+            positions.add(at)
     allowed = f"expected numbers from {span.low:g} to {span.high:g}"
     notes = [f"{', '.join(wrong[:4])} left out; {allowed}"] if wrong else []
-    if len(found) > MOST_HELD:
-        notes.append(f"{len(found)} positions; the first {MOST_HELD} are taken")
-    return tuple(sorted(found)[:MOST_HELD]), "; ".join(notes)
+    if len(positions) > MOST_HELD:
+        notes.append(f"{len(positions)} positions; the first {MOST_HELD} are taken")
+    return tuple(sorted(positions)[:MOST_HELD]), "; ".join(notes)
