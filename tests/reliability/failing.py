@@ -15,9 +15,9 @@ from warpspace.app.drawing.box import BoxLayer
 from warpspace.app.drawing.moving import MovingLayer
 from warpspace.app.evaluation import live_picture
 from warpspace.app.evaluation.live_model import LiveModel
-from warpspace.app.panels.error_list import ErrorsPart
-from warpspace.app.panels.overlay import HeadPart, LegendPart, OrderPart
-from warpspace.app.panels.top_bar import TopPart
+from warpspace.app.panels.error_list import ErrorsPanel
+from warpspace.app.panels.overlay import HeadPanel, LegendPanel, OrderPanel
+from warpspace.app.panels.top_bar import TopPanel
 from warpspace.app.server.session import Session
 from warpspace.app.server.viewer import Viewer
 from warpspace.app.state.app_state import AppState
@@ -35,11 +35,11 @@ STAGES: dict[str, tuple[object, str]] = {
     "map": (BoxLayer, "show"),
     "around the map": (MovingLayer, "show"),
     "at rest": (BoxLayer, "synchronise"),
-    "heading": (HeadPart, "pieces"),
-    "legend": (LegendPart, "pieces"),
-    "conditions": (OrderPart, "pieces"),
-    "panel": (ErrorsPart, "pieces"),
-    "bar at the top": (TopPart, "pieces"),
+    "heading": (HeadPanel, "pieces"),
+    "legend": (LegendPanel, "pieces"),
+    "conditions": (OrderPanel, "pieces"),
+    "panel": (ErrorsPanel, "pieces"),
+    "bar at the top": (TopPanel, "pieces"),
 }
 ERRORS: tuple[Callable[[], Exception], ...] = (
     lambda: OverflowError("int too large to convert to float"),

@@ -25,10 +25,11 @@ from warpspace.machine import definition
 from warpspace.machine.axes import PARAMETERS, direction_index, is_linear, parameter
 from warpspace.machine.curves.curve import OWN, ErrorFunction
 from warpspace.machine.errors import ErrorSet
+from warpspace.machine.limits import MAX_ERROR
 from warpspace.scene.library import load_scene, parse_scene, scene_names
 from warpspace.scene.machine_library import body_notes, load_machine, machine_names
-from warpspace.scene.model import Scene
-from warpspace.scene.scene_writer import scene_to_toml
+from warpspace.scene.model import Scene, scene_notes
+from warpspace.scene.scene_writer import over_ranges, scene_to_toml
 from warpspace.scene.starter import starter_scene
 from warpspace.units import MICROMETRE
 
@@ -193,14 +194,11 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
     chain = definition.parse_chain(raw["machine"]["chain"])
     gone = {a: at for a, at in scene.workspace.positions.items() if a not in chain.axes}
     raw["convention"]["reference_axis"] = "free"  # which axis that is may have changed
-    bare = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
-    kept = of_axes(scene.errors.functions, chain.axes)
-    errors = ErrorSet({key: one.without_axes(gone) for key, one in kept.items()})
-    own = tuple(one for one in scene.model.own_component_errors if one[0] in chain.axes)
-    main = scene.model.component_errors
-    model = replace(bare.model, component_errors=main, own_component_errors=own)
-    text = scene_to_toml(replace(bare, model=model, errors=errors))
-    read = parse_scene(text, scene.name, "machine")
+    read = parse_scene(tomli_w.dumps(_without(raw, gone)), scene.name, "machine")
+    curves = of_axes(scene.errors.functions, chain.axes)
+    errors = ErrorSet({key: curve.without_axes(gone) for key, curve in curves.items()})
+    errors = over_ranges(errors, read.model, read.workspace)
+    _check_errors(errors)
     same = _frames(like) == _frames(read.machine)
     named = like if same else known_alike(read.machine)
     if named is None:
@@ -213,10 +211,27 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
         body_dir=named.body_dir,
         bodies={frame: body for frame, body in like.bodies.items() if frame not in gone},
     )
-    notes = (*read.notes, *body_notes(machine))
-    model = replace(read.model, machine=machine)
-    read = replace(read, model=model, notes=notes, part=scene.part)
+    model = replace(
+        read.model,
+        machine=machine,
+        component_errors=scene.model.component_errors,
+        own_component_errors=tuple(
+            (axis, order) for axis, order in scene.model.own_component_errors if axis in chain.axes
+        ),
+    )
+    notes = (*scene_notes(machine, read.workspace, errors), *body_notes(machine))
+    read = replace(read, model=model, errors=errors, notes=notes, part=scene.part)
     return (scene, ()) if read == scene else (read, tuple(_left_out(scene, gone)))
+
+
+def _check_errors(errors: ErrorSet) -> None:
+    for key, curve in errors.functions.items():
+        if not abs(curve.amplitude) <= MAX_ERROR:
+            low, high = curve.span
+            raise OptionError(
+                f"errors.{key} reaches {curve.amplitude:g} {parameter(key).unit} within {low:g} …"
+                f" {high:g}; expected at most ±{MAX_ERROR:g}"
+            )
 
 
 def _without(table: Tables, axes: Collection[str]) -> Tables:
