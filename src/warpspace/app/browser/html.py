@@ -1,7 +1,7 @@
-"""Pieces of HTML that a page consists of: buttons, number boxes, sliders, choices, sections.
+"""HTML elements of the page: buttons, text boxes, sliders, choices, sections.
 
-Every text is escaped here; only what is `Markup` already goes in as it is. What an element sends is
-an event, ``part:word`` with a value, see `events.py`.
+Every text that is not `Markup` is escaped here. An element sends an event, ``panel:action`` with a
+value, see `incoming.py`.
 """
 
 import re
@@ -17,12 +17,12 @@ EMPTY = Markup("")
 
 
 def text(value: object) -> str:
-    """Escape what is no `Markup`; that of `markupsafe` itself takes three to ten times as long."""
+    """Escape a text that is not `Markup`; `markupsafe.escape` takes three to ten times as long."""
     return value if isinstance(value, Markup) else escape(str(value))
 
 
 def fill(template: str, /, *values: object, **named: object) -> Markup:
-    """Fill in a template; every value that is no `Markup` is escaped."""
+    """Format a template; values that are not `Markup` are escaped."""
     escaped = {name: text(value) for name, value in named.items()}
     return Markup(template.format(*map(text, values), **escaped))  # noqa: S704
 
@@ -32,7 +32,7 @@ def join(parts: Iterable[object]) -> Markup:
 
 
 def attributes(**values: object) -> Markup:
-    """Spell attributes; None and False leave one out, True needs no value, ``_`` becomes ``-``."""
+    """Format attributes; None and False omit one, True gives no value, ``_`` becomes ``-``."""
     markup = "".join(
         f" {_spelt(name)}" if value is True else f' {_spelt(name)}="{text(value)}"'
         for name, value in values.items()
@@ -61,7 +61,7 @@ def button(
     disabled: bool = False,
     **extra: object,
 ) -> Markup:
-    """Give a button that sends an event; `kind` is "", "main", "quiet" or "link"."""
+    """Render a button that sends an event; `kind` is "", "main", "quiet" or "link"."""
     state = None if pressed is None else str(pressed).lower()
     return tag(
         "button", label, type="button", class_=f"ws-button {kind}".strip(), data_do=do,
@@ -72,7 +72,7 @@ def button(
 def upload_button(
     label: str, part: str, most_bytes: int, endings: str, *, hint: str, kind: str = ""
 ) -> Markup:
-    """Give a button that opens a chooser of files, which come as events ``part:file``."""
+    """Render a button that opens a file chooser; the files arrive as events ``panel:file``."""
     return tag(
         "button", label, type="button", class_=f"ws-button {kind}".strip(), data_upload=part,
         data_most=most_bytes, data_accept=endings, title=hint,
@@ -80,7 +80,7 @@ def upload_button(
 
 
 def number(value: float, digits: int = 1) -> str:
-    """Spell a number for people: a true minus, no minus before a zero."""
+    """Format a number with a typographic minus; zero has no sign."""
     text = f"{value:.{digits}f}"
     if float(text) == 0.0:
         text = text.lstrip("-")
@@ -88,13 +88,13 @@ def number(value: float, digits: int = 1) -> str:
 
 
 def signed(value: float, digits: int = 1) -> str:
-    """Spell a number with its sign; zero has none."""
+    """Format a number with its sign; zero has no sign."""
     text = number(value, digits)
     return text if text.startswith(MINUS) or not float(text.replace(MINUS, "-")) else f"+{text}"
 
 
 def lowered(text: str) -> Markup:
-    """Set the letter behind an underscore lower: |E_B − E_A|."""
+    """Render the letter after an underscore as a subscript: |E_B − E_A|."""
     return Markup(re.sub("_(.)", r"<sub>\1</sub>", str(escape(text))))  # noqa: S704 - escaped before
 
 
@@ -102,7 +102,7 @@ _LINK = re.compile(r"(https?://[^\s<>\"']+[^\s<>\"'.,;:!?)\]])")
 
 
 def linked(source: str) -> Markup:
-    """Give what somebody has written, with links made of addresses of http and https alone."""
+    """Render the text of a user; http and https addresses become links."""
     parts = _LINK.split(source)
     return join(
         tag("a", part, href=part, target="_blank", rel="noopener noreferrer") if i % 2 else part
@@ -110,16 +110,16 @@ def linked(source: str) -> Markup:
     )
 
 
-# --- What can be set ------------------------------------------------------------------------------
+# --- Controls -------------------------------------------------------------------------------------
 
 
 def ident(name: str) -> str:
-    """Give an element's id for an event's name."""
+    """Return the id of the element that sends an event."""
     return "ws-" + re.sub(r"[^0-9A-Za-z]+", "-", name)
 
 
 def field(label: object, control: Markup, name: str, unit: str = "", hint: str = "") -> Markup:
-    """Give a labelled control; its unit stands behind it."""
+    """Render a control with label and unit."""
     return fill(
         '<div class="ws-field"{title}><label for="{id}">{label}</label>{control}{unit}</div>',
         title=attributes(title=hint or None), id=ident(name), label=label, control=control,
@@ -133,7 +133,7 @@ def _input(**values: object) -> Markup:
 
 def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False,
              label: str = "", size: str = "", **extra: object) -> Markup:  # fmt: skip
-    """Give a box that sends what was typed on Enter or when it is left; `live` with each letter."""
+    """Render a text box that sends its text on Enter or on blur; with `live` on each key."""
     return _input(
         type="text", id=extra.pop("id", ident(name)), class_=f"ws-box {size}".strip(), value=value,
         data_set=name, data_live=name if live else None, placeholder=placeholder or None,
@@ -143,7 +143,7 @@ def text_box(name: str, value: str, *, placeholder: str = "", live: bool = False
 
 def slider(name: str, value: float | str, low: float, high: float, step: float, *,
            label: str = "", twin: str = "", text: str = "") -> Markup:  # fmt: skip
-    """Give a slider; `twin` is the name of the number box that digits typed on it go into."""
+    """Render a slider; `twin` is the number box that receives digits typed on the slider."""
     return _input(
         type="range", id=None if not label else ident(name) + "-slider", class_="ws-slider",
         min=f"{low:g}", max=f"{high:g}", step=f"{step:g}",
@@ -170,7 +170,7 @@ def switch(name: str, label: object, *, on: bool, hint: str = "") -> Markup:
 def fold(
     key: str, heading: object, body: object, *, opens: str, open_: bool, hint: str = ""
 ) -> Markup:
-    """Give a section with a heading that unfolds it; folded, its body is not even there."""
+    """Render a section with a heading that unfolds it; a folded one has no body."""
     head = fill(
         '<summary class="ws-fold" data-do="{opens}" data-value="{key}"{hint}>'
         "<h3>{heading}</h3></summary>",
@@ -182,7 +182,7 @@ def fold(
 
 def menu(heading: object, body: object, *, key: str, kind: str = "", hint: str = "",
          label: str = "") -> Markup:  # fmt: skip
-    """Give a menu that opens over what is around it; `kind` "up" opens it upwards."""
+    """Render a menu that opens over the page; `kind` "up" opens it upwards."""
     return fill(
         '<details class="ws-pop {kind}" data-key="menu-{key}"{title}><summary{label}>{words}'
         '</summary><div class="ws-sheet">{body}</div></details>',
@@ -192,6 +192,6 @@ def menu(heading: object, body: object, *, key: str, kind: str = "", hint: str =
 
 
 def rows(pairs: Iterable[tuple[object, object]], kind: str = "ws-rows") -> Markup:
-    """Give a table of words and what belongs to them, numbers at the right."""
+    """Render a table of labels and values, numbers right-aligned."""
     body = join(fill("<tr><th>{head}</th><td>{value}</td></tr>", head=h, value=v) for h, v in pairs)
     return tag("table", body, class_=kind)

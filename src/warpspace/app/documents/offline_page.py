@@ -1,9 +1,9 @@
-"""One file with the interactive scene that needs no network: for a mail, a share, an archive.
+"""A single file with the interactive scene that works offline: for e-mail, file servers, archives.
 
-It shows one picture, or the steps of a story. A throwaway server that nobody connects to exports
-the drawing of the first step; the page around it (heading, colour bar, statistics, factor,
-parameters) is ours, since the export has no widgets. Of all steps the page holds points, levels of
-their colours and cameras, and bends the drawing by them (`browser/mesh.js`).
+It shows one picture, or the steps of a story. A temporary server exports the drawing of the first
+step; the page around it (heading, colour bar, statistics, exaggeration, parameters) is built here,
+since the export has no widgets. The page contains points, colour levels and cameras of all steps,
+and deforms the drawing by them (`browser/mesh.js`).
 """
 
 import contextlib
@@ -51,33 +51,33 @@ POLICY = (
     " style-src 'unsafe-inline'; img-src data: blob:; font-src data: blob:;"
     " connect-src data: blob:; worker-src blob: data:; frame-src 'self'"
 )
-"""What the browser may load: what is in the file, and nothing else."""
-MAX_UNFOLDED = 12  # errors that are listed at once
+"""The browser may load the contents of the file only."""
+MAX_UNFOLDED = 12  # errors in a list that is initially open
 ASPECT = 1.5
-PARTS = 50_000  # of the longest edge, that points of a step are rounded to
-AWAY_MM = (0.0, 0.0, 1e6)  # where the marker of a step without a point stands: out of sight
-LEFT_OUT = "machine, slices, isolines, traces and paths are left out of the steps"
+PARTS = 50_000  # resolution of points of a step, per longest edge
+AWAY_MM = (0.0, 0.0, 1e6)  # of the marker of a step without a point: out of sight
+LEFT_OUT = "the steps do not show machine, slices, isolines, traces and paths"
 
 
 @dataclass(frozen=True)
 class PageStep:
-    """What a page shows at a time; one picture is the only step."""
+    """One step of a page; a page of one picture has a single step."""
 
     picture: LivePicture
     camera: CameraMemory
-    note: Markup = EMPTY  # what the note says that it shows
+    note: Markup = EMPTY
 
     @property
     def point_mm(self) -> Array:
-        """Where the point of the note is drawn."""
+        """Place of the note's point in the drawing."""
         return next((one.at_mm for one in note_labels(self.picture)), np.array(AWAY_MM))
 
 
 def offline_picture(
     scene: Scene, *, nodes: int, largest: float | None = None, **changes: Any
 ) -> LivePicture:
-    """Evaluate a scene for a page; `largest` is where its colours end, for several alike."""
-    # callers count the nodes of a grid, and a point has one
+    """Evaluate a scene for a page; `largest` is the common end of colours of several scenes."""
+    # callers may pass 1 for a point
     state = replace(start_state(scene), nodes=max(nodes, MIN_NODES), **changes)
     picture = LiveModel().evaluate(state)
     colours = None if largest is None else choose_scale([np.array(largest)], state.component)
@@ -87,7 +87,7 @@ def offline_picture(
 def build_offline_html(
     picture: LivePicture, provenance: About = None, camera: CameraMemory | None = None
 ) -> str:
-    """Build the page: the interactive scene with its colour bar, numbers and factor."""
+    """Build the page: the interactive scene with colour bar, statistics and exaggeration."""
     conditions = list(legend.picture_conditions(picture))
     about = {**(provenance or {}), **({"conditions": conditions} if conditions else {})}
     shapes = {**box(picture), **draw_surroundings(picture), **draw_labels(picture)}
@@ -98,11 +98,11 @@ def build_offline_html(
 def build_story_html(
     state: AppState, provenance: About = None, known_scenes: KnownScenes = None
 ) -> str:
-    """Build the page of the story that the notes of a state tell."""
+    """Build the page of a story from the notes of a state."""
     steps = _story_steps(state, known_scenes)
     first, grid = steps[0].picture, steps[0].picture.grid.nominal_mm
     alike = all(np.array_equal(step.picture.grid.nominal_mm, grid) for step in steps)
-    # what follows no step stays away
+    # shapes that do not follow the steps are omitted
     prefixes = ("/box", "/ghost", "/axes", "/words/axis", "/words/tick") if alike else ("/box",)
     nodes = {**box(first), **draw_surroundings(first), **draw_labels(first)}
     shapes = {name: shape for name, shape in nodes.items() if name.startswith(prefixes)}
@@ -111,10 +111,10 @@ def build_story_html(
 
 
 def step_words(scene: Scene, notes: Sequence[Note], index: int, problem: str) -> Markup:
-    """Say what a step of a story says, from its number to why its drawing is another's."""
+    """Render number, text and numbers of a step of a story, and a problem with its drawing."""
     note = notes[index]
     heads = (note.kind.capitalize(), note.author, f"{note.date:%Y-%m-%d}", note.status)
-    stays = problem and f"The drawing of the step before stays: {problem}"
+    stays = problem and f"The drawing of the previous step is shown: {problem}"
     stale = said_stale(note, note_numbers(scene, [note])[0])
     return join((
         tag("h2", f"{index + 1} of {len(notes)}"),
@@ -136,7 +136,7 @@ def _usual_camera(picture: LivePicture) -> CameraMemory:
 
 
 def _export(step: PageStep, shapes: Shapes) -> str:
-    with contextlib.redirect_stdout(io.StringIO()):  # the server says hello and goodbye
+    with contextlib.redirect_stdout(io.StringIO()):  # messages of the server
         server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         try:
             light_scene(server.scene)
@@ -152,7 +152,7 @@ def _export(step: PageStep, shapes: Shapes) -> str:
 def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
     notes, scene, live = story(state.review), state.resulting_scene(), LiveModel()
     if not notes:
-        raise OptionError("no note of this scene has a step of a story")
+        raise OptionError("no note of this scene is a step of a story")
     picture, camera, steps = live.evaluate(_story_view(state, state)), None, list[PageStep]()
     for index, note in enumerate(notes):
         problem = ""
@@ -162,7 +162,7 @@ def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
             )
             evaluated = live.evaluate(_story_view(step_state, state, note))
             if steps and evaluated.shape != picture.shape:
-                raise OptionError("its machine has another volume")
+                raise OptionError("its machine has a different volume")
             picture, camera = evaluated, step_camera
         except WarpspaceError as error:
             problem = str(error)
@@ -172,7 +172,7 @@ def _story_steps(state: AppState, known_scenes: KnownScenes) -> list[PageStep]:
 
 
 def _story_view(step_state: AppState, like: AppState, *notes: Note) -> AppState:
-    """Give what the steps have in common: the whole surface of the box, on the same ground."""
+    """Return a state with the common settings of all steps: full surface, same background."""
     look, machine = replace(step_state.look, surface="surface", isolines=False), step_state.machine
     ground, machine = replace(step_state.shown, dark=like.shown.dark), replace(machine, shown=False)
     return replace(
@@ -181,7 +181,7 @@ def _story_view(step_state: AppState, like: AppState, *notes: Note) -> AppState:
 
 
 def _packed_steps(steps: Sequence[PageStep]) -> str:
-    """Pack what the page draws steps by; points as whole shifts from those of the first."""
+    """Pack the drawings of the steps; points as integer shifts from those of the first."""
     first, step_views = steps[0].picture, [{"camera": asdict(step.camera)} for step in steps]
     content: dict[str, object] = {"steps": step_views}
     if len(steps) > 1:
@@ -199,7 +199,7 @@ def _packed_steps(steps: Sequence[PageStep]) -> str:
     return b64encode(zlib.compress(text, 9)).decode("ascii")
 
 
-# --- The page around it ---------------------------------------------------------------------------
+# --- The page around the drawing ------------------------------------------------------------------
 
 
 def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: About) -> str:
@@ -208,7 +208,7 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
     scene = _export(steps[0], shapes).replace("</body>", f"{scripts}</body>")
     remarks = ("drag to turn, wheel to zoom", f"warpspace {__version__}")
     if steps[0].note:
-        remarks = (LEFT_OUT, "→ goes on, ← goes back", *remarks)
+        remarks = (LEFT_OUT, "→ next step, ← previous step", *remarks)
     heading, column, below = (
         join(tag("div", one, data_step=i, hidden=i > 0) for i, one in enumerate(said))
         for said in zip(*(_step_pieces(step, title) for step in steps), strict=True)
@@ -219,7 +219,7 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
         policy=POLICY,
         theme="dark" if steps[0].picture.state.shown.dark else "light",
         heading=heading,
-        # a page in an attribute: only these two characters would end or change it
+        # in an attribute only these two characters need escaping
         scene=scene.replace("&", "&amp;").replace('"', "&quot;"),
         buttons="" if len(steps) > 1 else "hidden",
         beside=column,
@@ -245,7 +245,7 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
         "max": statistics.max_um,
     }
     point_texts = [label.text for label in point_labels(picture) if label.kind == "asked"]
-    counted = "unlike in A and B" if picture.is_difference else "not zero"
+    counted = "different in A and B" if picture.is_difference else "not zero"
     summary = f"{len(errors)} error{'' if len(errors) == 1 else 's'} {counted}"
     listed = join(tag("tr", join(tag("td", cell) for cell in row)) for row in errors)
     column = (
@@ -266,7 +266,7 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
 
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
-    """Spell the errors that are not zero, or unlike in A and B: key, plain name, value and unit."""
+    """List errors that are not zero, or differ in A and B: key, descriptive name, value, unit."""
     compared = picture.compared.sides if picture.compared and picture.is_difference else ()
     sides = [one.active_scene().errors.functions for one in compared or (picture.drawn_state,)]
     error_rows: list[tuple[str, str, str]] = []

@@ -1,13 +1,12 @@
-"""A state as a scene file, and as a link; both read back to the same state.
+"""A state as a scene file and as a link; both are read back to the same state.
 
-Both hold one line of settings, a query string (``loop=relative&B=30&look.surface=cut``): what of
-the state differs from its scene as opened, the camera, and what it is compared with. In a file it
-is a comment at the head of an ordinary scene, in a link it stands behind the name of a scene that
-the app knows; any other link is the whole file, packed. A side of a comparison that is a scene, and
-what was pinned, are links of their own within that line.
+Both contain one line of settings, a query string (``loop=relative&B=30&look.surface=cut``): the
+differences of the state from its scene as opened, the camera, and the comparison. In a file it is a
+comment at the head of an ordinary scene, in a link it follows the name of a scene that the app
+knows; any other link is the packed file. Scenes and pinned states of a comparison are links within
+that line.
 
-Reading trusts nothing: every value passes the pure updates of the state, what cannot be read is
-left out and named.
+Every value passes the pure updates of the state; invalid settings are ignored and listed in notes.
 """
 
 import base64
@@ -42,10 +41,9 @@ MAX_LINE = 400_000  # characters of a line of settings in a file
 MAX_FIELDS = 400
 SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
-# what was compared had a line of its own in files of earlier versions
 _LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
 KnownScenes = Sequence[Scene] | None
-"""Scenes that whoever opens a file or a link also has; None for those of the program."""
+"""Scenes that are available where a file or a link is opened; None for the bundled ones."""
 Opened = tuple[AppState, CameraMemory | None]
 
 
@@ -53,13 +51,13 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
     scene = replace(state.resulting_scene(), review=file_notes(state))
     line = settings_line(replace(state, scene=scene, loaded=None), camera)
     if len(line) > MAX_LINE:
-        raise OptionError("what is compared is too large to be stored with the scene")
-    head = f"# Saved by warpspace {__version__}. Below stands how it was looked at."
+        raise OptionError("the comparison is too large to be stored with the scene")
+    head = f"# Saved by warpspace {__version__}. The next line holds the view."
     return f"{head}\n{MARK}{line}\n\n{scene_to_toml(scene)}"
 
 
 def open_text(text: str, name: str, source: str, *, without_comparison: bool = False) -> Opened:
-    """Build the state of a scene file that somebody has uploaded; `alone` with no comparison."""
+    """Build the state of an uploaded scene file."""
     scene = _recognised(parse_scene(text, name, source, folder=None))
     line = settings_of(text)
     return with_settings(
@@ -68,7 +66,7 @@ def open_text(text: str, name: str, source: str, *, without_comparison: bool = F
 
 
 def settings_of(text: str) -> str:
-    """Give the line of settings at the head of a scene file; empty where there is none."""
+    """Return the line of settings at the head of a scene file; empty where there is none."""
     head = _HEAD.match(text)
     return "&".join(filter(None, _LINES.findall(head[0] if head else "")))
 
@@ -80,7 +78,7 @@ def _find(name: str, known_scenes: KnownScenes) -> Scene | None:
 
 
 def _recognised(scene: Scene) -> Scene:
-    """Give a machine written inline its bodies back where only its axes' ends and ways differ."""
+    """Restore the bodies of a library machine that differs in travels and directions only."""
     machine = scene.machine
     library_machine = known_alike(machine)
     if library_machine is None:
@@ -96,7 +94,7 @@ def _recognised(scene: Scene) -> Scene:
 def state_to_link(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
     link = _spell(state, camera, known_scenes)
     if len(link) > MAX_LINK:
-        raise OptionError("this is too large for a link; save it as a file instead")
+        raise OptionError("the state is too large for a link; save it as a file")
     return link
 
 
@@ -111,7 +109,7 @@ def _packed(state: AppState, camera: CameraMemory | None) -> str:
 
 
 def named_link(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
-    """Spell a state of a scene that others have as a link of any length; any other as nothing."""
+    """Write a link to a known scene, of any length; empty for other scenes."""
     scene = state.scene
     plain = _is_plain(state) and state.review == scene.review
     if not plain or _find(scene.name, known_scenes) != scene:
@@ -121,7 +119,7 @@ def named_link(state: AppState, camera: CameraMemory | None, known_scenes: Known
 
 
 def _is_plain(state: AppState) -> bool:
-    """Tell whether a line of settings spells all in which a state differs from its scene."""
+    """Return whether settings alone describe the differences of a state from its scene."""
     return state.loaded is None and state.tolerances == state.scene.tolerances
 
 
@@ -146,7 +144,9 @@ def _read_link(link: str, known_scenes: KnownScenes, *, without_comparison: bool
     name = pairs.pop(SCENE, "")
     scene = _find(name, known_scenes)
     if scene is None:
-        raise OptionError(f"the link names the scene {name[:LONGEST_NAME]!r}, which is not here")
+        raise OptionError(
+            f"the link names the scene {name[:LONGEST_NAME]!r}, which is not available"
+        )
     line = urlencode(pairs)
     return with_settings(
         start_state(scene), line, known_scenes, without_comparison=without_comparison
@@ -175,7 +175,7 @@ def settings_line(
     *,
     at_rest: bool = False,
 ) -> str:
-    """Spell what differs from the scene as opened; `rest` from that scene at rest."""
+    """Write the differences from the scene as opened; `at_rest` from `AppState.at_rest`."""
     opened = start_state(state.scene).at_rest() if at_rest else start_state(state.scene)
     pairs = [
         (leaf.linked, spell_value(leaf, now))
@@ -195,7 +195,7 @@ def with_settings(
     *,
     without_comparison: bool = False,
 ) -> AppState:
-    """Apply a line of settings to a state; `alone` without a comparison."""
+    """Apply a line of settings to a state."""
     pairs = [
         pair for pair in _pairs(line) if not (without_comparison and pair[0].startswith(PREFIX))
     ]
@@ -203,7 +203,7 @@ def with_settings(
     for name, text in pairs:
         if name == CAMERA or name in SIDES:
             continue
-        # what there is depends on what was set before, such as the components of a quantity
+        # leaves depend on earlier settings, such as the components of a quantity
         leaf = {one.linked: one for one in leaves(state).values() if one.linked}.get(name)
         try:
             state = set_leaf(state, leaf, text) if leaf else with_form(state, name, text)
@@ -212,7 +212,7 @@ def with_settings(
     if unread:
         suffix = f" and {len(unread) - 4} more" if len(unread) > 4 else ""
         named = ", ".join(unread[:4])
-        return state.noted(f"settings left out, since they mean nothing here: {named}{suffix}")
+        return state.noted(f"ignored settings (unknown or invalid): {named}{suffix}")
     return state
 
 
@@ -222,7 +222,7 @@ def _pairs(line: str) -> list[tuple[str, str]]:
     try:
         return parse_qsl(line, keep_blank_values=True, max_num_fields=MAX_FIELDS)
     except ValueError:
-        raise OptionError("there are too many settings; this program did not write them") from None
+        raise OptionError(f"too many settings; expected at most {MAX_FIELDS}") from None
 
 
 CAMERA_NUMBERS = 10
@@ -231,7 +231,7 @@ FOV_RAD = (0.01, 2.5)
 
 
 def camera_of(line: str) -> CameraMemory | None:
-    """Read the camera of a line of settings; None where there is none that can be used."""
+    """Parse the camera of a line of settings; None where it is missing or invalid."""
     try:
         numbers = [parse_number(word) for word in dict(_pairs(line)).get(CAMERA, "").split(",")]
     except ValueError:
@@ -246,20 +246,20 @@ def camera_of(line: str) -> CameraMemory | None:
     return CameraMemory(position, look_at, up, numbers[9])
 
 
-# --- Notes: what was on the screen, and back to it -----------------------------------------------
+# --- Views of notes -------------------------------------------------------------------------------
 
 
 def view_of(state: AppState, camera: CameraMemory | None) -> str:
-    """Spell what is on the screen, for a note: relative to the scene as opened where that does."""
+    """Write the present view for a note: relative to the scene as opened where possible."""
     viewed = replace(state, review=())
     link = "" if _is_plain(state) else _packed(viewed, camera)
-    # curves of thousands of points are left to the scene
+    # curves of thousands of points are stored in the scene only
     fits = 0 < len(link) <= MAX_NOTE_VIEW
     return link if fits else settings_line(viewed, camera, at_rest=True)
 
 
 def file_notes(state: AppState) -> tuple[Note, ...]:
-    """Give the notes as a file keeps them, whose scene may differ from the one as opened."""
+    """Return the notes for a file, whose scene may differ from the one as opened."""
     opened = start_state(replace(state.origin, review=()))
 
     def with_packed_view(note: Note) -> Note:
@@ -272,7 +272,7 @@ def file_notes(state: AppState) -> tuple[Note, ...]:
 
 
 def reopened(state: AppState, note: Note, known_scenes: KnownScenes = None) -> Opened:
-    """Give what was on the screen when a note was made; what cannot be restored is named."""
+    """Restore the view of a note; its state lists settings that cannot be restored."""
     if not note.view:
         return state, None
     origin = state.origin
@@ -291,7 +291,7 @@ def reopened(state: AppState, note: Note, known_scenes: KnownScenes = None) -> O
 
 PREFIX = "compare."
 PINNED = "pinned"
-NOW = "now"  # what is steered, in files and links
+NOW = "now"  # the present state, in files and links
 LONGEST_TITLE = 200
 SIDES = [PREFIX + name for name in ("pinned", "a", "b", "pinned.title", "a.title", "b.title")]
 
@@ -324,7 +324,7 @@ def _with_sides(
         elif text == PINNED:
             sides[name] = sides[PINNED]
             if sides[PINNED] is None:
-                raise OptionError("the comparison is with a pinned state, but holds none")
+                raise OptionError("the comparison lacks its pinned state")
         else:
             opened, _ = _read_link(text, known_scenes, without_comparison=True)
             if name == PINNED:
@@ -339,21 +339,20 @@ def _with_sides(
     return replace(state, comparison=compared)
 
 
-# --- The scenes a tab can choose from -------------------------------------------------------------
-# The server's own, and the newest that were opened in it.
+# --- Scenes of a tab: those of the server, and the latest opened ones -----------------------------
 
 MOST_OPENED = 20
 
 
 class SceneList(dict[str, Scene]):
-    """Scenes by the title shown, each title once."""
+    """Scenes by unique title."""
 
     def __init__(self, scenes: Mapping[str, Scene]) -> None:
         super().__init__(scenes)
-        self.fixed = tuple(scenes.values())  # those that whoever opens a link here has as well
+        self.fixed = tuple(scenes.values())  # available to all tabs
 
     def add(self, scene: Scene) -> tuple[str, str]:
-        """Take in an opened scene; give its title, and that of one that has left for it."""
+        """Add an opened scene; return its title, and that of a scene dropped for it."""
         for title, listed in self.items():
             if listed is scene or listed == scene:
                 return title, ""

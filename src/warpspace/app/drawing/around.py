@@ -1,4 +1,4 @@
-"""What is drawn on and around the box: axes, traces, paths, arrows, markers."""
+"""Drawing of axes, traces, paths, arrows and markers on and around the box."""
 
 from functools import lru_cache
 
@@ -28,29 +28,29 @@ from warpspace.geometry.surfaces import corners, round_down
 from warpspace.picture.map_mesh import outline_pieces
 from warpspace.units import MM_PER_UM, Array
 
-# --- Sizes, as parts of the longest edge of the box -----------------------------------------------
+# --- Sizes relative to the longest edge of the box ------------------------------------------------
 
 HEAD, BALL = 0.034, 0.009  # of an arrow, and the marker of the worst point
-APART = 0.002  # distance from which nominal and actual trace are both drawn
-TURNED = 0.014  # diameter of a traced point while the table turns
+APART = 0.002  # distance from which both the nominal and the actual trace are drawn
+TURNED = 0.014  # diameter of a traced point while the table rotates
 POINT_MARKER, AXIS_HALF, DASH = 0.011, 0.32, 0.02
-"""Marker of the point that was asked about, half the axis that turns it, dash of its lever."""
+"""Marker of the picked point, half length of the axis of rotation, dash of the lever."""
 RESIDUAL_HEAD, LONGEST_RESIDUAL = 0.025, 0.2
-MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # points beyond the travel that are marked, and their size
+MOST_OUTSIDE, OUTSIDE = 4000, 0.006  # marked points beyond the travel, and their size
 UNMEASURED, SEEN_THROUGH = 0.008, 0.5  # size of dots, and opacity of ellipsoids
 GREY = (70, 78, 90)
-GIZMO = "/part/gizmo"  # what moves the part
+GIZMO = "/part/gizmo"  # moves the part
 
-ACCENT = (194, 24, 91)  # colour of everything that answers "why?"; it is in no colour map
+ACCENT = (194, 24, 91)  # colour of explanations; not part of any colour map
 RESIDUALS = {True: (138, 143, 152), False: (47, 116, 192)}
-"""Before the calibration, and after; those of the chart."""
+"""Colours before the calibration (True) and after, as in the chart."""
 MOST_RESIDUALS = 400
-HEAD_PART = 0.7  # longest head, as a part of its arrow
-STROKES, SLANT = 12, 0.3  # lines of a head, and how far they slant, as a part of its length
+HEAD_PART = 0.7  # longest head, relative to its arrow
+STROKES, SLANT = 12, 0.3  # lines of a head, and its radius relative to its length
 
 
 def draw_surroundings(picture: LivePicture) -> Shapes:
-    """Draw all that follows the picture beside the box and the machine."""
+    """Draw everything of a picture except the box and the machine."""
     draws = (_axes, _traces, _path, _part, _program, _other_side, _point, _measured, _marks,
              _uncertainty)  # fmt: skip
     return {name: shape for draw in draws for name, shape in draw(picture).items()}
@@ -73,7 +73,7 @@ def _axis_lines(of: tuple[AxisLabels, ...], tick: float, rgb: Rgb) -> SceneNode 
 def _traces(picture: LivePicture) -> Shapes:
     """Draw traces of rotary axes: one in colour, with its nominal circle; the others faint.
 
-    What no error moves is not drawn, nor what the actual trace covers of the nominal one.
+    Traces without error are not drawn, nor is the nominal trace where it is covered.
     """
     moved = picture.moved_traces
     if not moved:
@@ -127,7 +127,9 @@ def _program(picture: LivePicture) -> Shapes:
     if path is None:
         return {}
     drawn, (values, scale) = path.drawn_mm(picture.exaggeration), picture.coloured(path)
-    linear = np.clip(level_colours(diverging=scale.diverging), 0.0, 1.0)  # viser wants lines so
+    linear = np.clip(
+        level_colours(diverging=scale.diverging), 0.0, 1.0
+    )  # range of line colours in viser
     colours = (255.0 * linear).astype(np.uint8)[colour_levels(scale, values)]
     line = index_of(picture.state.forms.get(AT_LINE, ""), MAX_LINES)
     marker = dots(drawn[path.of.line == line][-1:], POINT_MARKER * picture.size_mm, ACCENT)
@@ -167,7 +169,7 @@ def _measured(picture: LivePicture) -> Shapes:
     if distance is None:
         return {}
     _, nominal, actual = distance
-    ends = [[0, 1], [2, 0], [2, 1]] if len(actual) == 3 else [[0, 1]]  # and edges of the angle
+    ends = [[0, 1], [2, 0], [2, 1]] if len(actual) == 3 else [[0, 1]]  # with legs of the angle
     return {
         "/measured/nominal": lines(nominal[ends], colour(picture, "edge"), 1.5),
         "/measured/actual": lines(actual[ends], ACCENT, 3.0),
@@ -192,9 +194,9 @@ def _marks(picture: LivePicture) -> Shapes:
 
 
 def _uncertainty(picture: LivePicture) -> Shapes:
-    """Draw U95 at corners and the clicked point as ellipsoids, and dots on what was not measured.
+    """Draw ellipsoids of U95 at corners and picked point, and dots where nothing was measured.
 
-    The extent of an ellipsoid along any direction is U95 of the error along it, exaggerated.
+    The extent of an ellipsoid along a direction is U95 of the error along it, exaggerated.
     """
     uncertainty, look, scene = picture.uncertainty, picture.state.look, picture.drawn_state.scene
     shapes: dict[str, SceneNode | None] = {}
@@ -222,7 +224,7 @@ def _uncertainty(picture: LivePicture) -> Shapes:
 
 
 def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
-    """Draw the traced points at a position of the axis that is played; none while none is."""
+    """Draw the traced points at a position of the animated axis; none without one."""
     if not position or not picture.state.shown.traces:
         return {}
     size = TURNED * picture.size_mm
@@ -236,9 +238,9 @@ def turned_points(picture: LivePicture, position: dict[str, float]) -> Shapes:
 def residuals(
     foot_mm: Array, vector_mm: Array, size_mm: float, *, before: bool
 ) -> tuple[Shapes, float]:
-    """Draw what a calibration leaves as arrows, the longest about a fifth of the box.
+    """Draw the residuals of a calibration as arrows, the longest about a fifth of the box.
 
-    Returns with them the factor they are drawn with; 0 where none has a length.
+    Also return their exaggeration; 0 where all have zero length.
     """
     stride = max(1, -(-len(foot_mm) // MOST_RESIDUALS))
     foot, vector = foot_mm[::stride], vector_mm[::stride]
@@ -251,9 +253,9 @@ def residuals(
 
 
 def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
-    """Give arrows, [n, 3] to [n, 3], as pieces of line: shafts, and strokes of their heads.
+    """Build arrows, [n, 3] to [n, 3], from line segments: shafts, and strokes of the heads.
 
-    Short arrows get a smaller head of the same shape; without length one shrinks to a point.
+    Short arrows have a smaller head of the same shape; one of zero length is a point.
     """
     vector = end_mm - start_mm
     length = np.linalg.norm(vector, axis=-1, keepdims=True)
@@ -268,7 +270,7 @@ def arrows(start_mm: Array, end_mm: Array, head_mm: float) -> Array:
 
 
 def draw_labels(picture: LivePicture) -> Shapes:
-    """Draw all words in 3-D, for a page that cannot place them."""
+    """Draw all labels in 3-D, for a page that cannot place them."""
     away, middle = 0.03 * picture.size_mm, picture.grid.bounds_mm.mean(axis=0)
     shapes: dict[str, SceneNode | None] = {}
     for number, label in enumerate((*axis_labels(picture), *point_labels(picture))):

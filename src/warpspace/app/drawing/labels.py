@@ -1,4 +1,4 @@
-"""Words beside points of the drawing: axes and their numbers, worst point, corners, names.
+"""Labels of points of the drawing: axes and their numbers, worst point, corners, names.
 
 The page places them as the camera moves (`browser/room.js`); an offline page has them in 3-D.
 """
@@ -29,7 +29,7 @@ from warpspace.picture.formatting import (
 from warpspace.units import MICROMETRE, MINUS, MM_PER_UM, Array
 
 AWAY = 0.13
-"""Distance of the axes from the nominal box, as a part of the longest edge: the bend has room."""
+"""Distance of the axes from the nominal box, relative to its longest edge."""
 TICK = 0.022
 MAX_TICKS = 6
 LEVER_AT = 0.25  # place of the lever's label between point and frame
@@ -37,28 +37,28 @@ LEVER_AT = 0.25  # place of the lever's label between point and frame
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """Words, and the point that they belong to."""
+    """A text at a point."""
 
     text: str
     at_mm: Array
     # "tick", "axis" (its name), "worst", "corner", "asked", "measured", "name", "note"
     kind: str = "name"
-    from_mm: Array | None = None  # of axes: a point that the words stand away from
+    from_mm: Array | None = None  # of axes: the label is moved away from this point
     axis: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisLabels:
-    """An axis beside the nominal box, numbered in positions of the machine's axis along it."""
+    """An axis beside the nominal box, with positions of the machine axis along it."""
 
     name: str  # "X"; "x in R" where no linear axis of the machine runs along it
     ends_mm: Array  # [2, 3]
-    out: Array  # [3]; the way its ticks point
+    out: Array  # [3]; direction of its ticks
     ticks: tuple[tuple[str, Array], ...]  # number and place
 
 
 def axes(picture: LivePicture) -> tuple[AxisLabels, ...]:
-    """Lay out the axes: X along the front, Y along the right, Z up the left of the front."""
+    """Build the axes: X along the front, Y along the right, Z up the left of the front."""
     return _axes(Identity(picture.grid), AWAY * picture.size_mm)
 
 
@@ -75,7 +75,7 @@ def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
     for k, (foot, out) in enumerate(frames):
         along, name, sign, shift = np.eye(3)[k], grid.axes[k], 1.0, 0.0
         if name and is_linear(name):
-            # position of the axis = way × (place in R) + shift
+            # position of the axis = sign × (place in R) + shift
             sign = float(grid.ways[k])
             start = float(low[k] if sign > 0.0 else high[k])
             shift = float(np.min(grid.coordinates[name])) - sign * start
@@ -93,20 +93,20 @@ def _axes(of: Identity, away: float) -> tuple[AxisLabels, ...]:
 
 
 def axes_room_mm(picture: LivePicture) -> Array:
-    """Give points around the nominal box that leave room for axes and traces, [n, 3], mm."""
+    """Return points around the nominal box, axes and traces, [n, 3], mm."""
     low, high = picture.grid.bounds_mm
     away = (AWAY + TICK) * picture.size_mm
     x, y, z = (low[0] - away, high[0] + away), (low[1] - away, high[1]), (low[2], high[2])
     room = [np.stack(np.meshgrid(x, y, z), axis=-1)]
     if is_thin(picture.shape):
-        # what there is to see of a machine with one linear axis or none are its traces
+        # a machine with at most one linear axis shows traces only
         room += [at for of in picture.traces for at in (of.nominal_mm, of.actual_mm)]
     return np.concatenate([points.reshape(-1, 3) for points in room])
 
 
 def axis_labels(picture: LivePicture) -> list[Label]:
     state = picture.state
-    if not state.shown.axes or state.machine.shown:  # their numbers would cover the machine
+    if not state.shown.axes or state.machine.shown:  # numbers would cover the machine
         return []
     return _axis_labels(axes(picture), TICK * picture.size_mm)
 
@@ -122,21 +122,21 @@ def _axis_labels(of: tuple[AxisLabels, ...], tick: float) -> list[Label]:
 
 
 def _spell(value: float, unit: str = MICROMETRE, plus_minus: str = "") -> str:
-    """Spell an error: ``23.6 µm``, ``23.6 ± 1.2 µm``, from 10 mm up ``12.3 mm``."""
+    """Format an error: ``23.6 µm``, ``23.6 ± 1.2 µm``, from 10 mm up ``12.3 mm``."""
     if unit == MICROMETRE and abs(value) >= 1e4:
         value, unit, plus_minus = value * MM_PER_UM, "mm", ""
     return f"{value:.1f}{plus_minus} {unit}".replace("-", MINUS)
 
 
 def point_labels(picture: LivePicture) -> list[Label]:
-    """Give what is written beside points of the volume, what matters most first."""
+    """List the labels of points of the volume, by priority."""
     worst, point = [*_worst(picture)], [*_point(picture)]
     for label, other in zip(worst, point, strict=False):
         apart = np.linalg.norm(label.at_mm - other.at_mm)
         if apart < TICK * picture.size_mm and other.text.startswith(
             label.text.removeprefix("max ")
         ):
-            worst = []  # one place, said once
+            worst = []  # same place
     return [*worst, *point, *_measured(picture), *_names(picture), *_corners(picture)]
 
 
@@ -213,7 +213,7 @@ def _names(picture: LivePicture) -> Iterator[Label]:
 
 
 def note_labels(picture: LivePicture) -> list[Label]:
-    """Give the flags of review notes: their numbers, where what they are about is drawn now."""
+    """List the flags of review notes: their numbers, at the present places in the drawing."""
     if picture.is_difference or not picture.state.review:
         return []
     state, own = picture.drawn_state, dict[str, Mapping[str, float]]()

@@ -1,4 +1,4 @@
-"""Everything around the box as one layer: the schematic machine, and the table that turns."""
+"""The layer around the box: surroundings, machine, and the rotating table."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -19,20 +19,20 @@ from warpspace.app.state.leaf import Identity
 from warpspace.bodies.placed import PlacedBody
 from warpspace.kinematics import transforms
 
-STEP_S = 0.125  # between two pictures of a turning table: modest, since each is sent to the page
-LONGEST_STEP_S = 0.5  # time lost is skipped, not made up for
+STEP_S = 0.125  # between two pictures of a rotating table; each is sent to the page
+LONGEST_STEP_S = 0.5  # longer delays are skipped
 SPEED_DEG_S = 30.0
 
-BALL = 0.010  # marker of the tool point, as a part of the longest edge
+BALL = 0.010  # marker of the tool point, relative to the longest edge
 OPACITY = 0.045
-GIZMO_SIZE = 0.3  # of what moves the part, as a part of the longest edge
+GIZMO_SIZE = 0.3  # relative to the longest edge
 
 
 def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
-    """Draw the bodies, moved by the positions of the machine and bent by its errors.
+    """Draw the bodies at the positions of the machine, deformed by its errors.
 
-    Some axes may stand elsewhere, degrees, while one is turned; its table is then drawn also where
-    the machine is not.
+    `turned` overrides positions, degrees, during an animation; its table is then drawn also where
+    the machine is hidden.
     """
     is_shown, shapes = picture.state.machine.shown, dict[str, SceneNode | None]()
     if is_shown or turned:
@@ -46,7 +46,7 @@ def machine(picture: LivePicture, turned: Mapping[str, float]) -> Shapes:
 
 
 def ghost_machine(picture: LivePicture) -> Shapes:
-    """Draw the nominal machine, nearly transparent: it tells what the box is a part of."""
+    """Draw the nominal machine, nearly transparent."""
     rgb, edge = (colour(picture, name) for name in ("ghost_body", "ghost_body_edge"))
     shapes: dict[str, SceneNode | None] = {}
     for part in drawn_bodies(picture, nominal=True):
@@ -63,7 +63,7 @@ def _body(root: str, part: PlacedBody, rgb: Rgb, edge: Rgb, **options: object) -
 
 
 class MovingLayer:
-    """Everything around the box, which may also move by itself: the session turns it on."""
+    """Everything around the box, with an animation that the session advances."""
 
     def __init__(self, client: ClientHandle, page: Page, picture: LivePicture) -> None:
         self._client = client
@@ -71,15 +71,17 @@ class MovingLayer:
         self._around = Nodes(client.scene, page)
         self._ghost, self._turning = Nodes(client.scene), Nodes(client.scene)
         self._ghost_of: object = None
-        self.position: dict[str, float] = {}  # of the played axis, degrees; none where it stands
+        self.position: dict[str, float] = {}  # of the animated axis, degrees; empty while stopped
         self.moved: Callable[[], None] = lambda: None
-        self.clamp: Callable[[str], None] = lambda _place: None  # takes where the part is let go
+        self.clamp: Callable[[str], None] = lambda _place: (
+            None
+        )  # receives the placement after a drag
         self._turned_deg = 0.0
-        self._turned_at: float | None = None  # None while it stands still
+        self._turned_at: float | None = None  # None while stopped
         self.show(picture)
 
     def show(self, picture: LivePicture) -> None:
-        """Draw a picture; where the axis itself has been moved, the rotation starts there anew."""
+        """Draw a picture; a moved axis restarts the rotation at its new position."""
         before, self._picture = self._picture.state, picture
         now = picture.state
         same = before.origin is now.origin and before.scene.machine is now.scene.machine
@@ -100,7 +102,7 @@ class MovingLayer:
         return {GIZMO: SceneNode("add_transform_controls", stays, follows, self._drag)}
 
     def _drag(self, event: Any) -> None:
-        """Clamp the part where it is let go; viser calls it in a thread of its own."""
+        """Place the part at the end of a drag; called by viser in a thread of its own."""
         if event.phase == "end" and self._picture.part is not None:
             part, turn = self._picture.part, np.asarray(SO3(event.target.wxyz).as_matrix(), float)
             at = transforms.rigid(turn, event.target.position / SCENE_PER_MM)
@@ -108,7 +110,7 @@ class MovingLayer:
             self.clamp(",".join(map(repr, place)))
 
     def _draw_ghost(self, picture: LivePicture) -> None:
-        """Errors do not move the ghost; it is not drawn beside the machine itself."""
+        """Draw the ghost of the machine where it has changed; errors do not move it."""
         state = picture.state
         on = state.machine.ghost and not state.machine.shown
         of = on and (
@@ -128,7 +130,7 @@ class MovingLayer:
         return self._turned_at is not None
 
     def play(self, on: bool | None) -> None:
-        """Play (True), pause (False), or go back to where the axis stands (None)."""
+        """Play (True), pause (False), or return to the position of the axis (None)."""
         if on:
             self._turned_at = time.monotonic()
             return
@@ -141,7 +143,7 @@ class MovingLayer:
 
     @property
     def wait_s(self) -> float | None:
-        """How long to wait until the table is turned on; None while it stands still."""
+        """Time until the next picture of the animation; None while stopped."""
         at = self._turned_at
         return None if at is None else max(0.0, at + STEP_S - time.monotonic())
 

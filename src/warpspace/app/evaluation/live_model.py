@@ -1,6 +1,6 @@
-"""From a state to the picture of it: numpy only, no browser.
+"""Evaluation of a state into a picture.
 
-Grids and first-order responses are kept, since they change only with the scene, the density, the
+Grids and first-order responses are cached, since they change only with the scene, the density, the
 rotary positions and the loop; a slider move is then one matrix-vector product.
 """
 
@@ -29,16 +29,16 @@ from warpspace.scene.model import grid_basis
 from warpspace.units import Array
 
 CACHE_BYTES = 400_000_000
-WITHIN_LIMIT = 0.27  # place of the colour of what keeps the limit, on the scale of signed values
+WITHIN_LIMIT = 0.27  # place on the scale of signed values: colour of values within the limit
 TRACE_SAMPLES = 73  # points along a trace: every five degrees of a turn
 T = TypeVar("T")
 Responding: TypeAlias = tuple[T, ErrorBasis]
-"""A grid, or traces of rotary axes, and its first-order response."""
+"""A grid, or traces of rotary axes, with its first-order response."""
 Response: TypeAlias = tuple[Responding[Grid], tuple[Responding[TraceGroup], ...]]
 
 
 class LiveModel:
-    """Turns states into pictures; one for all sessions, usable from any thread."""
+    """Evaluates states into pictures; shared by all sessions, thread-safe."""
 
     def __init__(self) -> None:
         self._cache: Cache[Any] = Cache(CACHE_BYTES)
@@ -99,12 +99,12 @@ class LiveModel:
     def _uncertainty(
         self, state: AppState, grid: Grid, field: ErrorField
     ) -> FieldUncertainty | None:
-        """Say how sure errors over a grid are; a slider that is moved keeps its covariance."""
+        """Evaluate the uncertainty of errors over a grid; the covariance is cached."""
         scene = state.scene
         if scene.covariance is None and not scene.uncertainty:
             return None
 
-        def build() -> FieldUncertainty | None:  # something is stated
+        def build() -> FieldUncertainty | None:
             return field_uncertainty(
                 scene, field.error_um, grid.coordinates, state.view(), grid.point_mm
             )
@@ -135,10 +135,10 @@ class LiveModel:
                 yield axis, at, cached[0], self._field(state, *cached)
 
     def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
-        """Evaluate a grid or traces: to first order, or what a table of compensation leaves.
+        """Evaluate a grid or traces: to first order, or the residual error of a compensation table.
 
-        What does not depend on the errors (what the controller adds, where the axes stand then) is
-        kept; a slider move is then one evaluation of the exact chain.
+        Corrections and axis positions, which do not depend on the errors, are cached; a slider move
+        is then one evaluation of the exact chain.
         """
         controller, scene = state.controller, state.scene
         on_trace = isinstance(of, TraceGroup)
@@ -190,7 +190,7 @@ def _build(state: AppState) -> Response:
 
 @dataclass(frozen=True)
 class PassFail(ColourScale):
-    """Two colours: what keeps a limit, and what does not."""
+    """Two colours: within a limit, and above."""
 
     limit: float = 0.0
 
@@ -203,7 +203,7 @@ class PassFail(ColourScale):
 
 
 def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -> ColourScale:
-    """Give the colours that a user has chosen: fixed, shared, or with round ends."""
+    """Return the selected colour scale: fixed, shared, or with round ends."""
     quantity, component, look = volume.quantity, state.component, state.look
     field, values = volume.field, volume.values
     if look.pass_fail and quantity == "position" and component == "norm":

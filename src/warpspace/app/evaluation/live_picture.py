@@ -1,4 +1,4 @@
-"""The picture of a state: what the app draws, with the comparison it belongs to."""
+"""The picture of a state or a comparison, which the app draws."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -27,21 +27,20 @@ from warpspace.units import Array
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    view: str  # what is drawn: "a", "b" or "difference"
+    view: str  # "a", "b" or "difference"
     titles: tuple[str, str]  # names of the two sides
-    sides: tuple[AppState, AppState]  # what they are, looked at as now
+    sides: tuple[AppState, AppState]  # with the present display settings
     a: Statistics
     b: Statistics
-    # of the length of the change at each node, |E_B − E_A|; None where there is no difference
+    # of the length of the difference at each node, |E_B − E_A|; None where there is none
     difference: Statistics | None
-    # [nx, ny, nz, 3], or None; displaced nodes of the side that is not drawn; None for the
-    # difference
+    # [nx, ny, nz, 3]; displaced nodes of the other side; None for the difference
     other_mm: Array | None
-    refused: str = ""  # why there is no difference; empty where there is one
+    refused: str = ""  # reason for a missing difference
 
     @property
     def title(self) -> str:
-        """Name of what is drawn."""
+        """Label of the drawn side, or of the difference."""
         a, b = self.titles
         if self.view != "difference":
             return f"A: {a}" if self.view == "a" else f"B: {b}"
@@ -54,18 +53,18 @@ class Compared:
 
 @dataclass(frozen=True, kw_only=True)
 class LivePicture(Picture):
-    state: AppState  # what is steered
+    state: AppState  # the present state
     traces: tuple[TraceLines, ...]
-    compared: Compared | None = None  # the comparison it belongs to
+    compared: Compared | None = None
 
     @cached_property
     def size_mm(self) -> float:
-        """Length that marks are sized by, mm, for a single point too."""
+        """Reference length of marker sizes, mm; defined for a single point, too."""
         return picture_size_mm(self.state.scene, self.grid)
 
     @cached_property
     def bench(self) -> SceneOverlay[type[BenchTest]] | None:
-        """The path of the standard test that is run; None where none is, or cannot be."""
+        """The path of the selected standard test; None where there is none, or it cannot be run."""
         return None if self.is_difference else bench_overlay(self.drawn_state)
 
     @cached_property
@@ -77,7 +76,7 @@ class LivePicture(Picture):
         return self._in_box(path_overlay)
 
     def _in_box(self, find: Callable[[AppState], SceneOverlay[T] | None]) -> SceneOverlay[T] | None:
-        """Find a part or a path; of a difference its change; None where none is, or cannot be."""
+        """Evaluate an overlay; for a difference its change; None where there is none."""
         if not self.is_difference or self.compared is None:
             return find(self.drawn_state)
         a, b = map(find, self.compared.sides)
@@ -86,7 +85,7 @@ class LivePicture(Picture):
         return replace(b, error_um=b.error_um - a.error_um)
 
     def coloured(self, overlay: SceneOverlay[Any]) -> tuple[Array, ColourScale]:
-        """Give what is coloured of it, in the colours of the map; along normals in its own."""
+        """Return coloured values and colour scale of an overlay."""
         if self.state.part.normal and isinstance(overlay.of, PartMesh):
             normals = overlay.of.corners.normals @ overlay.pose[:3, :3].T
             values = np.einsum("ij,ij->i", overlay.error_um[overlay.at], normals)
@@ -96,7 +95,7 @@ class LivePicture(Picture):
 
     @cached_property
     def worst_node(self) -> int:
-        """Flat number of the node where what is coloured is largest in magnitude."""
+        """Flat index of the node with the largest coloured magnitude."""
         return int(np.argmax(np.abs(self.values)))
 
     @cached_property
@@ -108,17 +107,17 @@ class LivePicture(Picture):
 
     @property
     def drawn_state(self) -> AppState:
-        """The state that is drawn: the one steered, or a side of a comparison."""
+        """The drawn state: the present one, or a side of a comparison."""
         compared = self.compared
         return self.state if compared is None else compared.sides[compared.view != "a"]
 
     @property
     def title(self) -> str:
-        """Name of what is drawn: the scene, or a side of a comparison, or the difference."""
+        """Title of the scene, of a side of a comparison, or of the difference."""
         return self.state.scene.title if self.compared is None else self.compared.title
 
     def describe_sides(self, word: Callable[[AppState], str]) -> str:
-        """Say something of what is drawn; of a difference for both sides where they differ."""
+        """Describe the drawn state; for a difference both sides where they differ."""
         if self.compared is None or not self.is_difference:
             return word(self.drawn_state)
         a, b = (word(side) for side in self.compared.sides)

@@ -1,7 +1,7 @@
-"""The machine of a scene or a state changed, by words of the editor; machines to start from.
+"""Edits of the machine of a scene or a state, and the machines of the library.
 
-The changed machine lives in the state's scene; `AppState.origin` keeps the scene's own one. What
-belongs to axes that stay is kept.
+The edited machine is part of the state's scene; `AppState.origin` holds the original one. Errors
+and tolerances of the remaining axes are unchanged.
 """
 
 import tomllib
@@ -33,22 +33,22 @@ from warpspace.scene.scene_writer import over_ranges, scene_to_toml
 from warpspace.scene.starter import starter_scene
 from warpspace.units import MICROMETRE
 
-# --- A scene changed as its file: one entry, or all that says what the machine is -----------------
+# --- Edits of a scene as a document: a single entry, or the whole machine -------------------------
 
 Tables = dict[str, dict[str, Any]]
 T = TypeVar("T")
 KEYS = {"offset": "offset_mm", "rotation": "rotation_deg", "travel": "travel"}
 UNITS = {"offset": "mm", "rotation": "°", "span": "mm", "travel": "", "volume": ""}
-"""Tables of numbers; without a unit it is that of the axis."""
+"""Units of the tables of numbers; empty for the unit of the axis."""
 NOUNS = {"span": "gantry", "mesh": "body"}
-START_SPAN_MM = 1000.0  # of guides where no travel across says how far apart they are
-MOST_CHAIN_TEXT = 101  # characters of a chain that are read: one more than in a file
+START_SPAN_MM = 1000.0  # of guides without a travel across them
+MOST_CHAIN_TEXT = 101  # characters of a chain that are parsed: one more than in a file
 FRAME = "F"
-MAX_QUOTED = 30  # characters of what was typed that a message repeats
+MAX_QUOTED = 30  # characters of a typed text in a message
 
 
 def tables_of(scene: Scene) -> Tables:
-    """Give all that can be changed frame by frame."""
+    """Return the tables that can be edited frame by frame."""
     machine, fixed = scene.machine, dict.fromkeys(definition.FIXED_FRAMES, definition.ORIGIN)
     offset = {name: axis.offset_mm for name, axis in machine.axes.items()}
     rotation = {name: axis.rotation_deg for name, axis in machine.axes.items()}
@@ -63,7 +63,7 @@ def tables_of(scene: Scene) -> Tables:
 
 
 def own_bodies(machine: definition.Machine) -> dict[str, definition.BodySource]:
-    """Give the bodies that a description names, without those of its machine in the library."""
+    """Return the bodies of a description that are not those of the library machine."""
     library_bodies = load_machine(machine.name).bodies if machine.name in machine_names() else {}
     return {
         frame: source
@@ -73,9 +73,9 @@ def own_bodies(machine: definition.Machine) -> dict[str, definition.BodySource]:
 
 
 def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
-    """Give the scene with its machine changed as a page spells it, and what was left out.
+    """Apply an edit of the page to the machine of a scene; return notes on what was removed.
 
-    A word that is none changes nothing; what a file could not hold is refused.
+    An unknown edit changes nothing; one that a file could not hold is refused.
     """
     what, _, arguments = word.partition(" ")
     tables, raw, machine = tables_of(scene), _document(scene), scene.machine
@@ -144,7 +144,7 @@ def _put(raw: Tables, key: str, frame: str, value: object) -> None:
 
 
 def _moved(machine: definition.Machine, what: str, axis: str) -> definition.Chain:
-    """Move an axis along the written chain, across the frame too; or next to it; or away."""
+    """Move an axis along the chain, also across the frame; or next to the frame; or remove it."""
     places = [*reversed(machine.chain.workpiece), FRAME, *machine.chain.tool]
     at = places.index(machine.axis(axis).name) + {"left": -1, "right": 1}.get(what, 0)
     places.remove(axis)
@@ -170,26 +170,26 @@ def _rearrange(raw: Tables, scene: Scene, chain: definition.Chain) -> None:
 
 
 def _with_machine(scene: Scene, other: Scene) -> tuple[Scene, tuple[str, ...]]:
-    """Give a scene the machine, the working volume and the points of another one."""
+    """Replace machine, working volume and points of a scene by those of another one."""
     document = _document(other)
     raw = _document(scene) | {key: document[key] for key in ("machine", "workspace", "points_mm")}
     return _read(scene, raw, other.machine)
 
 
 def _document(scene: Scene) -> Tables:
-    """Give a scene as its file would have it, the machine written out; without bodies and errors.
+    """Return a scene as the document of its file, with its machine, without bodies and errors.
 
-    A ramp is spelled by the range of its axis, which may become another one.
+    The text of a ramp refers to the range of its axis, which an edit may change.
     """
     model = replace(scene.model, machine=replace(scene.machine, name="", bodies={}))
     return tomllib.loads(scene_to_toml(replace(scene, model=model, errors=ErrorSet())))
 
 
 def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, tuple[str, ...]]:
-    """Read a changed document without what belongs to axes that are gone; and say what that was.
+    """Parse an edited document without entries of removed axes; return notes on those.
 
-    The machine is named after its frames: as the one that it is like, as that of the library with
-    the same ones, or as its scene. Bodies that were made for other frames suit it no more.
+    A machine with the frames of `like` or of a library machine has its name and bodies; any other
+    is named after the scene, since bodies belong to their frames.
     """
     chain = definition.parse_chain(raw["machine"]["chain"])
     gone = {a: at for a, at in scene.workspace.positions.items() if a not in chain.axes}
@@ -249,13 +249,13 @@ def _frames(machine: definition.Machine) -> tuple[object, ...]:
 
 
 def known_alike(machine: definition.Machine) -> definition.Machine | None:
-    """Find the machine of the library with the same frames, whatever their travels and ways."""
+    """Find the library machine with the same frames; travels and directions may differ."""
     machines = map(load_machine, machine_names())
     return next((one for one in machines if _frames(one) == _frames(machine)), None)
 
 
 def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
-    """Keep the entries of a table of parameters that belong to some axes."""
+    """Select the entries of a table of parameters that belong to some axes."""
     return {key: value for key, value in table.items() if parameter(key).axis in axes}
 
 
@@ -265,20 +265,20 @@ def _left_out(scene: Scene, gone: Collection[str]) -> Iterator[str]:
         parts = {
             "its errors {}": of_axes(scene.errors.functions, [axis]),
             "its tolerances {}": of_axes(scene.tolerances.own, [axis]),
-            "how {} depends on it": [k for k in depend if parameter(k).axis not in gone],
-            "its position at the reference": {axis} & (scene.reference or {}).keys(),
+            "the dependence of {} on it": [k for k in depend if parameter(k).axis not in gone],
+            "its reference position": {axis} & (scene.reference or {}).keys(),
         }
         losses = "; ".join(words.format(", ".join(keys)) for words, keys in parts.items() if keys)
-        yield f"axis {axis} left out{f' and with it {losses}' if losses else ''}"
+        yield f"axis {axis} removed{f', with {losses}' if losses else ''}"
 
 
-# --- The machine of a state: errors and tolerances that were changed stay, undo takes all back ----
+# --- The machine of a state: edited errors and tolerances stay ------------------------------------
 
-UNCHANGED = "the machine stays as it was"
+UNCHANGED = "the machine is unchanged"
 
 
 def with_word(state: AppState, word: str) -> AppState:
-    """Change the machine as a page spells it; what cannot be is refused with a note."""
+    """Apply an edit of the page to the machine of a state; a refused edit adds a note."""
     what, *arguments = word.split(" ", maxsplit=3)
     gantry = state.scene.machine.gantries.get(arguments[0]) if arguments else None
     try:
@@ -297,7 +297,7 @@ def with_word(state: AppState, word: str) -> AppState:
         changed = state if scene is state.scene else with_changed_scene(state, scene)
     except WarpspaceError as problem:
         return state.noted(f"{str(problem).removeprefix('machine: ')}; {UNCHANGED}")
-    if what == "span" and gantry is not None:  # the errors of both guides stay
+    if what == "span" and gantry is not None:  # the errors of both guides are unchanged
         now = scene.machine.gantries[gantry.axis]
         turned = changed.amplitudes[now.rotation_key] * now.rotation_weight
         turned /= gantry.rotation_weight
@@ -308,7 +308,7 @@ def with_word(state: AppState, word: str) -> AppState:
 def with_changed_scene(state: AppState, scene: Scene) -> AppState:
     before, keys = state.scene, scene.parameter_keys
     was, stands = before.workspace.positions, scene.workspace.positions
-    # an axis whose position in the working volume was changed goes there
+    # an axis whose position in the working volume was edited moves there
     unmoved = {
         axis: at for axis, at in state.positions.items() if was.get(axis) == stands.get(axis)
     }
@@ -327,7 +327,7 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
         specification=replace(state.specification, fixed=fixed),
         picked=state.picked if scene.machine.chain == before.machine.chain else None,
         lever=state.lever if state.lever in keys else "",
-        # the table of another machine would correct nothing here
+        # a table is valid for its machine only
         controller=state.controller if scene.model == before.model else None,
     )
     curves = changed.own_curves
@@ -336,7 +336,7 @@ def with_changed_scene(state: AppState, scene: Scene) -> AppState:
 
 
 def _amplitude(state: AppState, scene: Scene, key: str) -> float:
-    """Give an amplitude in a changed scene: in a larger volume the same curve may reach further."""
+    """Return an amplitude in an edited scene; the same curve may be larger over a larger volume."""
     if key not in state.amplitudes:
         return scene.errors.amplitude(key)
     present = state.amplitudes[key]
@@ -347,12 +347,12 @@ def _amplitude(state: AppState, scene: Scene, key: str) -> float:
 
 
 def with_own_machine(state: AppState) -> AppState:
-    """Go back to machine, working volume and points of the scene as it was opened."""
+    """Restore machine, working volume and points of the scene as opened."""
     original, scene = state.origin, state.scene
     if original.machine == scene.machine and original.workspace == scene.workspace:
         return state
     returned = original.machine.axes.keys() - scene.machine.axes.keys()
-    # curves that are the scene's own, but for the working volume, become those again
+    # curves that differ from those as opened by the working volume only are restored
     original_curves, present = state.own_curves, scene.errors.functions
     curves = {key: one for key, one in present.items() if original_curves.get(key) != one}
     orders = {
@@ -372,14 +372,14 @@ def with_own_machine(state: AppState) -> AppState:
     return with_changed_scene(state, restored).noted(*notes)
 
 
-# --- The two guides of a gantry: their errors, which the axis has as mean and rotation ------------
+# --- Errors of the two guides of a gantry, from mean and rotation of the axis ---------------------
 
 SAMPLES = 65
-ALIKE = 1e-9  # by how much two curves of amplitude 1 may differ that count as one
+ALIKE = 1e-9  # largest difference of two curves of amplitude 1 that are regarded as equal
 
 
 def guide_errors(state: AppState, gantry: definition.Gantry) -> tuple[float, float] | None:
-    """Give the positioning errors of both guides, µm; None where their curves differ."""
+    """Return the positioning errors of both guides, µm; None where their curves differ."""
     if not _alike(*_curves(state, gantry)):
         return None
     mean = state.amplitudes[gantry.positioning_key]
@@ -390,7 +390,7 @@ def guide_errors(state: AppState, gantry: definition.Gantry) -> tuple[float, flo
 def with_guide_error(
     state: AppState, gantry: definition.Gantry, guide: int, value_um: float
 ) -> AppState:
-    """Set the positioning error of one guide; the other one stays."""
+    """Set the positioning error of one guide; the other one is unchanged."""
     present = guide_errors(state, gantry)
     if present is None:
         raise OptionError(
@@ -420,28 +420,25 @@ def _alike(*curves: ErrorFunction) -> bool:
     return bool(np.abs(first.evaluate(at) - second.evaluate(at)).max() <= ALIKE)
 
 
-# --- The machines to start from: those of the bundled scenes, each once ---------------------------
+# --- Machines of the bundled scenes, each once ----------------------------------------------------
 
 
 @cache
 def library() -> Mapping[str, Scene]:
-    """Give a scene of each machine, by the machine's name: it brings its volume and points."""
+    """Load one scene of each machine, for its volume and points, by name of the machine."""
     scenes: dict[str, Scene] = {}
     for name in scene_names():
-        with suppress(WarpspaceError):  # a broken scene beside the others hides none of them
+        with suppress(WarpspaceError):  # a damaged scene does not hide the others
             scene = load_scene(name)
             scenes.setdefault(scene.machine.name, scene)
     return scenes
 
 
 def with_library_scene(state: AppState, scene: Scene) -> AppState:
-    """Start anew with a machine of the library: what was measured on one says nothing of another.
-
-    The machine of the scene as it was opened comes back with all that is shown.
-    """
+    """Open a machine of the library with its own errors; the original machine is restored."""
     if state.origin.machine == scene.machine:
         return with_own_machine(state)
     previous = state.scene.title
-    note = f"{scene.title}, with its own errors: those of {previous} are left behind"
+    note = f"{scene.title} with its own errors; those of {previous} were dropped"
     changed = replace(state.with_scene(scene), left_behind=previous)
-    return changed.noted(f"{note}; undo brings them back")
+    return changed.noted(f"{note} (Undo restores them)")

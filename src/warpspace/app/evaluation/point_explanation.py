@@ -1,4 +1,4 @@
-"""Why a point is where it is: which point a click means, and what its error is made of."""
+"""Picked points: their selection by a click, and the contributions to their error."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -28,46 +28,44 @@ from warpspace.picture.map_mesh import solid_map
 from warpspace.picture.traces import is_moved
 from warpspace.units import Array
 
-TOLERANCE_RAD = 0.0032  # how far a click may pass a trace: about seven pixels of the usual view
-BETWEEN = 5  # places looked at between two samples of a trace: one degree apart
-REACH_MM = 1e7  # rays from farther away than this come from no camera
+TOLERANCE_RAD = 0.0032  # from a click to a trace: about seven pixels of the default view
+BETWEEN = 5  # points per sample of a trace: one degree apart
+REACH_MM = 1e7  # largest distance of a camera
 PARALLEL = 1e-12
 
 
 @dataclass(frozen=True)
 class PointExplanation:
-    """A picked point explained, as it is drawn."""
+    """Error of a picked point, its contributions, and its place in the drawing."""
 
     at: Mapping[str, float]  # mm or degrees; positions of all axes
     loop: Loop
     explanation: Explanation
-    # [3]; from R to where things are drawn, on machines whose linear axes carry the workpiece
+    # [3]; from R to the drawing, on machines whose linear axes carry the workpiece
     shift_mm: Array
-    drawn_mm: Array  # [3]; where the displaced point is drawn
-    # [3]; the error that it is drawn with: the one explained, or what a table leaves of it
+    drawn_mm: Array  # [3]; displaced point in the drawing
+    # [3]; drawn error: the explained one, or the residual error of a compensation table
     drawn_um: Array
-    uncertainty: (
-        FieldUncertainty | None
-    )  # of the error that is explained; None where nothing is stated
+    uncertainty: FieldUncertainty | None  # of the explained error; None where unknown
 
     @property
     def is_corrected(self) -> bool:
-        """Whether a table corrects the point that is drawn."""
+        """True where a compensation table corrects the drawn point."""
         return not np.array_equal(self.drawn_um, self.explanation.error_um)
 
     @property
     def length_um(self) -> float:
-        """Length of the error that is explained."""
+        """Length of the explained error."""
         return float(np.linalg.norm(self.explanation.error_um))
 
     @cached_property
     def ranked(self) -> list[PointContribution]:
-        """What it is made of, the largest part along the error first."""
+        """Contributions, the largest component along the error first."""
         return sorted(self.explanation.contributions, key=lambda part: -abs(part.along_um))
 
 
 def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Picked, Array] | None:
-    """Find the point of a drawn trace or surface that a ray meets, and where it is drawn, [3]."""
+    """Find the nearest point of a trace or surface on a ray, and its place in the drawing, [3]."""
     ray = np.concatenate([np.ravel(origin_mm), np.ravel(direction)]).astype(float)
     if ray.shape != (6,) or not np.isfinite(ray).all() or np.abs(ray).max() > REACH_MM:
         return None
@@ -84,7 +82,7 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Pick
 
 
 def pick_worst(picture: LivePicture) -> Picked:
-    """Give the node whose position error is largest in what is drawn."""
+    """Return the node with the largest position error of the picture."""
     axes = picture.statistics.max_at_axes
     return Picked(
         {name: at for name, at in axes.items() if is_linear(name) or name in picture.grid.axes}
@@ -124,7 +122,7 @@ def _on_traces(picture: LivePicture, origin: Array, unit: Array) -> Iterator[tup
 
 
 def pick_line(picture: LivePicture, origin_mm: Array, direction: Array) -> int | None:
-    """Find the line of the program whose drawn path a ray passes."""
+    """Find the line of the program at a ray through its drawn path."""
     path = picture.path
     if path is None or not direction.any():
         return None
@@ -141,7 +139,7 @@ def _denser(samples: Array) -> Array:
 
 
 def explain_point(state: AppState, picked: Picked, exaggeration: float) -> PointExplanation:
-    """Explain the error of a picked point."""
+    """Evaluate error and contributions of a picked point."""
     scene, model = state.active_scene(), state.scene.model
     stands = {**state.scene.workspace.positions, **state.positions, **picked.at}
     at = {name: stands.get(name, 0.0) for name in model.machine.axes}
@@ -170,7 +168,7 @@ def explain_point(state: AppState, picked: Picked, exaggeration: float) -> Point
 def drawn_places(
     state: AppState, points: Sequence[Mapping[str, float]], exaggeration: float
 ) -> Array:
-    """Tell where points of the surface are drawn, [n, 3], mm; all at once, as a drag needs it."""
+    """Compute the places of points of the surface in the drawing, [n, 3], mm."""
     stands = {**state.scene.workspace.positions, **state.positions}
     at = {
         name: np.array([one.get(name, stands.get(name, 0.0)) for one in points])
@@ -183,7 +181,7 @@ def drawn_places(
 def drawn_field(
     state: AppState, at: Coordinates, *, exact: bool = False
 ) -> tuple[Array, ErrorField]:
-    """Tell where points of the surface are drawn without errors, and evaluate them in R, [n]."""
+    """Compute the nominal places of points in the drawing, and their errors in R, [n]."""
     scene, model, loop = state.active_scene(), state.scene.model, state.loop
     nominal = nominal_point(model, Loop.TOOL, at)
     drawn_mm = seen_from_workpiece(model, at, scene.workspace, nominal)
@@ -194,7 +192,7 @@ def drawn_field(
 
 
 def with_picked(state: AppState, picked: Picked | None) -> AppState:
-    """Ask about a point, or about none; the chosen contribution stays while there is a point."""
+    """Pick a point, or none; the selected contribution stays while there is a point."""
     return replace(state, picked=picked, lever=state.lever if picked else "")
 
 
@@ -205,35 +203,35 @@ POINTS = {
     f"{Distance.name}.end": "Click the second point.",
     f"{Distance.name}.corner": "Click the corner of an angle, or stop.",
 }
-"""What asks for the points of a distance, by form, in turn; an empty form waits for a click."""
+"""Prompts for the points of a distance, by form; an empty form waits for a click."""
 
 
 def awaited_form(state: AppState) -> str:
-    """Give the form of the point that the next click sets; empty where a click asks why."""
+    """Return the form of the point that the next click sets; empty where it picks a point."""
     page = state.page
     is_open = Distance.name in page.open and page.task == Distance.task and not page.notes
     return next((one for one in POINTS if is_open and state.forms.get(one) == ""), "")
 
 
 def with_clicked(state: AppState, picked: Picked) -> AppState:
-    """Take a click on the drawing: a point that is waited for, else one that is asked about."""
+    """Set the awaited point of a distance to a clicked one, or pick it."""
     point = awaited_form(state)
     if not point:
         return with_picked(state, picked)
     if picked.point_mm is not None:
-        return state.noted("a trace was clicked; click a point of the map")
+        return state.noted("expected a click on the map, not on a trace")
     return with_form(state, point, spell_at(picked.at))
 
 
 def measure_distance(picture: LivePicture) -> tuple[DistanceResult, Array, Array] | None:
-    """Measure between the points that were chosen; None where there are not two.
+    """Evaluate the distance of two selected points; None where they are not set.
 
-    With the result where start, end and corner are drawn, [n, 3], without errors and displaced.
+    Also return the places of start, end and corner in the drawing, [n, 3], nominal and displaced.
     """
     return None if picture.is_difference else _measure_distance(Identity(picture))
 
 
-@lru_cache(maxsize=1)  # lines and words of one picture ask; it keeps the picture
+@lru_cache(maxsize=1)  # lines and labels of one picture use it
 def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | None:
     picture: LivePicture = of.target
     state, option_texts = picture.drawn_state, option_values(picture.state, Distance.name)
@@ -247,19 +245,19 @@ def _measure_distance(of: Identity) -> tuple[DistanceResult, Array, Array] | Non
         at = distance.places(scene, distance.corner)
         drawn_mm, field = drawn_field(state, at, exact=distance.exact)
         measurement = distance.between(scene, at, field)
-    except WarpspaceError:  # said in its section
+    except WarpspaceError:  # reported in its section
         return None
     return measurement, drawn_mm, deform(drawn_mm, field.error_um, picture.exaggeration)
 
 
-# --- Where a ray from the eye meets a surface or passes a line ------------------------------------
+# --- Rays from the camera -------------------------------------------------------------------------
 
 
 class Hit(NamedTuple):
-    """Where a ray meets a surface."""
+    """Intersection of a ray with a surface."""
 
     vertices: NDArray[np.intp]  # [3]; vertex numbers of the triangle
-    # [3]; barycentric weights of the point in it; they interpolate anything given per vertex
+    # [3]; barycentric weights of the point in it, for values per vertex
     weights: Array
     distance: float  # along the ray, in lengths of its direction
 
@@ -267,7 +265,7 @@ class Hit(NamedTuple):
 def pick_surface(
     origin: Array, direction: Array, vertices: Array, triangles: NDArray[np.intp]
 ) -> Hit | None:
-    """Find the first triangle, [T, 3], that a ray meets.
+    """Find the first of the triangles, [T, 3], on a ray.
 
     Origin and direction, [3], are in the units of the vertices, [M, 3]; None where the ray misses.
     """
@@ -285,9 +283,9 @@ def pick_surface(
 def pick_point(
     origin: Array, direction: Array, points: Array, tolerance: float
 ) -> tuple[int, float] | None:
-    """Find the point, [M, 3], that a ray passes most closely, as seen from its origin.
+    """Find the point, [M, 3], with the smallest angle to a ray.
 
-    Its number, and its distance along the ray; None where none lies within a tolerance, rad.
+    Return its index and its distance along the ray; None where the angle exceeds a tolerance, rad.
     """
     if len(points) == 0:
         return None

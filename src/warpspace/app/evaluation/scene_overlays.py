@@ -1,6 +1,6 @@
-"""What stands in the box: a part, and paths of a program and of a standard test.
+"""Overlays in the box: a part, and paths of a program and of a standard test.
 
-Responses are kept; a slider move is a product.
+Responses are cached; a slider move is a product.
 """
 
 from collections.abc import Callable, Hashable, Mapping
@@ -27,35 +27,35 @@ from warpspace.parts.workpiece import Made, PartMesh, make_points, place_part, p
 from warpspace.scene.model import Scene
 from warpspace.units import MM_PER_UM, Array
 
-AT_LINE = "program.at_line"  # the form that names a line of the program
+AT_LINE = "program.at_line"  # form of the selected line of the program
 MOST_POINTS = 300_000  # of a part, or of the path of a program, that the app draws
 MOST_SITES = 20_000  # places of one test
-PIECE = 20_000  # points that are worked on at once: what lies between needs memory, too
+PIECE = 20_000  # points evaluated at once, which limits the memory of intermediate arrays
 T = TypeVar("T")
 _CACHE: Cache[Any] = Cache(400_000_000)
 
 
 @dataclass(frozen=True, eq=False)
 class SceneOverlay(Generic[T]):
-    """Points of a part, or of a path, as they are drawn; numbers of 4 bytes are enough for it."""
+    """Points of a part or of a path in the drawing, in single precision."""
 
     of: T  # in the workpiece frame
-    pose: Array  # [4, 4]; of that frame as drawn
-    at: NDArray[Any]  # points at the corners of a part, [W], or at both ends of pieces of a path
-    coordinates: Mapping[str, Array]  # [n], or one for all: where the axes stand
-    point_mm: Array  # [n, 3]; in R, where they are made
+    pose: Array  # [4, 4]; of that frame in the drawing
+    at: NDArray[Any]  # indices of the corners of a part, [W], or of both ends of path segments
+    coordinates: Mapping[str, Array]  # [n], or one for all: axis positions
+    point_mm: Array  # [n, 3]; in R, where they are cut
     outside: NDArray[np.bool_]  # [n]; beyond the travel
-    turn: Array  # [4, 4] or [n, 4, 4]; from there to where they are drawn
+    turn: Array  # [4, 4] or [n, 4, 4]; from there to the drawing
     nominal_mm: NDArray[Any]  # [n, 3]; as drawn
     response: NDArray[Any]  # [K, n * 3], µm per µm or µrad
     error_um: NDArray[Any]  # [n, 3]; of the tool against the workpiece
 
     def drawn_mm(self, exaggeration: float) -> NDArray[Any]:
-        """Give where the points are, [n, 3], exaggerated."""
+        """Compute the displaced points, [n, 3], exaggerated."""
         return self.nominal_mm + np.float32(exaggeration * MM_PER_UM) * self.error_um
 
     def with_errors(self, state: AppState) -> "SceneOverlay[T]":
-        """Evaluate it to first order, or what a table of compensation leaves."""
+        """Evaluate the errors to first order, or the residual errors of a compensation table."""
         controller, scene, point = state.controller, state.active_scene(), self.point_mm
         if controller is None:
             amplitudes = np.fromiter(state.active.values(), np.float32, len(state.amplitudes))
@@ -72,14 +72,14 @@ class SceneOverlay(Generic[T]):
 def _cached_overlay(
     state: AppState, arguments: tuple[Hashable, ...], build: Callable[[Scene], SceneOverlay[T]]
 ) -> SceneOverlay[T] | None:
-    """Give something with the errors of a state; None where it cannot be made."""
+    """Build an overlay, or return it from the cache, with errors; None where it cannot be built."""
     key = Identity(state.scene), tuple(state.positions.items()), state.placed, arguments
     try:
         overlay: SceneOverlay[T] = _CACHE.get(
             key, lambda: build(state.standing), lambda found: found.response.nbytes
         )
         return overlay.with_errors(state)
-    except WarpspaceError:  # its section says it
+    except WarpspaceError:  # reported in its section
         return None
 
 
@@ -105,7 +105,7 @@ def _respond(scene: Scene, of: T, made: Made, at: NDArray[Any]) -> SceneOverlay[
 
 
 def part_overlay(state: AppState) -> SceneOverlay[PartMesh] | None:
-    """Give the part as it is cut; None where there is none, or it cannot be clamped."""
+    """Build the part as it is cut; None where there is none, or it cannot be placed."""
     mesh, place = state.part.mesh, state.part.place
     if mesh is None or not state.part.shown:
         return None
@@ -118,7 +118,7 @@ def part_overlay(state: AppState) -> SceneOverlay[PartMesh] | None:
 
 
 def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
-    """Give the place of a part whose middle is to stand so, [4, 4], in the workpiece frame."""
+    """Compute the placement of a part from a pose of its middle, [4, 4], in the workpiece frame."""
     placement = transforms.placed(part.place[:3], part.place[3:])
     pose = stand @ transforms.translation(-part.middle_mm) @ placement
     angles = transforms.roll_pitch_yaw_deg(pose[:3, :3])
@@ -129,7 +129,7 @@ def moved_place(part: PartMesh, stand: Array) -> tuple[float, ...]:
 
 
 def path_overlay(state: AppState) -> SceneOverlay[ToolPath] | None:
-    """Give the path of the program; None where there is none, or it cannot be followed."""
+    """Build the path of the program; None where there is none, or it cannot be traced."""
     text, option_texts = state.part.program, option_values(state, Program.name) | {"at_line": ""}
     if text is None:
         return None
@@ -151,7 +151,7 @@ def chosen_test(state: AppState) -> type[BenchTest] | None:
 
 
 def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
-    """Lay the path of a test on a machine."""
+    """Plan a test on a machine."""
     plan = test.plan(scene)
     if len(plan.point_mm) > MOST_SITES:
         raise OptionError(
@@ -161,7 +161,7 @@ def plan_test(test: BenchTest, scene: Scene) -> BenchPlan:
 
 
 def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
-    """Give the path of the chosen test; None where none is drawn, or it cannot be run."""
+    """Build the path of the selected test; None where none is drawn, or it cannot be run."""
     kind, option_texts = chosen_test(state), option_values(state, TEST)
     if kind is None or option_texts.get("path") == "0":
         return None
@@ -177,5 +177,5 @@ def bench_overlay(state: AppState) -> SceneOverlay[type[BenchTest]] | None:
             kind, still, pieces, at, point, inside, still, nominal, response, nominal
         )
 
-    without = replace(state, controller=None)  # a test is of the machine as it is
+    without = replace(state, controller=None)  # a test is of the uncompensated machine
     return _cached_overlay(without, (kind, *sorted(option_texts.items())), lay)

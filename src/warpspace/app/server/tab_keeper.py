@@ -1,10 +1,10 @@
-"""Which browser tab is which, and what is kept of one: in the server for a while, and in its page.
+"""Identity of browser tabs, and their recovery from the server or from a copy in the page.
 
-viser numbers connections, not tabs: after a dropped connection the page connects anew and counts as
-a new client. The page therefore keeps a random token in its `sessionStorage`, which belongs to one
-tab and survives a reload, and says it when it has connected. What a tab leaves behind is kept for
-a while under its token. A page whose browser forbids `sessionStorage`, and a tab that was closed
-and opened anew, start afresh. A restarted server knows no one: then helps what the page has kept.
+viser numbers connections, not tabs: a page that reconnects is a new client. The page therefore
+stores a random token in its `sessionStorage`, which belongs to one tab and survives a reload, and
+sends it after connecting. The record of a closed tab is stored for a while under its token. A page
+whose browser forbids `sessionStorage`, and a tab that was closed and opened again, start afresh.
+After a restart of the server, the tab is restored from the copy in its page.
 """
 
 import re
@@ -54,14 +54,14 @@ def is_token(text: str) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class TabRecord:
-    """What a tab leaves behind."""
+    """State and camera of a closed tab."""
 
     store: StateStore  # state and history
     camera: CameraMemory | None
 
 
 class TabMemory:
-    """Keeps what tabs leave behind, bounded in time, number and memory."""
+    """Records of closed tabs, limited in time, number and memory."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -73,7 +73,7 @@ class TabMemory:
         self.forget()
 
     def forget(self) -> None:
-        """Forget what is too old, or too much; the oldest first."""
+        """Delete records above the limits, the oldest first."""
         now = self._clock()
         size = sum(left.store.size_bytes for _, left in self._records.values())
         while self._records:
@@ -84,7 +84,7 @@ class TabMemory:
             self._records.popitem(last=False)
 
     def take(self, token: str) -> TabRecord | None:
-        """Give back what a tab has left behind, once; None where there is nothing."""
+        """Return and delete the record of a tab; None where there is none."""
         self.forget()
         return self._records.pop(token, (0.0, None))[1]
 
@@ -92,27 +92,27 @@ class TabMemory:
 # --- In the page ----------------------------------------------------------------------------------
 
 NEVER_RESTORED = (
-    "what Undo and Redo could go back to",
-    "other scenes that were opened in this tab",
-    "which error's curve was shown",
-    "a file that was being made",
+    "the history of Undo and Redo",
+    "other scenes opened in this tab",
+    "the selected error curve",
+    "a file in preparation",
 )
-COMPARISON = "the comparison, which was too large to keep"
-NO_TABLE = "the table of compensation that the box was drawn with, and its comparison"
-START_VALUES = "the values that Reset goes back to: it goes back to those restored"
+COMPARISON = "the comparison, which was too large"
+NO_TABLE = "the applied compensation table and its comparison"
+START_VALUES = "the values of Reset, which now returns to the restored ones"
 
 
 class PageCopy(msgspec.Struct, omit_defaults=True):
     file: str = ""
     name: str = ""
-    link: str = ""  # where there is one: it knows what Reset goes back to
-    missing: tuple[str, ...] = ()  # what was left out, in words
+    link: str = ""  # where there is one: it holds the values of Reset
+    missing: tuple[str, ...] = ()  # omitted parts, as texts
 
 
 def page_copy_text(
     state: AppState, camera: CameraMemory | None, known_scenes: Sequence[Scene]
 ) -> str:
-    """Spell a state for its page to keep."""
+    """Write the copy of a state that its page stores."""
     bare = without_table(state)
     missing = () if bare is state else (NO_TABLE,)
     single = replace(bare, comparison=Comparison())
@@ -134,41 +134,41 @@ def page_copy_text(
 def read_page_copy(
     text: str, known_scenes: Sequence[Scene]
 ) -> tuple[AppState, CameraMemory | None, tuple[str, ...]]:
-    """Build what a page has kept; with what has not come back, in words."""
+    """Build state and camera from the copy in a page; also list the parts that are missing."""
     try:
         copy = msgspec.json.decode(text[: MAX_KEPT_TEXT + 1], type=PageCopy)
     except (ValueError, RecursionError):
-        raise OptionError("what this tab has kept cannot be read") from None
+        raise OptionError("the copy in this tab is damaged") from None
     missing = (*NEVER_RESTORED, *copy.missing)
     with suppress(WarpspaceError):
         state, camera = open_link(copy.link, known_scenes)
         if state_to_toml(state, camera) == copy.file:
             return state, camera, missing
-    state, camera = open_text(copy.file, safe_name(copy.name, "kept"), "what this tab has kept")
+    state, camera = open_text(copy.file, safe_name(copy.name, "kept"), "the copy in this tab")
     return state, camera, (*missing, START_VALUES)
 
 
 RESTORED_TITLE = "This tab is restored"
 RESTORED = (
-    "Its server was restarted, or had forgotten it after ten minutes. What the tab had kept is"
-    " back: scene, errors, view, camera, the point asked about, and what is compared unless named"
-    " below. Undo goes to what the server was started with."
+    "The server was restarted, or the tab was disconnected for more than ten minutes. Scene,"
+    " errors, view, camera, picked point and comparison are restored unless named below. Undo"
+    " returns to the scene that the server was started with."
 )
 MISSING = "Not restored: {}."
 REFUSED_TITLE = "This tab could not be restored"
 REFUSED = (
-    "Its server was restarted, or had forgotten it after ten minutes. It begins anew, since what it"
-    " had kept cannot be used here: {}"
+    "The server was restarted, or the tab was disconnected for more than ten minutes. The tab"
+    " starts afresh, since its copy cannot be used here: {}"
 )
 JOINED_TITLE = "You are in the shared review as it is now"
 JOINED = (
-    "The server was restarted, and somebody has changed the review since. What this tab had kept"
-    " was not brought back."
+    "The server was restarted, and the review has been changed since. The copy in this tab was not"
+    " restored."
 )
 
 
 class TabKeeper(Panel):
-    """Has the page keep what it shows, and takes it back."""
+    """Stores a copy of the state in the page, and restores it after a restart of the server."""
 
     name = "keeper"
     refresh = Refresh.IDLE
@@ -185,7 +185,7 @@ class TabKeeper(Panel):
         context.page.call("server.watch")
 
     def begin(self, *, is_known: bool) -> None:
-        """Find out what the page has kept, once the server knows whether it knows the tab."""
+        """Request the copy in the page unless the server knows the tab."""
         self._may_keep, self._awaits_copy = True, not is_known
         self.context.rest_again()
         self.context.page.call("server.back", is_known)

@@ -1,4 +1,4 @@
-"""What forms were told: options of analyses by ``NAME.OPTION``, and the standard test, ``test``."""
+"""Texts of the forms: options of analyses by ``NAME.OPTION``, and the standard test, ``test``."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -16,18 +16,18 @@ from warpspace.exceptions import OptionError
 from warpspace.scene.model import Scene
 
 A = TypeVar("A", bound=Analysis)
-TEST = "test"  # the standard test that is run; its options begin with it, as those of an analysis
+TEST = "test"  # selected standard test; also the prefix of its options
 MAX_ENTRIES, LONGEST = 100, 1000  # entries, and characters of one
 _OPTION = re.compile(r"[a-z_]{1,40}")
 
 
 def linked_forms(state: AppState) -> list[tuple[str, str]]:
-    """List what links and files hold: not what belongs to files that were opened."""
+    """List the form texts that are stored in links and files."""
     return [(name, text) for name, text in state.forms.items() if _is_known(name)]
 
 
 def with_form(state: AppState, name: str, text: str) -> AppState:
-    """Take what somebody typed, or a link says; raises `Unreadable`."""
+    """Set a form text from the page or a link; raises `Unreadable`."""
     if not _is_known(name) or (name == TEST and text not in bench_names()):
         raise Unreadable("expected an option of an analysis, or the name of a test")
     if len(state.forms) >= MAX_ENTRIES:
@@ -44,7 +44,7 @@ def _is_known(name: str) -> bool:
 
 
 def option_values(state: AppState, name: str) -> dict[str, str]:
-    """Give what was told of the options of an analysis."""
+    """Return the texts of the options of an analysis, by option."""
     prefix = f"{name}."
     return {k.removeprefix(prefix): v for k, v in state.forms.items() if k.startswith(prefix)}
 
@@ -52,7 +52,7 @@ def option_values(state: AppState, name: str) -> dict[str, str]:
 def read_form(
     kind: type[A], options: Sequence[Option], values: Mapping[str, str], scene: Scene
 ) -> A:
-    """Build an analysis from what was typed; an `OptionError` names an option as ``{name}``."""
+    """Build an analysis from texts; an `OptionError` refers to an option as ``{name}``."""
     arguments: dict[str, Any] = {}
     for option in options:
         text = values.get(option.name)

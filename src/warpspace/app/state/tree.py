@@ -1,7 +1,7 @@
-"""The state as one tree of described values: what widgets, links, saved files and undo walk.
+"""The state as a tree of described values, for widgets, links, files and undo.
 
-A leaf is named by its path, ``look.surface`` or ``amplitudes.EA0Z``. `put` takes whatever a browser
-sends for it; `spell` gives the text that is read back to the same value.
+A leaf is identified by its path, ``look.surface`` or ``amplitudes.EA0Z``. `put` sets it from any
+text of a browser; `spell` returns the text that is read back to the same value.
 """
 
 import math
@@ -31,14 +31,14 @@ from warpspace.kinematics.model import Loop
 from warpspace.machine.axes import axis_order, parameter
 from warpspace.machine.limits import COST, MAX_HALF_WIDTH, MIN_HALF_WIDTH
 
-LONGEST = 4000  # characters that are read
-MAX_QUOTED = 40  # characters of a text that a note shows
+LONGEST = 4000  # characters of a text; others are ignored
+MAX_QUOTED = 40  # characters of a text in a note
 
 # --- The leaves of a state ------------------------------------------------------------------------
 
 
 def leaves(state: AppState) -> Mapping[str, Leaf]:
-    """Give the leaves of a state by their paths; the same object until what they say changes."""
+    """Return the leaves of a state by path; the same object until they change."""
     return _leaves(Identity(state.scene), state.look.quantity)
 
 
@@ -83,11 +83,11 @@ def _picked_leaves(state: AppState) -> Iterator[Leaf]:
         yield Leaf(path, label, "number", span=span, unit=unit, linked=f"why.{axis}")
 
 
-# --- Values, and how they are spelt ---------------------------------------------------------------
+# --- Values and their texts -----------------------------------------------------------------------
 
 
 def value(state: AppState, path: str) -> Any:
-    """Give the value of a leaf; of an entry that was not set the one that counts in its place."""
+    """Return the value of a leaf; of an entry that is not set its effective value."""
     group, _, key = path.rpartition(".")
     if group == "look.slices_mm":
         return slice_positions(state.scene, state.look, state.machine)[key]
@@ -97,7 +97,7 @@ def value(state: AppState, path: str) -> Any:
 
 
 def stored(state: AppState, path: str) -> Any:
-    """Give what a state holds at a path; None for an entry that was not set."""
+    """Return the stored value at a path; None for an entry that is not set."""
     group, _, key = path.rpartition(".")
     if group == "tolerances":
         return edits.half_width_of(state, key)
@@ -117,7 +117,7 @@ def spell(state: AppState, path: str) -> str:
 
 
 def spell_value(leaf: Leaf, setting: Any) -> str:
-    """Spell a value; numbers to the last bit."""
+    """Format a value; numbers to the last bit."""
     if isinstance(setting, Picked):
         return " ".join(f"{axis} {at!r}" for axis, at in setting.at.items())
     if setting is None:
@@ -140,20 +140,18 @@ def words_of(leaf: Leaf) -> str:
     return key if group == "amplitudes" else lowered(leaf.label)
 
 
-# --- What a browser sends -------------------------------------------------------------------------
+# --- Settings from a browser ----------------------------------------------------------------------
 
 
 def put(state: AppState, path: str, text: str) -> AppState:
-    """Set a leaf to what somebody has typed, clicked or sent; notes say what was not taken."""
+    """Set a leaf from a text of the page; notes report rejected and clamped values."""
     leaf = leaves(state).get(path)
     if leaf is None:
-        return state.noted(f"{path[:MAX_QUOTED]!r}: nothing on this page goes by this name")
+        return state.noted(f"{path[:MAX_QUOTED]!r}: unknown setting")
     try:
         state = set_leaf(state, leaf, text)
     except Unreadable as problem:
-        return state.noted(
-            f"{words_of(leaf)} = {text[:MAX_QUOTED]!r}; {problem}, it stays as it was"
-        )
+        return state.noted(f"{words_of(leaf)} = {text[:MAX_QUOTED]!r}; {problem}; unchanged")
     after = AFTER.get(path) or AFTER.get(path.rpartition(".")[0])
     return state if after is None else after(state)
 
@@ -166,11 +164,11 @@ AFTER: Mapping[str, Callable[[AppState], AppState]] = {
     "look.range_top": lambda s: replace(s, look=replace(s.look, range_mode="fixed")),
     "look.slices_mm": lambda s: replace(s, look=replace(s.look, follow=False)),
 }
-"""What follows where somebody sets a leaf; not where a link or a file does."""
+"""Consequences of setting a leaf on the page; not from a link or a file."""
 
 
 def set_leaf(state: AppState, leaf: Leaf, text: str) -> AppState:
-    """Set a leaf to what a text says and to nothing else; raises `Unreadable`."""
+    """Set one leaf from a text; raises `Unreadable`."""
     text = text[:LONGEST].encode("utf-8", "replace").decode()
     setter = SETTERS.get(leaf.path) or SETTERS.get(leaf.path.rpartition(".")[0])
     if setter is not None:
@@ -189,7 +187,7 @@ def _with(branch: Any, names: Sequence[str], setting: Any) -> Any:
     )
 
 
-# --- Leaves that are set in a way of their own ----------------------------------------------------
+# --- Leaves with their own setters ----------------------------------------------------------------
 
 
 def _with_half_width(state: AppState, leaf: Leaf, text: str) -> AppState:
@@ -207,14 +205,14 @@ def _with_costs(state: AppState, _leaf: Leaf, text: str) -> AppState:
         raise Unreadable(str(problem)) from None
     for key, cost in costs.items():
         if key not in state.amplitudes:
-            raise Unreadable(f"{key}: no parameter of this machine")
+            raise Unreadable(f"{key} is not a parameter of this machine")
         if not COST[0] <= cost <= COST[1]:
             raise Unreadable(f"{key}={cost:g}: expected {COST[0]:g} to {COST[1]:g}")
     normalised = ",".join(f"{key}={cost:g}" for key, cost in costs.items() if cost != 1.0)
     return replace(state, specification=replace(state.specification, costs=normalised))
 
 
-FARTHEST_MM = 1e5  # farthest point of a workpiece that a link may ask about
+FARTHEST_MM = 1e5  # of a traced point in a link
 EXAMPLE = "X 275 Y -225 Z -480"
 
 
@@ -262,7 +260,7 @@ SETTERS: Mapping[str, Callable[[AppState, Leaf, str], AppState]] = {
 }
 
 
-# --- One text that somebody typed or sent into the value of a leaf --------------------------------
+# --- Parsing of texts -----------------------------------------------------------------------------
 
 MOST_NAMES = 100
 LONGEST_NAME = 80
@@ -271,7 +269,7 @@ SWITCHES = {"0": False, "1": True}
 
 
 def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
-    """Read a value, and what had to be said about it; raises `Unreadable`."""
+    """Parse a value; return it with a note; raises `Unreadable`."""
     plain = text.strip()
     match leaf.kind:
         case "number" if plain in leaf.choices:
@@ -305,7 +303,7 @@ def read_value(leaf: Leaf, text: str, old: Any) -> tuple[Any, str]:
 
 
 def _number(leaf: Leaf, text: str) -> tuple[float, str]:
-    """Read a number, with or without its unit, and bring it into the range of its leaf."""
+    """Parse a number, with or without its unit, and clamp it to the range of its leaf."""
     typed = read_typed(text.strip().removeprefix("×"), leaf.unit)
     if typed is None:
         raise Unreadable("expected a number")
@@ -320,7 +318,7 @@ def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
     parts = text.replace(";", " ").split()
     parts = parts if len(parts) in counts else text.split(",")
     if len(parts) not in counts:
-        raise Unreadable(f"expected three numbers{', or six with turns' * (len(counts) > 1)}")
+        raise Unreadable(f"expected three numbers{', or six with rotations' * (len(counts) > 1)}")
     numbers = [_number(leaf, part.strip().rstrip(",")) for part in parts]
     return tuple(kept for kept, _ in numbers), "; ".join(
         filter(None, (note for _, note in numbers))
@@ -328,7 +326,7 @@ def _read_point(leaf: Leaf, text: str) -> tuple[Any, str]:
 
 
 def _read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[str], str]:
-    """Read a list of words in place of a set, or words with + or - that come to it or leave it."""
+    """Parse a list of names that replaces a set, or names with + or - that change it."""
     entries = [word.strip()[:LONGEST_NAME] for word in text.split(",") if word.strip()]
     unknown: list[str] = []
     changes = bool(entries) and all(word[0] in "+-" for word in entries)
@@ -342,5 +340,5 @@ def _read_keys(leaf: Leaf, text: str, old: frozenset[str]) -> tuple[frozenset[st
         else:
             names.add(name)
     keys = frozenset(sorted(names)[:MOST_NAMES] if leaf.kind == "names" else names)
-    note = f"{words_of(leaf)}: {', '.join(unknown[:4])} left out, which mean nothing here"
+    note = f"{words_of(leaf)}: {', '.join(unknown[:4])} ignored (unknown)"
     return keys, note if unknown else ""

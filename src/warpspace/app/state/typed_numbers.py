@@ -1,4 +1,4 @@
-"""Numbers as people type and paste them: decimal commas, other signs, tables, points, lists."""
+"""Numbers as typed and pasted: decimal commas, typographic signs, tables, points, lists."""
 
 import math
 import re
@@ -11,7 +11,7 @@ from warpspace.picture.formatting import IN_R
 
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?", re.IGNORECASE | re.ASCII)
 _SIGNS = str.maketrans({"−": "-", "–": "-", "\u00a0": " ", "\u202f": " "})
-"""Signs and blanks that programs write in place of the plain ones."""
+"""Typographic signs and blanks."""
 _MAX_QUOTED = 40  # characters of a line that a message shows
 
 
@@ -28,7 +28,7 @@ def read_typed(text: str, unit: str = "") -> float | None:
 
 
 def spell_typed(value: float) -> str:
-    """Spell a number as in its box: all digits that were given, none that are rounding."""
+    """Format a number for its text box, without rounding noise."""
     return f"{value + 0.0:.12g}"
 
 
@@ -38,15 +38,15 @@ def read_rows(text: str) -> tuple[list[tuple[float, ...]], tuple[str, ...]]:
     remarks: tuple[str, ...] = ()
     if len(numbered) > 1 and _is_heading(numbered[0][1]):
         heading = " ".join(numbered[0][1].split())[:_MAX_QUOTED]
-        remarks = (f"Heading left out: “{heading}”.",)
+        remarks = (f"Heading ignored: “{heading}”.",)
         del numbered[0]
     return [_numbers(number, line) for number, line in numbered], remarks
 
 
 def comma_rows(text: str) -> str | None:
-    """Give a text whose only separators are commas with blanks in their place, else None.
+    """Replace the commas of a text without other separators by tabs; None for other texts.
 
-    Read the other way, ``-275,0`` is one number with a decimal comma.
+    Otherwise ``-275,0`` is read as one number with a decimal comma.
     """
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     if any("," not in line or re.search(r"[\s;|]", line) for line in lines[1:] or lines):
@@ -73,7 +73,8 @@ def _numbers(number: int, line: str) -> tuple[float, ...]:
     numbers = tuple(value for value in values if value is not None)
     if len(numbers) != len(values):
         raise OptionError(
-            f"row {number}: {line[:_MAX_QUOTED]!r} holds what is no number; expected finite numbers"
+            f"row {number}: {line[:_MAX_QUOTED]!r} contains an invalid number; expected finite"
+            " numbers"
         )
     return numbers
 
@@ -81,15 +82,15 @@ def _numbers(number: int, line: str) -> tuple[float, ...]:
 # --- Positions of axes, and costs of tolerances ---------------------------------------------------
 
 _POINT_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:e[-+]?\d+)?"
-# a digit belongs to the name where a number follows apart: C1 30, C1=30, but C30
+# a digit belongs to the name where a separate number follows: C1 30, C1=30, but C30
 _NAME = r"[a-z][0-9](?=\s*[=:]|\s+[-+.,0-9])|[a-z]"
 _PAIR = re.compile(rf"({_NAME})\s*[=:]?\s*({_POINT_NUMBER})\s*(?:mm|°|deg)?", re.IGNORECASE)
 _BETWEEN = re.compile(r"[\s,;·]*")
-MOST_HELD = 8  # positions that one axis can be held at while another one is turned
+MOST_HELD = 8  # positions of one axis while another one rotates
 
 
 def read_positions(text: str) -> dict[str, float] | None:
-    """Read positions of axes in any of the ways in which they are spelt on the page."""
+    """Parse positions of axes in any notation of the page."""
     plain = text[:MOST_TYPED].translate(_SIGNS).partition(IN_R)[0].strip()
     plain = plain.removeprefix("--at").lstrip(" =").removeprefix("axes")
     pairs = _PAIR.findall(plain)
@@ -103,7 +104,7 @@ def read_positions(text: str) -> dict[str, float] | None:
 
 
 def read_list(text: str, span: Span) -> tuple[tuple[float, ...], str]:
-    """Read positions that an axis is held at, in any order; what is none is left out and named."""
+    """Parse positions of a held axis, in any order; return them with a note on ignored texts."""
     wrong: list[str] = []
     positions: set[float] = set()
     for word in filter(None, re.split(r"[\s,;°]+", text[:MOST_TYPED])):
@@ -113,7 +114,7 @@ def read_list(text: str, span: Span) -> tuple[tuple[float, ...], str]:
         else:
             positions.add(at)
     allowed = f"expected numbers from {span.low:g} to {span.high:g}"
-    notes = [f"{', '.join(wrong[:4])} left out; {allowed}"] if wrong else []
+    notes = [f"{', '.join(wrong[:4])} ignored; {allowed}"] if wrong else []
     if len(positions) > MOST_HELD:
-        notes.append(f"{len(positions)} positions; the first {MOST_HELD} are taken")
+        notes.append(f"{len(positions)} positions; only the first {MOST_HELD} are used")
     return tuple(sorted(positions)[:MOST_HELD]), "; ".join(notes)
