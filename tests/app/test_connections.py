@@ -73,7 +73,7 @@ def test_public_tunnel_is_off_and_a_second_app_takes_another_port():
     scene = load_scene("dvf5000_nominal")
     with viewer.Viewer(scene) as first, viewer.Viewer(scene) as second:
         assert first.port != second.port
-        assert first._server.request_share_url() is None
+        assert first.server.request_share_url() is None
 
 
 def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
@@ -81,9 +81,9 @@ def test_a_connection_that_is_gone_takes_nothing_from_the_tab_that_comes_back():
     token, left = new_token(), TabRecord(StateStore(start_state(scene)), None)
     gone: Any = SimpleNamespace(token="")
     with viewer.Viewer(scene) as running:
-        running._memory.keep(token, left)
-        assert running._claim(gone, token) is None
-        assert running._memory.take(token) is left
+        running.memory.keep(token, left)
+        assert running.claim(gone, token) is None
+        assert running.memory.take(token) is left
 
 
 def test_a_page_says_once_which_tab_it_is():

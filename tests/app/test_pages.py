@@ -128,7 +128,7 @@ def test_what_fails_because_a_page_has_just_gone_is_no_error(viewer, monkeypatch
         own.run_guarded(fail)
         assert "Cannot assign" in caplog.text
         caplog.clear()
-    while viewer._server.get_clients():
+    while viewer.server.get_clients():
         time.sleep(0.01)
     own.run_guarded(fail)
     told.set()

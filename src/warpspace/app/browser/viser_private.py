@@ -69,6 +69,12 @@ def serve_with(change: Callable[[dict[str, Any]], dict[str, Any]]) -> Generator[
             library.serve = original
 
 
+def message_buffer(client: ClientHandle) -> Any:
+    """Return the queue of messages to a client."""
+    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
+    return connection.get_message_buffer()
+
+
 def send_at_once(client: ClientHandle) -> None:
     """Send messages to a client at once, in the thread that queues them.
 
@@ -77,8 +83,7 @@ def send_at_once(client: ClientHandle) -> None:
     allowed, and once in ten thousand assignments it raises "deque mutated during iteration". What
     viser then asks of the event loop is enough. A viser without either would replace this.
     """
-    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    buffer = connection.get_message_buffer()
+    buffer = message_buffer(client)
     buffer.window_duration_sec = 0.0
     event = buffer.message_event
     original: Callable[[], None] = event.set
@@ -98,5 +103,4 @@ def queued(client: ClientHandle) -> int:
 
     viser keeps all of it. A limit of viser's own would replace this.
     """
-    connection: Any = client._websock_connection  # noqa: SLF001 # pyright: ignore[reportPrivateUsage]
-    return len(connection.get_message_buffer().message_from_id)
+    return len(message_buffer(client).message_from_id)

@@ -175,9 +175,10 @@ def subject_words(picture: LivePicture) -> list[str]:
     table = "" if picture.is_difference else table_words(state)
     if table and not (subjects and table in subjects[0]):
         subjects.append(table)
-    if edited := len(state.changed_keys):
+    edited, excluded = len(state.changed_keys), len(_left_out(state))
+    if edited:
         subjects.append(f"{edited} error{'s' if edited > 1 else ''} changed")
-    if excluded := len(_left_out(state)):
+    if excluded:
         subjects.append(f"{excluded} excluded")
     beyond = formatting.beyond_words(state.active_scene(), state.loop)
     return [*subjects, *formatting.direction_words(state.scene), *filter(None, [beyond])]
@@ -205,8 +206,8 @@ def state_conditions(state: AppState) -> tuple[str, ...]:
 def order_conditions(picture: LivePicture) -> tuple[str, ...]:
     """Remark on states for which the first order is insufficient."""
     sides = picture.compared.sides if picture.compared and picture.is_difference else ()
-    states = [one for one in sides or (picture.drawn_state,) if one.controller is None]
-    return second_order_words(*(second_order(one.active_scene(), one.loop) for one in states))
+    states = [state for state in sides or (picture.drawn_state,) if state.controller is None]
+    return second_order_words(*(second_order(state.active_scene(), state.loop) for state in states))
 
 
 def picture_conditions(picture: LivePicture) -> tuple[str, ...]:

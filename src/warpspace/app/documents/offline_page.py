@@ -70,7 +70,7 @@ class PageStep:
     @property
     def point_mm(self) -> Array:
         """Place of the note's point in the drawing."""
-        return next((one.at_mm for one in note_labels(self.picture)), np.array(AWAY_MM))
+        return next((label.at_mm for label in note_labels(self.picture)), np.array(AWAY_MM))
 
 
 def offline_picture(
@@ -120,10 +120,10 @@ def step_words(scene: Scene, notes: Sequence[Note], index: int, problem: str) ->
         tag("h2", f"{index + 1} of {len(notes)}"),
         tag("p", " · ".join(filter(None, heads)), class_="ws-quiet"),
         tag("p", linked(note.text), class_="ws-said"),
-        *(tag("p", linked(f"{one.author}: {one.text}")) for one in note.replies),
+        *(tag("p", linked(f"{reply.author}: {reply.text}")) for reply in note.replies),
         tag("p", " · ".join(filter(None, (spell_place(note), spell_numbers(note)))),
             class_="ws-quiet"),
-        *(tag("p", one, class_="ws-warn") for one in (stale, stays) if one),
+        *(tag("p", text, class_="ws-warn") for text in (stale, stays) if text),
     ))  # fmt: skip
 
 
@@ -223,7 +223,7 @@ def _build_page(title: str, steps: Sequence[PageStep], shapes: Shapes, about: Ab
         scene=scene.replace("&", "&amp;").replace('"', "&quot;"),
         buttons="" if len(steps) > 1 else "hidden",
         beside=column,
-        remarks=below + join(tag("span", one) for one in remarks),
+        remarks=below + join(tag("span", remark) for remark in remarks),
         # no text in a script may end it
         provenance=json.dumps(about, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c"),
         steps=_packed_steps(steps),
@@ -236,7 +236,7 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
     within = "" if picture.is_difference else f" · {legend.within_limit_words(picture)[0]}"
     factor, *looks = legend.look_words(picture)
     headline = f"{legend.numbers_words(picture)} {legend.place_words(picture)}{within} · {factor}"
-    subjects = [one for one in (picture.title, *legend.subject_words(picture)) if one != title]
+    subjects = [text for text in (picture.title, *legend.subject_words(picture)) if text != title]
     statistics = picture.statistics
     numbers = {
         "mean": statistics.mean_um,
@@ -250,7 +250,7 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
     listed = join(tag("tr", join(tag("td", cell) for cell in row)) for row in errors)
     column = (
         step.note,
-        *(tag("p", one, class_="ws-warn") for one in picture.state.notes),
+        *(tag("p", text, class_="ws-warn") for text in picture.state.notes),
         legend.legend_html(picture),
         tag("b", lowered(f"{picture.length_words} over the volume")),
         rows((name, f"{number(value, 2)} µm") for name, value in numbers.items()),
@@ -259,20 +259,22 @@ def _step_pieces(step: PageStep, title: str) -> tuple[Markup, Markup, Markup]:
             open=len(errors) <= MAX_UNFOLDED and not step.note),
     )  # fmt: skip
     return (
-        join(tag("p", one) for one in (headline, *subjects)),
+        join(tag("p", text) for text in (headline, *subjects)),
         join(column),
-        join(tag("span", one) for one in looks),
+        join(tag("span", text) for text in looks),
     )
 
 
 def _error_rows(picture: LivePicture) -> list[tuple[str, str, str]]:
     """List errors that are not zero, or differ in A and B: key, descriptive name, value, unit."""
     compared = picture.compared.sides if picture.compared and picture.is_difference else ()
-    sides = [one.active_scene().errors.functions for one in compared or (picture.drawn_state,)]
+    sides = [side.active_scene().errors.functions for side in compared or (picture.drawn_state,)]
     error_rows: list[tuple[str, str, str]] = []
     for row in map(parameter, dict.fromkeys(key for side in sides for key in side)):
         functions = [side.get(row.key) for side in sides]
-        spelt = [f"{one.amplitude:+g}" if one and one.amplitude else "0" for one in functions]
+        spelt = [
+            f"{curve.amplitude:+g}" if curve and curve.amplitude else "0" for curve in functions
+        ]
         value = f"A {spelt[0]}, B {spelt[1]}" if compared else spelt[0]
         if (functions[0] != functions[1]) if compared else value != "0":
             error_rows.append((row.key, row.name, f"{value} {row.unit}".replace("-", "−")))

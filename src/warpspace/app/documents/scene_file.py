@@ -178,9 +178,9 @@ def settings_line(
     """Write the differences from the scene as opened; `at_rest` from `AppState.at_rest`."""
     opened = start_state(state.scene).at_rest() if at_rest else start_state(state.scene)
     pairs = [
-        (leaf.linked, spell_value(leaf, now))
+        (leaf.linked, spell_value(leaf, stored(state, leaf.path)))
         for leaf in leaves(state).values()
-        if leaf.linked and (now := stored(state, leaf.path)) != stored(opened, leaf.path)
+        if leaf.linked and stored(state, leaf.path) != stored(opened, leaf.path)
     ]
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
@@ -204,7 +204,7 @@ def with_settings(
         if name == CAMERA or name in SIDES:
             continue
         # leaves depend on earlier settings, such as the components of a quantity
-        leaf = {one.linked: one for one in leaves(state).values() if one.linked}.get(name)
+        leaf = {entry.linked: entry for entry in leaves(state).values() if entry.linked}.get(name)
         try:
             state = set_leaf(state, leaf, text) if leaf else with_form(state, name, text)
         except Unreadable:

@@ -150,7 +150,8 @@ def file_stem(picture: LivePicture) -> str:
 def exported_words(picture: LivePicture) -> str:
     """Describe the contents of exports where they differ from the present state."""
     compared, tilts = picture.compared, picture.state.look.tilts
-    if without := without_words(picture.state):
+    without = without_words(picture.state)
+    if without:
         return f"Figure, exports, Save and Link: {without[0].lower()}{without[1:]} {AS_DRAWN}"
     if compared is None:
         return "The figure shows the tilts of the tool axis as needles on the box." if tilts else ""

@@ -159,7 +159,7 @@ class TabCamera:
             "iso",
             False,
         )  # selected last: a key of `VIEWS`, the telephoto lens
-        self._reported_room: Room | None = None
+        self.reported_room: Room | None = None
         self._placements: tuple[
             CameraMemory, ...
         ] = ()  # latest; a page may still report an earlier one
@@ -199,11 +199,11 @@ class TabCamera:
     def room(self) -> Room:
         """Size of the drawing, as reported by the page or estimated."""
         camera = self._camera
-        return self._reported_room or first_room(camera.image_width, camera.image_height)
+        return self.reported_room or first_room(camera.image_width, camera.image_height)
 
     def take_room(self, room: Room, picture: LivePicture | None) -> None:
         """Record the size of the drawing; a camera that was not moved by hand fits it again."""
-        self._reported_room, now = room, self.remember()
+        self.reported_room, now = room, self.remember()
         if picture is not None and any(put.is_near(now) for put in self._placements):
             self.fit(picture)
 

@@ -184,11 +184,13 @@ def _point(picture: LivePicture) -> Iterator[Label]:
 
 
 def _measured(picture: LivePicture) -> Iterator[Label]:
-    if (drawn := measure_distance(picture)) is not None:
-        distance, _, (start, end, *corner) = drawn
-        places = (*[(start + end) / 2.0] * 2, *corner)
-        for text, at in zip(distance.words(), places, strict=True):
-            yield Label(text, at, "measured")
+    measurement = measure_distance(picture)
+    if measurement is None:
+        return
+    distance, _, (start, end, *corner) = measurement
+    places = (*[(start + end) / 2.0] * 2, *corner)
+    for text, at in zip(distance.words(), places, strict=True):
+        yield Label(text, at, "measured")
 
 
 def _names(picture: LivePicture) -> Iterator[Label]:
@@ -216,21 +218,22 @@ def note_labels(picture: LivePicture) -> list[Label]:
     """List the flags of review notes: their numbers, at the present places in the drawing."""
     if picture.is_difference or not picture.state.review:
         return []
-    state, own = picture.drawn_state, dict[str, Mapping[str, float]]()
+    state, factor = picture.drawn_state, picture.exaggeration
     bodies = drawn_bodies(picture) if picture.state.machine.shown else ()
-    labels: list[Label] = []
+    places: dict[str, Array] = {}
+    surface_points: dict[str, Mapping[str, float]] = {}  # evaluated together
     for number, note in enumerate(picture.state.review, 1):
         text, picked = f"⚑ {number}", Picked.of_note(note)
         if picked and picked.point_mm:
-            labels.append(
-                Label(text, explain_point(state, picked, picture.exaggeration).drawn_mm, "note")
-            )
+            places[text] = explain_point(state, picked, factor).drawn_mm
         elif picked:
-            own[text] = picked.at
-        elif vertices_mm := [
-            b.vertices_mm for b in bodies if note.on and b.body.frame == note.on.body
-        ]:
-            points = np.concatenate(vertices_mm)
-            labels.append(Label(text, (points.min(axis=0) + points.max(axis=0)) / 2.0, "note"))
-    places = drawn_places(state, [*own.values()], picture.exaggeration) if own else ()
-    return [*labels, *(Label(words, at, "note") for words, at in zip(own, places, strict=True))]
+            surface_points[text] = picked.at
+        elif note.on:
+            vertices = [part.vertices_mm for part in bodies if part.body.frame == note.on.body]
+            if vertices:
+                points = np.concatenate(vertices)
+                places[text] = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    if surface_points:
+        drawn_mm = drawn_places(state, [*surface_points.values()], factor)
+        places |= zip(surface_points, drawn_mm, strict=True)
+    return [Label(text, at, "note") for text, at in places.items()]

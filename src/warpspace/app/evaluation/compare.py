@@ -64,13 +64,13 @@ def compare_pictures(single: Callable[[AppState], LivePicture], state: AppState)
     chosen = state.comparison
     other_side = chosen.b or Side()
     sides = [single(side_state(state, side)) for side in (chosen.a, other_side)]
-    if len({one.quantity for one in sides}) > 1:  # one has no uncertainty
+    if len({picture.quantity for picture in sides}) > 1:  # one has no uncertainty
         plain = replace(state, look=replace(state.look, quantity="position"))
         sides = [single(side_state(plain, side)) for side in (chosen.a, other_side)]
-    factor = min(one.exaggeration for one in sides)
+    factor = min(picture.exaggeration for picture in sides)
     a, b = (
-        one if one.exaggeration == factor else single(replace(one.state, exaggeration=factor))
-        for one in sides
+        side if side.exaggeration == factor else single(replace(side.state, exaggeration=factor))
+        for side in sides
     )
     refused = "" if same_nodes(a.grid.nominal_mm, b.grid.nominal_mm) else REFUSED
     difference = None if refused else _difference(a, b)
@@ -108,9 +108,9 @@ def _difference(a: LivePicture, b: LivePicture) -> LivePicture:
         change,
         traces=subtract_traces(b.traces, a.traces),
         slices=tuple(
-            subtract_pictures(one, other)
-            for one, other in zip(b.slices, a.slices, strict=False)
-            if same_nodes(one.grid.nominal_mm, other.grid.nominal_mm)
+            subtract_pictures(plane, other)
+            for plane, other in zip(b.slices, a.slices, strict=False)
+            if same_nodes(plane.grid.nominal_mm, other.grid.nominal_mm)
         ),
     )
 
@@ -119,7 +119,7 @@ def _shared_scale(state: AppState, maps: Sequence[LivePicture]) -> ColourScale:
     if state.look.range_mode == "fixed":
         return maps[0].scale
     widest = max((picture.scale for picture in maps), key=lambda scale: scale.high)
-    shared = choose_scale([one.values for one in maps], state.component, maps[0].quantity)
+    shared = choose_scale([picture.values for picture in maps], state.component, maps[0].quantity)
     return shared if shared.high > widest.high else widest
 
 

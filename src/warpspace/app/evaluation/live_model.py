@@ -111,7 +111,7 @@ class LiveModel:
 
         key = "uncertainty", Identity(grid), _place(state)
         uncertainty: FieldUncertainty = self._cache.get(
-            key, build, lambda one: 3 * one.response.nbytes
+            key, build, lambda uncertainty: 3 * uncertainty.response.nbytes
         )
         axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
         unstated = (key for key, value in state.active.items() if value and key not in stated)
@@ -130,7 +130,7 @@ class LiveModel:
             for axis, at in slice_positions(scene, state.look, state.machine).items():
                 key = _place(state), axis, at
                 cached = self._cache.get(
-                    key, partial(build, axis, at), lambda one: _size((one, ()))
+                    key, partial(build, axis, at), lambda response: _size((response, ()))
                 )
                 yield axis, at, cached[0], self._field(state, *cached)
 
@@ -182,8 +182,11 @@ def _build(state: AppState) -> Response:
     groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)
     arguments = scene.model, scene.errors, scene.parameter_keys
     traces = tuple(
-        (one, build_basis(*arguments, one.coordinates, state.view(one.loop), one.nominal_mm))
-        for one in groups
+        (
+            group,
+            build_basis(*arguments, group.coordinates, state.view(group.loop), group.nominal_mm),
+        )
+        for group in groups
     )
     return (grid, grid_basis(scene, grid, state.view())), traces
 
@@ -212,7 +215,7 @@ def _chosen_colours(state: AppState, volume: model.Picture, basis: ErrorBasis) -
         return PassFail(0.0, top, diverging=True, label=scale.label, unit=scale.unit, limit=limit)
     if look.range_mode == "shared" and quantity != "uncertainty":
         opened = basis.evaluate(np.array([state.start[key] for key in basis.keys]))
-        errors = (model.coloured_error(one, quantity) for one in (field, opened))
+        errors = (model.coloured_error(error_field, quantity) for error_field in (field, opened))
         lengths = [np.linalg.norm(error, axis=-1) for error in errors]
         return model.choose_scale(lengths, component, quantity)
     end = look.range_top if look.range_mode == "fixed" else None

@@ -45,8 +45,8 @@ class Compared:
         if self.view != "difference":
             return f"A: {a}" if self.view == "a" else f"B: {b}"
         a, b = (
-            one.partition(": ")[0] if one.startswith(("after", "before")) else one
-            for one in self.titles
+            title.partition(": ")[0] if title.startswith(("after", "before")) else title
+            for title in self.titles
         )
         return f"B − A: {b} − {a}"
 
@@ -102,8 +102,8 @@ class LivePicture(Picture):
     def moved_traces(self) -> Mapping[str, TraceLine]:
         if not self.state.shown.traces:
             return {}
-        lines = (one for of in self.traces if of.error_um.any() for one in of.each())
-        return {name_trace(one.trace): one for one in lines if is_moved(one)}
+        lines = (line for of in self.traces if of.error_um.any() for line in of.each())
+        return {name_trace(line.trace): line for line in lines if is_moved(line)}
 
     @property
     def drawn_state(self) -> AppState:

@@ -90,11 +90,10 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
         case "gantry", [axis]:
             if guides.pop(axis, None) is None:
                 across = definition.default_across(machine.axis(axis).name)
-                linear = [one for one in machine.axes.values() if one.is_linear]
                 spans = [
-                    one.travel[1] - one.travel[0]
-                    for one in linear
-                    if definition.ACROSS[one.index] == across
+                    other.travel[1] - other.travel[0]
+                    for other in machine.axes.values()
+                    if other.is_linear and definition.ACROSS[other.index] == across
                 ]
                 guides[axis] = {"span_mm": max(spans, default=START_SPAN_MM), "across": across}
         case "across", [axis]:
@@ -251,7 +250,7 @@ def _frames(machine: definition.Machine) -> tuple[object, ...]:
 def known_alike(machine: definition.Machine) -> definition.Machine | None:
     """Find the library machine with the same frames; travels and directions may differ."""
     machines = map(load_machine, machine_names())
-    return next((one for one in machines if _frames(one) == _frames(machine)), None)
+    return next((other for other in machines if _frames(other) == _frames(machine)), None)
 
 
 def of_axes(table: Mapping[str, T], axes: Collection[str]) -> dict[str, T]:
@@ -340,7 +339,7 @@ def _amplitude(state: AppState, scene: Scene, key: str) -> float:
     if key not in state.amplitudes:
         return scene.errors.amplitude(key)
     present = state.amplitudes[key]
-    was, now = (one.errors.functions.get(key) for one in (state.scene, scene))
+    was, now = (side.errors.functions.get(key) for side in (state.scene, scene))
     if was is None or now is None or was == now or was.amplitude == 0.0:
         return present
     return now.amplitude * (present / was.amplitude)

@@ -77,7 +77,7 @@ def pick(picture: LivePicture, origin_mm: Array, direction: Array) -> tuple[Pick
     hits = [*traces, *_on_surfaces(picture, origin, unit)]
     if not hits:
         return None
-    picked, distance = min(hits, key=lambda one: one[1])
+    picked, distance = min(hits, key=lambda hit: hit[1])
     return picked, origin + distance * unit
 
 
@@ -171,7 +171,7 @@ def drawn_places(
     """Compute the places of points of the surface in the drawing, [n, 3], mm."""
     stands = {**state.scene.workspace.positions, **state.positions}
     at = {
-        name: np.array([one.get(name, stands.get(name, 0.0)) for one in points])
+        name: np.array([point.get(name, stands.get(name, 0.0)) for point in points])
         for name in state.scene.machine.axes
     }
     drawn_mm, field = drawn_field(state, at)
@@ -210,7 +210,7 @@ def awaited_form(state: AppState) -> str:
     """Return the form of the point that the next click sets; empty where it picks a point."""
     page = state.page
     is_open = Distance.name in page.open and page.task == Distance.task and not page.notes
-    return next((one for one in POINTS if is_open and state.forms.get(one) == ""), "")
+    return next((form for form in POINTS if is_open and state.forms.get(form) == ""), "")
 
 
 def with_clicked(state: AppState, picked: Picked) -> AppState:

@@ -67,6 +67,9 @@ class TabMemory:
         self._clock = clock
         self._records: OrderedDict[str, tuple[float, TabRecord]] = OrderedDict()
 
+    def __len__(self) -> int:
+        return len(self._records)
+
     def keep(self, token: str, record: TabRecord) -> None:
         self._records.pop(token, None)
         self._records[token] = (self._clock() + RETENTION_S, record)

@@ -233,7 +233,8 @@ class Viewer:
         access: Access | None = None,
     ) -> None:
         self.address = resolve_host(host)
-        self.token = (access := access or Access()).choose_token(local=self.is_local)
+        access = access or Access()
+        self.token = access.choose_token(local=self.is_local)
         self._services = replace(services or Services(), token=self.token)
         self.port = free_port(self.address, port)
         policy = RequestPolicy(
@@ -249,13 +250,13 @@ class Viewer:
         self._live = LiveModel()
         self._sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
-        self._memory = TabMemory()
+        self.memory = TabMemory()
         self._shared = StateStore(self._start) if shared else None
-        self._server = _serve(self.address, self.port, Guard(policy))
-        light_scene(self._server.scene)
-        send_script_to_all(self._server, f"{page_script()}\nwarpspacePage.arrive();")
-        self._server.on_client_connect(self._connect)
-        self._server.on_client_disconnect(self._disconnect)
+        self.server = _serve(self.address, self.port, Guard(policy))
+        light_scene(self.server.scene)
+        send_script_to_all(self.server, f"{page_script()}\nwarpspacePage.arrive();")
+        self.server.on_client_connect(self._connect)
+        self.server.on_client_disconnect(self._disconnect)
         # so that the first tab does not wait for it
         self._warming = threading.Thread(target=self._warm, name="warpspace-warm", daemon=True)
         self._warming.start()
@@ -291,28 +292,31 @@ class Viewer:
             surface(self._live.evaluate(self._start))
 
     async def _connect(self, client: viser.ClientHandle) -> None:
-        connection = connection_of(self._server, client)
+        connection = connection_of(self.server, client)
         if not isinstance(connection, TabConnection):
             return  # closed meanwhile
         store = self._shared.joined() if self._shared else StateStore(self._start)
         scenes = SceneList(self._scenes)
-        context = Context(self._server, client, store, scenes, self._services)
+        context = Context(self.server, client, store, scenes, self._services)
         context.notes += self._notes
-        review_tabs = (lambda: [one.context for one in self.sessions]) if self._shared else None
-        session = Session(context, self._live, self._claim, review_tabs=review_tabs)
+        review_tabs = self._review_tabs if self._shared else None
+        session = Session(context, self._live, self.claim, review_tabs=review_tabs)
         with self._lock:
             self._sessions[client.client_id] = session
         connection.listen(context.take)
         session.start()
 
-    def _claim(self, session: Session, token: str) -> TabRecord | None:
+    def _review_tabs(self) -> list[Context]:
+        return [session.context for session in self.sessions]
+
+    def claim(self, session: Session, token: str) -> TabRecord | None:
         if not is_token(token):
             return None
         with self._lock:
             if session not in self._sessions.values():
                 return None  # already closed: it must not take its own record
             twins = [s for s in self._sessions.values() if s is not session and s.token == token]
-            record = self._memory.take(token)
+            record = self.memory.take(token)
             if not twins:
                 session.token = token
         if twins:
@@ -328,20 +332,20 @@ class Viewer:
             if session is None:
                 return
             try:
-                self._memory.keep(session.token, session.record())
+                self.memory.keep(session.token, session.record())
             finally:
                 session.stop()
         asyncio.get_running_loop().call_later(RETENTION_S + 1.0, self._forget)
 
     def _forget(self) -> None:
         with self._lock:
-            self._memory.forget()
+            self.memory.forget()
 
     def stop(self) -> None:
         for session in self.sessions:
             session.stop()
         with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
+            self.server.stop()
 
     def __enter__(self) -> Self:
         return self

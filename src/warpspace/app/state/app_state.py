@@ -488,7 +488,7 @@ class AppState:
 
     def with_edited(self, scene: Scene) -> "AppState":
         """Replace the scene by an edited one; equal scenes keep their identity."""
-        same = next((one for one in (self.origin, self.scene) if one == scene), scene)
+        same = next((known for known in (self.origin, self.scene) if known == scene), scene)
         return replace(self, scene=same, loaded=None if same is self.origin else self.origin)
 
     def reset(self) -> "AppState":

@@ -69,12 +69,13 @@ def with_scene_tolerances(state: AppState) -> AppState:
 
 def with_scaled_tolerances(state: AppState, keys: Collection[str], factor: float) -> AppState:
     """Scale tolerances by a factor, except fixed ones."""
-    half_widths = {
+    present = {key: half_width_of(state, key) for key in keys}
+    scaled = {
         key: min(half_width * factor, max(MAX_HALF_WIDTH, half_width))
-        for key in keys
-        if key not in state.specification.fixed and (half_width := half_width_of(state, key)) > 0.0
+        for key, half_width in present.items()
+        if key not in state.specification.fixed and half_width > 0.0
     }
-    return with_half_widths(state, half_widths)
+    return with_half_widths(state, scaled)
 
 
 def with_half_widths(state: AppState, half_widths: Mapping[str, float]) -> AppState:

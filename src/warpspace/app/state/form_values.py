@@ -39,7 +39,7 @@ def _is_known(name: str) -> bool:
     part, dot, option = name.partition(".")
     if not dot:
         return name == TEST
-    is_listed = part == TEST or part in {one.name for one in entries()}
+    is_listed = part == TEST or part in {entry.name for entry in entries()}
     return is_listed and _OPTION.fullmatch(option) is not None
 
 

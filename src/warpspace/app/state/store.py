@@ -213,7 +213,7 @@ class StateStore:
 
     @property
     def is_edited(self) -> bool:
-        """Whether any tab has changed the state."""
+        """True once any tab has changed the state."""
         return self._document.is_edited
 
     @property
