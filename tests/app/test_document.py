@@ -147,7 +147,7 @@ def test_hostile_settings_are_clamped_or_left_out_and_named():
     assert back.amplitudes["EXX"] == MAX_ERROR
     assert back.component == "norm"
     assert abs(back.picked.at["X"]) <= 300.0
-    assert any("left out" in note for note in back.notes)
+    assert any("ignored" in note for note in back.notes)
     assert with_settings(START, "x" * 20_000).without_notes() == START
 
 
@@ -304,7 +304,7 @@ def opened(way, line):
     """Open what a line adds to a link, or to a file."""
     if way == "link":
         return open_link(f"scene=dvf5000_first&{line}", KNOWN_SCENES)[0]
-    return open_text(f"# warpspace-compare: {line}\n{state_to_toml(START)}", "x", "x.toml")[0]
+    return open_text(f"# warpspace-view: {line}\n{state_to_toml(START)}", "x", "x.toml")[0]
 
 
 def compared(**given):
@@ -384,7 +384,7 @@ def test_titles_from_a_link_cannot_pose_as_something_else(title):
 def test_a_trace_that_means_nothing_is_left_out_and_named(text):
     back = opened("link", urlencode({"why.trace": text, "why.C": "3"}))
     assert back.picked is None
-    assert any("left out" in note for note in back.notes)
+    assert any("ignored" in note for note in back.notes)
 
 
 @pytest.mark.parametrize("text", ["\n" * 300_000, "#\n" * 200_000, "# warpspace-view: a\n" * 9])

@@ -58,7 +58,7 @@ def test_a_panel_that_fails_whatever_is_shown_does_not_hold_the_state(
             wire.toasts.clear()
         wire.say("errors:set.EXX", "5")
         assert wire.read_until(lambda: any(wire.toasts))
-        assert wire.toasts[0][1] == "That did not work"
+        assert wire.toasts[0][1] == "The action failed"
         assert session.state.amplitudes["EXX"] == 5.0
 
 

@@ -137,7 +137,7 @@ def test_pass_or_fail_fades_where_it_cannot_be_told():
     assert picture.faded[away < 1.5].all()
     assert not picture.faded[away > 1.8].any()
     percent = round(100.0 * (picture.grid.weights * picture.faded).sum())
-    said = f"grey: cannot be told with 95 %, {percent} % of the volume"
+    said = f"grey: undecided at 95 %, {percent} % of the volume"
     assert faded_words(picture) == (said,)
     assert LIVE.evaluate(put(state, "look.pass_fail", "0")).faded is None
 

@@ -41,7 +41,7 @@ MAX_LINE = 400_000  # characters of a line of settings in a file
 MAX_FIELDS = 400
 SCENE, PACKED, NAME, CAMERA = "scene", "file", "name", "camera"
 _HEAD = re.compile(r"(?:[ \t]*+(?:#[^\n]*+)?\n)*+")
-_LINES = re.compile(r"^# warpspace-(?:view|compare): (\S*)\s*$", re.MULTILINE)
+_LINES = re.compile(r"^# warpspace-view: (\S*)\s*$", re.MULTILINE)
 KnownScenes = Sequence[Scene] | None
 """Scenes that are available where a file or a link is opened; None for the bundled ones."""
 Opened = tuple[AppState, CameraMemory | None]
@@ -56,13 +56,11 @@ def state_to_toml(state: AppState, camera: CameraMemory | None = None) -> str:
     return f"{head}\n{MARK}{line}\n\n{scene_to_toml(scene)}"
 
 
-def open_text(text: str, name: str, source: str, *, without_comparison: bool = False) -> Opened:
+def open_text(text: str, name: str, source: str, *, single: bool = False) -> Opened:
     """Build the state of an uploaded scene file."""
     scene = _recognised(parse_scene(text, name, source, folder=None))
     line = settings_of(text)
-    return with_settings(
-        start_state(scene), line, without_comparison=without_comparison
-    ), camera_of(line)
+    return with_settings(start_state(scene), line, single=single), camera_of(line)
 
 
 def settings_of(text: str) -> str:
@@ -71,35 +69,35 @@ def settings_of(text: str) -> str:
     return "&".join(filter(None, _LINES.findall(head[0] if head else "")))
 
 
-def _find(name: str, known_scenes: KnownScenes) -> Scene | None:
-    if known_scenes is None:
+def _find(name: str, scenes: KnownScenes) -> Scene | None:
+    if scenes is None:
         return load_scene(name) if name in scene_names() else None
-    return next((scene for scene in known_scenes if scene.name == name), None)
+    return next((scene for scene in scenes if scene.name == name), None)
 
 
 def _recognised(scene: Scene) -> Scene:
     """Restore the bodies of a library machine that differs in travels and directions only."""
     machine = scene.machine
-    library_machine = known_alike(machine)
-    if library_machine is None:
+    twin = known_alike(machine)
+    if twin is None:
         return scene
     bodies, gantries = (
-        machine.bodies or library_machine.bodies,
-        machine.gantries or library_machine.gantries,
+        machine.bodies or twin.bodies,
+        machine.gantries or twin.gantries,
     )
-    same = replace(library_machine, axes=machine.axes, bodies=bodies, gantries=gantries)
+    same = replace(twin, axes=machine.axes, bodies=bodies, gantries=gantries)
     return replace(scene, model=replace(scene.model, machine=same))
 
 
-def state_to_link(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
-    link = _spell(state, camera, known_scenes)
+def state_to_link(state: AppState, camera: CameraMemory | None, scenes: KnownScenes) -> str:
+    link = _spell(state, camera, scenes)
     if len(link) > MAX_LINK:
         raise OptionError("the state is too large for a link; save it as a file")
     return link
 
 
-def _spell(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
-    return named_link(state, camera, known_scenes) or _packed(state, camera)
+def _spell(state: AppState, camera: CameraMemory | None, scenes: KnownScenes) -> str:
+    return named_link(state, camera, scenes) or _packed(state, camera)
 
 
 def _packed(state: AppState, camera: CameraMemory | None) -> str:
@@ -108,13 +106,13 @@ def _packed(state: AppState, camera: CameraMemory | None) -> str:
     return urlencode({NAME: state.scene.name, PACKED: word})
 
 
-def named_link(state: AppState, camera: CameraMemory | None, known_scenes: KnownScenes) -> str:
+def named_link(state: AppState, camera: CameraMemory | None, scenes: KnownScenes) -> str:
     """Write a link to a known scene, of any length; empty for other scenes."""
     scene = state.scene
     plain = _is_plain(state) and state.review == scene.review
-    if not plain or _find(scene.name, known_scenes) != scene:
+    if not plain or _find(scene.name, scenes) != scene:
         return ""
-    line = settings_line(state, camera, known_scenes)
+    line = settings_line(state, camera, scenes)
     return "&".join(filter(None, (urlencode({SCENE: scene.name}), line)))
 
 
@@ -123,15 +121,15 @@ def _is_plain(state: AppState) -> bool:
     return state.loaded is None and state.tolerances == state.scene.tolerances
 
 
-def open_link(link: str, known_scenes: KnownScenes) -> Opened:
+def open_link(link: str, scenes: KnownScenes) -> Opened:
     if len(link) > MAX_LINK:
         raise OptionError(
             f"the link is {len(link):,} characters long; expected at most {MAX_LINK:,}"
         )
-    return _read_link(link, known_scenes)
+    return _read_link(link, scenes)
 
 
-def _read_link(link: str, known_scenes: KnownScenes, *, without_comparison: bool = False) -> Opened:
+def _read_link(link: str, scenes: KnownScenes, *, single: bool = False) -> Opened:
     pairs = dict(_pairs(link))
     if PACKED in pairs:
         name = safe_name(pairs.get(NAME, ""), "link")
@@ -139,18 +137,16 @@ def _read_link(link: str, known_scenes: KnownScenes, *, without_comparison: bool
             _unpack(pairs[PACKED]),
             name,
             "the scene in the link",
-            without_comparison=without_comparison,
+            single=single,
         )
     name = pairs.pop(SCENE, "")
-    scene = _find(name, known_scenes)
+    scene = _find(name, scenes)
     if scene is None:
         raise OptionError(
             f"the link names the scene {name[:LONGEST_NAME]!r}, which is not available"
         )
     line = urlencode(pairs)
-    return with_settings(
-        start_state(scene), line, known_scenes, without_comparison=without_comparison
-    ), camera_of(line)
+    return with_settings(start_state(scene), line, scenes, single=single), camera_of(line)
 
 
 def _unpack(packed: str) -> str:
@@ -169,12 +165,9 @@ def _unpack(packed: str) -> str:
 
 
 def settings_line(
-    state: AppState,
-    camera: CameraMemory | None = None,
-    known_scenes: KnownScenes = None,
-    *,
-    at_rest: bool = False,
-) -> str:
+    state: AppState, camera: CameraMemory | None = None, scenes: KnownScenes = None,
+    *, at_rest: bool = False,
+) -> str:  # fmt: skip
     """Write the differences from the scene as opened; `at_rest` from `AppState.at_rest`."""
     opened = start_state(state.scene).at_rest() if at_rest else start_state(state.scene)
     pairs = [
@@ -185,21 +178,19 @@ def settings_line(
     if camera is not None:
         numbers = (*camera.position, *camera.look_at, *camera.up, camera.fov_rad)
         pairs.append((CAMERA, ",".join(f"{number:.9g}" for number in numbers)))
-    return urlencode([*pairs, *linked_forms(state), *_sides(state, known_scenes)])
+    return urlencode([*pairs, *linked_forms(state), *_sides(state, scenes)])
 
 
 def with_settings(
     state: AppState,
     line: str,
-    known_scenes: KnownScenes = None,
+    scenes: KnownScenes = None,
     *,
-    without_comparison: bool = False,
+    single: bool = False,
 ) -> AppState:
     """Apply a line of settings to a state."""
-    pairs = [
-        pair for pair in _pairs(line) if not (without_comparison and pair[0].startswith(PREFIX))
-    ]
-    state, unread = _with_sides(state, dict(pairs), known_scenes), list[str]()
+    pairs = [pair for pair in _pairs(line) if not (single and pair[0].startswith(PREFIX))]
+    state, unread = _with_sides(state, dict(pairs), scenes), list[str]()
     for name, text in pairs:
         if name == CAMERA or name in SIDES:
             continue
@@ -271,18 +262,18 @@ def file_notes(state: AppState) -> tuple[Note, ...]:
     return state.review if _is_plain(state) else tuple(map(with_packed_view, state.review))
 
 
-def reopened(state: AppState, note: Note, known_scenes: KnownScenes = None) -> Opened:
+def reopened(state: AppState, note: Note, scenes: KnownScenes = None) -> Opened:
     """Restore the view of a note; its state lists settings that cannot be restored."""
     if not note.view:
         return state, None
     origin = state.origin
     if PACKED in dict(_pairs(note.view)):
-        viewed, camera = _read_link(note.view, known_scenes)
+        viewed, camera = _read_link(note.view, scenes)
         same = viewed.scene.machine.axes == origin.machine.axes
         viewed = replace(viewed, loaded=None if viewed.scene == origin else origin,
                         start=state.start if same else viewed.start)  # fmt: skip
     else:
-        viewed = with_settings(start_state(origin).at_rest(), note.view, known_scenes)
+        viewed = with_settings(start_state(origin).at_rest(), note.view, scenes)
         camera = camera_of(note.view)
     return replace(viewed, review=state.review, page=state.page, forms=state.forms), camera
 
@@ -296,7 +287,7 @@ LONGEST_TITLE = 200
 SIDES = [PREFIX + name for name in ("pinned", "a", "b", "pinned.title", "a.title", "b.title")]
 
 
-def _sides(state: AppState, known_scenes: KnownScenes) -> Iterator[tuple[str, str]]:
+def _sides(state: AppState, scenes: KnownScenes) -> Iterator[tuple[str, str]]:
     chosen = state.comparison
     for name, side in (("pinned", chosen.pinned), ("a", chosen.a), ("b", chosen.b)):
         if side is None or (name == "a" and side.state is None):
@@ -306,16 +297,14 @@ def _sides(state: AppState, known_scenes: KnownScenes) -> Iterator[tuple[str, st
         elif name != PINNED and not side.is_scene:
             text, usual = PINNED, side.title
         else:
-            text = _spell(side.state, None, known_scenes)
+            text = _spell(side.state, None, scenes)
             usual = scene_side(side.state.scene).title if side.is_scene else ""
         yield PREFIX + name, text
         if side.title != usual:
             yield f"{PREFIX}{name}.title", side.title
 
 
-def _with_sides(
-    state: AppState, settings: Mapping[str, str], known_scenes: KnownScenes
-) -> AppState:
+def _with_sides(state: AppState, settings: Mapping[str, str], scenes: KnownScenes) -> AppState:
     sides: dict[str, Side | None] = {PINNED: None}
     for name in (PINNED, "a", "b"):
         text = settings.get(PREFIX + name)
@@ -326,7 +315,7 @@ def _with_sides(
             if sides[PINNED] is None:
                 raise OptionError("the comparison lacks its pinned state")
         else:
-            opened, _ = _read_link(text, known_scenes, without_comparison=True)
+            opened, _ = _read_link(text, scenes, single=True)
             if name == PINNED:
                 state = state.noted(*(f"{BEFORE}: {note}" for note in opened.notes))
                 side = pinned_side(plain_state(opened.without_notes()))

@@ -110,9 +110,7 @@ class LiveModel:
             )
 
         key = "uncertainty", Identity(grid), _place(state)
-        uncertainty: FieldUncertainty = self._cache.get(
-            key, build, lambda uncertainty: 3 * uncertainty.response.nbytes
-        )
+        uncertainty: FieldUncertainty = self._cache.get(key, build, _uncertainty_size)
         axes, stated = loop_axes(scene.model, state.loop), uncertainty.errors.keys
         unstated = (key for key, value in state.active.items() if value and key not in stated)
         unknown = [key for key in unstated if parameter(key).axis in axes]
@@ -129,10 +127,8 @@ class LiveModel:
         if state.look.surface == "slices":
             for axis, at in slice_positions(scene, state.look, state.machine).items():
                 key = _place(state), axis, at
-                cached = self._cache.get(
-                    key, partial(build, axis, at), lambda response: _size((response, ()))
-                )
-                yield axis, at, cached[0], self._field(state, *cached)
+                plane, basis = self._cache.get(key, partial(build, axis, at), _basis_size)
+                yield axis, at, plane, self._field(state, plane, basis)
 
     def _field(self, state: AppState, of: Grid | TraceGroup, basis: ErrorBasis) -> ErrorField:
         """Evaluate a grid or traces: to first order, or the residual error of a compensation table.
@@ -147,14 +143,8 @@ class LiveModel:
             return basis.evaluate(amplitudes, orientation=state.look.tilts and not on_trace)
         loop, point_mm = (of.loop, of.nominal_mm) if on_trace else (state.loop, None)
         positions = tuple((scene.reference or {}).items()), tuple(state.positions.items())
-        key = (
-            Identity(controller),
-            Identity(of),
-            Identity(scene.model),
-            positions,
-            loop,
-            state.view_key,
-        )
+        identities = Identity(controller), Identity(of), Identity(scene.model)
+        key = *identities, positions, loop, state.view_key
         now = state.active_scene()
         prepared = self._cache.get(
             key,
@@ -168,10 +158,16 @@ def _place(state: AppState) -> tuple[object, ...]:
     return Identity(state.scene), state.nodes, tuple(state.positions.items()), state.view_key
 
 
+def _uncertainty_size(uncertainty: FieldUncertainty) -> int:
+    return 3 * uncertainty.response.nbytes
+
+
+def _basis_size(responding: Responding[Any]) -> int:
+    return responding[1].position.nbytes + responding[1].orientation.nbytes
+
+
 def _size(response: Response) -> int:
-    return sum(
-        one.position.nbytes + one.orientation.nbytes for _, one in (response[0], *response[1])
-    )
+    return sum(map(_basis_size, (response[0], *response[1])))
 
 
 def _build(state: AppState) -> Response:
@@ -180,14 +176,12 @@ def _build(state: AppState) -> Response:
     positions = {**scene.workspace.positions, **state.positions}
     points = state.rotary.points_mm(scene)
     groups = build_traces(scene.model, points, positions, TRACE_SAMPLES, state.rotary.held)
-    arguments = scene.model, scene.errors, scene.parameter_keys
-    traces = tuple(
-        (
-            group,
-            build_basis(*arguments, group.coordinates, state.view(group.loop), group.nominal_mm),
-        )
-        for group in groups
-    )
+
+    def build_trace_basis(group: TraceGroup) -> ErrorBasis:
+        at, point, view = group.coordinates, group.nominal_mm, state.view(group.loop)
+        return build_basis(scene.model, scene.errors, scene.parameter_keys, at, view, point)
+
+    traces = tuple((group, build_trace_basis(group)) for group in groups)
     return (grid, grid_basis(scene, grid, state.view())), traces
 
 

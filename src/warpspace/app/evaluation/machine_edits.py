@@ -64,11 +64,9 @@ def tables_of(scene: Scene) -> Tables:
 
 def own_bodies(machine: definition.Machine) -> dict[str, definition.BodySource]:
     """Return the bodies of a description that are not those of the library machine."""
-    library_bodies = load_machine(machine.name).bodies if machine.name in machine_names() else {}
+    bundled = load_machine(machine.name).bodies if machine.name in machine_names() else {}
     return {
-        frame: source
-        for frame, source in machine.bodies.items()
-        if library_bodies.get(frame) != source
+        frame: source for frame, source in machine.bodies.items() if bundled.get(frame) != source
     }
 
 
@@ -77,12 +75,12 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
 
     An unknown edit changes nothing; one that a file could not hold is refused.
     """
-    what, _, arguments = word.partition(" ")
+    what, _, args = word.partition(" ")
     tables, raw, machine = tables_of(scene), _document(scene), scene.machine
     guides, bodies = raw["machine"].setdefault("gantry", {}), dict(machine.bodies)
-    match what, arguments.split(" ", maxsplit=2):
+    match what, args.split(" ", maxsplit=2):
         case "chain", _:
-            _rearrange(raw, scene, definition.parse_chain(arguments[:MOST_CHAIN_TEXT]))
+            _rearrange(raw, scene, definition.parse_chain(args[:MOST_CHAIN_TEXT]))
         case "left" | "right" | "side" | "remove", [axis]:
             _rearrange(raw, scene, _moved(machine, what, axis))
         case "turn", [axis]:
@@ -98,10 +96,8 @@ def edited(scene: Scene, word: str) -> tuple[Scene, tuple[str, ...]]:
                 guides[axis] = {"span_mm": max(spans, default=START_SPAN_MM), "across": across}
         case "across", [axis]:
             _entry(tables, "span", axis)
-            directions = (guides[axis]["across"], definition.ACROSS[direction_index(axis)])
-            guides[axis]["across"] = next(
-                name for name in definition.ACROSS if name not in directions
-            )
+            used = (guides[axis]["across"], definition.ACROSS[direction_index(axis)])
+            guides[axis]["across"] = next(name for name in definition.ACROSS if name not in used)
         case "mesh", [frame]:
             _entry(tables, what, frame)
             del bodies[frame]
@@ -210,14 +206,9 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
         body_dir=named.body_dir,
         bodies={frame: body for frame, body in like.bodies.items() if frame not in gone},
     )
-    model = replace(
-        read.model,
-        machine=machine,
-        component_errors=scene.model.component_errors,
-        own_component_errors=tuple(
-            (axis, order) for axis, order in scene.model.own_component_errors if axis in chain.axes
-        ),
-    )
+    orders = tuple(pair for pair in scene.model.own_component_errors if pair[0] in chain.axes)
+    main = scene.model.component_errors
+    model = replace(read.model, machine=machine, component_errors=main, own_component_errors=orders)
     notes = (*scene_notes(machine, read.workspace, errors), *body_notes(machine))
     read = replace(read, model=model, errors=errors, notes=notes, part=scene.part)
     return (scene, ()) if read == scene else (read, tuple(_left_out(scene, gone)))
@@ -226,11 +217,8 @@ def _read(scene: Scene, raw: Tables, like: definition.Machine) -> tuple[Scene, t
 def _check_errors(errors: ErrorSet) -> None:
     for key, curve in errors.functions.items():
         if not abs(curve.amplitude) <= MAX_ERROR:
-            low, high = curve.span
-            raise OptionError(
-                f"errors.{key} reaches {curve.amplitude:g} {parameter(key).unit} within {low:g} …"
-                f" {high:g}; expected at most ±{MAX_ERROR:g}"
-            )
+            peak = f"{curve.amplitude:g} {parameter(key).unit}"
+            raise OptionError(f"errors.{key} reaches {peak}; expected at most ±{MAX_ERROR:g}")
 
 
 def _without(table: Tables, axes: Collection[str]) -> Tables:
@@ -278,20 +266,15 @@ UNCHANGED = "the machine is unchanged"
 
 def with_word(state: AppState, word: str) -> AppState:
     """Apply an edit of the page to the machine of a state; a refused edit adds a note."""
-    what, *arguments = word.split(" ", maxsplit=3)
-    gantry = state.scene.machine.gantries.get(arguments[0]) if arguments else None
+    what, *args = word.split(" ", maxsplit=3)
+    gantry = state.scene.machine.gantries.get(args[0]) if args else None
     try:
         if word == "own":
             return with_own_machine(state)
-        if (
-            what == "guide"
-            and gantry is not None
-            and len(arguments) == 3
-            and arguments[1] in ("0", "1")
-        ):
-            what = f"guide {int(arguments[1]) + 1} of {arguments[0]}"
-            value = read_number(what, arguments[2], MICROMETRE)
-            return with_guide_error(state, gantry, int(arguments[1]), value)
+        if what == "guide" and gantry is not None and len(args) == 3 and args[1] in ("0", "1"):
+            what = f"guide {int(args[1]) + 1} of {args[0]}"
+            value = read_number(what, args[2], MICROMETRE)
+            return with_guide_error(state, gantry, int(args[1]), value)
         scene, notes = edited(state.scene, word)
         changed = state if scene is state.scene else with_changed_scene(state, scene)
     except WarpspaceError as problem:
@@ -413,7 +396,7 @@ def _alike(*curves: ErrorFunction) -> bool:
     if any(curve.amplitude == 0.0 for curve in curves):
         return True
     first, second = (curve.with_amplitude(1.0) for curve in curves)
-    if any(curve.has_directions or {*curve.arguments} - {OWN} for curve in curves):
+    if any(curve.has_directions or {*curve.args} - {OWN} for curve in curves):
         return first == second
     at = np.linspace(*first.span, SAMPLES)
     return bool(np.abs(first.evaluate(at) - second.evaluate(at)).max() <= ALIKE)
